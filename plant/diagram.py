@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -32,8 +30,9 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from plant.events import add_panel
 from plant.rendering import Scene
-from plant.robots.robot_kind import BodyOptions, LocomotionLimits, RobotBody, robot_kind
+from plant.robots.robot_kind import PlacedRobot, RobotBody, robot_kind
 from plant.scenery import add_model, add_scenery
+from plant.worlds.seeding import PointRoute, Receiving
 from plant.worlds.world import DoorRule, add_package
 
 TIME_STEP_S = 0.0125
@@ -52,27 +51,45 @@ X_PT_HOME = RigidTransform(
 class LooseModel:
     """A model put into the world at the beginning: X_WM is the pose of its base.
 
-    A fixed one is welded there. One that `slides` moves upright in x, y and yaw, as somebody moves it, and touches
-    nothing that is fixed. A person who `receives` has a tray.
+    A fixed one is welded there. A person who walks has a `route`, and slides upright in x, y and yaw without touching
+    anything that is fixed. A person who takes objects from robots is `receiving` and has a tray.
     """
 
     name: str
     path: Path
     X_WM: RigidTransform
     fixed: bool = False
-    slides: bool = False
-    receives: bool = False
+    route: PointRoute | None = None
+    receiving: Receiving | None = None
+
+
+@dataclass(frozen=True)
+class DiagramConfig:
+    """Contents of a Diagram: the directives of a world (None: an empty one), models, robots and doors.
+
+    `visuals` draws robots with meshes where these are installed. `render` makes the scene for cameras, with the light
+    and sky of `renderer_parameters`. `friction` multiplies the friction coefficients of everything that moves.
+    """
+
+    directives: Path | None = None
+    models: Sequence[LooseModel] = ()
+    robots: Sequence[PlacedRobot] = ()
+    doors: Sequence[DoorRule] = ()
+    visuals: bool = True
+    render: bool = True
+    renderer_parameters: RenderEngineVtkParams | None = None
+    friction: float = 1.0
 
 
 @dataclass(frozen=True)
 class WorldDiagram:
-    """The finished Diagram and handles to its parts.
+    """The finished Diagram of a `config`, with its parts by name.
 
-    `trays` are those of people who receive, by the people's names, and are none of `models`. `scenery` names the model
-    that each collision shape of the world body comes from. `scene` renders it, where that
-    was wanted; `rebuild` makes the same once more, shown in a Meshcat.
+    `models` includes the panels of doors. `trays` has the trays of people by the people's names. `scenery` names the
+    model that each collision shape of the world body comes from. `scene` renders the Diagram if the config asks for it.
     """
 
+    config: DiagramConfig
     diagram: Diagram
     plant: MultibodyPlant
     scene_graph: SceneGraph
@@ -81,88 +98,58 @@ class WorldDiagram:
     trays: Mapping[str, RigidBody]
     scenery: Mapping[GeometryId, str]
     scene: Scene | None
-    rebuild: Callable[[Meshcat], WorldDiagram]
 
 
-def build_diagram(
-    *,
-    directives: Path | None,
-    models: Sequence[LooseModel],
-    robots: Mapping[str, str],
-    doors: Sequence[DoorRule] = (),
-    visuals: bool = True,
-    carried: bool = True,
-    locomotion: Mapping[str, LocomotionLimits] = MappingProxyType({}),
-    render: bool = True,
-    renderer_parameters: RenderEngineVtkParams | None = None,
-    meshcat: Meshcat | None = None,
-    friction: float = 1.0,
-) -> WorldDiagram:
-    """A Diagram of the directives' world (or an empty one) with models and robots.
+def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> WorldDiagram:
+    """Builds the Diagram of a world with its models, robots and doors, and shows it in `meshcat`.
 
     SAP contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that evaluating
-    contact results solves once more. Positions of the models are defaults, the robots' are set by the caller.
-    `robots` names the kind of each; `doors` have panels, which are models, too.
-    `renderer_parameters` set light and sky; `meshcat` shows the world there.
-    `visuals` draws robots with meshes where they are installed; `render` makes the scene for cameras; `locomotion`
-    limits what bears each robot. `friction` multiplies the coefficients of all that moves.
+    contact results solves once more. Default positions place the models; the engine places the robots.
     """
-    rebuild = partial(
-        build_diagram,
-        directives=directives,
-        models=models,
-        robots=robots,
-        doors=doors,
-        visuals=visuals,
-        carried=carried,
-        locomotion=locomotion,
-        render=False,
-    )
     builder = DiagramBuilder()
-    config = MultibodyPlantConfig(
+    plant_config = MultibodyPlantConfig(
         time_step=TIME_STEP_S, discrete_contact_approximation="sap", use_sampled_output_ports=False
     )
-    plant, scene_graph = AddMultibodyPlant(config, builder)
+    plant, scene_graph = AddMultibodyPlant(plant_config, builder)
     plant.set_sap_near_rigid_threshold(NEAR_RIGID)
     parser = parser_of(plant)
-    scenery = {} if directives is None else add_scenery(plant, directives, parser_of)
-    instances = {model.name: _add_model(plant, parser, model) for model in models}
-    panels = {door.name: add_panel(plant, door) for door in doors}
-    trays = {model.name: _add_tray(plant, parser, model) for model in models if model.receives}
-    bodies = {
-        name: robot_kind(kind).add(plant, name, BodyOptions(visuals, carried, locomotion.get(name)))
-        for name, kind in sorted(robots.items())
-    }
+    scenery = {} if config.directives is None else add_scenery(plant, config.directives, parser_of)
+    instances = {model.name: _add_model(plant, parser, model) for model in config.models}
+    panels = {door.name: add_panel(plant, door) for door in config.doors}
+    receivers = [model for model in config.models if model.receiving is not None]
+    trays = {model.name: _add_tray(plant, parser, model) for model in receivers}
+    placed = sorted(config.robots, key=lambda robot: robot.name)
+    robots = {robot.name: robot_kind(robot.kind).add(plant, robot, config.visuals) for robot in placed}
     plant.Finalize()
-    if friction != 1.0:
-        multiply_friction(plant, scene_graph, friction)
-    for model in models:
-        if not (model.fixed or model.slides):
+    if config.friction != 1.0:
+        multiply_friction(plant, scene_graph, config.friction)
+    for model in config.models:
+        if not (model.fixed or model.route is not None):
             (body,) = plant.GetBodyIndices(instances[model.name])[:1]
             plant.SetDefaultFloatingBaseBodyPose(plant.get_body(body), model.X_WM)
-    filters = scene_graph.collision_filter_manager()
-    floor = GeometrySet(_floor_geometries(plant, scene_graph))
-    for robot in bodies.values():
-        robot.filter_collisions(filters, floor)
-    moved = [*panels.values(), *(instances[model.name] for model in models if model.slides)]
-    moved += [tray.model_instance() for tray in trays.values()]
-    prescribed, anchored = GeometrySet([*_shapes_of(plant, moved)]), GeometrySet([*_anchored_shapes(plant)])
-    filters.Apply(CollisionFilterDeclaration().ExcludeWithin(prescribed).ExcludeBetween(prescribed, anchored))
+    walkers = [instances[model.name] for model in config.models if model.route is not None]
+    moved = [*panels.values(), *walkers, *(tray.model_instance() for tray in trays.values())]
+    _filter_collisions(plant, scene_graph, robots.values(), moved)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, scene_graph, meshcat)
     diagram = builder.Build()
-    scene = Scene(diagram, plant, scene_graph, renderer_parameters) if render else None
-    return WorldDiagram(
-        diagram,
-        plant,
-        scene_graph,
-        bodies,
-        {**instances, **panels},
-        trays,
-        scenery,
-        scene,
-        lambda shown_in: rebuild(meshcat=shown_in),
-    )
+    scene = Scene(diagram, plant, scene_graph, config.renderer_parameters) if config.render else None
+    return WorldDiagram(config, diagram, plant, scene_graph, robots, {**instances, **panels}, trays, scenery, scene)
+
+
+def _filter_collisions(
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    robots: Iterable[RobotBody],
+    moved: Sequence[ModelInstanceIndex],
+) -> None:
+    """Applies the filters of the robots; models whose pose is prescribed pass each other and anything fixed."""
+    filters = scene_graph.collision_filter_manager()
+    floor = GeometrySet(_floor_geometries(plant, scene_graph))
+    for robot in robots:
+        robot.filter_collisions(filters, floor)
+    prescribed, anchored = GeometrySet([*_shapes_of(plant, moved)]), GeometrySet([*_anchored_shapes(plant)])
+    filters.Apply(CollisionFilterDeclaration().ExcludeWithin(prescribed).ExcludeBetween(prescribed, anchored))
 
 
 def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
@@ -195,7 +182,7 @@ def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Mode
     frame = plant.get_body(index).body_frame()
     if model.fixed:
         plant.WeldFrames(plant.world_frame(), frame, model.X_WM)
-    elif model.slides:
+    elif model.route is not None:
         _let_slide(plant, frame, model)
     return instance
 

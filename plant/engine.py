@@ -1,10 +1,9 @@
-"""The engine: steps the Diagram, lets robots command and sense, and keeps the only clock."""
+"""The engine: steps the Diagram, commands and senses for the robots, and is the only clock."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from types import MappingProxyType
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -15,76 +14,49 @@ from plant.events import Doors, Moves
 from plant.loose_objects import Carried, Sleepers
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
-from plant.robots.robot_kind import RobotBody, SensorOptions
-from plant.saved_state import Kept, State
-from plant.worlds.seeding import PointRoute, Receiving
-from plant.worlds.world import DoorRule
-from skills.robot import FloatArray, Pose2D, Robot
+from plant.robots.robot_kind import SensorOptions
+from plant.saved_state import State, Stateful
+from skills.robot import FloatArray, Robot
 
 CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
 _SQUARE = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 HAND_OUTLINE_M, PERSON_OUTLINE_M = 0.15 * _SQUARE, 0.25 * _SQUARE
-"""What a door sees of a hand, and of a person."""
+"""Outlines (4, 2) of a hand and a person about their centres, for which doors wait."""
 
 
-class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
+class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
     """A Diagram in motion with the robots in it; implements the Clock protocol."""
 
-    def __init__(
-        self,
-        world: WorldDiagram,
-        starts: Mapping[str, Pose2D],
-        *,
-        seed: int = 0,
-        docks: Mapping[str, Pose2D] = MappingProxyType({}),
-        charge: float = 1.0,
-        routes: Mapping[str, PointRoute] = MappingProxyType({}),
-        receiving: Mapping[str, Receiving] = MappingProxyType({}),
-        doors: Sequence[DoorRule] = (),
-    ) -> None:
-        """`starts`: where each robot stands at time 0, in the world frame; `seed` gives the sensors' noise.
+    def __init__(self, world: WorldDiagram, *, seed: int = 0) -> None:
+        """Places the robots at their starts at time 0; `seed` gives the noise of their sensors.
 
-        Batteries begin at `charge` (0 to 1), each robot's charges at its own of the `docks`. `routes` are those of
-        people who walk, by the names of their models; `receiving` says how those with a tray take what is held out to
-        them; `doors` are those of the Diagram. Raises WorldError: a route leads through what stands fast.
+        Raises WorldError when a person's route leads through something that is fixed.
         """
-        self.world, self._docks, self._charge = world, docks, charge
+        self.world = world
         self._simulator = Simulator(world.diagram)
         self.root_context: Context = self._simulator.get_mutable_context()
         self.context: Context = world.plant.GetMyMutableContextFromRoot(self.root_context)
-        for name, pose in starts.items():
-            world.robots[name].place(self.context, pose)
+        for body in world.robots.values():
+            body.place(self.context)
         self.work: Counter[str] = Counter()
-        self._robots = {
-            name: body.kind.drive(body, self._sensors(body, seed)) for name, body in sorted(world.robots.items())
-        }
-        self.walkers = Walkers(world, self.context, routes)
+        sensors = SensorOptions(world.scene_graph, self.context, seed=seed, scene=world.scene, work=self.work)
+        self._robots = {name: body.kind.drive(body, sensors) for name, body in world.robots.items()}
+        self.walkers = Walkers(world, self.context)
         self._sleepers = Sleepers(world, self.root_context)
         plant = world.plant
         loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
         self._carried = Carried(plant, self.context, loose)
         self._hands = {name: robot.hand for name, robot in world.robots.items()}
-        self.receivers = Receivers(world, self.context, receiving)
+        self.receivers = Receivers(world, self.context)
         self._happened: list[tuple[float, str]] = []
-        self.doors = Doors(plant, self.context, doors, self._outlines_W, self.note)
+        self.doors = Doors(plant, self.context, world.config.doors, self._outlines_W, self.note)
         self.moves: Moves | None = None
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
         self._after_advance: list[Callable[[], None]] = []
         self._command_robots()
         self._simulator.Initialize()
-
-    def _sensors(self, body: RobotBody, seed: int) -> SensorOptions:
-        return SensorOptions(
-            self.world.scene_graph,
-            self.context,
-            seed=seed,
-            scene=self.world.scene,
-            dock=self._docks.get(body.name),
-            charge=self._charge,
-            work=self.work,
-        )
 
     @property
     def robots(self) -> Mapping[str, Robot]:
@@ -93,16 +65,16 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
 
     @property
     def happened(self) -> Sequence[tuple[float, str]]:
-        """What doors did, and what somebody moved: the time (s) and a sentence each."""
+        """Events of doors and moved objects: the time (s) and a sentence for each."""
         return self._happened
 
     @property
     def asleep(self) -> frozenset[str]:
-        """Loose objects at rest, which do not move until something comes near."""
+        """Names of the sleeping loose objects, which stay where they are."""
         return self._sleepers.asleep
 
     def observe(self, observer: Callable[[float], None], *, every: int = 1) -> None:
-        """Calls `observer(now_s)` after every step, or every so many."""
+        """Calls `observer(now_s)` after every step, or after `every` steps."""
         self._observers.append((every, observer))
 
     def now(self) -> float:
@@ -133,7 +105,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
             self._do_steps(steps, holding)
 
     def _before_step(self, later: int, holding: Sequence[str]) -> None:
-        """Moves people, doors and what somebody moves, before the next step or a `later` one."""
+        """Moves people, doors and objects before the next step, or before a `later` one."""
         now_s = (self._steps + later) * TIME_STEP_S
         self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
         self.receivers.before_step(now_s, TIME_STEP_S, holding)
@@ -142,13 +114,13 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
             self.moves.before_step(now_s, self._hands_W, holding)
 
     def _only_robots_move(self, holding: Sequence[str]) -> bool:
-        """Returns whether nothing is to be done or seen between two steps of one control period."""
-        seen = any(every % CONTROL_STEPS for every, _ in self._observers)
+        """Returns whether only robots move, so that all steps of one control period can be done at once."""
+        observed = any(every % CONTROL_STEPS for every, _ in self._observers)
         still = self.walkers.still and self.doors.still and self.moves is None and not self.receivers.busy
-        return still and not seen and not holding and self._sleepers.all_asleep
+        return still and not observed and not holding and self._sleepers.all_asleep
 
     def _do_steps(self, steps: int, holding: Sequence[str]) -> None:
-        """Lets the plant do one step, or several in one go where nothing is to be done between them."""
+        """Advances the plant by some steps at once, corrects loose objects, and calls the observers."""
         self._steps += steps
         self._simulator.AdvanceTo(self.now(), interruptible=False)  # a check for signals would wait for the GIL
         if not self._sleepers.all_asleep:
@@ -161,32 +133,28 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
                 observer(self.now())
 
     def sense(self) -> None:
-        """Lets all robots take readings."""
+        """Takes the readings of all robots and calls the listeners of `after_advance`."""
         for robot in self._robots.values():
             robot.sense(self.now())
         for listener in self._after_advance:
             listener()
 
     def after_advance(self, listener: Callable[[], None]) -> None:
-        """Calls `listener` whenever time has been advanced and all robots have sensed."""
+        """Calls `listener` after each advance, once all robots have sensed."""
         self._after_advance.append(listener)
 
     def world_state(self) -> Mapping[str, FloatArray]:
-        """Positions and velocities of all that moves."""
+        """Discrete state of the Diagram by group: positions and velocities of everything that moves."""
         groups = range(self.root_context.num_discrete_state_groups())
         return {str(group): self.root_context.get_discrete_state(group).value() for group in groups}
 
     def state(self) -> State:
-        """Time, what the robots keep, how far the people have walked, and what they are about to take."""
+        """Returns the time and the saved state of robots, people, doors and moves."""
         robots = {name: robot.state() for name, robot in self._robots.items()}
         return {**super().state(), "robots": robots, "moves": None if self.moves is None else self.moves.state()}
 
     def go_on(self, state: State, world: Mapping[str, FloatArray]) -> None:
-        """Goes on from such a state; the robots have powered up in it.
-
-        Raises:
-            ValueError: the state is that of another Diagram.
-        """
+        """Restores a state, and powers the robots up in it. Raises ValueError when it is of another Diagram."""
         if set(world) != set(self.world_state()):
             raise ValueError("the parts of the world are others")
         self._sleepers.wake_all()
@@ -203,7 +171,7 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         self._simulator.Initialize()
 
     def note(self, sentence: str) -> None:
-        """Notes what happens now."""
+        """Records a sentence about an event that happens now."""
         self._happened.append((round(self.now(), 6), sentence))
 
     def _hands_W(self) -> Mapping[str, FloatArray]:
@@ -211,12 +179,9 @@ class Engine(Kept, keeps=("_steps", "walkers", "receivers", "doors")):
         return {name: np.array(X_WH.translation()) for name, X_WH in poses.items()}
 
     def _outlines_W(self) -> Iterator[FloatArray]:
-        """The outlines (K, 2) of robots, their hands and people, from above."""
+        """Outlines (K, 2) of robots, their hands and walking people, from above."""
         for robot in self.world.robots.values():
-            outline_B = np.array(robot.kind.capabilities().footprint_m)
-            corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
-            X_WB = self.world.plant.EvalBodyPoseInWorld(self.context, robot.body)
-            yield X_WB.multiply(corners_B.T).T[:, :2]
+            yield robot.outline_W(self.context)
         yield from (p_W[:2] + HAND_OUTLINE_M for p_W in self._hands_W().values())
         yield from (np.array(place_W) + PERSON_OUTLINE_M for place_W in self.walkers.places_W())
 

@@ -21,7 +21,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import FixedOffsetFrame, ModelInstanceIndex, PlanarJoint, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context
 
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from plant.worlds.seeding import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
 from plant.worlds.world import DoorRule, MoveRule, Point, SurfaceTop, World
 from skills.robot import FloatArray
@@ -29,18 +29,18 @@ from skills.robot import FloatArray
 HEIGHT_M, THICKNESS_M, ABOVE_FLOOR_M = 2.0, 0.04, 0.02
 SPEED_M_S = 0.6
 CLEAR_M = 0.12
-"""A panel waits while something is nearer than this to the doorway's middle line."""
+"""A panel waits while a robot or a person is nearer than this to the doorway's middle line."""
 _KG = 40.0
 _COLOUR = np.array([0.55, 0.42, 0.30, 1.0])
 _FRICTION = CoulombFriction(0.6, 0.5)
 _MOVED = 1e-9
 
 Outlines = Callable[[], Iterator[FloatArray]]
-"""The outlines (K, 2) of robots and people."""
+"""Iterates over the outlines (K, 2) of robots and people."""
 
 
 def add_panel(plant: MultibodyPlant, door: DoorRule) -> ModelInstanceIndex:
-    """Adds a door's panel to a plant (before Finalize), as a model instance of the door's name."""
+    """Adds the panel of a door to a plant (before Finalize), as a model instance with the door's name."""
     instance = plant.AddModelInstance(door.name)
     size_m = (door.width, THICKNESS_M, HEIGHT_M)
     inertia = UnitInertia.SolidBox(*size_m)
@@ -50,7 +50,7 @@ def add_panel(plant: MultibodyPlant, door: DoorRule) -> ModelInstanceIndex:
     level = RigidTransform(np.array([0.0, 0.0, ABOVE_FLOOR_M + HEIGHT_M / 2]))
     floor = plant.AddFrame(FixedOffsetFrame(f"{door.name}_floor", plant.world_frame(), level))
     joint = plant.AddJoint(PlanarJoint(f"{door.name}_slides", floor, body.body_frame()))
-    x, y, yaw = _pose(door, _share_closed(door, 0.0))
+    x, y, yaw = _pose(door, float(_closed_at(door, 0.0)))
     joint.set_default_translation(np.array([x, y]))
     joint.set_default_rotation(yaw)
     return instance
@@ -65,21 +65,17 @@ def _closed_at(door: DoorRule, now_s: float) -> bool:
     return now_s < opens_s or now_s >= closes_s
 
 
-def _share_closed(door: DoorRule, now_s: float) -> float:
-    return 1.0 if _closed_at(door, now_s) else 0.0
-
-
 def _pose(door: DoorRule, share: float) -> FloatArray:
-    """x, y and yaw of the panel's middle when the door is closed to a share (0 to 1)."""
-    way_m = (1.0 - share) * door.width
+    """Pose (x, y, yaw) of the panel's middle when the door is closed to a share (0 to 1)."""
+    open_m = (1.0 - share) * door.width
     x, y = door.at
-    return np.array([x + way_m * math.cos(door.yaw), y + way_m * math.sin(door.yaw), door.yaw])
+    return np.array([x + open_m * math.cos(door.yaw), y + open_m * math.sin(door.yaw), door.yaw])
 
 
 def slide(
     plant: MultibodyPlant, context: Context, instance: ModelInstanceIndex, pose: FloatArray, velocity: FloatArray
 ) -> None:
-    """Sets (x, y, yaw) and their rates, where they are others, of a model that slides on a planar joint."""
+    """Sets the pose (x, y, yaw) of a model on a planar joint, and the rates of it, where they differ from now."""
     if np.abs(plant.GetPositions(context, instance) - pose).max() > _MOVED:
         plant.SetPositions(context, instance, pose)
     if np.abs(plant.GetVelocities(context, instance) - velocity).max() > _MOVED:
@@ -87,10 +83,10 @@ def slide(
 
 
 @dataclass
-class _Panel(Kept):
-    """The panel of a door: to which share it closes it, whether it `closes` now, and each share with its time (s).
+class _Panel(Stateful):
+    """Panel of a door: the closed share of the doorway (0 to 1), and whether the panel `closes` now.
 
-    The history only tells 0 (open), 1 (closed) and 0.5 (moving).
+    The history has the time (s) of each change and the new state: 0 (open), 1 (closed) or 0.5 (moving).
     """
 
     share: float
@@ -98,15 +94,15 @@ class _Panel(Kept):
     history: list[tuple[float, float]]
 
     def move_to(self, share: float, now_s: float) -> None:
-        """Opens the door by `share` (0 to 1), and records when it becomes open, closed or moving."""
+        """Closes the door to a `share` (0 to 1), and records when it becomes open, closed or moving."""
         self.share = share
-        told = share if share in (0.0, 1.0) else 0.5
-        if told != self.history[-1][1]:
-            self.history.append((now_s, told))
+        state = share if share in (0.0, 1.0) else 0.5
+        if state != self.history[-1][1]:
+            self.history.append((now_s, state))
 
 
-class Doors(Kept, keeps=("_panels",)):
-    """The doors of one plant; `before_step` is to be called before each step. `outlines` may stand in a doorway."""
+class Doors(Stateful, saved=("_panels",)):
+    """Doors of one plant; call `before_step` before each step. A door waits for the `outlines` in its doorway."""
 
     def __init__(
         self,
@@ -116,24 +112,24 @@ class Doors(Kept, keeps=("_panels",)):
         outlines: Outlines,
         tell: Callable[[str], None],
     ) -> None:
-        """`tell` takes one sentence for each door that begins to move."""
+        """`tell` is called with a sentence when a door begins to move."""
         self._plant, self._context, self._outlines, self._tell = plant, context, outlines, tell
         self._doors = {door.name: door for door in doors}
         self._instances = {name: plant.GetModelInstanceByName(name) for name in self._doors}
-        shares = {name: _share_closed(door, 0.0) for name, door in self._doors.items()}
+        shares = {name: float(_closed_at(door, 0.0)) for name, door in self._doors.items()}
         self._panels = {name: _Panel(share, share == 1.0, [(0.0, share)]) for name, share in shares.items()}
 
     @property
     def still(self) -> bool:
-        """Returns whether there is no door that moves."""
+        """Returns whether the plant has no doors that could move."""
         return not self._doors
 
     def history(self) -> Mapping[tuple[float, float], Sequence[tuple[float, float]]]:
-        """Changes of each door by its position (x, y): time (s) and closed share, 0 open, 1 closed, 0.5 moving."""
+        """Changes of each door by its position (x, y): time (s) and state, 0 open, 1 closed, 0.5 moving."""
         return {door.at: tuple(self._panels[name].history) for name, door in self._doors.items()}
 
     def before_step(self, now_s: float, dt_s: float) -> None:
-        """Puts each panel where it is, with the velocity that leads to where it will be after dt_s."""
+        """Sets the pose of each panel, and the velocity that brings it to its next pose within dt_s."""
         for name, door in self._doors.items():
             panel, closes = self._panels[name], _closed_at(door, now_s)
             if closes != panel.closes:
@@ -145,29 +141,29 @@ class Doors(Kept, keeps=("_panels",)):
             slide(self._plant, self._context, self._instances[name], pose, (_pose(door, after) - pose) / dt_s)
 
     def _next(self, door: DoorRule, panel: _Panel, dt_s: float) -> float:
-        """To which share a door is closed after dt_s."""
+        """Share to which a door is closed after dt_s."""
         share, step = panel.share, SPEED_M_S * dt_s / door.width
         if not panel.closes:
             return max(0.0, share - step)
         return share if share < 1.0 and self._occupied(door) else min(1.0, share + step)
 
     def _occupied(self, door: DoorRule) -> bool:
-        """Returns whether somebody is in the doorway."""
+        """Returns whether a robot or a person is in the doorway."""
         half = 0.5 * door.width * np.array([math.cos(door.yaw), math.sin(door.yaw)])
         line = shapely.LineString([np.array(door.at) - half, np.array(door.at) + half])
         return any(shapely.distance(line, shapely.Polygon(each)) < CLEAR_M for each in self._outlines())
 
 
 FROM_HAND_M: Final = 0.25
-"""Nothing is put nearer than this to a robot's hand, or taken from where it holds something."""
+"""No object is put nearer than this to a robot's hand, or taken while a holding hand is nearer."""
 _STREAM: Final = 5
 
 Hands = Mapping[str, FloatArray]
-"""Where the hand of each robot is, (3,) in the world."""
+"""Position (3,) of each robot's hand in the world, by the robot's name."""
 
 
-class Moves(Kept, keeps=("_done",)):
-    """The moves of one plant; `before_step` is to be called before each step."""
+class Moves(Stateful, saved=("_done",)):
+    """Moves of objects in one plant at their times; call `before_step` before each step."""
 
     def __init__(
         self,
@@ -179,7 +175,7 @@ class Moves(Kept, keeps=("_done",)):
         seed: int,
         tell: Callable[[str], None],
     ) -> None:
-        """`placed` are the loose objects; `tell` takes one sentence for each move, or for one that cannot be."""
+        """`placed` are the loose objects; `tell` is called with a sentence for each move, or why it is not done."""
         self._plant, self._context, self._world, self._seed, self._tell = plant, context, world, seed, tell
         self._forms = {each.name: each.form for each in placed}
         self._bodies = {
@@ -189,18 +185,19 @@ class Moves(Kept, keeps=("_done",)):
         self._listeners: list[Callable[[str], None]] = []
 
     def listen(self, listener: Callable[[str], None]) -> None:
-        """Calls `listener` with the name of each object that was moved."""
+        """Calls `listener` with the name of each moved object."""
         self._listeners.append(listener)
 
     def before_step(self, now_s: float, hands_W: Callable[[], Hands], holding: Sequence[str]) -> None:
-        """Moves what is due. `hands_W` gives where the robots' hands are; `holding` are those that hold something."""
+        """Does the moves that are due; `holding` names the robots that hold an object in their `hands_W`."""
         for number, move in enumerate(self._world.moves):
             if number not in self._done and now_s >= move.at:
                 self._done |= {number}
                 self._do(number, move, hands_W(), holding)
 
     def _do(self, number: int, move: MoveRule, hands_W: Hands, holding: Sequence[str]) -> None:
-        here_W = self._place_W(move.name)
+        body = self._bodies[move.name]
+        here_W = self._plant.EvalBodyPoseInWorld(self._context, body).translation()
         holder = next((name for name in holding if float(np.linalg.norm(hands_W[name] - here_W)) < FROM_HAND_M), None)
         if holder is not None:
             self._tell(f"nobody moves the {move.name}, which {holder} holds")
@@ -209,17 +206,17 @@ class Moves(Kept, keeps=("_done",)):
         if X_WO is None:
             self._tell(f"nobody moves the {move.name}, since nothing is free on the {move.to}")
             return
-        body = self._bodies[move.name]
         self._plant.SetFreeBodyPose(self._context, body, X_WO)
         self._plant.SetFreeBodySpatialVelocity(
             context=self._context, body=body, V_JpJc=SpatialVelocity(np.zeros(3), np.zeros(3))
         )
-        self._tell(f"somebody moves the {move.name} to {_told(move)}")
+        goal = f"the {move.to}" if isinstance(move.to, str) else "({:g}, {:g}, {:g})".format(*move.to)
+        self._tell(f"somebody moves the {move.name} to {goal}")
         for listener in self._listeners:
             listener(move.name)
 
     def _goal(self, number: int, move: MoveRule, hands_W: Hands) -> RigidTransform | None:
-        """Where the object is put; None where the surface has no free spot."""
+        """Goal pose of the object; None when the surface has no free spot."""
         form, rules = self._forms[move.name], self._world.seed_rules.rules
         if not isinstance(move.to, str):
             x, y, z = move.to
@@ -238,7 +235,7 @@ class Moves(Kept, keeps=("_done",)):
         return None
 
     def _candidates(self, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
-        """Random centres and yaws: along the fronts of a surface that has some, else anywhere on it."""
+        """Random centres and yaws: along the fronts of the surface if it has some, else anywhere on it."""
         if self._world.seed_rules.fronts.get(surface.name):
             yield from candidates(self._world, surface, rng)
             return
@@ -248,16 +245,9 @@ class Moves(Kept, keeps=("_done",)):
             yield (float(x), float(y)), float(rng.uniform(-np.pi, np.pi))
 
     def _outlines_W(self, without: str) -> Iterator[FloatArray]:
-        """The outlines of the other objects from above, as they stand now."""
+        """Present outlines (K, 2) of the other objects, from above."""
         for name, body in self._bodies.items():
             if name != without:
                 X_WO = self._plant.EvalBodyPoseInWorld(self._context, body)
                 x, y, _ = X_WO.translation()
                 yield outline_W(self._forms[name], (float(x), float(y)), RollPitchYaw(X_WO.rotation()).yaw_angle())
-
-    def _place_W(self, name: str) -> FloatArray:
-        return np.array(self._plant.EvalBodyPoseInWorld(self._context, self._bodies[name]).translation())
-
-
-def _told(move: MoveRule) -> str:
-    return f"the {move.to}" if isinstance(move.to, str) else "({:g}, {:g}, {:g})".format(*move.to)

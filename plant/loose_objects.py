@@ -37,16 +37,16 @@ from skills.robot import FloatArray
 
 _EXACT = 1e-9
 _REACH_M = 2.0
-"""Farther from its body than any part of a robot or a person gets, with an object's own size and the margin."""
+"""Greatest distance from a robot's body at which one of its links can reach an object, margins included."""
 
 
 @dataclass(frozen=True)
 class SleepLimits:
-    """When an object falls asleep and when it wakes.
+    """Limits at which objects fall asleep and wake.
 
-    It is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep after
-    `still_s`. It wakes when bounding spheres come closer than `margin_m`, which nothing crosses between two updates.
-    Objects whose spheres are closer than `beside_m` sleep and wake together.
+    An object is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep
+    after `still_s`. It wakes when a bounding sphere comes closer than `margin_m`, which no link crosses between two
+    updates. Objects whose spheres are closer than `beside_m` sleep and wake together.
     """
 
     still: float = 0.004
@@ -57,7 +57,7 @@ class SleepLimits:
 
 @dataclass(frozen=True)
 class _Object:
-    """A loose object of one body, its collision shapes with what they are like, and its place in the velocities."""
+    """A loose object of one body: its collision shapes with their properties, and its slice of the velocities."""
 
     name: str
     body: RigidBody
@@ -66,7 +66,7 @@ class _Object:
 
 
 class _Spheres:
-    """One bounding sphere of the collision shapes of each of some bodies; bodies without shapes have none."""
+    """Bounding spheres of bodies, one around the collision shapes of each; bodies without shapes have none."""
 
     def __init__(self, plant: MultibodyPlant, inspector: SceneGraphInspector, bodies: Sequence[RigidBody]) -> None:
         self._plant = plant
@@ -77,7 +77,7 @@ class _Spheres:
         self.radii_m = np.array([radius for _, (_, radius) in bounds])
 
     def centres_W(self, context: Context) -> FloatArray:
-        """The spheres' centres (N, 3) in the world."""
+        """Centres (N, 3) of the spheres in the world."""
         X_WB = [self._plant.EvalBodyPoseInWorld(context, body).GetAsMatrix34() for body in self._bodies]
         centres: FloatArray = np.einsum("nij,nj->ni", np.array(X_WB).reshape(-1, 3, 4), self._centres_B)
         return centres
@@ -87,7 +87,7 @@ class Sleepers:
     """Puts the loose objects of one plant to sleep and wakes them; call `update` regularly, before the plant steps."""
 
     def __init__(self, world: WorldDiagram, root_context: Context, limits: SleepLimits | None = None) -> None:
-        """All objects are awake at first; `all_asleep` says whether no loose body can move now."""
+        """All objects are awake at first; `all_asleep` says whether every loose body of the plant sleeps."""
         plant, inspector = world.plant, world.scene_graph.model_inspector()
         self._plant, self._limits = plant, limits or SleepLimits()
         self._context = plant.GetMyMutableContextFromRoot(root_context)
@@ -117,11 +117,11 @@ class Sleepers:
 
     @property
     def asleep(self) -> frozenset[str]:
-        """Names of the objects that sleep."""
+        """Names of the sleeping objects."""
         return frozenset(each.name for each, asleep in zip(self._objects, self._asleep, strict=True) if asleep)
 
     def update(self, now_s: float) -> None:
-        """Wakes whom something is about to reach, and puts to sleep who has been still for long enough."""
+        """Wakes the objects that a link or another object is about to reach; puts still objects to sleep."""
         if not self._objects:
             return
         poses = self._plant.GetPositions(self._context)[self._places]
@@ -142,14 +142,14 @@ class Sleepers:
             self._turn(int(number))
 
     def wake_all(self) -> None:
-        """Wakes all objects, as when the plant's state is replaced."""
+        """Wakes all objects, for instance before the plant's state is replaced."""
         for number in np.flatnonzero(self._asleep):
             self._turn(int(number))
         self._still_s = np.zeros(len(self._objects))
         self._last = None
 
     def _reached(self, centres_W: FloatArray) -> NDArray[np.bool_]:
-        """For each object, whether a link is about to reach it."""
+        """Flags (N,) of the objects that a link is about to reach."""
         bases = [self._plant.EvalBodyPoseInWorld(self._context, body).translation() for body in self._known]
         if self._only_known_move and all(np.abs(centres_W - p_WB).max(axis=1).min() > _REACH_M for p_WB in bases):
             return np.zeros(len(centres_W), dtype=bool)
@@ -159,13 +159,13 @@ class Sleepers:
     def _near(
         self, centres_W: FloatArray, others_W: FloatArray, radii_m: FloatArray, margin_m: float
     ) -> NDArray[np.bool_]:
-        """For each object, whether any of some spheres (M, 3) comes within a margin of its own."""
+        """Flags (N,) of the objects whose sphere is within a margin of another sphere (M, 3)."""
         apart_m = np.linalg.norm(centres_W[:, None] - others_W[None], axis=-1)
         near: NDArray[np.bool_] = (apart_m < self._bounds.radii_m[:, None] + radii_m + margin_m).any(axis=1)
         return near
 
     def _turn(self, number: int) -> None:
-        """Wakes a sleeper, or puts to sleep who is awake."""
+        """Wakes a sleeping object, or puts an object that is awake to sleep."""
         each, graph, plant = self._objects[number], self._scene_graph, self._plant
         source = plant.get_source_id()
         if self._asleep[number]:
@@ -187,7 +187,7 @@ class Sleepers:
 def _objects(
     plant: MultibodyPlant, inspector: SceneGraphInspector, models: Mapping[str, ModelInstanceIndex]
 ) -> Iterator[_Object]:
-    """The loose objects of one body each; models with parts that move against each other stay awake."""
+    """Loose objects of one body each; models with moving parts stay awake."""
     for name, instance in models.items():
         bodies = [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
         if len(bodies) == 1 and bodies[0].is_floating_base_body():
@@ -198,7 +198,7 @@ def _objects(
 
 
 def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
-    """Returns whether a moving body is a model of its own that is not loose: a person who walks."""
+    """Returns whether a moving body is a model that slides on a planar joint, such as a walking person."""
     return body.model_instance() in models.values() and not body.is_floating_base_body()
 
 
@@ -208,7 +208,7 @@ def _moving_bodies(plant: MultibodyPlant) -> Iterator[RigidBody]:
 
 
 def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tuple[FloatArray, float] | None:
-    """Centre and radius of a sphere around shapes, in their body's frame."""
+    """Centre and radius of a sphere around shapes, in the frame of their body."""
     rows = [shape_row(inspector, shape) for shape in shapes]
     if not rows:
         return None
@@ -218,16 +218,16 @@ def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tupl
 
 
 WITH_HAND_M_S: Final = 0.02
-"""What moves against the hand by less than this moves with it."""
+"""An object that moves against the hand by less than this moves with the hand."""
 FASTEST_SPIN_RAD_S: Final = 25.0
 """A third of a radian in a step of 12.5 ms."""
 _FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
-"""What spins no faster about any axis cannot be too fast."""
+"""A body that spins no faster than this about each axis cannot exceed `FASTEST_SPIN_RAD_S`."""
 _AT_HAND_M: Final = 0.5
 
 
 class Carried:
-    """Corrects the free bodies among `loose` that a hand carries; call `after_step` after each step of the plant."""
+    """Correction of the loose bodies that a hand carries; call `after_step` after each step of the plant."""
 
     def __init__(self, plant: MultibodyPlant, context: Context, loose: Sequence[RigidBody]) -> None:
         self._plant, self._context = plant, context
@@ -238,7 +238,7 @@ class Carried:
         self._spins = np.array([range(start, start + 3) for start in starts], dtype=np.int64).reshape(-1, 3)
 
     def after_step(self, hand: RigidBody, dt_s: float) -> None:
-        """Moves what the hand carries along its arc; dt_s is the length of the step."""
+        """Moves the bodies that the hand carries along their arcs; dt_s is the length of the step."""
         plant, context = self._plant, self._context
         p_WH = plant.EvalBodyPoseInWorld(context, hand).translation()
         places_W = plant.GetPositions(context)[self._places]
@@ -251,10 +251,12 @@ class Carried:
             v_WO = plant.EvalBodySpatialVelocityInWorld(context, body).translational()
             with_hand = V_WH.translational() + _cross(V_WH.rotational(), p_WO - p_WH)
             if np.linalg.norm(v_WO - with_hand) < WITH_HAND_M_S:
-                self._shift(body, arc_m(self._bias_m_s2(hand, p_WO), dt_s))
+                q = plant.GetPositions(context)
+                q[self._places[number]] += arc_m(self._bias_m_s2(hand, p_WO), dt_s)
+                plant.SetPositions(context, q)
 
     def _bias_m_s2(self, hand: RigidBody, p_WO: FloatArray) -> FloatArray:
-        """How the hand's point at p_WO accelerates while no joint's rate changes (m/s^2)."""
+        """Acceleration (m/s^2) of the hand's point at p_WO while no joint changes its rate."""
         plant, context, world = self._plant, self._context, self._plant.world_frame()
         p_HO = plant.EvalBodyPoseInWorld(context, hand).inverse() @ p_WO
         rates = JacobianWrtVariable.kV
@@ -262,7 +264,7 @@ class Carried:
         return np.asarray(bias.translational())
 
     def limit_spin(self) -> None:
-        """Slows down the free bodies that spin faster than `FASTEST_SPIN_RAD_S`."""
+        """Slows the free bodies that spin faster than `FASTEST_SPIN_RAD_S` down to it."""
         velocities = self._plant.GetVelocities(self._context)
         spins = velocities[self._spins]
         if spins.size and np.abs(spins).max() > _FASTEST_ALONG_RAD_S:
@@ -270,19 +272,13 @@ class Carried:
             velocities[self._spins] = spins * np.minimum(1.0, FASTEST_SPIN_RAD_S / np.maximum(rates, 1e-9))
             self._plant.SetVelocities(self._context, velocities)
 
-    def _shift(self, body: RigidBody, offset_W: FloatArray) -> None:
-        q = self._plant.GetPositions(self._context)
-        start = body.floating_positions_start() + 4
-        q[start : start + 3] += offset_W
-        self._plant.SetPositions(self._context, q)
-
 
 def arc_m(acceleration_W: FloatArray, dt_s: float) -> FloatArray:
-    """How far (m) a point that accelerates (m/s^2) is off its tangent after dt_s."""
+    """Distance (m) from its tangent, after dt_s, of a point with an acceleration (m/s^2)."""
     return np.asarray(0.5 * dt_s**2 * acceleration_W)
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """The product a x b of two vectors (3,)."""
+    """Cross product a x b of two vectors (3,); faster than numpy's."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

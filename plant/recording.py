@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import Meshcat, MeshcatParams
 from pydrake.systems.framework import Context
 
-from plant.diagram import WorldDiagram
+from plant.diagram import WorldDiagram, build_diagram
 from skills.robot import FloatArray
 
 FRAMES_PER_SECOND = 16.0
@@ -128,7 +128,7 @@ def save_html(world: WorldDiagram, frames: Sequence[Frame], path: Path, view: Vi
     """Writes an animation of `frames` as one HTML file that needs no server and opens on `view`."""
     meshcat = Meshcat()
     prepare_view(meshcat, view)
-    shown = world.rebuild(meshcat)
+    shown = build_diagram(replace(world.config, render=False), meshcat)
     root_context = shown.diagram.CreateDefaultContext()
     context = shown.plant.GetMyMutableContextFromRoot(root_context)
     meshcat.StartRecording(frames_per_second=FRAMES_PER_SECOND)
@@ -162,7 +162,7 @@ class LiveScene:
         self._follows, self._camera_at = False, view
         self._meshcat = Meshcat(MeshcatParams(host=HOST, port=0, show_stats_plot=False))
         prepare_view(self._meshcat, view)
-        self._shown = world.rebuild(self._meshcat)
+        self._shown = build_diagram(replace(world.config, render=False), self._meshcat)
         self._root_context = self._shown.diagram.CreateDefaultContext()
         self._shown_context = self._shown.plant.GetMyMutableContextFromRoot(self._root_context)
         self._period_s = PERIOD_WALL_S

@@ -14,10 +14,10 @@ RENDERER = "vtk"
 
 
 class Scene:
-    """Renders a Diagram at any positions, in a context of its own.
+    """Renderer of a Diagram at any positions, in a context of its own.
 
-    The renderer lives in that context alone: one that belongs to the context which is stepped follows every step,
-    which costs a third of the time.
+    The renderer lives in that context alone: in the context that is stepped it would follow every step, which costs a
+    third of the time.
     """
 
     def __init__(
@@ -37,9 +37,9 @@ class Scene:
         self._rendering = False
 
     def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
-        """The scene with the plant at `positions` (as many as the plant has); it holds until the next call.
+        """Returns the scene with the plant at all its `positions`; it is valid until the next call.
 
-        The renderer is made at the first call, since it loads all meshes.
+        The first call makes the renderer, which loads all meshes.
         """
         if not self._rendering:
             self._rendering = True
@@ -61,7 +61,10 @@ _BEAMS = (
 
 
 def lights(light: Light = DAY_LIGHT) -> list[LightParameter]:
-    """Day light through the open top, softer from the four sides and from the floor, as `light` changes it."""
+    """Directional lights of a world: day light from above, softer from the sides and the floor, changed by `light`.
+
+    Rooms have no ceiling and rendering casts no shadows, so a few directions are enough.
+    """
     beams = [(direction, intensity * light.brightness) for direction, intensity in _BEAMS]
     return [
         LightParameter(
@@ -76,6 +79,6 @@ def lights(light: Light = DAY_LIGHT) -> list[LightParameter]:
 
 
 def render_parameters(light: Light = DAY_LIGHT) -> RenderEngineVtkParams:
-    """Parameters of Drake's VTK renderer for cameras in a world."""
+    """Parameters of Drake's VTK renderer: the lights of a world and the colour of its sky."""
     sky = np.clip(np.array(SKY) * np.array(light.colour) * min(1.0, light.brightness), 0.0, 1.0)
     return RenderEngineVtkParams(default_clear_color=sky, lights=lights(light))

@@ -1,4 +1,4 @@
-"""What of the plant is kept over its process: each part that changes names the attributes that are its state."""
+"""Saved state of the plant: each stateful part names the attributes that change from step to step."""
 
 from __future__ import annotations
 
@@ -12,27 +12,28 @@ from skills.files.kept_values import packed, unpacked
 State = dict[str, Any]
 
 
-class Kept:
-    """A part of the plant whose state is that of the attributes that its class and those above it name in `keeps`.
+class Stateful:
+    """A part of the plant whose state is saved and restored by attributes.
 
-    A dataclass that names none keeps all its fields. An attribute may be such a part itself, or a mapping of some.
+    A class names its attributes in `saved`, in addition to those of its bases; a dataclass that names none saves all
+    its fields. An attribute may be stateful itself, or a mapping of stateful parts.
     """
 
-    _keeps: ClassVar[tuple[str, ...]] = ()
+    _saved: ClassVar[tuple[str, ...]] = ()
 
-    def __init_subclass__(cls, *, keeps: tuple[str, ...] = ()) -> None:
+    def __init_subclass__(cls, *, saved: tuple[str, ...] = ()) -> None:
         super().__init_subclass__()
-        cls._keeps = (*cls._keeps, *keeps)
+        cls._saved = (*cls._saved, *saved)
 
     def state(self) -> State:
-        """What changes from step to step, as values of JSON."""
-        return {key: _state(getattr(self, name)) for key, name in self._kept_names().items()}
+        """Returns the saved attributes as values of JSON."""
+        return {key: _state(getattr(self, name)) for key, name in self._saved_names().items()}
 
     def restore(self, state: State) -> None:
-        """Goes on from such a state. Raises KeyError: a part of it is missing."""
-        for key, name in self._kept_names().items():
+        """Restores the saved attributes. Raises KeyError when one of them is missing."""
+        for key, name in self._saved_names().items():
             value = getattr(self, name)
-            if isinstance(value, Kept):
+            if isinstance(value, Stateful):
                 value.restore(state[key])
             elif _holds_parts(value):
                 for each, part in value.items():
@@ -42,17 +43,17 @@ class Kept:
 
     @classmethod
     @cache
-    def _kept_names(cls) -> Mapping[str, str]:
-        """The names of the attributes, by those that they have in the state."""
-        names = cls._keeps or [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
+    def _saved_names(cls) -> Mapping[str, str]:
+        """The names of the attributes, by their keys in the state."""
+        names = cls._saved or [field.name for field in dataclasses.fields(cls)]  # type: ignore[arg-type]
         return {name.lstrip("_"): name for name in names}
 
 
 def _state(value: Any) -> Any:
-    if isinstance(value, Kept):
+    if isinstance(value, Stateful):
         return value.state()
     return {key: part.state() for key, part in value.items()} if _holds_parts(value) else packed(value)
 
 
 def _holds_parts(value: Any) -> bool:
-    return isinstance(value, dict) and isinstance(next(iter(value.values()), None), Kept)
+    return isinstance(value, dict) and isinstance(next(iter(value.values()), None), Stateful)

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2934,
+    "executive/words": 2955,
     "executive/language": 7647,
     "executive/speech": 1604,
     "executive/mission": 1535,
@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 591,
     "executive/view": 1383,
     "executive/testing": 813,
-    "executive/app": 7482,
-    "executive/cli": 3817,
+    "executive/app": 7435,
+    "executive/cli": 3818,
     "skills": 25232,
-    "plant": 11835,
+    "plant": 11727,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 470, 80, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 470, 82, 8
 """All modules; those that one other imports; file names that stand more than once."""
 
 

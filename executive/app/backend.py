@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from executive.app.artifacts import Artifacts
-from executive.app.report import RefereeReport
 from executive.record.work import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry
 from executive.store.journal import StoreJournal
 from executive.tree.compiler import CompiledTree
+from executive.words.goal import RefereeReport
 from skills.robot import Clock, Pose2D
 
 if TYPE_CHECKING:

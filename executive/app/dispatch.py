@@ -27,7 +27,6 @@ from executive.app.fleet import (
 )
 from executive.app.goal_conditions import Share
 from executive.app.mission_run import entry_for, robot_report
-from executive.app.placed_robots import PlacedRobot
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
 from executive.mission.scenario import Scenario
@@ -40,6 +39,7 @@ from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
+from plant.robots.robot_kind import PlacedRobot
 from skills.files.errors import listing
 from skills.robot import Pose2D
 

@@ -12,13 +12,13 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Final
 
-from executive.app.placed_robots import DEFAULT_KIND, PlacedRobot, shared_detector
+from executive.app.placed_robots import DEFAULT_KIND, robot_stack, shared_detector
 from executive.app.prepared import Prepared
 from executive.app.worlds import refuse_unusable
 from executive.tree.check import Abilities, Checked, PlannedRoutes, check_tree
 from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.models.catalogue import load_catalogue
-from plant.robots.robot_kind import robot_kind
+from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.files.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
@@ -37,7 +37,7 @@ class _RoutesOnMap(RoutePlanner):
 
     def __init__(self, world: World, robot: PlacedRobot) -> None:
         self._world, self._robot = world, robot
-        self._stack = None if robot.stack_file is None else robot.stack
+        self._stack = None if robot.stack_file is None else robot_stack(robot)
 
     @cached_property
     def _routes(self) -> PlannedRoutes:
@@ -78,8 +78,9 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     """
     world, robot = prepared.world, prepared.robot
     abilities = abilities_in(world, robot.kind)
-    if robot.stack_file is not None and robot.stack.detector != default_component("detector"):
-        seen = abilities.classes & frozenset(shared_detector(robot.stack).class_names)
+    stack = None if robot.stack_file is None else robot_stack(robot)
+    if stack is not None and stack.detector != default_component("detector"):
+        seen = abilities.classes & frozenset(shared_detector(stack).class_names)
         abilities = replace(abilities, classes=seen)
     return check_tree(
         prepared.tree,

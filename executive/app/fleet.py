@@ -13,7 +13,6 @@ from py_trees.common import Status
 from executive.app.auction import Auction, Bid
 from executive.app.feasibility import check_prepared, route_planner_of
 from executive.app.goal_conditions import Share
-from executive.app.placed_robots import PlacedRobot
 from executive.app.prepare import Setting, prepare_alone
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
@@ -32,7 +31,7 @@ from executive.words.knowledge import BatteryFacts, Knowledge, SurfaceFacts
 from executive.words.leaf_steps import Do, Say, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Step
-from plant.robots.robot_kind import robot_kind
+from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.api import Surface
 from skills.files.errors import InputError

@@ -11,8 +11,7 @@ from executive.run.outcome import Execution, Outcome, RobotResult
 from executive.tree.board import FromBoard
 from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.expression import Expression, Template
-from executive.words.goal import GoalCondition, GoalKind, When
-from plant.referee import Verdict
+from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from skills.files.errors import listing
 
 SHOWN_CHARS = 60
@@ -47,11 +46,11 @@ class _Move:
 def verdict_of(
     tree: CompiledTree,
     result: RobotResult,
-    judge: Callable[[Sequence[GoalCondition]], Verdict],
+    judge: Callable[[Sequence[GoalCondition]], RefereeReport],
     *,
     before: Sequence[Share] = (),
     since_s: float = 0.0,
-) -> Verdict:
+) -> RefereeReport:
     """The verdict on a tree that has run; `judge` is the referee's, on the goal conditions.
 
     A run that did not end with success has not fulfilled its mission, whatever holds. Of one that did, all that can be

@@ -18,7 +18,7 @@ from executive.app.backend import Backend, Durable
 from executive.app.goal_conditions import Share
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
-from executive.app.report import RefereeReport, RobotReport, RunReport
+from executive.app.report import RobotReport, RunReport
 from executive.app.report_file import EndedTree, with_findings, write_report
 from executive.app.signals import ended_by_signals
 from executive.app.simulated import SimulatedBackend, compile_first
@@ -36,6 +36,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
+from executive.words.goal import RefereeReport
 from executive.words.knowledge import Knowledge
 from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -15,11 +14,11 @@ from executive.mission.request import Start
 from executive.mission.stack_file import load_stack
 from executive.words.knowledge import Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
-from plant.robots.robot_kind import robot_kind
+from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
-from skills.robot import Capabilities, FloatArray, Pose2D
+from skills.robot import FloatArray, Pose2D
 from skills.stack import DetectorComponent, RobotStack, default_stack
 
 if TYPE_CHECKING:
@@ -35,35 +34,9 @@ BETWEEN_M: Final = 0.35
 _START_STREAM: Final = 7
 
 
-@dataclass(frozen=True)
-class PlacedRobot:
-    """Robot of a run: its kind, its start and dock in the world frame, and its stack.
-
-    Without a `dock` it charges at the world's dock. Without an `own_stack` file it uses the stack of its kind. Unless
-    `start_known` it must localise first.
-    """
-
-    name: str
-    kind: str
-    start: Pose2D
-    dock: Pose2D | None = None
-    own_stack: Path | None = None
-    start_known: bool = True
-
-    @property
-    def capabilities(self) -> Capabilities:
-        """Capabilities of this kind of robot."""
-        return robot_kind(self.kind).capabilities()
-
-    @property
-    def stack_file(self) -> Path | None:
-        """File of its stack; None for the default stack."""
-        return self.own_stack or robot_kind(self.kind).stack
-
-    @cached_property
-    def stack(self) -> RobotStack:
-        """Components of its stack. Raises InputError with file and line if the file cannot be used."""
-        return load_stack(self.stack_file)
+def robot_stack(robot: PlacedRobot) -> RobotStack:
+    """Loads the components of a robot's stack. Raises InputError with file and line if the file cannot be used."""
+    return load_stack(robot.stack_file)
 
 
 def placed_robots(world: World, knowledge: Knowledge, configs: Sequence[RobotConfig]) -> Mapping[str, PlacedRobot]:

@@ -9,7 +9,7 @@ from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
-from executive.app.placed_robots import PlacedRobot, knowledge_for, only_robot, placed_robots, refuse_blocked
+from executive.app.placed_robots import knowledge_for, only_robot, placed_robots, refuse_blocked
 from executive.app.prepared import Prepared, combine
 from executive.app.worlds import knowledge_of, open_world, with_map
 from executive.language.parser import load_parser
@@ -29,6 +29,7 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
 from executive.words.robot_config import RobotConfig, find_robot, robots_of_file
 from executive.words.yaml_steps import steps_from_lines
+from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.world import ObjectRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.texts import LONGEST_ANSWER, plain_text

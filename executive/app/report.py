@@ -13,31 +13,11 @@ from typing import TYPE_CHECKING, Any, Final
 from rich.markup import escape
 
 from executive.run.outcome import Said
+from executive.words.goal import RefereeReport
 from skills.files.errors import count_text
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
-
-
-@dataclass(frozen=True)
-class RefereeReport:
-    """The referee's verdict with its counts, and one sentence for each lift, drop and bump.
-
-    `success` is None when the referee has not judged all that was asked for. `people_hit` counts collisions with
-    people, `robots_hit` those between two robots, and `hit_by_people` how often somebody walked into the robot while it
-    stood: no collision of the robot's. `holds` tells of a run that failed whether the referee sees nevertheless what
-    was asked for.
-    """
-
-    success: bool | None
-    why: str
-    collisions: int
-    drops: int
-    people_hit: int = 0
-    hit_by_people: int = 0
-    robots_hit: int = 0
-    holds: bool | None = None
-    events: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,23 +6,24 @@ import logging
 import subprocess
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from executive.app.artifacts import Artifacts, draw_artifacts
 from executive.app.backend import Durable, Scene
 from executive.app.goal_conditions import Share, verdict_of
-from executive.app.placed_robots import PlacedRobot, shared_detector
-from executive.app.report import RefereeReport
+from executive.app.placed_robots import robot_stack, shared_detector
 from executive.record.work import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry
 from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
+from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION, Variation
 from plant.pipeline import Pipeline
 from plant.referee import Referee
+from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
@@ -79,7 +80,7 @@ class SimulatedBackend:
         known, believed = robot.start_known, None
         if durable is not None:
             known, believed = robot.start_known and not durable.take_up, durable.poses.get(tree.robot_name)
-        entry = run_entry(self._simulation, self._world, tree, robot.stack, believed=believed, start_known=known)
+        entry = run_entry(self._simulation, self._world, tree, robot_stack(robot), believed=believed, start_known=known)
         if durable is not None:
             durable.journals[tree.robot_name].keep_world = self._world_keeper(durable)
         return replace(entry, robot=self._pipeline.robots[tree.robot_name])
@@ -132,7 +133,7 @@ class SimulatedBackend:
     ) -> RefereeReport:
         """Returns the report of the plant's referee."""
         verdict = verdict_of(tree, result, self._settled().referee.judge, before=before, since_s=since_s)
-        return RefereeReport(**asdict(verdict), events=self._simulation.referee.events)
+        return replace(verdict, events=self._simulation.referee.events)
 
     def leave(self, artifacts: Artifacts, out: Path) -> Path | None:
         """Writes recording and pictures of a recorded run; returns the recording's path."""
@@ -170,11 +171,8 @@ def simulate(
         return Simulation(
             world,
             seed=seed,
-            robots={name: robot.kind for name, robot in robots.items()},
+            robots=[replace(robot, locomotion=robot_stack(robot).locomotion) for robot in robots.values()],
             record=record,
-            locomotion={name: robot.stack.locomotion for name, robot in robots.items()},
-            starts={name: robot.start for name, robot in robots.items()},
-            docks={name: robot.dock for name, robot in robots.items() if robot.dock is not None},
             variation=variation,
             spared=spared,
         )

@@ -94,3 +94,24 @@ class GoalCondition:
     def needed(self) -> int:
         """Number of objects that fulfil it."""
         return max(1, self.count)
+
+
+@dataclass(frozen=True)
+class RefereeReport:
+    """Verdict of the referee on all goal conditions, with its counts and a sentence for each lift, drop and bump.
+
+    `success` is None when the referee has not judged everything that was asked for; `why` has a sentence for each
+    condition. `collisions` are the robots' own: `people_hit` of them are with people, `robots_hit` between two robots.
+    `hit_by_people` counts the people who walked into a standing robot. `holds` tells of a failed run whether its goal
+    conditions hold nevertheless.
+    """
+
+    success: bool | None
+    why: str
+    collisions: int
+    drops: int
+    people_hit: int = 0
+    hit_by_people: int = 0
+    robots_hit: int = 0
+    holds: bool | None = None
+    events: tuple[str, ...] = ()

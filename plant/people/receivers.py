@@ -23,7 +23,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
 from plant.diagram import X_PT_HOME, WorldDiagram
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from plant.sensors.ray_shapes import ShapeKind, shape_row
 from plant.worlds.seeding import Receiving
 from skills.robot import FloatArray
@@ -42,7 +42,7 @@ class Offer:
     thing: str
 
 
-class Offers(Kept, keeps=("_still_since_s",)):
+class Offers(Stateful, saved=("_still_since_s",)):
     """What the robots of one plant hold out; call `look` regularly."""
 
     def __init__(self, world: WorldDiagram, context: Context) -> None:
@@ -201,7 +201,7 @@ class Phase(enum.Enum):
     RECEIVING = "receiving"
 
 
-class Receiver(Kept, keeps=("phase", "offer", "_since_s", "_opening", "_p_HO", "_home", "_X_WT")):
+class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO", "_home", "_X_WT")):
     """One person. Call `look` now and then, and `move_tray` before each step."""
 
     def __init__(self, world: WorldDiagram, context: Context, name: str, receiving: Receiving, offers: Offers) -> None:
@@ -366,16 +366,17 @@ LOOK_STEPS = 4
 """Everybody looks whether something is held out once in so many steps."""
 
 
-class Receivers(Kept, keeps=("_steps", "_offers", "_people")):
+class Receivers(Stateful, saved=("_steps", "_offers", "_people")):
     """The people of one plant who receive, by name. `before_step` is to be called before each step."""
 
-    def __init__(self, world: WorldDiagram, context: Context, receiving: Mapping[str, Receiving]) -> None:
-        """`context` is the plant's; those with a tray who are not in `receiving` take things in the usual manner."""
+    def __init__(self, world: WorldDiagram, context: Context) -> None:
+        """`context` is the plant's."""
         self._plant, self._context = world.plant, context
         self._offers = Offers(world, context)
         self._people = {
-            name: Receiver(world, context, name, receiving.get(name, Receiving()), self._offers)
-            for name in sorted(world.trays)
+            model.name: Receiver(world, context, model.name, model.receiving, self._offers)
+            for model in sorted(world.config.models, key=lambda model: model.name)
+            if model.receiving is not None
         }
         self._steps = 0
         self._pulling = False

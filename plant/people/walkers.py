@@ -12,7 +12,7 @@ import contextlib
 import copy
 import itertools
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -25,7 +25,7 @@ from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
 from plant.events import slide
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from plant.sensors.ray_shapes import ShapeKind, shape_row
 from plant.worlds.seeding import PointRoute
 from plant.worlds.world import Point, WorldError
@@ -197,7 +197,7 @@ class Leg:
         return tuple(lengths)
 
 
-class Walk(Kept, keeps=("_leg", "_way_m", "_wait_s", "_detour", "place_W", "yaw_rad", "heading_rad", "held_s")):
+class Walk(Stateful, saved=("_leg", "_way_m", "_wait_s", "_detour", "place_W", "yaw_rad", "heading_rad", "held_s")):
     """A person on the legs of a route, who looks where they go. Call `advance` once a step.
 
     `held_s` is for how long they stand for a robot.
@@ -284,15 +284,14 @@ PASS_M = 0.22
 """On a way around, they stop only for what is nearer than this."""
 
 
-class Walkers(Kept, keeps=("_walks",)):
+class Walkers(Stateful, saved=("_walks",)):
     """The people of one plant who walk, by name. `before_step` is to be called before each step."""
 
-    def __init__(self, world: WorldDiagram, context: Context, routes: Mapping[str, PointRoute]) -> None:
-        """`context` is the plant's. Raises WorldError: a waypoint is in something, or there is no way to it."""
-        self._plant, self._context, self._routes = world.plant, context, dict(routes)
-        self._robots = [
-            (robot.body, np.array(robot.kind.capabilities().footprint_m)) for robot in world.robots.values()
-        ]
+    def __init__(self, world: WorldDiagram, context: Context) -> None:
+        """`context` is the plant's. Raises WorldError when a waypoint is in an obstacle, or no path leads there."""
+        routes = {model.name: model.route for model in world.config.models if model.route is not None}
+        self._plant, self._context, self._routes = world.plant, context, routes
+        self._robots = tuple(world.robots.values())
         self._instances = {name: world.models[name] for name in routes}
         inertia = SpatialInertia.SolidCylinderWithMass(BODY_KG, *BODY_M, np.array([0.0, 0.0, 1.0]))
         for instance in self._instances.values():
@@ -354,12 +353,11 @@ class Walkers(Kept, keeps=("_walks",)):
 
     def _outlines_W(self, walk: Walk) -> Iterator[FloatArray]:
         """The outlines (K, 2) of the robots that somebody may be close to."""
-        for body, outline_B in self._robots:
-            X_WB = self._plant.EvalBodyPoseInWorld(self._context, body)
-            reach_m = float(np.linalg.norm(outline_B, axis=1).max())
-            if math.dist(X_WB.translation()[:2], walk.place_W) < YIELD_M + reach_m:
-                corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
-                yield X_WB.multiply(corners_B.T).T[:, :2]
+        for robot in self._robots:
+            p_WB = self._plant.EvalBodyPoseInWorld(self._context, robot.body).translation()
+            reach_m = float(np.linalg.norm(robot.kind.capabilities().footprint_m, axis=1).max())
+            if math.dist(p_WB[:2], walk.place_W) < YIELD_M + reach_m:
+                yield robot.outline_W(self._context)
 
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
         """Returns whether an outline is close to the person and before them."""

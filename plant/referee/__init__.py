@@ -1,6 +1,5 @@
-"""The referee: the only one that is told the truth. It watches the plant and judges the goal conditions afterwards."""
+"""The referee, which alone sees the true state of the plant: it observes a run and judges its goal conditions."""
 
-from plant.referee.judge import Verdict
 from plant.referee.referee import Referee
 
-__all__ = ["Referee", "Verdict"]
+__all__ = ["Referee"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pydrake.geometry import GeometryId, PenetrationAsPointPair
 
 from plant.referee.entities import ROBOT_KINDS, Entity, Kind
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 
 Pair = tuple[int, int]
 
@@ -48,7 +48,7 @@ class Collision:
     other_robot: str | None = None
 
 
-class CollisionCounter(Kept, keeps=("_last_touched_s", "collisions")):
+class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
     """Counts rising edges of contact between robots and scenery, persons or other robots.
 
     A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count. With a

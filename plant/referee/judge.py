@@ -7,32 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from executive.words.goal import GoalCondition, GoalKind, Region, When
+from executive.words.goal import GoalCondition, GoalKind, RefereeReport, Region, When
 from plant.referee.contacts import Collision
 from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
 from plant.referee.truth import ON_TRAY_GAP_S, TimedPath, Truth
 from skills.robot import FloatArray
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What the referee saw: whether all goal conditions hold (None: that was not judged), a sentence on each, and the
-    counts of the whole run, or since the conditions count.
-
-    `collisions` are the robots' own, `people_hit` those of them with people, `robots_hit` those between two robots;
-    `hit_by_people` counts who walked into a robot that stood. `holds` tells of a run that failed whether its goal
-    conditions hold nevertheless.
-    """
-
-    success: bool | None
-    why: str
-    collisions: int
-    drops: int
-    people_hit: int = 0
-    hit_by_people: int = 0
-    robots_hit: int = 0
-    holds: bool | None = None
-
 
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
@@ -49,7 +28,7 @@ class Finding:
     sentence: str
 
 
-def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision]) -> Verdict:
+def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision]) -> RefereeReport:
     """The verdict on all conditions, each at the times at which it must hold."""
     findings = [_judge_one(condition, truth) for condition in conditions]
     success = all(finding.holds for finding in findings) if findings else None
@@ -57,7 +36,7 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[
     bumps = [bump for bump in bumps if bump.time_s >= since_s]
     own = [bump for bump in bumps if not bump.walked_in]
     drops = sum(when_s >= since_s for history in truth.histories for when_s in history.dropped_s)
-    return Verdict(
+    return RefereeReport(
         success,
         " ".join(dict.fromkeys(finding.sentence for finding in findings)),
         collisions=len(own),

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from skills.robot import FloatArray
 
 LIFT_M = 0.03
@@ -50,7 +50,7 @@ class Lift:
 
 
 @dataclass(eq=False)
-class ObjectHistory(Kept):
+class ObjectHistory(Stateful):
     """The record of one object; `take` is called with every sample.
 
     `rests_W` are the places where it rested, `rested_s` since when; at `dropped_s` it was dropped.

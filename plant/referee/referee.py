@@ -13,13 +13,13 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from executive.words.goal import GoalCondition
+from executive.words.goal import GoalCondition, RefereeReport
 from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
 from plant.referee.entities import Entities, Kind
-from plant.referee.judge import Verdict, judge
+from plant.referee.judge import judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
-from plant.saved_state import Kept, State
+from plant.saved_state import State, Stateful
 from skills.robot import FloatArray
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ BEFORE_SAMPLES = 3
 DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, float]]]]
 
 
-class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
+class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
     """Watches one plant. `observe` at about 20 Hz while it runs, `judge` whenever wanted.
 
     Its state is the whole record, without the paths; of people, only where they are.
@@ -122,7 +122,7 @@ class Referee(Kept, keeps=("_counter", "_histories", "_given", "_now_s", "_bases
                 history.take(self._sample(plant_context, time_s, self._position(plant_context, body), touches))
         self._note_given(time_s)
 
-    def judge(self, conditions: Sequence[GoalCondition]) -> Verdict:
+    def judge(self, conditions: Sequence[GoalCondition]) -> RefereeReport:
         """Returns whether all conditions hold at their times. Raises ValueError before the first sample."""
         if not self._bases:
             raise ValueError("the referee has not observed anything yet")

@@ -25,6 +25,22 @@ class Part(enum.Enum):
 
 
 @dataclass(frozen=True)
+class Velocity:
+    """A planar velocity in the body frame: m/s, m/s, rad/s."""
+
+    vx: float = 0.0
+    vy: float = 0.0
+    wz: float = 0.0
+
+
+@dataclass(frozen=True)
+class HeadGoal:
+    """Angles that a head turns to: pan and tilt (rad)."""
+
+    angles_rad: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Active(Generic[PayloadT]):
     """A command that runs: what it asks for, since when and until when (robot's clock, s)."""
 

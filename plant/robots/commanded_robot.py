@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from typing import TypeVar
 
 import numpy as np
 from pydrake.systems.framework import Context
 
-from plant.robots.command_table import CommandTable, Part
+from plant.robots.command_table import CommandTable, HeadGoal, Part, Velocity
 from plant.robots.robot_kind import RobotBody
 from plant.robots.servos import ActuatedJoints, ArmServos, Closing, GripperGoal, GripperServo, GripperTolerances
-from plant.saved_state import Kept, State
+from plant.saved_state import State, Stateful
 from plant.sensors.suite import SensorSuite
 from skills.robot import (
     ArmTrajectory,
@@ -30,6 +32,8 @@ from skills.robot import (
     Odometry,
     Scan,
 )
+
+GoalT = TypeVar("GoalT")
 
 
 class LeaseManager:
@@ -74,7 +78,7 @@ class LeaseManager:
         return f"lease {lease.number} of {lease.holder!r} no longer counts; the lease is held by {holder!r}"
 
 
-class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
+class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     """A robot that senses, keeps the book of its commands, and obeys who holds its lease.
 
     What it keeps are its servos and sensors; commands and leases do not outlive its computer.
@@ -136,6 +140,27 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         return ()
 
     # -- act ------------------------------------------------------------------------------------------------------
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s."""
+        velocity = Velocity(vx, vy, wz)
+        if not all(math.isfinite(value) for value in (vx, vy, wz)):
+            return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
+        reason = self._drive_refusal(velocity)
+        return self._commands.refuse(reason) if reason else self._begin(Part.VELOCITY, velocity, until_s, lease)
+
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Turns the head to a pan (positive to the left) and a tilt (positive looks down)."""
+        head = self._capabilities.head
+        if head is None:
+            return self._commands.refuse("point_head: the robot has no head")
+        (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
+        if not (left <= pan_rad <= right and up <= tilt_rad <= down):
+            return self._commands.refuse(
+                f"point_head: pan {pan_rad:.2f} rad must lie in [{left}, {right}] "
+                f"and tilt {tilt_rad:.2f} rad in [{up}, {down}]"
+            )
+        return self._begin(Part.HEAD, HeadGoal((pan_rad, tilt_rad)), until_s, lease)
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when its end is reached and the arm is still."""
@@ -233,6 +258,10 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
     # -- for the kinds of robots ----------------------------------------------------------------------------------
 
     @abstractmethod
+    def _drive_refusal(self, velocity: Velocity) -> str | None:
+        """Reason why the robot cannot drive at a finite velocity now; None when it can."""
+
+    @abstractmethod
     def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
         """How far the gripper is open, and how fast its fingers move, in the unit of its kind and s."""
 
@@ -256,9 +285,13 @@ class CommandedRobot(Kept, ABC, keeps=("_arm", "_gripper", "_sensors")):
         """Velocities of all joints."""
         return np.asarray(self._plant.GetVelocities(self._context)[self._index.velocities])
 
+    def _goal(self, part: Part, of: type[GoalT]) -> GoalT | None:
+        """Goal of the part's running command, if it is of that class."""
+        active = self._commands.running(part)
+        return active.payload if active is not None and isinstance(active.payload, of) else None
+
     def _follow_arm(self, joints: FloatArray, rates: FloatArray) -> None:
-        active = self._commands.running(Part.ARM)
-        trajectory = active.payload if active is not None and isinstance(active.payload, ArmTrajectory) else None
+        active, trajectory = self._commands.running(Part.ARM), self._goal(Part.ARM, ArmTrajectory)
         elapsed_s = 0.0 if active is None else self._now_s - active.since_s
         if self._arm.follow(trajectory, elapsed_s, joints, rates):
             self._commands.finish(Part.ARM, CommandState.DONE)

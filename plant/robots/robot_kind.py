@@ -1,4 +1,4 @@
-"""The kinds of robots that a plant can hold, each registered as an entry point of the group `errand.robots`."""
+"""Kinds of robots, registered as entry points of the group `errand.robots`, and the robots of a run."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol
 
+import numpy as np
+
 from skills.files.errors import InputError
 from skills.files.plugins import PluginDefect, distribution_of, installed_plugins, run_plugin
-from skills.robot import Capabilities, Pose2D, Robot
+from skills.robot import Capabilities, FloatArray, Pose2D, Robot
 
 if TYPE_CHECKING:
     from pydrake.geometry import CollisionFilterManager, GeometryId, GeometrySet, SceneGraph
@@ -28,6 +30,40 @@ if TYPE_CHECKING:
 GROUP = "errand.robots"
 
 
+@dataclass(frozen=True)
+class LocomotionLimits:
+    """Speeds, accelerations and forces with which a robot moves; each kind of robot has a class of its own."""
+
+
+@dataclass(frozen=True)
+class PlacedRobot:
+    """One robot of a run: its kind, and its poses at the start and at its dock (world frame).
+
+    Without an `own_stack` file it uses the stack of its kind. `start_known` says whether the localiser is given the
+    start. `locomotion` of another class than the kind's counts as none: then the kind's own limits apply. The battery
+    begins at `charge` (0 to 1).
+    """
+
+    name: str
+    kind: str
+    start: Pose2D
+    dock: Pose2D | None = None
+    own_stack: Path | None = None
+    start_known: bool = True
+    locomotion: LocomotionLimits | None = None
+    charge: float = 1.0
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """Capabilities of the robot's kind."""
+        return robot_kind(self.kind).capabilities()
+
+    @property
+    def stack_file(self) -> Path | None:
+        """File of the robot's stack; None for the stack that comes with Errand."""
+        return self.own_stack or robot_kind(self.kind).stack
+
+
 class RobotBody(ABC):
     """One robot's bodies and joints in a plant.
 
@@ -37,8 +73,7 @@ class RobotBody(ABC):
     def __init__(
         self,
         plant: MultibodyPlant,
-        name: str,
-        kind: RobotKind,
+        robot: PlacedRobot,
         urdf: str,
         gains: Mapping[str, tuple[float, float]],
         packages: Mapping[str, Path] = MappingProxyType({}),
@@ -50,13 +85,13 @@ class RobotBody(ABC):
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.tree import PdControllerGains
 
-        self.plant, self.name, self.kind = plant, name, kind
+        self.plant, self.robot, self.name, self.kind = plant, robot, robot.name, robot_kind(robot.kind)
         parser = Parser(plant)
         parser.SetAutoRenaming(True)
         for package, folder in packages.items():
             parser.package_map().Add(package, folder)
         (self.instance,) = parser.AddModelsFromString(urdf, "urdf")
-        plant.RenameModelInstance(self.instance, name)
+        plant.RenameModelInstance(self.instance, robot.name)
         self.body: RigidBody = plant.GetBodyByName("body", self.instance)
         for joint, (p, d) in gains.items():
             plant.GetJointActuatorByName(joint, self.instance).set_controller_gains(PdControllerGains(p=p, d=d))
@@ -65,6 +100,12 @@ class RobotBody(ABC):
     def hand(self) -> RigidBody:
         """The last link of the arm."""
         return self.plant.GetBodyByName(self.kind.gripper_links[0], self.instance)
+
+    def outline_W(self, context: Context) -> FloatArray:
+        """Footprint (K, 2) of the body in the world, from above."""
+        outline_B = np.array(self.kind.capabilities().footprint_m)
+        corners_B = np.column_stack([outline_B, np.zeros(len(outline_B))])
+        return np.asarray(self.plant.EvalBodyPoseInWorld(context, self.body).multiply(corners_B.T).T[:, :2])
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
         """The model instances that make up this robot."""
@@ -82,13 +123,20 @@ class RobotBody(ABC):
         named = (body for body in bodies if body.name().startswith(prefix))
         return [each for body in named for each in self.plant.GetCollisionGeometriesForBody(body)]
 
+    def set_joints(self, context: Context, positions: Mapping[str, float]) -> None:
+        """Sets the positions (rad, m) of joints with one degree of freedom, by their names."""
+        q = self.plant.GetPositions(context)
+        for name, position in positions.items():
+            q[self.plant.GetJointByName(name, self.instance).position_start()] = position
+        self.plant.SetPositions(context, q)
+
     @abstractmethod
-    def place(self, context: Context, pose: Pose2D) -> None:
-        """Sets the robot standing at a pose (world frame) with its arm stowed."""
+    def place(self, context: Context) -> None:
+        """Sets the robot standing at its start with its arm stowed."""
 
     @abstractmethod
     def opening(self, context: Context) -> float:
-        """How far the gripper is open, in the unit of `set_gripper`."""
+        """Opening of the gripper, in the unit of `set_gripper`."""
 
 
 class PlantRobot(Robot, Protocol):
@@ -111,44 +159,27 @@ class PlantRobot(Robot, Protocol):
 
 
 @dataclass(frozen=True)
-class LocomotionLimits:
-    """What bears a robot can do. Each kind of robot has its own, and takes no other's."""
-
-
-@dataclass(frozen=True)
-class BodyOptions:
-    """How a robot is put into a plant: with meshes where they are installed, moved within the limits of its stack."""
-
-    visuals: bool = True
-    carried: bool = True
-    locomotion: LocomotionLimits | None = None
-
-
-@dataclass(frozen=True)
 class SensorOptions:
-    """What the sensors of a robot need.
+    """Inputs of a robot's sensors: the plant's context and scene graph, and the seed of their noise.
 
-    The seed and the robot's name give the noise; without a scene, cameras are blind.
-    The battery begins at `charge` (0 to 1) and charges while the body stands still at `dock`. `work` counts rays cast
-    and pictures rendered.
+    Without a `scene`, cameras are blind. `work` counts rays cast and pictures rendered.
     """
 
     scene_graph: SceneGraph
     context: Context
     seed: int = 0
     scene: Scene | None = None
-    dock: Pose2D | None = None
-    charge: float = 1.0
     work: Counter[str] = field(default_factory=Counter)
 
 
 @dataclass(frozen=True)
 class RobotKind:
-    """A kind of robot: what it can do, how it is put into a plant (before Finalize), and what drives it there.
+    """A kind of robot: its capabilities, and how it is built and driven in a plant.
 
     `gripper_links` are the hand and the fingers; `trunk_links` and `leg_links` those of the body and of legs or wheels:
-    all others are the arm's. `facts` is the file of its numbers, `stack` that of the stack that suits it
-    (None: the default stack).
+    all others are the arm's. `facts` is the file of its numbers, `stack` that of its stack (None: the default stack).
+    `add` puts a robot into a plant before Finalize, with visual meshes or without; `drive` makes its controllers and
+    sensors.
     """
 
     name: str
@@ -157,7 +188,7 @@ class RobotKind:
     leg_links: tuple[str, ...]
     facts: Path
     capabilities: Callable[[], Capabilities]
-    add: Callable[[MultibodyPlant, str, BodyOptions], RobotBody]
+    add: Callable[[MultibodyPlant, PlacedRobot, bool], RobotBody]
     drive: Callable[[RobotBody, SensorOptions], PlantRobot]
     stack: Path | None = None
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from skills.robot import ArmTrajectory, FloatArray
 
 Indices = NDArray[np.int64]
@@ -84,7 +84,7 @@ class Closing(enum.Enum):
     BLOCKED = "blocked"
 
 
-class GripperServo(Kept, keeps=("goal", "_before", "_still_s")):
+class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
     """The present goal of one gripper, and the one before."""
 
     def __init__(self, opening: float, tolerances: GripperTolerances) -> None:
@@ -113,6 +113,11 @@ class GripperServo(Kept, keeps=("goal", "_before", "_still_s")):
             self.goal = self._before
 
 
+def clip(value: float, most: float) -> float:
+    """The value, cut to [-most, most]."""
+    return min(max(value, -most), most)
+
+
 def gripper_set_point(goal: float, now: float, lead: float) -> float:
     """Position that a servo is given so that it pushes with no more than its gain times `lead`."""
     return min(max(goal, now - lead), now + lead)
@@ -123,7 +128,7 @@ _STILL_RAD_S = 0.06
 _TRAJECTORY_START_RAD = 0.25
 
 
-class ArmServos(Kept, keeps=("goal_rad",)):
+class ArmServos(Stateful, saved=("goal_rad",)):
     """Set points of one arm's joints."""
 
     def __init__(self, joints: ActuatedJoints, now_rad: FloatArray) -> None:

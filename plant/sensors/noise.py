@@ -14,11 +14,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from skills.robot import Intrinsics
 
 
-class NoisySensor(Kept, keeps=("noise",)):
+class NoisySensor(Stateful, saved=("noise",)):
     """A sensor of one robot."""
 
     def __init__(self, rng: np.random.Generator) -> None:

@@ -59,7 +59,7 @@ class ImuNoise:
     accelerometer_m_s2: float = 0.05
 
 
-class ImuModel(NoisySensor, keeps=("_last",)):
+class ImuModel(NoisySensor, saved=("_last",)):
     """The IMU of one robot; acceleration comes from the change of velocity between two updates."""
 
     def __init__(self, rng: np.random.Generator, noise: ImuNoise | None = None) -> None:
@@ -104,7 +104,7 @@ class BatterySpec:
     charge_s: float = 300.0
 
 
-class BatteryModel(NoisySensor, keeps=("_charge", "_stamp_s")):
+class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
     """The battery of one robot."""
 
     def __init__(self, rng: np.random.Generator, charge: float = 1.0, spec: BatterySpec | None = None) -> None:
@@ -164,7 +164,7 @@ class _Last:
     estimate: Pose2D
 
 
-class OdometryModel(NoisySensor, keeps=("_last",)):
+class OdometryModel(NoisySensor, saved=("_last",)):
     """Odometry of one robot. `odom` (O) lies on the floor under the body at the first update."""
 
     def __init__(self, rng: np.random.Generator, noise: OdometryNoise | None = None) -> None:
@@ -253,7 +253,7 @@ class GripperNoise:
     holding_after_s: float = 0.15
 
 
-class GripperModel(NoisySensor, keeps=("_holding", "_changing_since_s")):
+class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
     """The gripper of one robot."""
 
     def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:

@@ -16,7 +16,7 @@ from pydrake.multibody.tree import RigidBody
 from plant.rendering import RENDERER
 from plant.robots.robot_kind import RobotBody, SensorOptions
 from plant.robots.servos import ActuatedJoints
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import CameraSpec
 from plant.sensors.lidar import Lidar, LidarSpec
@@ -46,9 +46,9 @@ class LidarMount:
 
 
 class SensorSuite(
-    Kept,
+    Stateful,
     ABC,
-    keeps=("_odometry_model", "_imu_model", "_joint_model", "_gripper_model", "_battery_model", "_lidar", "_cameras"),
+    saved=("_odometry_model", "_imu_model", "_joint_model", "_gripper_model", "_battery_model", "_lidar", "_cameras"),
 ):
     """All sensors of one robot. Pictures are taken when asked for; `update` takes the readings, which are attributes.
 
@@ -68,14 +68,14 @@ class SensorSuite(
     ) -> None:
         """Cameras sit on links of the body."""
         self._body, self._index = body, joints
-        self._dock, self._scene, self._context = options.dock, options.scene, options.context
+        self._dock, self._scene, self._context = body.robot.dock, options.scene, options.context
         self._kinematics = body.plant.CreateDefaultContext()
         rngs = _generators(options.seed, body.name)
         self._odometry_model = OdometryModel(next(rngs))
         self._imu_model = ImuModel(next(rngs))
         self._joint_model = JointModel(next(rngs), joints.names)
         self._gripper_model = GripperModel(next(rngs), gripper_noise)
-        self._battery_model = BatteryModel(next(rngs), options.charge, BatterySpec(runtime_s=runtime_s))
+        self._battery_model = BatteryModel(next(rngs), body.robot.charge, BatterySpec(runtime_s=runtime_s))
         self._lidar_period_s = lidar.period_s
         self._lidar = Lidar(
             body.plant,

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from executive.run.worker import LockStepWorker
+from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.worlds.world import World
 from skills.api import Failed, PlanningError, Running, SkillContext
@@ -97,8 +98,8 @@ class Driver:
     """One Spot at the start of a world. `maps` are the scan and the keep-out grid that it is given."""
 
     def __init__(self, world: World, stack: RobotStack, maps: tuple[GridMap, GridMap], *, seed: int) -> None:
-        starts = {ROBOT: world.start}
-        self.simulation = Simulation(world, seed=seed, visuals=False, starts=starts, robots={ROBOT: "spot"})
+        robots = [PlacedRobot(ROBOT, "spot", world.start, world.dock)]
+        self.simulation = Simulation(world, seed=seed, visuals=False, robots=robots)
         self.planner, self.controller = Clocked(stack.planner, "problem"), Clocked(stack.controller, "build")
         options = stack.skills.get("navigate") or NavigateOptions()
         blind = replace(options, low_obstacles=WatchOptions(period_s=86_400.0))

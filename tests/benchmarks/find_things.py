@@ -33,9 +33,10 @@ from errand_train.dataset.views import View, camera_specs
 from executive.app.placed_robots import shared_detector
 from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.rendering import render_parameters
+from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import spot_capabilities
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from skills.api import Detection, Detector, Surface
@@ -118,13 +119,15 @@ def in_flat(seed: int, number: int) -> Iterator[Asked]:
     objects = list(scattered(rng, models, surface, pose))
     loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(objects)]
     built = build_diagram(
-        directives=world.directives_path,
-        models=loose,
-        robots={"Alice": "spot"},
-        visuals=False,
-        renderer_parameters=render_parameters(),
+        DiagramConfig(
+            directives=world.directives_path,
+            models=loose,
+            robots=[PlacedRobot("Alice", "spot", pose)],
+            visuals=False,
+            renderer_parameters=render_parameters(),
+        )
     )
-    engine = Engine(built, {"Alice": pose}, seed=seed * 1000 + number)
+    engine = Engine(built, seed=seed * 1000 + number)
     bench = SkillBench(
         engine.robots["Alice"],
         engine,

@@ -42,7 +42,7 @@ from errand_train.dataset.views import (
     roll_deg,
 )
 from executive.app.worlds import knowledge_of, open_world
-from plant.diagram import LooseModel, WorldDiagram, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, WorldDiagram, build_diagram
 from plant.rendering import RENDERER, render_parameters
 from plant.scene_pictures import look_at
 from plant.sensors.camera_spec import colour_render_camera
@@ -118,11 +118,12 @@ def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Sup
     objects = [*_on_surfaces(rng, world, supply, bare=bare), *(() if bare else _on_the_floor(rng, free, supply))]
     loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(objects)]
     built = build_diagram(
-        directives=world.directives_path,
-        models=loose,
-        robots={},
-        visuals=False,
-        renderer_parameters=render_parameters(),
+        DiagramConfig(
+            directives=world.directives_path,
+            models=loose,
+            visuals=False,
+            renderer_parameters=render_parameters(),
+        )
     )
     assert built.scene is not None
     query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))

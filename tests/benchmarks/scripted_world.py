@@ -14,10 +14,9 @@ from pydrake.math import RigidTransform
 from executive.run.mission_history import is_speech
 from executive.run.outcome import RobotResult
 from executive.tree.compiler import CompiledTree, StepPart
-from executive.words.goal import GoalCondition, GoalKind, When
+from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.outlines import inside
-from plant.referee import Verdict
 from plant.referee.judge import LOOKS_AT_DOOR_S, judge
 from plant.referee.object_history import ObjectHistory, ObjectSample
 from plant.referee.truth import TimedPath, Truth, extend, note_stay
@@ -246,7 +245,7 @@ class ScriptedWorld:
                 note_stay(self.given.setdefault((name, history.on_tray_of), []), now_s)
         extend(self.path, np.array([*self.robot_W, 0.5]), now_s)
 
-    def judge(self, conditions: Sequence[GoalCondition], now_s: float) -> Verdict:
+    def judge(self, conditions: Sequence[GoalCondition], now_s: float) -> RefereeReport:
         """The referee's verdict."""
         people = {name: TimedPath(np.array([[*p_W, 0.9, 0.0]])) for name, p_W in PEOPLE.items()}
         robots = {"Alice": TimedPath(np.array(self.path))}

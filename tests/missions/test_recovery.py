@@ -23,6 +23,7 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from plant.diagram import LooseModel
+from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.description import HAND_LINK
 from plant.simulation import Simulation
 from skills.faults.faulty_robot import with_faults
@@ -55,7 +56,7 @@ class FlatMission:
         self.tree = compile_mission(
             Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )
-        self.simulation = Simulation(self.world, seed=seed, robots={"Alice": "spot"}, visuals=False, **plant)
+        self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
         self.entry = run_entry(self.simulation, self.world, self.tree)
         self.transitions: list[dict[str, Any]] = []
         self.seed = seed
@@ -180,7 +181,9 @@ def test_what_falls_on_the_way_is_noticed_at_once_picked_up_from_the_floor_and_b
 
 @pytest.mark.nightly
 def test_a_low_battery_is_charged_in_between_and_the_mission_goes_on():
-    mission = FlatMission(("Take [Nothing] to [workshop] and do [find] to [hammer]",), charge=0.153)
+    flat = open_world("flat")
+    nearly_empty = PlacedRobot("Alice", "spot", flat.start, flat.dock, charge=0.153)
+    mission = FlatMission(("Take [Nothing] to [workshop] and do [find] to [hammer]",), robots=[nearly_empty])
     charges = []
     battery = mission.entry.robot.battery
     result, verdict = mission.run(observer=lambda progress: charges.append(battery().charge))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from executive.words.mission import Route
+from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_people
 from plant.worlds.world import DoorRule, MoveRule, SurfaceTop, WorldError, load_world
@@ -18,9 +19,8 @@ DOOR = DoorRule(name="door", at=AT, yaw=math.pi, width=0.9, closes=1.0, opens=5.
 
 
 def simulated(*, doors=(DOOR,), moves=(), start=None, seed=1):
-    return Simulation(
-        FLAT.with_events(doors, moves), seed=seed, visuals=False, starts={} if start is None else {"Alice": start}
-    )
+    robots = [PlacedRobot("Alice", "spot", start or FLAT.start, FLAT.dock)]
+    return Simulation(FLAT.with_events(doors, moves), seed=seed, visuals=False, robots=robots)
 
 
 def panel_W(simulation):
@@ -134,7 +134,7 @@ def test_doors_and_moves_go_on_after_a_restart(tmp_path):
 def test_somebody_who_stands_sets_off_from_there():
     world = FLAT.with_walks({"Robin": Route(waypoints=((9.5, 3.0),), start=1.0)})
     (stands,) = place_people(FLAT, seed=1)
-    simulation = Simulation(world, seed=1, visuals=False, starts={"Alice": Pose2D(4.0, 4.5, 0.0)})
+    simulation = Simulation(world, seed=1, visuals=False, robots=[PlacedRobot("Alice", "spot", Pose2D(4.0, 4.5, 0.0))])
     ((x, y),) = simulation.engine.walkers.places_W()
     assert (x, y) == pytest.approx(tuple(stands.X_WO.translation()[:2]))
     simulation.clock.advance(4.0)

@@ -10,10 +10,11 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import PrismaticJoint, RevoluteJoint, SpatialInertia
 from pydrake.systems.analysis import Simulator
 
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.loose_objects import FASTEST_SPIN_RAD_S, Carried, arc_m
 from plant.models.catalogue import load_catalogue
+from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
 
 SHELF = """<sdf version="1.9"><model name="shelf"><static>false</static><link name="shelf">
@@ -44,13 +45,15 @@ def stage(tmp_path):
     def make(seconds=1.5, robots=None, **places_W):
         models = [LooseModel(name, tmp_path / "block.sdf", RigidTransform(p_W)) for name, p_W in places_W.items()]
         built = build_diagram(
-            directives=tmp_path / "world.dmd.yaml",
-            models=models,
-            robots=dict.fromkeys(robots or {}, "spot"),
-            visuals=False,
-            render=False,
+            DiagramConfig(
+                directives=tmp_path / "world.dmd.yaml",
+                models=models,
+                robots=[PlacedRobot(name, "spot", start) for name, start in (robots or {}).items()],
+                visuals=False,
+                render=False,
+            )
         )
-        engine = Engine(built, robots or {})
+        engine = Engine(built)
         engine.advance(seconds)
         return engine
 
@@ -229,7 +232,7 @@ def test_a_can_that_is_wrung_out_of_the_fingers_over_a_table_is_not_hurled_away(
         LooseModel("table", path, RigidTransform(), fixed=True),
         LooseModel("can", can.path(), RigidTransform([0.0, 0.0, 0.5])),
     ]
-    engine = Engine(build_diagram(directives=None, models=models, robots={}, render=False), {})
+    engine = Engine(build_diagram(DiagramConfig(models=models, render=False)))
     plant, context = engine.world.plant, engine.context
     body = plant.GetBodyByName("coke", engine.world.models["can"])
     engine.advance(steps_before * DT_S)

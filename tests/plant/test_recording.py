@@ -3,16 +3,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from plant.diagram import build_diagram
+from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
 from plant.recording import Frame, Recorder, save_html, thinned
+from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
 
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
-    return Engine(world, {"Alice": Pose2D(0, 0, 0)})
+    world = build_diagram(
+        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0, 0, 0))], visuals=False, render=False)
+    )
+    return Engine(world)
 
 
 def test_frames_come_at_the_recorders_rate_and_are_found_by_time(engine):

@@ -8,9 +8,10 @@ from pydrake.multibody.parsing import LoadModelDirectives, ProcessModelDirective
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.diagram import build_diagram, parser_of
+from plant.diagram import DiagramConfig, build_diagram, parser_of
 from plant.engine import Engine
 from plant.referee import Referee
+from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
@@ -53,7 +54,7 @@ def shapes(plant, scene_graph):
 
 def test_every_shape_of_the_flat_stands_where_the_directives_put_it():
     world = load_world("flat")
-    built = build_diagram(directives=world.directives_path, models=[], robots={}, render=False)
+    built = build_diagram(DiagramConfig(directives=world.directives_path, render=False))
     plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     ProcessModelDirectives(LoadModelDirectives(world.directives_path), parser_of(plant))
     plant.Finalize()
@@ -63,7 +64,7 @@ def test_every_shape_of_the_flat_stands_where_the_directives_put_it():
 
 
 def test_a_model_with_a_part_that_moves_stays_a_model(directives):
-    built = build_diagram(directives=directives, models=[], robots={}, render=False)
+    built = build_diagram(DiagramConfig(directives=directives, render=False))
     assert {*built.scenery.values()} == {"north_wall"}
     hinge = built.plant.GetJointByName("hinge", built.plant.GetModelInstanceByName("cupboard"))
     assert built.plant.num_positions() == hinge.num_positions() == 1
@@ -73,8 +74,15 @@ def test_a_model_with_a_part_that_moves_stays_a_model(directives):
 
 
 def test_a_bump_into_scenery_names_the_piece(directives):
-    built = build_diagram(directives=directives, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
-    engine = Engine(built, {"Alice": Pose2D(0.0, 0.0, 0.0)})
+    built = build_diagram(
+        DiagramConfig(
+            directives=directives,
+            robots=[PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))],
+            visuals=False,
+            render=False,
+        )
+    )
+    engine = Engine(built)
     referee = Referee(built.plant, [], robots={"Alice": SPOT}, scenery=built.scenery)
     engine.observe(lambda now_s: referee.observe(engine.context, now_s), every=5)
     robot = engine.robots["Alice"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
@@ -9,9 +10,9 @@ from skills.robot import Pose2D
 
 def test_a_crash_of_two_robots_is_one_contact_between_them() -> None:
     """Alice drives into Bob, who stands, and stays there."""
-    starts = {"Alice": Pose2D(2.0, 4.5, 0.0), "Bob": Pose2D(2.95, 4.5, 3.14)}
-    robots = {"Alice": "spot", "Bob": "fetch"}
-    simulation = Simulation(load_world("flat"), seed=1, visuals=False, robots=robots, starts=starts)
+    alice, bob = Pose2D(2.0, 4.5, 0.0), Pose2D(2.95, 4.5, 3.14)
+    robots = [PlacedRobot("Alice", "spot", alice), PlacedRobot("Bob", "fetch", bob)]
+    simulation = Simulation(load_world("flat"), seed=1, visuals=False, robots=robots)
     alice = simulation.robots["Alice"]
     lease = alice.acquire_lease("test")
     for _ in range(20):

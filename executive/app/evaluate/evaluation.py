@@ -25,12 +25,13 @@ from executive.app.checker import prepare_checked
 from executive.app.evaluate.results import Case, Evaluated, Evaluation, Evidence, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
 from executive.app.mission_run import return_memory, run_request
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.mission.request import Request
 from executive.record.history import Event, read_events, timeline
 from executive.record.schemas import TRANSITIONS, TREE
 from executive.tree.node_view import logged_view
 from executive.view.map_picture import map_picture
+from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION
 from skills.files.errors import InputError, Problems
 

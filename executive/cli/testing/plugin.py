@@ -91,6 +91,7 @@ def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     from executive.app.placed_robots import shared_detector
     from executive.testing.bench import SkillBench
     from executive.testing.small_room import write_small_room
+    from plant.robots.robot_kind import PlacedRobot
     from plant.simulation import Simulation
     from plant.worlds.world import load_world
     from skills.estimate.costmap import LayeredCostmap
@@ -98,7 +99,7 @@ def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
     from skills.estimate.localiser import ScanMatchingLocaliser
 
     world = load_world(write_small_room(folder, can=can))
-    simulation = Simulation(world, seed=1, robots={_ROBOT: "spot"}, visuals=False)
+    simulation = Simulation(world, seed=1, robots=[PlacedRobot(_ROBOT, "spot", world.start, world.dock)], visuals=False)
     bench = SkillBench(
         simulation.robots[_ROBOT],
         simulation.clock,

@@ -23,8 +23,7 @@ from plant.robots.fetch.description import (
     fetch_urdf,
     head_camera,
 )
-from plant.robots.fetch.wheels import WheelLimits
-from plant.robots.robot_kind import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.robots.robot_kind import PlacedRobot, PlantRobot, RobotBody, RobotKind, SensorOptions
 from skills.robot import (
     ArmCapabilities,
     BaseKind,
@@ -104,19 +103,18 @@ def _round(radius_m: float) -> tuple[tuple[float, float], ...]:
     return tuple((out_m * math.cos(a), out_m * math.sin(a)) for a in angles)
 
 
-def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
+def _add(plant: MultibodyPlant, robot: PlacedRobot, visuals: bool) -> RobotBody:
     from plant.robots.fetch.model import FetchModel
 
-    limits = options.locomotion if isinstance(options.locomotion, WheelLimits) else WheelLimits()
-    return FetchModel(plant, name, kind=FETCH, limits=limits)
+    return FetchModel(plant, robot)
 
 
 def _drive(body: RobotBody, options: SensorOptions) -> PlantRobot:
     from plant.robots.fetch.model import FetchModel
-    from plant.robots.fetch.robot import FetchRobot, FetchSensors
+    from plant.robots.fetch.robot import FetchRobot
 
     assert isinstance(body, FetchModel)
-    return FetchRobot(body, FetchSensors(body, options), options.context)
+    return FetchRobot(body, options)
 
 
 FETCH = RobotKind(

@@ -18,9 +18,8 @@ from plant.robots.fetch.description import (
     fetch_urdf,
 )
 from plant.robots.fetch.wheels import WheelLimits
-from plant.robots.robot_kind import RobotBody, RobotKind
+from plant.robots.robot_kind import PlacedRobot, RobotBody
 from plant.robots.servos import ActuatedJoints
-from skills.robot import Pose2D
 
 FINGER_GAIN_N_M = 2e4
 _GAINS = {
@@ -41,35 +40,25 @@ _GAINS = {
 class FetchModel(RobotBody):
     """Fetch's bodies and joints in a plant. It stands on its wheels and casters; its fingers are geared together."""
 
-    def __init__(self, plant: MultibodyPlant, name: str, *, kind: RobotKind, limits: WheelLimits) -> None:
+    def __init__(self, plant: MultibodyPlant, robot: PlacedRobot) -> None:
         """Adds the robot to `plant` (before Finalize)."""
-        super().__init__(plant, name, kind, fetch_urdf(), _GAINS)
-        self.limits, self.base = limits, plant.GetBodyByName(BASE_LINK, self.instance)
+        super().__init__(plant, robot, fetch_urdf(), _GAINS)
+        self.limits = robot.locomotion if isinstance(robot.locomotion, WheelLimits) else WheelLimits()
+        self.base = plant.GetBodyByName(BASE_LINK, self.instance)
         left, right = (plant.GetJointByName(finger, self.instance) for finger in FINGERS)
         plant.AddCouplerConstraint(left, right, 1.0)
 
     def opening(self, context: Context) -> float:
-        """How far the fingers are apart (m)."""
+        """Distance between the fingers (m)."""
         positions = self.plant.GetPositions(context)
-        return sum(float(positions[self._place(finger)]) for finger in FINGERS)
+        joints = (self.plant.GetJointByName(finger, self.instance) for finger in FINGERS)
+        return sum(float(positions[joint.position_start()]) for joint in joints)
 
-    def index(self) -> JointIndex:
-        """Where the joints stand in the plant's state and in the instance's actuation; after Finalize."""
-        return JointIndex(self.plant, self.instance)
-
-    def place(self, context: Context, pose: Pose2D) -> None:
-        """Sets the robot on its wheels at a pose, the torso as for travelling and the arm stowed."""
+    def place(self, context: Context) -> None:
+        """Sets the robot on its wheels at its start, the torso at its height for travelling and the arm stowed."""
         facts = fetch_facts()
-        angles = {**facts["stowed"], LIFT_JOINT: facts["capabilities"]["travelling_lift"]}
-        positions = self.plant.GetPositions(context)
-        for name, position in angles.items():
-            positions[self._place(name)] = position
-        self.plant.SetPositions(context, positions)
-        self.plant.SetFreeBodyPose(context, self.base, pose.transform())
-
-    def _place(self, joint: str) -> int:
-        """Where a joint stands in the plant's positions; after Finalize."""
-        return int(self.plant.GetJointByName(joint, self.instance).position_start())
+        self.set_joints(context, {**facts["stowed"], LIFT_JOINT: facts["capabilities"]["travelling_lift"]})
+        self.plant.SetFreeBodyPose(context, self.base, self.robot.start.transform())
 
 
 class JointIndex(ActuatedJoints):

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
-from pydrake.systems.framework import Context
 
-from plant.robots.command_table import Part
+from plant.robots.command_table import HeadGoal, Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.fetch.description import (
     HAND_LINK,
@@ -42,29 +41,24 @@ def axle() -> Axle:
     return Axle(wheel["radius"], wheel["offset"][1])
 
 
-class FetchSensors(SensorSuite, keeps=("_odometer",)):
+class FetchSensors(SensorSuite, saved=("_odometer",)):
     """All sensors of one Fetch."""
 
-    def __init__(self, model: FetchModel, options: SensorOptions) -> None:
+    def __init__(self, model: FetchModel, joints: JointIndex, options: SensorOptions) -> None:
         """`options.context` is the plant's."""
-        self._joints = model.index()
-        facts = fetch_facts()
+        self._joints, facts = joints, fetch_facts()
         self._p_BaseL = np.array(facts["lidar"]["xyz"])
-        self._odometer = WheelOdometer(axle(), self._wheels_rad(model, options))
-        self._context = options.context
+        wheels_rad = model.plant.GetPositions(options.context)[joints.positions[joints.wheels]]
+        self._odometer = WheelOdometer(axle(), np.asarray(wheels_rad, dtype=np.float64))
         super().__init__(
             model,
-            self._joints,
+            joints,
             options,
             lidar=LidarMount(model.base, RigidTransform(self._p_BaseL), lidar_spec(), 1.0 / facts["lidar"]["rate"]),
             cameras={HEAD_CAMERA: head_camera()},
             runtime_s=facts["capabilities"]["runtime"],
             gripper_noise=_GRIPPER_NOISE,
         )
-
-    def _wheels_rad(self, model: FetchModel, options: SensorOptions) -> FloatArray:
-        positions = model.plant.GetPositions(options.context)
-        return np.asarray(positions[self._joints.positions[self._joints.wheels]], dtype=np.float64)
 
     def count_wheels(self, wheels_rad: FloatArray) -> None:
         """Takes in where the wheels (2,) are: encoders count faster than readings are asked for."""
@@ -120,32 +114,21 @@ _HEAD_SPEED_SHARE = 0.8
 
 
 @dataclass(frozen=True)
-class _Wanted:
-    """A velocity of the base: m/s ahead, rad/s."""
-
-    speed_m_s: float
-    turn_rate_rad_s: float
-
-
-@dataclass(frozen=True)
-class _HeadGoal:
-    angles_rad: tuple[float, float]
-
-
-@dataclass(frozen=True)
 class _LiftGoal:
     height_m: float
 
 
-class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head_goal", "_lift", "_lift_goal")):
+class FetchRobot(CommandedRobot, saved=("_fingers_m", "_wheels", "_head", "_head_goal", "_lift", "_lift_goal")):
     """One Fetch: takes commands under a lease and turns them into set points of the plant's servos."""
 
     _index: JointIndex
 
-    def __init__(self, model: FetchModel, sensors: FetchSensors, context: Context) -> None:
-        """Takes over the robot as it stands in the plant's `context` at time 0."""
-        super().__init__(model, model.index(), sensors, context, _GRIPPER_TOLERANCES)
-        self._encoders, index, joints = sensors, self._index, self._joints()
+    def __init__(self, model: FetchModel, options: SensorOptions) -> None:
+        """Takes over the robot at the state of `options.context`, at time 0."""
+        index = JointIndex(model.plant, model.instance)
+        self._encoders = FetchSensors(model, index, options)
+        super().__init__(model, index, self._encoders, options.context, _GRIPPER_TOLERANCES)
+        joints = self._joints()
         self._fingers_m = joints[index.fingers]
         self._wheels = WheelServos(axle(), joints[index.wheels], model.limits)
         self._head = self._head_goal = joints[index.head]
@@ -156,14 +139,6 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
         self._finger_m_s = facts["finger"]["velocity"]
 
     # -- act ------------------------------------------------------------------------------------------------------
-
-    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Drives at a speed ahead (m/s) and a turn rate (rad/s) until the clock reads until_s; never sideways."""
-        if not all(math.isfinite(value) for value in (vx, vy, wz)):
-            return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
-        if vy != 0.0:
-            return self._commands.refuse(f"drive: two wheels cannot drive sideways, as {vy:.2f} m/s asks for")
-        return self._begin(Part.VELOCITY, _Wanted(vx, wz), until_s, lease)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Lifts the torso until the body frame is at a height above the floor; it does not pitch."""
@@ -182,19 +157,12 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
             self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot lowers its torso")
         return command
 
-    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turns the head to a pan (positive to the left) and a tilt (positive looks down)."""
-        head = self._capabilities.head
-        assert head is not None
-        (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
-        if not (left <= pan_rad <= right and up <= tilt_rad <= down):
-            return self._commands.refuse(
-                f"point_head: pan {pan_rad:.2f} rad must lie in [{left}, {right}] "
-                f"and tilt {tilt_rad:.2f} rad in [{up}, {down}]"
-            )
-        return self._begin(Part.HEAD, _HeadGoal((pan_rad, tilt_rad)), until_s, lease)
-
     # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _drive_refusal(self, velocity: Velocity) -> str | None:
+        if velocity.vy == 0.0:
+            return None
+        return f"drive: two wheels cannot drive sideways, as {velocity.vy:.2f} m/s asks for"
 
     def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
         fingers = self._index.fingers
@@ -220,24 +188,22 @@ class FetchRobot(CommandedRobot, keeps=("_fingers_m", "_wheels", "_head", "_head
             self._head_goal = self._head
 
     def _follow_drive(self, joints: FloatArray, dt_s: float) -> None:
-        active = self._commands.running(Part.VELOCITY)
-        wanted = active.payload if active is not None and isinstance(active.payload, _Wanted) else _Wanted(0.0, 0.0)
-        velocity = (wanted.speed_m_s, wanted.turn_rate_rad_s)
-        self._wheels.follow(velocity, joints[self._index.wheels], dt_s, stopping=active is None)
+        wanted, wheels_rad = self._goal(Part.VELOCITY, Velocity), joints[self._index.wheels]
+        self._wheels.follow(wanted or Velocity(), wheels_rad, dt_s, stopping=wanted is None)
 
     def _follow_lift(self, joints: FloatArray) -> None:
-        active = self._commands.running(Part.POSTURE)
-        if active is None or not isinstance(active.payload, _LiftGoal):
+        goal = self._goal(Part.POSTURE, _LiftGoal)
+        if goal is None:
             return
-        self._lift_goal = active.payload.height_m - self._lift_down_m
+        self._lift_goal = goal.height_m - self._lift_down_m
         if abs(float(joints[self._index.lift]) - self._lift_goal) < _LIFT_ARRIVED_M:
             self._commands.finish(Part.POSTURE, CommandState.DONE)
 
     def _follow_head(self, joints: FloatArray, rates: FloatArray) -> None:
-        active, head = self._commands.running(Part.HEAD), self._index.head
-        if active is None or not isinstance(active.payload, _HeadGoal):
+        goal, head = self._goal(Part.HEAD, HeadGoal), self._index.head
+        if goal is None:
             return
-        self._head_goal = np.array(active.payload.angles_rad)
+        self._head_goal = np.array(goal.angles_rad)
         there = float(np.abs(joints[head] - self._head_goal).max()) < _HEAD_ARRIVED_RAD
         if there and float(np.abs(rates[head]).max()) < _HEAD_STILL_RAD_S:
             self._commands.finish(Part.HEAD, CommandState.DONE)

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from plant.robots.command_table import Velocity
 from plant.robots.robot_kind import LocomotionLimits
-from plant.saved_state import Kept
+from plant.robots.servos import clip
+from plant.saved_state import Stateful
 from skills.robot import FloatArray, Pose2D, quantities
 
 _MEAN_AHEAD = 0.75
@@ -49,7 +51,7 @@ class Axle:
         return (left_m + right_m) / 2.0, (right_m - left_m) / (2.0 * self.half_track_m)
 
 
-class WheelServos(Kept, keeps=("_speed", "_turn_rate", "_due_rad")):
+class WheelServos(Stateful, saved=("_speed", "_turn_rate", "_due_rad")):
     """Set points of the wheels for a wanted velocity; at rest they hold the wheels where they are."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
@@ -58,20 +60,20 @@ class WheelServos(Kept, keeps=("_speed", "_turn_rate", "_due_rad")):
         self._speed = self._turn_rate = 0.0
         self.goal_rad, self.rate_rad_s, self._due_rad = now_rad.copy(), np.zeros(2), now_rad.copy()
 
-    def follow(self, wanted: tuple[float, float], now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
-        """Sets the wheels for the next dt_s: ramp to a speed (m/s) and a turn rate (rad/s), faster when stopping."""
+    def follow(self, wanted: Velocity, now_rad: FloatArray, dt_s: float, *, stopping: bool) -> None:
+        """Sets the wheels for the next dt_s: ramps to the wanted speed ahead and turn rate, faster when `stopping`."""
         limits = self._limits
         most = limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2
         turn = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
-        self._speed += _cut(_cut(wanted[0], limits.speed_m_s) - self._speed, most * dt_s)
-        self._turn_rate += _cut(_cut(wanted[1], limits.turn_rate_rad_s) - self._turn_rate, turn * dt_s)
+        self._speed += clip(clip(wanted.vx, limits.speed_m_s) - self._speed, most * dt_s)
+        self._turn_rate += clip(clip(wanted.wz, limits.turn_rate_rad_s) - self._turn_rate, turn * dt_s)
         self.rate_rad_s = self._axle.rates(self._speed, self._turn_rate)
         self._due_rad = now_rad + np.clip(self._due_rad - now_rad, -limits.lead_rad, limits.lead_rad)
         self.goal_rad = self._due_rad + _MEAN_AHEAD * self.rate_rad_s * dt_s
         self._due_rad = self._due_rad + self.rate_rad_s * dt_s
 
 
-class WheelOdometer(Kept, keeps=("pose", "_last_rad")):
+class WheelOdometer(Stateful, saved=("pose", "_last_rad")):
     """The base's pose since the beginning, as its wheels' encoders count it: slip goes unnoticed."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray) -> None:
@@ -89,8 +91,3 @@ class WheelOdometer(Kept, keeps=("pose", "_last_rad")):
             self.pose.y_m + way_m * math.sin(middle),
             math.remainder(self.pose.yaw_rad + turn_rad, math.tau),
         )
-
-
-def _cut(value: float, most: float) -> float:
-    """The value, cut to [-most, most]."""
-    return min(max(value, -most), most)

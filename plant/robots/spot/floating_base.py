@@ -27,8 +27,10 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
+from plant.robots.command_table import Velocity
 from plant.robots.robot_kind import LocomotionLimits
-from plant.saved_state import Kept
+from plant.robots.servos import clip
+from plant.saved_state import Stateful
 from skills.robot import FloatArray, Pose2D, quantities
 
 
@@ -51,28 +53,17 @@ class FloatingBaseLimits(LocomotionLimits):
     lead_m: quantities.Length = 0.02
 
 
-@dataclass(frozen=True)
-class Velocity:
-    """A planar velocity in the body frame: m/s, m/s, rad/s."""
-
-    vx: float = 0.0
-    vy: float = 0.0
-    wz: float = 0.0
-
-
 _AXES = ("x", "y", "yaw", "height", "pitch")
 _GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3e3), "pitch": (8e3, 4e2)}
 
 
-class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
+class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
     """Bears one robot's body and drives it to a velocity and a posture with limited force and acceleration."""
 
-    def __init__(
-        self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits | None = None
-    ) -> None:
+    def __init__(self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits) -> None:
         """Adds the joints to `plant` (before Finalize) and weld `body` to the last of them."""
         self._plant = plant
-        self._limits = limits or FloatingBaseLimits()
+        self._limits = limits
         self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
         self._joints = self._add_joints(name, body)
         self._velocity = Velocity()
@@ -165,9 +156,9 @@ class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
         c, s = math.cos(state[2]), math.sin(state[2])
         rates = (c * v.vx - s * v.vy, s * v.vx + c * v.vy, v.wz)
         planar = zip(self._target[:3], rates, state[:3], strict=True)
-        ahead = [now + _clip(target + rate * dt_s - now, limits.lead_m) for target, rate, now in planar]
+        ahead = [now + clip(target + rate * dt_s - now, limits.lead_m) for target, rate, now in planar]
         most = (limits.posture_speed_m_s * dt_s, limits.pitch_rate_rad_s * dt_s)
-        move = [_clip(goal - now, step) for goal, now, step in zip(posture, self._posture, most, strict=True)]
+        move = [clip(goal - now, step) for goal, now, step in zip(posture, self._posture, most, strict=True)]
         self._posture = (self._posture[0] + move[0], self._posture[1] + move[1])
         self._target = [*ahead, *self._posture]
         desired = np.array([*self._target, *rates, move[0] / dt_s, move[1] / dt_s])
@@ -182,10 +173,5 @@ class FloatingBase(Kept, keeps=("_velocity", "_target", "_posture")):
         most = (limits.stop_deceleration_m_s2 if stopping else limits.acceleration_m_s2) * dt_s
         share = min(1.0, most / size) if size else 0.0
         turn_rate = limits.stop_turn_deceleration_rad_s2 if stopping else limits.turn_acceleration_rad_s2
-        turn = _clip(_clip(wanted.wz, limits.turn_rate_rad_s) - now.wz, turn_rate * dt_s)
+        turn = clip(clip(wanted.wz, limits.turn_rate_rad_s) - now.wz, turn_rate * dt_s)
         return Velocity(now.vx + share * change_x, now.vy + share * change_y, now.wz + turn)
-
-
-def _clip(value: float, most: float) -> float:
-    """The value, cut to [-most, most]."""
-    return min(max(value, -most), most)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from plant.robots.robot_kind import BodyOptions, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.robots.robot_kind import PlacedRobot, PlantRobot, RobotBody, RobotKind, SensorOptions
 from plant.robots.spot.description import (
     CAMERAS,
     FACTS,
@@ -65,20 +65,18 @@ def _mount(link: str) -> Mount:
     return Mount.BODY if link == "body" else Mount.HAND
 
 
-def _add(plant: MultibodyPlant, name: str, options: BodyOptions) -> RobotBody:
-    from plant.robots.spot.floating_base import FloatingBaseLimits
+def _add(plant: MultibodyPlant, robot: PlacedRobot, visuals: bool) -> RobotBody:
     from plant.robots.spot.model import SpotModel
 
-    limits = options.locomotion if isinstance(options.locomotion, FloatingBaseLimits) else None
-    return SpotModel(plant, name, kind=SPOT, visuals=options.visuals, carried=options.carried, limits=limits)
+    return SpotModel(plant, robot, visuals)
 
 
 def _drive(body: RobotBody, options: SensorOptions) -> PlantRobot:
     from plant.robots.spot.model import SpotModel
-    from plant.robots.spot.robot import SpotRobot, SpotSensors
+    from plant.robots.spot.robot import SpotRobot
 
     assert isinstance(body, SpotModel)
-    return SpotRobot(body, SpotSensors(body, options), options.context)
+    return SpotRobot(body, options)
 
 
 SPOT = RobotKind(

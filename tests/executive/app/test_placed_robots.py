@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from executive.app.placed_robots import PlacedRobot, knowledge_for, placed_robots
+from executive.app.placed_robots import knowledge_for, placed_robots
 from executive.app.worlds import knowledge_of, open_world
 from executive.words.robot_config import RobotConfig
+from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.seeding import place_people
 from skills.files.errors import InputError
 from skills.robot import Pose2D

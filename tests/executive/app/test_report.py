@@ -2,7 +2,8 @@
 
 import pytest
 
-from executive.app.report import RefereeReport, counts_text
+from executive.app.report import counts_text
+from executive.words.goal import RefereeReport
 
 
 @pytest.mark.parametrize(

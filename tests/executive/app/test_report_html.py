@@ -5,11 +5,12 @@ from html.parser import HTMLParser
 
 import pytest
 
-from executive.app.report import RefereeReport, ReportedAnswer, ReportedObject, RobotReport
+from executive.app.report import ReportedAnswer, ReportedObject, RobotReport
 from executive.app.report_file import MissionRow, ReportPage, ReportPart, StepRow
 from executive.run.outcome import Said
 from executive.view.html import render
 from executive.view.styles import Styles
+from executive.words.goal import RefereeReport
 
 NASTY = "<script>alert(\"1\")</script> & 'x' \x1b[31m"
 JPEG = b"\xff\xd8 a picture"

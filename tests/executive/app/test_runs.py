@@ -5,13 +5,14 @@ from contextlib import contextmanager
 import pytest
 
 from executive.app.mission_run import FinishedRun
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.app.runs import MissionRuns, RunOptions
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.store.database import STORE_FILE
 from executive.store.missions import MissionState, MissionStore
 from executive.tree.node_view import node_view
+from executive.words.goal import RefereeReport
 from skills.files.errors import InputError
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

@@ -11,11 +11,12 @@ from executive.app.evaluate import evaluation
 from executive.app.evaluate.workers import Pool
 from executive.app.evaluate.workers import WorkResult as Done
 from executive.app.mission_run import FinishedRun
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.cli import entry
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.tree.node_view import node_view
+from executive.words.goal import RefereeReport
 from tests.executive.conftest import ManualClock
 
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"

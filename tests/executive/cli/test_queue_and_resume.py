@@ -12,7 +12,7 @@ from py_trees.common import Status
 from typer.testing import CliRunner
 
 from executive.app.mission_run import FinishedRun
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.cli import entry
 from executive.run.visitor import TickNote
 from executive.store.missions import MissionStore
@@ -22,6 +22,7 @@ from executive.tree.node import Change, NodeState
 from executive.tree.node_view import node_view
 from executive.tree.registry import installed_skills
 from executive.words.command import Command
+from executive.words.goal import RefereeReport
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
 from skills.files.errors import InputError

@@ -11,10 +11,11 @@ from executive.app.evaluate.random_missions import random_missions
 from executive.app.evaluate.workers import Pool
 from executive.app.evaluate.workers import WorkResult as Done
 from executive.app.mission_run import FinishedRun
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.cli import entry
 from executive.record.event_log import EventLog
 from executive.tree.node_view import node_view
+from executive.words.goal import RefereeReport
 from skills.files.errors import InputError
 from tests.executive.conftest import ManualClock
 

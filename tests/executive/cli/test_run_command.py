@@ -8,9 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from executive.app.mission_run import FinishedRun
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.cli import entry
 from executive.tree.node_view import node_view
+from executive.words.goal import RefereeReport
 from plant.worlds.world import WORLDS_FOLDER
 
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"

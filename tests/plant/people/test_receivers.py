@@ -7,11 +7,12 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
 from plant.people.receivers import Phase
 from plant.referee import Referee
+from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Placement, PointRoute, PointStop, Receiving
 from skills.files.kept_values import packed, unpacked
@@ -35,23 +36,23 @@ X_WP = RigidTransform(RollPitchYaw(0.0, 0.0, math.pi), [1.45, 0.0, 0.0])
 class Hall:
     """Alice holds a can out to Kim, who stands before her or walks by."""
 
-    def __init__(self, folder, receiving=TAKES, *, route=None, receives=True):
+    def __init__(self, folder, receiving=TAKES, *, route=None):
         (folder / "floor.sdf").write_text(FLOOR)
         (folder / "world.dmd.yaml").write_text(WORLD % (folder / "floor.sdf").as_uri())
-        walks = route is not None
         models = [
-            LooseModel("Kim", PERSON.path(), X_WP, fixed=not walks, slides=walks, receives=receives),
+            LooseModel("Kim", PERSON.path(), X_WP, fixed=route is None, route=route, receiving=receiving),
             LooseModel("coke", CAN.path(), RigidTransform([-2.0, 0.0, CAN.rest_height_m])),
         ]
         self.world = build_diagram(
-            directives=folder / "world.dmd.yaml", models=models, robots={"Alice": "spot"}, visuals=False, render=False
+            DiagramConfig(
+                directives=folder / "world.dmd.yaml",
+                models=models,
+                robots=[PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))],
+                visuals=False,
+                render=False,
+            )
         )
-        self.engine = Engine(
-            self.world,
-            {"Alice": Pose2D(0.0, 0.0, 0.0)},
-            routes={"Kim": route} if walks else {},
-            receiving={"Kim": receiving},
-        )
+        self.engine = Engine(self.world)
         placed = Placement("coke", "coke", CAN, RigidTransform())
         self.referee = Referee(
             self.world.plant, [placed], robots={"Alice": SPOT}, persons=["Kim"], scenery=self.world.scenery
@@ -184,7 +185,7 @@ def test_the_tray_goes_home_when_the_object_is_drawn_in(tmp_path):
 
 
 def test_who_does_not_receive_has_no_tray(tmp_path):
-    hall = Hall(tmp_path, receives=False)
+    hall = Hall(tmp_path, None)
     hall.engine.advance(4.0)
     assert not hall.world.trays
     assert hall.robot.gripper().holding

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
 from plant.people.walkers import Leg, Walk
 from plant.referee import Referee
+from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import PointRoute, PointStop
 from plant.worlds.world import WorldError
@@ -99,11 +100,17 @@ class Hall:
             WORLD % tuple((folder / f"{name}.sdf").as_uri() for name in ("floor", "wall"))
         )
         (x, y), models = route.stops[0].at_W, []
-        models.append(LooseModel("Kim", PERSON, RigidTransform([x, y, 0.0]), slides=True))
+        models.append(LooseModel("Kim", PERSON, RigidTransform([x, y, 0.0]), route=route))
         self.world = build_diagram(
-            directives=folder / "world.dmd.yaml", models=models, robots={"Alice": "spot"}, visuals=False, render=False
+            DiagramConfig(
+                directives=folder / "world.dmd.yaml",
+                models=models,
+                robots=[PlacedRobot("Alice", "spot", robot)],
+                visuals=False,
+                render=False,
+            )
         )
-        self.engine = Engine(self.world, {"Alice": robot}, routes={"Kim": route})
+        self.engine = Engine(self.world)
         self.referee = Referee(
             self.world.plant, [], robots={"Alice": SPOT}, persons=["Kim"], scenery=self.world.scenery
         )

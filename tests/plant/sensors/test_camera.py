@@ -1,7 +1,5 @@
 """Cameras see what is in front of them, as noisily as real ones, from where Spot's cameras sit."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from pydrake.geometry import Box, MakeRenderEngineVtk, RenderEngineVtkParams
@@ -10,13 +8,13 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
+from plant.robots.spot.description import CAMERAS
 from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import load_cameras
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from skills.files.errors import InputError
 from skills.robot import FrameTree, Intrinsics
 
-CAMERAS = Path(__file__).parents[3] / "plant" / "models" / "spot" / "cameras.yaml"
 HEIGHT_M = 0.52
 QUIET = DepthNoise(sigma_m=0.0, sigma_per_m=0.0, speck=0.0, dark=-1.0, shiny=256.0)
 BODY_BOX_CENTRES_B = {  # where a box stands, in the body frame, for each body camera to look at

@@ -13,8 +13,9 @@ from executive.app.evaluate.summary import (
     to_look_at,
     to_page,
 )
-from executive.app.report import RefereeReport, RunReport
+from executive.app.report import RunReport
 from executive.mission.request import Request
+from executive.words.goal import RefereeReport
 
 
 def case(seed, outcome, success=None, *, cause=None, holds=None, kind="fetch", world="flat"):

@@ -2,8 +2,9 @@
 
 import pytest
 
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
+from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
 
 FLOOR = """<sdf version="1.7"><model name="floor"><link name="floor">
@@ -22,8 +23,10 @@ def floor(tmp_path):
 
 @pytest.fixture
 def engine(floor):
-    world = build_diagram(directives=None, models=[floor], robots={"Bob": "fetch"}, render=False)
-    return Engine(world, {"Bob": Pose2D(0.5, 0.2, 0.0)})
+    world = build_diagram(
+        DiagramConfig(models=[floor], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.5, 0.2, 0.0))], render=False)
+    )
+    return Engine(world)
 
 
 @pytest.fixture

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from pydrake.multibody.math import SpatialVelocity
 
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.robots.fetch.kind import fetch_capabilities
 from plant.robots.fetch.robot import lidar_spec
 from plant.robots.fetch.wheels import Axle, WheelOdometer
+from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, BaseKind, CommandState, LeaseError, Mount, Pose2D
 
 WALL = """<sdf version="1.7"><model name="wall"><link name="wall">
@@ -29,8 +30,10 @@ def test_a_wall_ahead_is_where_the_scan_says(floor, tmp_path):
     path = tmp_path / "wall.sdf"
     path.write_text(WALL)
     wall = LooseModel("wall", path, Pose2D(3.0, 0.0, 0.0).transform(0.5), fixed=True)
-    world = build_diagram(directives=None, models=[floor, wall], robots={"Bob": "fetch"}, render=False)
-    scan = Engine(world, {"Bob": Pose2D(0.0, 0.0, 0.0)}).robots["Bob"].scan()
+    world = build_diagram(
+        DiagramConfig(models=[floor, wall], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.0, 0.0, 0.0))], render=False)
+    )
+    scan = Engine(world).robots["Bob"].scan()
     points_B = scan.points_B()
     ahead = points_B[np.abs(points_B[:, 1]) < 0.3]
     assert float(np.median(ahead[:, 0])) == pytest.approx(2.9, abs=0.02)
@@ -252,8 +255,10 @@ def test_state_and_restore_go_on_as_if_nothing_had_been(floor):
     """The same commands after a restore end at the same place as without one."""
 
     def new():
-        world = build_diagram(directives=None, models=[floor], robots={"Bob": "fetch"}, render=False)
-        return Engine(world, {"Bob": Pose2D(0.5, 0.2, 0.0)}, seed=3)
+        world = build_diagram(
+            DiagramConfig(models=[floor], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.5, 0.2, 0.0))], render=False)
+        )
+        return Engine(world, seed=3)
 
     first, second = new(), new()
     lease = first.robots["Bob"].acquire_lease("test")
@@ -274,8 +279,10 @@ def boxed(floor, tmp_path):
     path = tmp_path / "box.sdf"
     path.write_text(BOX)
     box = LooseModel("box", path, Pose2D(5.0, 5.0, 0.0).transform(0.06))
-    world = build_diagram(directives=None, models=[floor, box], robots={"Bob": "fetch"}, render=False)
-    return Engine(world, {"Bob": Pose2D(0.0, 0.0, 0.0)})
+    world = build_diagram(
+        DiagramConfig(models=[floor, box], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.0, 0.0, 0.0))], render=False)
+    )
+    return Engine(world)
 
 
 def test_the_gripper_closes_on_a_box_and_carries_it(boxed):

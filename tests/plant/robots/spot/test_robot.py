@@ -4,15 +4,18 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlantConfig
 
-from plant.diagram import build_diagram
+from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
+from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
 
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
-    return Engine(world, {"Alice": Pose2D(0.5, 0.2, 0.0)})
+    world = build_diagram(
+        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0.5, 0.2, 0.0))], visuals=False, render=False)
+    )
+    return Engine(world)
 
 
 @pytest.fixture
@@ -175,8 +178,10 @@ def test_efforts_of_joints_are_those_that_the_solver_applies(monkeypatch):
             "plant.diagram.MultibodyPlantConfig",
             lambda sampled=sampled, **given: MultibodyPlantConfig(**{**given, "use_sampled_output_ports": sampled}),
         )
-        world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
-        engine = Engine(world, {"Alice": Pose2D(0.0, 0.0, 0.0)})
+        world = build_diagram(
+            DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))], visuals=False, render=False)
+        )
+        engine = Engine(world)
         spot, model = engine.robots["Alice"], world.robots["Alice"]
         spot.drive(0.4, 0.0, 0.3, until_s=2.0, lease=spot.acquire_lease("test"))
         engine.advance(0.7)

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from plant.diagram import LooseModel, build_diagram
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
+from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.description import spot_facts
+from plant.robots.spot.model import OwnLegs
 from skills.robot import Pose2D
 
 FLOOR = """<sdf version="1.9"><model name="ground"><link name="ground"><collision name="ground">
@@ -19,9 +21,14 @@ def free_spot(tmp_path):
     path.write_text(FLOOR)
     ground = LooseModel("ground", path, RigidTransform([0, 0, -0.1]), fixed=True)
     world = build_diagram(
-        directives=None, models=[ground], robots={"Alice": "spot"}, carried=False, visuals=False, render=False
+        DiagramConfig(
+            models=[ground],
+            robots=[PlacedRobot("Alice", "spot", Pose2D(0, 0, 0), locomotion=OwnLegs())],
+            visuals=False,
+            render=False,
+        )
     )
-    return Engine(world, {"Alice": Pose2D(0, 0, 0)})
+    return Engine(world)
 
 
 def test_free_spot_stands_on_its_own_feet(free_spot):

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from plant.diagram import build_diagram
+from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
+from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, Pose2D
 
 STILL_S = 0.2
@@ -12,8 +13,10 @@ STILL_S = 0.2
 
 @pytest.fixture
 def engine():
-    world = build_diagram(directives=None, models=[], robots={"Alice": "spot"}, visuals=False, render=False)
-    engine = Engine(world, {"Alice": Pose2D(0.5, 0.2, 0.0)})
+    world = build_diagram(
+        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0.5, 0.2, 0.0))], visuals=False, render=False)
+    )
+    engine = Engine(world)
     engine.advance(0.2)
     return engine
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from plant.diagram import build_diagram
+from plant.diagram import DiagramConfig, build_diagram
 from plant.worlds.builder.own import rectangles, world_from_cylinders, world_from_grid
 from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
 from plant.worlds.world import WorldError, load_world
@@ -50,7 +50,7 @@ def test_the_walls_stand_where_the_map_has_them(tmp_path: Path) -> None:
     world_from_grid(tmp_path, two_rooms(), start=Pose2D(2.0, 0.0, 0.0), wall_height_m=2.5)
     world = load_world(tmp_path)
     assert world.start == Pose2D(2.0, 0.0, 0.0)
-    built = build_diagram(directives=world.directives_path, models=(), robots={}, render=False)
+    built = build_diagram(DiagramConfig(directives=world.directives_path, render=False))
     scene = built.scene_graph.GetMyContextFromRoot(built.diagram.CreateDefaultContext())
     query = built.scene_graph.get_query_output_port().Eval(scene)
     for x, y, z in ((1.05, 0.0, 1.0), (4.15, 1.0, 2.4), (3.0, 2.15, 0.1)):

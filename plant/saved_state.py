@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any, ClassVar
 
-from skills.files.kept_values import packed, unpacked
+from skills.files.json_values import packed, unpacked
 
 State = dict[str, Any]
 

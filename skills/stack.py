@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, get_type_hints
 
 import numpy as np
 
+from skills.files.errors import suggestion
 from skills.files.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
-from skills.files.schema_errors import first_error, nearest_of
+from skills.files.schema import first_error
 from skills.quantities import shown
 from skills.robot import FloatArray, GripperCapabilities, Pose2D
 
@@ -222,7 +223,7 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
     known = _names(slot)
     name = given.get(USE, known[0])
     if name not in known:
-        raise StackError((slot, USE), f"there is no {slot} {shown(name)}", nearest_of(str(name), known))
+        raise StackError((slot, USE), f"there is no {slot} {shown(name)}", suggestion(str(name), known))
     return name, _typed(
         (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
     )
@@ -309,11 +310,11 @@ def _check_keys(path: tuple[str | int, ...], kind: type, given: Any) -> None:
 
 def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> None:
     if not isinstance(given, Mapping):
-        raise StackError(path, "should be a mapping of keys to values", nearest_of("", known))
+        raise StackError(path, "should be a mapping of keys to values", suggestion("", known))
     for key in given:
         if key not in known:
             named = f"key {key!r}" if str(key).isidentifier() else "key that is no plain word"
-            raise StackError((*path, key), f"unknown {named}", nearest_of(str(key), known))
+            raise StackError((*path, key), f"unknown {named}", suggestion(str(key), known))
 
 
 def plain(stack: RobotStack) -> dict[str, Any]:

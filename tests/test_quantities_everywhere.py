@@ -18,7 +18,7 @@ OURS_ALONE = (
     "plant/models/catalogue.py",
     "plant/sensors/camera_spec.py",
     "skills/mapping/map_folder.py",
-    "skills/perception/attributes.py",
+    "skills/perception/class_forms.py",
     "skills/perception/class_forms.py",
 )
 """Modules whose models describe files that come with the project, that Errand writes, or that other programs write."""

@@ -22,8 +22,7 @@ from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.files.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
-from skills.perception.attributes import known_attributes
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import class_forms, known_attributes
 from skills.robot import Capabilities, Pose2D
 from skills.stack import DEFAULT_FILE, default_component
 

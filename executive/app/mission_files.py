@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from skills.files.errors import InputError, did_you_mean
 from skills.files.outside import is_there
-from skills.files.yaml_scalars import yaml_of
+from skills.files.yaml_source import yaml_of
 
 if TYPE_CHECKING:
     from skills.teleop.driver import SavedPose

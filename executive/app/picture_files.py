@@ -11,9 +11,8 @@ import numpy as np
 
 from skills.detection import Detection
 from skills.files.errors import InputError
-from skills.files.pictures import read_pixels
-from skills.perception.detector.cascade_files import MODEL_FILE
-from skills.perception.detector.network_file import ModelFileError
+from skills.files.picture_files import read_pixels
+from skills.perception.detector.model_files import MODEL_FILE, ModelFileError
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector, load_detector
 from skills.robot import Picture
 

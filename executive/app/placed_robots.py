@@ -188,7 +188,7 @@ def shared_detector(stack: RobotStack | None = None) -> Detector:
 
 @cache
 def _built(component: DetectorComponent) -> Detector:
-    from skills.perception.detector.network_file import ModelFileError  # loads the network runtime
+    from skills.perception.detector.model_files import ModelFileError  # loads the network runtime
 
     try:
         return component.build()

@@ -32,7 +32,7 @@ from executive.words.yaml_steps import steps_from_lines
 from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.world import ObjectRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion
-from skills.files.texts import LONGEST_ANSWER, plain_text
+from skills.files.outside import LONGEST_ANSWER, plain_text
 from skills.files.yaml_source import KeyPath, read_yaml
 from skills.robot import Pose2D
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NoReturn
 import typer
 
 from skills.files.errors import InputError
-from skills.files.texts import LONGEST_ANSWER, LONGEST_TEXT, plain_text
+from skills.files.outside import LONGEST_ANSWER, LONGEST_TEXT, plain_text
 
 if TYPE_CHECKING:
     from rich.console import Console

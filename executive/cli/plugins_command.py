@@ -23,7 +23,7 @@ from executive.tree import registry
 from plant.robots import robot_kind as kinds
 from skills.files.errors import InputError
 from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
-from skills.files.yaml_scalars import yaml_of
+from skills.files.yaml_source import yaml_of
 from skills.quantities import Duration
 from skills.stack import SLOTS, plain
 

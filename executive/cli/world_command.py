@@ -19,7 +19,7 @@ from plant.worlds.world import WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.files.errors import InputError, count_text
 from skills.files.outside import read_text
-from skills.files.schema_errors import first_error
+from skills.files.schema import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity
 from skills.robot import Picture, Pose2D
 

@@ -116,8 +116,8 @@ class Roles:
         phrase = one.chunk.phrase
         self.listed = self.listed or (bool(one.joint) and bool(self.objects))
         last = self.objects[-1] if self.objects else None
-        told_apart = last is not None and not (last.speaker or last.person) and phrase.stands_for_one
-        if last is not None and told_apart and one.joint in _LISTING and one.within is None:
+        distinct_objects = last is not None and not (last.speaker or last.person) and phrase.stands_for_one
+        if last is not None and distinct_objects and one.joint in _LISTING and one.within is None:
             self.objects[-1] = phrase.instead_of_one(last)
             return
         places = self.goals or self.ats

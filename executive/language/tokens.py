@@ -16,7 +16,7 @@ from executive.language.lexicon import any_of, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
-from skills.detect.words import plural
+from skills.detect.descriptions import plural
 
 
 @dataclass(frozen=True)

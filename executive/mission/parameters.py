@@ -18,9 +18,8 @@ import yaml
 from executive.words.expression import Value
 from executive.words.mission import Parameter
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
-from skills.files.texts import json_object, plain_text
-from skills.files.yaml_scalars import scalar_of
-from skills.files.yaml_source import KeyPath, YamlSource
+from skills.files.outside import json_object, plain_text
+from skills.files.yaml_source import KeyPath, YamlSource, scalar_of
 from skills.quantities import LARGEST, Number, QuantityError, number_of, shown
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")

@@ -36,7 +36,7 @@ from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, logged_view
 from executive.words.robot_config import find_robot
 from skills.api import Cause, ObjectKind, ObjectObservation
-from skills.detect.words import told_apart
+from skills.detect.descriptions import distinct_objects
 from skills.files.errors import InputError
 from skills.files.outside import plain_file
 from skills.perception.class_forms import THING
@@ -281,7 +281,7 @@ def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
         elif event.topic == TRACKS and robot in open_searches:
             sure = [track for track in event.data["tracks"] if track.get("confirmed") and track["class_name"] != THING]
             searches[open_searches[robot]] = [_observation(track) for track in sorted(sure, key=itemgetter("number"))]
-    return told_apart(searches)
+    return distinct_objects(searches)
 
 
 def _observation(track: Mapping[str, Any]) -> ObjectObservation:

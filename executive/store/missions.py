@@ -17,7 +17,7 @@ from executive.store.database import STORE_FILE, Database, form
 from executive.store.journal import StoreJournal, of_robot, prefix_of
 from executive.store.recollection import Memory, StepRecord
 from skills.files.errors import InputError, listing
-from skills.files.kept_values import from_text
+from skills.files.json_values import from_text
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"

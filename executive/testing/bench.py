@@ -21,8 +21,7 @@ from skills.faults.faulty_robot import with_faults
 from skills.robot import Capabilities, Clock, Robot
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
 from skills.testing.clock import VirtualClock
-from skills.testing.detector import PlainColours
-from skills.testing.estimators import BlockCostmap, KnownPlace
+from skills.testing.estimators import BlockCostmap, KnownPlace, PlainColours
 from skills.testing.robot import ScriptedRobot, Start
 
 TICK_S = 0.05

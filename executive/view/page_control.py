@@ -17,7 +17,7 @@ from executive.run.visitor import Progress, RunVisitor
 from executive.tree.node import NodeState, Snapshot
 from executive.view.feed import Feed
 from skills.files.errors import InputError
-from skills.files.texts import plain_text
+from skills.files.outside import plain_text
 
 Action = Callable[[Mapping[str, Any]], str]
 

@@ -12,8 +12,7 @@ from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Steps
 from skills.files.errors import InputError
-from skills.files.yaml_scalars import yaml_of
-from skills.files.yaml_source import parse_yaml
+from skills.files.yaml_source import parse_yaml, yaml_of
 
 
 class _Document(Strict):

@@ -16,8 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from skills.files.errors import InputError
 from skills.files.schema import validate
-from skills.files.yaml_scalars import yaml_of
-from skills.files.yaml_source import read_yaml
+from skills.files.yaml_source import read_yaml, yaml_of
 from skills.robot import quantities
 
 MODELS_FOLDER = Path(__file__).resolve().parent

@@ -86,7 +86,7 @@ class _Walk:
         """Checks a model, mesh or picture that the files of `chain` led to."""
         kind = file.suffix.lower()
         if kind in _PICTURES:
-            from skills.files.pictures import check_picture  # brings OpenCV, which most commands do not need
+            from skills.files.picture_files import check_picture  # brings OpenCV, which most commands do not need
 
             check_picture(file)
             return

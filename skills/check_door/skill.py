@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
 from skills.patience import PATIENCE_S
-from skills.perception.doorway import Doorway, Opening, opening
+from skills.perception.doorway import Doorway, Opening, measure_opening
 from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
 from skills.robot import Scan
 from skills.routine import Routine, RoutineSkill, SkillFailure
@@ -97,7 +97,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
             raise SkillFailure(Cause.POSTCONDITION, f"the {name} is {far_m:.1f} m away, too far to tell")
         if door.view_angle_rad((x_m, y_m)) > self.options.flattest_rad:
             raise SkillFailure(Cause.POSTCONDITION, f"the {name} is seen too flat from here to tell")
-        return opening(door, scans)
+        return measure_opening(door, scans)
 
     def _next_scan(self, message: str) -> Routine[Scan]:
         """The first scan that is taken from now on. Raises SkillFailure: there is none."""

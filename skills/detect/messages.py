@@ -9,10 +9,10 @@ from pydrake.math import RigidTransform
 
 from skills.api import Detection, ObjectObservation, SkillContext
 from skills.perception.class_forms import class_forms
-from skills.perception.coverage import SurfaceShares
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.tracker import Track
+from skills.perception.visibility import SurfaceShares
 from skills.robot import Image
 
 Message = Mapping[str, Any]
@@ -97,7 +97,7 @@ def _track(track: Track) -> Message:
         "class_name": track.class_name,
         "class_belief": round(track.class_belief, 3),
         "belief": round(track.belief, 3),
-        "confirmed": track.confirmed(),
+        "confirmed": track.is_confirmed(),
         "views": track.views,
         "missed": track.missed,
         "last_seen_s": track.last_seen_s,

@@ -1,4 +1,4 @@
-"""The detect skill: look at surfaces with the hand camera until an object is found, and look twice."""
+"""The detect skill: searches surfaces with the hand camera, and confirms each object from a second viewpoint."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import (
-    FLOOR,
     Cause,
     Detection,
     LocalisationEstimate,
@@ -21,6 +20,7 @@ from skills.api import (
     Succeeded,
     Surface,
 )
+from skills.detect.descriptions import count_sentence, describe, surface_names, wanted_names
 from skills.detect.messages import (
     coverage_message,
     detections_message,
@@ -29,37 +29,40 @@ from skills.detect.messages import (
     tracks_message,
 )
 from skills.detect.ports import DetectInputs, DetectPorts
-from skills.detect.unidentified import most_free_first, segments_3d, unnamed
-from skills.detect.viewpoints import in_plain_view, look_targets, surface_boxes
-from skills.detect.words import counted, describe, surface_names, wanted
+from skills.detect.selection import (
+    DetectOptions,
+    is_sure,
+    level_distance,
+    matching_tracks,
+    sure_tracks,
+    unlabelled_clusters,
+)
+from skills.detect.viewpoints import look_targets, surface_boxes
 from skills.geometry import wrap
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
-from skills.perception.attributes import known_attributes, shows
-from skills.perception.class_forms import THING, class_forms
-from skills.perception.coverage import Coverage
+from skills.perception.class_forms import THING, class_forms, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in, is_dark
-from skills.perception.surface_segmentation import Cluster, view_surfaces
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
+from skills.perception.surface_segmentation import Cluster, segment_surfaces, segments_3d
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
-from skills.quantities import Angle, Duration, Length, Tries
+from skills.perception.visibility import Coverage, in_plain_view
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
 
 _LEAST_SEEN = 0.02
 _FITS_NEAR_M = 0.4
 _LOOKED_AT_M = 0.08
-_AVOIDED_M = 0.08
 _BELOW_TOP_M = 0.01
 _RAISED_M = 0.15
-"""A head looks once more from a body that is higher by so much."""
+"""Height by which the body rises for one more view by a camera on a head."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """One picture, where the robot was, what was found in it, with and without a place, and what stands there.
+    """One picture with the robot's pose, the detections with and without a position, and the clusters on the surfaces.
 
-    What was found may be faint.
+    Detections may be faint.
     """
 
     image: Image
@@ -69,33 +72,14 @@ class Look:
     clusters: tuple[Cluster, ...]
 
 
-@dataclass(frozen=True)
-class DetectOptions:
-    """How long the skill looks on.
-
-    What may be meant is looked at again from aside, turned by `confirm_shifts_rad` about the shoulder; `candidates` of
-    them more than are asked for. What has no name yet is looked at from near, `closer_looks` at most; what something
-    hides is looked at from `around_rad`. An answer rests on a picture no older than `fresh_s`. An object counts within
-    `expected_within_m` of where it is expected, and on the floor within `floor_within_m` of the robot.
-    """
-
-    confirm_shifts_rad: tuple[Angle, ...] = (0.25, -0.3)
-    candidates: Tries = 3
-    expected_within_m: Length = 0.35
-    floor_within_m: Length = 2.2
-    closer_looks: Tries = 3
-    fresh_s: Duration = 1.5
-    around_rad: tuple[Angle, ...] = (0.7, -0.7)
-
-
 class Detect(DetectPorts, LookingSkill[DetectInputs]):
-    """The skill that `DetectPorts` declares."""
+    """Implementation of `DetectPorts`."""
 
     Options: ClassVar[type] = DetectOptions
     options: DetectOptions
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
-        """Looks at each surface in turn; an object counts when a second look from beside agrees."""
+        """Searches each surface in turn; an object counts when a view from another side confirms it."""
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
@@ -113,7 +97,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
             yield from self._look_and_confirm(inputs, p_BT, blocked, close=_fits_near(inputs))
             if self._has_enough(inputs):
                 break
-            yield Running(f"looking for {wanted(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
+            yield Running(f"looking for {wanted_names(inputs.classes, inputs.attributes)}", (k + 1) / len(targets))
         yield from self._look_closer(inputs)
         yield from self._look_around(inputs)
         yield from self._look_from_above(inputs, targets_W)
@@ -122,7 +106,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return (yield from self._ended(inputs, blocked if len(blocked) == len(targets) else []))
 
     def _check(self, inputs: DetectInputs) -> None:
-        """Raises SkillFailure with cause PRECONDITION for what cannot be looked for."""
+        """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, or without surfaces."""
         knows = set(self.context.detector.class_names) & set(class_forms()) | {THING}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
@@ -133,18 +117,18 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         assert self.model is not None
 
     def _targets(self, inputs: DetectInputs, X_WB: RigidTransform) -> list[FloatArray]:
-        """Points p_BT to look at, one after the other."""
+        """Points p_BT to look at, in this order."""
         if inputs.expected_W is not None:
             return [X_WB.inverse() @ np.array(inputs.expected_W)]
         return [t for s in _by_distance(inputs.surfaces, X_WB) for t in look_targets(s, X_WB, self.model.p_BS)]
 
     def _has_enough(self, inputs: DetectInputs) -> bool:
-        return 0 < inputs.count <= len(self._found(inputs))
+        return 0 < inputs.count <= len(self._sure(inputs))
 
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
-        """Looks from near where the object is expected, or at what was not named and may be what is wanted.
+        """Views the expected place from near, or unlabelled clusters that may be wanted.
 
-        What was looked at from near already is looked at from above.
+        The second view of a place from near is one from above.
         """
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
@@ -154,18 +138,18 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         if THING in inputs.classes:
             return
         for _ in range(self.options.closer_looks):
-            left = unnamed(self._clusters, self._tracker.snapshot(), inputs.classes)
+            left = unlabelled_clusters(self._clusters, self._tracker.snapshot(), inputs.classes)
             if self._has_enough(inputs) or not left:
                 return
             shape, base_m = left[0].shape, left[0].base_m
-            self._clusters = [c for c in self._clusters if _apart(c.shape.centre, shape.centre) > _LOOKED_AT_M]
+            self._clusters = [c for c in self._clusters if level_distance(c.shape.centre, shape.centre) > _LOOKED_AT_M]
             p_BT = self.X_WB().inverse() @ np.array([*shape.centre, base_m + 0.5 * shape.height_m])
-            kept, self._clusters = self._clusters, []
+            others, self._clusters = self._clusters, []
             yield from self._look_and_confirm(inputs, p_BT, [], close=True)
-            self._clusters = kept
+            self._clusters = others
 
     def _look_around(self, inputs: DetectInputs) -> Routine[None]:
-        """Looks from either side at what something hides; a camera on a head has no other side."""
+        """Views hidden areas from both sides; a camera on a head has no other side."""
         around = inputs.expected_W is None and self.object_camera.on_hand
         for p_W in self._coverage.hidden_middle_W().values() if around else ():
             for shift_rad in self.options.around_rad:
@@ -175,9 +159,9 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
                 yield from self._look_and_confirm(inputs, p_BT, [], shift_rad=shift_rad)
 
     def _look_from_above(self, inputs: DetectInputs, targets_W: Sequence[FloatArray]) -> Routine[None]:
-        """Looks from a body that stands as high as it can, where the camera is on a head: it looks flat over tables.
+        """Raises the body as high as it can, for a camera on a head, which sees tables at a flat angle.
 
-        It stays there when that shows what is looked for, which may not be seen from lower down.
+        The body stays there when it finds the objects, which may be hidden from lower down.
         """
         capabilities = self.context.robot.capabilities()
         raised_m = capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
@@ -191,23 +175,22 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         yield from self.stand_as_usual()
 
     def _refresh(self, inputs: DetectInputs) -> Routine[None]:
-        """Looks once more at what was seen last, when that is a while ago: an answer rests on fresh pictures."""
-        if (track := self._seen_a_while_ago(inputs)) is not None:
+        """Views the result once more when its picture is old."""
+        if (track := self._old_result(inputs)) is not None:
             yield from self._look_and_confirm(inputs, self.X_WB().inverse() @ track.position_W, [])
-        if (track := self._seen_a_while_ago(inputs)) is not None:  # from there it did not show: from where it did
+        if (track := self._old_result(inputs)) is not None:  # hidden from there: use the viewpoint of its last view
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
             viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
             yield from self._look_if_possible(inputs, p_BO, viewpoints)
 
-    def _seen_a_while_ago(self, inputs: DetectInputs) -> Track | None:
-        """What was found and seen last, unless it was seen just now."""
-        newest = next(iter(self._found(inputs)), None)
-        return (
-            newest
-            if newest is not None and self.context.clock.now() - newest.last_seen_s > self.options.fresh_s
-            else None
-        )
+    def _old_result(self, inputs: DetectInputs) -> Track | None:
+        """The track seen last, if it is sure and its picture is old."""
+        newest = next(iter(self._sure(inputs)), None)
+        return newest if newest is not None and self._is_old(newest) else None
+
+    def _is_old(self, track: Track) -> bool:
+        return self.context.clock.now() - track.last_seen_s > self.options.fresh_s
 
     def _look_and_confirm(
         self,
@@ -219,7 +202,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         shift_rad: float = 0.0,
         raised_m: float = 0.0,
     ) -> Routine[None]:
-        """Looks at a point, and again from aside at what may be meant. A look that the arm cannot take is noted."""
+        """Views a point, and candidates again from the side. Adds a failure of the arm to `blocked`."""
         viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
         failure = yield from self._look_if_possible(inputs, p_BT, viewpoints, raised_m)
         if failure is not None:
@@ -235,7 +218,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     def _look_if_possible(
         self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
     ) -> Routine[SkillFailure | None]:
-        """Looks at a point, unless the arm cannot: then why."""
+        """Views a point; returns the failure when the arm cannot."""
         try:
             yield from self.look(inputs, p_BT, viewpoints_B, raised_m)
         except SkillFailure as failure:
@@ -245,16 +228,16 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return None
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
-        """Camera places p_BC to look from at p_BT, turned by shift_rad about the shoulder; near ones first if close."""
+        """Camera positions p_BC to view p_BT, turned by shift_rad about the shoulder; near ones first if close."""
         far = overview_viewpoints(self.model, p_BT, shift_rad)
         if abs(shift_rad) >= max(map(abs, self.options.around_rad)):
             far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
         return [*close_viewpoints(self.model.p_BS, p_BT, shift_rad), *far] if close else far
 
     def _confirming(self, track: Track, tries: int, *, close: bool) -> list[FloatArray]:
-        """Camera places to look from at a track for the first, second or third time after it was seen.
+        """Camera positions for the first, second or third confirming view of a track.
 
-        First from the side farther from where it was seen, then from the other, then from right beside there.
+        First the side farther from its last view, then the other side, then right beside the last view.
         """
         X_BW = self.X_WB().inverse()
         p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
@@ -266,43 +249,18 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
-        """The likeliest track that may be what is looked for and is to be looked at again."""
+        """The likeliest track that needs another view, if any."""
         if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
             return None
         shifts = len(self.options.confirm_shifts_rad)
-        open_ones = (t for t in self._matching(inputs) if not _is_sure(inputs, t))
+        open_ones = (t for t in self._matching(inputs) if not is_sure(t, inputs))
         return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t, shifts)), None)
 
-    def _found(self, inputs: DetectInputs) -> list[Track]:
-        """The confirmed ones, those seen last first; of any objects, those first that are to be taken first."""
-        confirmed = [track for track in self._matching(inputs) if _is_sure(inputs, track)]
-        if inputs.expected_W is not None or THING in inputs.classes:
-            return confirmed
-        return sorted(confirmed, key=lambda track: -track.last_seen_s)
-
     def _matching(self, inputs: DetectInputs) -> list[Track]:
-        """The tracks that are of the classes, show the attributes and lie in the right place; the likeliest first.
+        return matching_tracks(self._tracker.snapshot(), inputs, self.options, self.X_WB().translation())
 
-        Of any objects, the nearest and most free ones first.
-        """
-        tracks = [t for t in self._tracker.snapshot() if _is_wanted(inputs, t) and self._in_place(inputs, t)]
-        fitting = [t for t in tracks if all(shows(t.best, word) for word in inputs.attributes)]
-        if inputs.expected_W is None and THING in inputs.classes:
-            free = most_free_first(fitting, self.X_WB().translation())
-            places = [np.array(each.position_W) for each in inputs.avoid]
-            return sorted(free, key=lambda t: any(_apart(t.position_W, p) < _AVOIDED_M for p in places))
-        if inputs.expected_W is None:
-            return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
-        off = {t.number: _apart(t.position_W, inputs.expected_W) for t in fitting}
-        return sorted(
-            (t for t in fitting if off[t.number] < self.options.expected_within_m), key=lambda t: off[t.number]
-        )
-
-    def _in_place(self, inputs: DetectInputs, track: Track) -> bool:
-        if track.latest.surface in {surface.name for surface in inputs.surfaces}:
-            return True
-        near = _apart(track.position_W, self.X_WB().translation()) < self.options.floor_within_m
-        return inputs.floor and track.latest.surface == FLOOR and near
+    def _sure(self, inputs: DetectInputs) -> list[Track]:
+        return sure_tracks(self._matching(inputs), inputs)
 
     def look(
         self,
@@ -311,28 +269,29 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         viewpoints_B: Sequence[FloatArray],
         raised_m: float = 0.0,
     ) -> Routine[Look]:
-        """Points the camera at p_BT, from the first possible one of `viewpoints_B`, and takes in what is seen.
+        """Points the camera at p_BT from the first possible one of `viewpoints_B`, and updates the tracks.
 
-        One on a head looks from a body that is raised by so much.
+        A camera on a head views it from a body raised by raised_m.
         """
-        message = f"looking for {wanted(inputs.classes, inputs.attributes)}"
+        message = f"looking for {wanted_names(inputs.classes, inputs.attributes)}"
         yield from self.look_at(p_BT, viewpoints_B, message, raised_m=raised_m)
         image = yield from self.picture(message)
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            found = detections_in(detector, image, FAINT_SCORE)
+            found = detect_in_image(detector, image, FAINT_SCORE)
             placed = detections_3d(image, place, found, inputs.surfaces)
-            views = [view for view in view_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
+            views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
             if THING in inputs.classes:
-                placed += segments_3d(image, place, views, placed, inputs.surfaces)
+                sure = [each for each in placed if each.detection.score >= SURE_SCORE]
+                placed += segments_3d(image, place, views, sure, inputs.surfaces)
             return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)
-        self._take_in(look)
+        self._update(look)
         return look
 
-    def _take_in(self, look: Look) -> None:
+    def _update(self, look: Look) -> None:
         X_WO = look.localisation.X_WO
         if not is_dark(look.image):
             self._coverage.add(look.image, X_WO)
@@ -344,74 +303,59 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         self._last = look
 
     def _ended(self, inputs: DetectInputs, blocked: Sequence[SkillFailure]) -> Routine[Succeeded]:
-        """The answer. Raises SkillFailure when there is none, or not enough."""
-        found = [_observed(track, inputs.attributes) for track in self._answered(inputs)]
+        """Returns the result. Raises SkillFailure when too few objects were found."""
+        found = [_observed(track, inputs.attributes) for track in self._results(inputs)]
         if found and len(found) >= inputs.count:
             look = self._last
             for seen in found:
                 message = object_destination_message(self.context, seen, look.image, look.localisation.X_WO)
                 self.context.publish("object_destination", message)
-            told = f"saw {describe(found[0])}" if inputs.count == 1 else counted(found, inputs.surfaces)
-            return Succeeded(told, {"observation": found[0], "observations": tuple(found)})
+            said = f"saw {describe(found[0])}" if inputs.count == 1 else count_sentence(found, inputs.surfaces)
+            return Succeeded(said, {"observation": found[0], "observations": tuple(found)})
         yield from self.try_stow()
         if blocked:
             raise blocked[0]
-        raise self._nothing(inputs, found)
+        raise self._too_few(inputs, found)
 
-    def _answered(self, inputs: DetectInputs) -> list[Track]:
-        """The confirmed ones; of any objects, those first that were seen just now, since an answer rests on that."""
-        now_s, found = self.context.clock.now(), self._found(inputs)
+    def _results(self, inputs: DetectInputs) -> list[Track]:
+        """Sure tracks in the order of the result; where any object is wanted, those with a fresh picture first."""
+        found = self._sure(inputs)
         if inputs.expected_W is not None or THING not in inputs.classes:
             return found
-        return sorted(found, key=lambda track: now_s - track.last_seen_s > self.options.fresh_s)
+        return sorted(found, key=self._is_old)
 
-    def _nothing(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> SkillFailure:
-        """What to say when not enough was found: how much was seen of which surface."""
+    def _too_few(self, inputs: DetectInputs, found: Sequence[ObjectObservation]) -> SkillFailure:
+        """Failure that says how much of each surface was seen."""
         shares = self._coverage.shares()
-        what, names = wanted(inputs.classes, inputs.attributes), surface_names(inputs.surfaces)
+        what, names = wanted_names(inputs.classes, inputs.attributes), surface_names(inputs.surfaces)
         seen = "; ".join(f"{name}: {share}" for name, share in shares.items())
         if all(share.seen < _LEAST_SEEN for share in shares.values()):
             why = "it is dark" if is_dark(self._last.image) else "the camera shows none of it"
             return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
         if found:
-            told = f"{counted(found, inputs.surfaces)}, and not {inputs.count} ({seen})"
-            return SkillFailure(Cause.POSTCONDITION, told)
+            few = f"{count_sentence(found, inputs.surfaces)}, and not {inputs.count} ({seen})"
+            return SkillFailure(Cause.POSTCONDITION, few)
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
 
 
 def _fits_near(inputs: DetectInputs) -> bool:
-    """Returns whether it was seen before and fits into a picture from near."""
+    """Returns whether the object was seen before and fits into a picture from near."""
     return inputs.seen_before is not None and max(inputs.seen_before.size_m) < _FITS_NEAR_M
 
 
-def _is_wanted(inputs: DetectInputs, track: Track) -> bool:
-    return THING in inputs.classes or track.class_name in inputs.classes
-
-
-def _is_sure(inputs: DetectInputs, track: Track) -> bool:
-    """Returns whether nothing more is to be seen of a track: for any object, its class does not matter."""
-    views = 2 if inputs.seen_before is None else 1
-    return track.stands(views) if THING in inputs.classes else track.confirmed(views)
-
-
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
-    """A track as an observation: its fused place, the rest from its last detection; a `THING` without a sure class."""
+    """Observation of a track: fused position, the rest from its last detection; `THING` where the class is not sure."""
     seen = observation(replace(track.latest, position_W=track.position_W), attributes)
-    return seen if track.confirmed(1) else replace(seen, kind=ObjectKind(THING, attributes))
+    return seen if track.is_confirmed(1) else replace(seen, kind=ObjectKind(THING, attributes))
 
 
 def _tries_for(track: Track, shifts: int) -> int:
-    """How often to look at a track again: once more from nearby where neither side showed its place."""
+    """Number of confirming views of a track: one more from nearby where neither side showed its place."""
     return shifts + (track.views == 1 and track.missed == 0)
 
 
 def _bearing(p_B: FloatArray) -> float:
     return math.atan2(p_B[1], p_B[0])
-
-
-def _apart(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | FloatArray) -> float:
-    """Level distance of two points."""
-    return float(np.linalg.norm(np.asarray(p_W)[:2] - np.asarray(q_W)[:2]))
 
 
 def _by_distance(surfaces: tuple[Surface, ...], X_WB: RigidTransform) -> list[Surface]:

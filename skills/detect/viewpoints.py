@@ -1,4 +1,4 @@
-"""Where to point the hand camera to see surfaces, and what stands around as boxes for the arm."""
+"""Camera targets on surfaces, and boxes about surfaces and clusters for the arm's collision checks."""
 
 from __future__ import annotations
 
@@ -12,9 +12,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.api import Surface
 from skills.geometry import grid_inside
 from skills.manipulation.arm.collision import Box
-from skills.perception.detection_3d import depth_ahead_m
 from skills.perception.surface_segmentation import Cluster
-from skills.robot import FloatArray, Image
+from skills.robot import FloatArray
 
 NEAREST_M = 0.35
 FURTHEST_M = 3.2
@@ -27,17 +26,14 @@ _CELL_M = 0.03
 _WHOLE_M = 0.15
 _LEAST_FILLED = 0.5
 _SPLITS = 5
-_EDGE_M = 0.05
-_PLAIN_M = 2.0
-_BEFORE_M = 0.08
 _LOWEST_TOP_M = 0.06
-"""What is lower is the floor."""
+"""Height below which a surface is the floor."""
 
 
 def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
-    """Points p_BT on a surface whose views cover what is seen of it from the shoulder, the middle ones first.
+    """Points p_BT on a surface whose views cover the part visible from the shoulder p_BS, the middle ones first.
 
-    Empty when nothing of it lies between NEAREST_M and FURTHEST_M and within the arm's turn.
+    Empty when no part lies between NEAREST_M and FURTHEST_M and within the arm's turn.
     """
     offsets = _samples(surface) @ X_WB.inverse().rotation().matrix().T + X_WB.inverse().translation() - p_BS
     bearing, distance = np.arctan2(offsets[:, 1], offsets[:, 0]), np.hypot(offsets[:, 0], offsets[:, 1])
@@ -61,7 +57,7 @@ def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> li
 
 
 def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list[tuple[float, NDArray[np.bool_]]]:
-    """Middles of the fewest angle ranges that cover the values chosen, each with the mask of its own."""
+    """Middles of the fewest angle ranges that cover the values in a mask, each with the mask of its values."""
     low, high = float(values[among].min()), float(values[among].max())
     count = max(1, int(np.ceil((high - low) / (2 * half_rad))))
     half = max(0.5 * (high - low) / count, 1e-6)
@@ -71,41 +67,32 @@ def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list
 
 
 def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
-    """Points (N, 3) all over a surface, its corners included."""
+    """Samples points (N, 3) all over a surface, with its corners."""
     xy = np.concatenate([np.asarray(surface.polygon_W, dtype=float), grid_inside(surface.polygon_W, step_m)])
     return np.column_stack([xy, np.full(len(xy), surface.height_m)])
 
 
-def in_plain_view(image: Image, X_WO: RigidTransform, p_W: FloatArray) -> bool:
-    """Returns whether a picture should show an object at a point: well inside, near, and with nothing before it."""
-    beside = p_W + np.array([[0.0, 0.0, 0.0], *(_EDGE_M * np.eye(3)), *(-_EDGE_M * np.eye(3))])
-    depth, seen = depth_ahead_m(image, X_WO, beside)
-    if not np.all(np.isfinite(depth)) or depth[0] > _PLAIN_M:
-        return False
-    return bool(np.isfinite(seen[0]) and seen[0] > depth[0] - _BEFORE_M)
-
-
 def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box]:
-    """Surfaces as solid boxes from just above the floor to their tops, in the body frame."""
+    """Solid boxes from just above the floor to the tops of surfaces, in the body frame."""
     standing = (s for s in surfaces if s.height_m > _LOWEST_TOP_M)
     return [_standing_box(np.asarray(s.polygon_W, dtype=float), 0.05, s.height_m, X_WB) for s in standing]
 
 
 def cluster_box(cluster: Cluster, X_WB: RigidTransform, grow_m: float = 0.01) -> Box:
-    """An object seen on a surface as one box in the body frame."""
+    """Box about a cluster, in the body frame."""
     return _part_box(cluster, cluster.points.p_W[:, :2], X_WB, grow_m)
 
 
 def cluster_boxes(clusters: Iterable[Cluster], X_WB: RigidTransform, grow_m: float = 0.01) -> list[Box]:
-    """Objects seen on a surface as boxes in the body frame; several for one that a single box would fill badly."""
+    """Boxes about clusters, in the body frame; several for a cluster that fills one box badly."""
     parts = ((cluster, xy) for cluster in clusters for xy in standing_parts(cluster.points.p_W[:, :2]))
     return [_part_box(cluster, xy, X_WB, grow_m) for cluster, xy in parts]
 
 
 def standing_parts(xy: FloatArray, depth: int = _SPLITS) -> list[FloatArray]:
-    """Points (N, 2) in groups, each of which fills the rectangle about it; two walls at a corner are two groups.
+    """Splits points (N, 2) into groups that fill their rectangles; two walls at a corner are two groups.
 
-    A rectangle that is mostly empty is halved along its longer side, and so on, `depth` times at most.
+    Halves a mostly empty rectangle across its longer side, at most `depth` times.
     """
     (x, y), (width, height), angle_deg = cv2.minAreaRect((middled := xy - xy.mean(axis=0)).astype(np.float32))
     cells = np.unique(np.floor(xy / _CELL_M).astype(int), axis=0)
@@ -124,7 +111,7 @@ def _part_box(cluster: Cluster, xy: FloatArray, X_WB: RigidTransform, grow_m: fl
 
 
 def _standing_box(xy: FloatArray, bottom_m: float, top_m: float, X_WB: RigidTransform, grow_m: float = 0.0) -> Box:
-    """The upright box about points (x, y) in W, given in B."""
+    """Upright box in B about points (x, y) in W."""
     middle = xy.mean(axis=0)
     (x, y), (width, depth), angle = cv2.minAreaRect((xy - middle).astype(np.float32))
     centre = [middle[0] + x, middle[1] + y, 0.5 * (bottom_m + top_m)]

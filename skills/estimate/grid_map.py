@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 from skills.estimate.compiled import distances
 from skills.files.errors import InputError
 from skills.files.outside import file_beside
-from skills.files.pictures import picture_shares
+from skills.files.picture_files import picture_shares
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Height, Quantity, Share

@@ -10,7 +10,7 @@ from typing import ClassVar
 import shapely
 
 from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
-from skills.detect.words import counted
+from skills.detect.descriptions import count_sentence
 from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
@@ -18,7 +18,7 @@ from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose
 from skills.patience import Patience
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
-from skills.perception.people import SeenPerson, merged, people_in_scan
+from skills.perception.people import SeenPerson, add_person, people_in_scan
 from skills.perception.people_watch import people_in_images
 from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
@@ -62,7 +62,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
             echoes += [] if by_camera is None else by_lidar
             for one in by_lidar if by_camera is None else by_camera:
-                seen = merged(seen, one, same_m) if area.covers(shapely.Point(one.place_W)) else seen
+                seen = add_person(seen, one, same_m) if area.covers(shapely.Point(one.place_W)) else seen
             found = [one for one in seen if one.looks > 1 or any(_apart_m(one, echo) <= same_m for echo in echoes)]
             if 0 < inputs.count <= len(found):
                 break
@@ -85,9 +85,9 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...]) -> Succeeded:
         """The answer. Raises SkillFailure when there is none, or not enough."""
         if not found or len(found) < inputs.count:
-            few = counted(found, ()) if found else f"nobody is seen in the {inputs.place} from here"
+            few = count_sentence(found, ()) if found else f"nobody is seen in the {inputs.place} from here"
             raise SkillFailure(Cause.POSTCONDITION, few)
-        told = _told(found[0]) if inputs.count == 1 else counted(found, ())
+        told = _told(found[0]) if inputs.count == 1 else count_sentence(found, ())
         return Succeeded(told, {"observation": found[0], "observations": found})
 
     def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:

@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from skills.files.errors import InputError
 from skills.files.outside import plain_file, read_text
-from skills.files.schema_errors import first_error
+from skills.files.schema import first_error
 from skills.mapping.keyframe import Keyframe
 from skills.mapping.mapper import Mapper, MapperOptions, Submap
 from skills.mapping.occupancy import BANDS_M, LayeredOccupancy

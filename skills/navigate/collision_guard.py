@@ -13,7 +13,7 @@ import numpy as np
 from skills.api import ReturnsView, SkillContext
 from skills.navigate.footprint import Footprint, disc_centres
 from skills.navigate.path import TURN_M_PER_RAD
-from skills.perception.moving import Moving, MovingOptions, MovingWatch
+from skills.perception.moving_objects import Moving, MovingOptions, MovingWatch
 from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
@@ -63,7 +63,7 @@ class CollisionGuard:
         if not isinstance(costmap, ReturnsView):
             return None
         stamp_s, returns_W = costmap.unexplained()
-        moving = self._watch.take(stamp_s, returns_W)
+        moving = self._watch.update(stamp_s, returns_W)
         found = self._suddenly_ahead(here, returns_W) or self._crossing(here, follower, most_m_s, moving, now_s)
         if found is not None:
             self._danger_s, self._place_W = now_s, found

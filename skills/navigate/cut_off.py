@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skills.api import ForgettingCostmap, FreeSpace, SkillContext
 from skills.navigate.footprint import Footprint
-from skills.perception.doorway import Doorway, opening
+from skills.perception.doorway import Doorway, measure_opening
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D
 
@@ -69,7 +69,7 @@ class DoorWatch:
         for door in self._context.doors:
             if door.distance_m(place) > options.reach_m or door.view_angle_rad(place) > options.flattest_rad:
                 continue
-            seen = opening(door, [(scan, X_WL)])
+            seen = measure_opening(door, [(scan, X_WL)])
             if seen.rays >= _FEW_RAYS and seen.most_m <= options.closed_m:
                 self._closed[door] = None
             elif seen.least_m > options.closed_m:

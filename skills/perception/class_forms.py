@@ -1,4 +1,4 @@
-"""What the classes of objects are like in general: `class_forms.yaml`."""
+"""General knowledge of object classes and attributes: `class_forms.yaml` and `colour_words.yaml`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Final, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from skills.files.yaml_source import read_yaml
@@ -15,14 +17,19 @@ from skills.files.yaml_source import read_yaml
 PERSON: Final = "person"
 """The class of people."""
 THING: Final = "thing"
-"""The class word for any object: what stands out from its surface, whether the detector has a class for it or not."""
+"""The class word for any object that stands on a surface, whether the detector knows its class or not."""
+MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(
+    dict.fromkeys(("big", "large", "huge"), True) | dict.fromkeys(("small", "little", "tiny"), False)
+)
+"""Attributes of size: whether each says that an object is larger than usual in its class."""
 
 
 class ClassForm(BaseModel):
     """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length.
 
-    `mass_kg` is from the lightest to the heaviest usual one; None: nothing is known. `least_kg_m3` is the least mass
-    per volume of the bar about it (its longest side times the shortest twice); None: its size says nothing of its mass.
+    `mass_kg` is from the lightest to the heaviest usual object; None when unknown. `least_kg_m3` is the least mass per
+    volume of a bar about the object (its longest side times the shortest twice); None when its size says nothing about
+    its mass.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
@@ -36,9 +43,9 @@ class ClassForm(BaseModel):
     least_kg_m3: float | None = None
 
     def least_mass_kg(self, size_m: tuple[float, float, float]) -> float:
-        """What one that was seen with a size (three sides in m) weighs at least; 0.0 where nothing is known.
+        """Least mass of an object that was seen with a size (three sides in m); 0.0 when unknown.
 
-        What is hidden of it makes it seem smaller, and so lighter, not heavier.
+        A hidden part makes an object seem smaller, and so lighter, not heavier.
         """
         if self.mass_kg is None:
             return 0.0
@@ -47,8 +54,42 @@ class ClassForm(BaseModel):
         return max(self.mass_kg[0], min(by_size_kg, self.mass_kg[1]))
 
 
+class ColourRange(BaseModel):
+    """A range of hue (degrees, may wrap past 360), saturation and value (0 to 1)."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    hue_deg: tuple[float, float] = (0.0, 360.0)
+    saturation: tuple[float, float] = (0.0, 1.0)
+    value: tuple[float, float] = (0.0, 1.0)
+
+    def share(self, colours: NDArray[np.uint8]) -> float:
+        """Share of colours (N, 3) RGB in the range."""
+        import cv2  # a caller that only lists the words does not load it
+
+        hsv = cv2.cvtColor(colours.reshape(1, -1, 3), cv2.COLOR_RGB2HSV_FULL)[0].astype(np.float64)
+        hue, saturation, value = hsv[:, 0] * (360 / 255), hsv[:, 1] / 255, hsv[:, 2] / 255
+        low, high = self.hue_deg
+        in_hue = (hue >= low) & (hue <= high) if low <= high else (hue >= low) | (hue <= high)
+        in_saturation = (saturation >= self.saturation[0]) & (saturation <= self.saturation[1])
+        in_value = (value >= self.value[0]) & (value <= self.value[1])
+        return float(np.mean(in_hue & in_saturation & in_value))
+
+
 @lru_cache(maxsize=1)
 def class_forms() -> Mapping[str, ClassForm]:
-    """The classes by name. Raises pydantic.ValidationError when the file beside this module is malformed."""
+    """Loads the classes by name. Raises pydantic.ValidationError when the file beside this module is malformed."""
     forms = read_yaml(Path(__file__).with_name("class_forms.yaml")).data
     return MappingProxyType(TypeAdapter(dict[str, ClassForm]).validate_python(forms))
+
+
+@lru_cache(maxsize=1)
+def colour_words() -> Mapping[str, ColourRange]:
+    """Loads the colour words. Raises pydantic.ValidationError when the file beside this module is malformed."""
+    words = read_yaml(Path(__file__).with_name("colour_words.yaml")).data["attributes"]
+    return TypeAdapter(dict[str, ColourRange]).validate_python(words)
+
+
+def known_attributes() -> frozenset[str]:
+    """Attribute words that the pixels or the size of a detected object can show."""
+    return frozenset(colour_words()) | frozenset(MEANS_BIG)

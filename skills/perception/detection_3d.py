@@ -1,35 +1,37 @@
-"""Detections with a place: where in the world each object is, how large, on which surface, of which colours."""
+"""Detections in 3D: position, size, surface and colours of detected objects in the world."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RollPitchYaw
 
 from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.geometry import inside_polygon
-from skills.perception.class_forms import class_forms
-from skills.perception.point_cloud import camera_pose_W
-from skills.perception.position import Position, position_of
+from skills.perception.class_forms import MEANS_BIG, class_forms, colour_words
+from skills.perception.point_cloud import Mask, camera_pose_W, closed_mask
+from skills.perception.position import Position, locate
 from skills.robot import FloatArray, Image
 
 _SURFACE_MARGIN_M = 0.05
 _SURFACE_HEIGHT_M = 0.10
 _FLOOR_HEIGHT_M = 0.08
 _FAR_TOO_LARGE = 1.5
+_LEAST_COLOUR_SHARE = 0.3
 
 
 @dataclass(frozen=True)
 class Detection3D:
-    """One detection with its place in the world.
+    """One detection with its position in the world.
 
-    `covariance` (3, 3) is that of position_W from the camera at capture; `place_covariance` adds the localisation's.
-    `size_m` and `yaw_rad` are as in `ObjectObservation`; `eye_W` is where the camera was; `pixels` (N, 2) as (u, v) are
-    the object's own, as far as depth tells, and `colours` (N, 3) theirs, none in a grey picture; `surface` is what it
-    rests on, "floor" for the floor, None for what is not known.
+    `covariance` (3, 3) is that of position_W by the camera at capture; `place_covariance` adds the localisation's.
+    `size_m` and `yaw_rad` are as in `ObjectObservation`; `eye_W` is the camera's position; `pixels` (N, 2) as (u, v)
+    are the object's own, by depth, with their `colours` (N, 3), none in a grey picture; `surface` is the surface below
+    it, "floor" for the floor, None when unknown.
     """
 
     stamp_s: float
@@ -46,17 +48,17 @@ class Detection3D:
 
     @property
     def class_name(self) -> str:
-        """The class of the detection."""
+        """Class of the detection."""
         return self.detection.class_name
 
 
 def detections_3d(
     image: Image, localisation: LocalisationEstimate, detections: Iterable[Detection], surfaces: Sequence[Surface]
 ) -> tuple[Detection3D, ...]:
-    """The detections that have a place.
+    """Locates detections in the world.
 
-    Left out are those where no depth is seen, of classes without a form, and those that span far more than the longest
-    objects of their class do.
+    Leaves out detections without depth, of classes without a form, and far larger than the longest objects of their
+    class.
     """
     known = [detection for detection in detections if detection.class_name in class_forms()]
     placed = zip(known, _positions(image, known), strict=True)
@@ -72,14 +74,15 @@ def _is_far_too_large(detection: Detection, position: Position) -> bool:
 
 
 def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:
-    """The place of each detection; what long objects lie between or behind is found first, and is none of theirs."""
+    """Locates each detection; long objects come last, without the pixels of the others, between which they may lie."""
     shape = (image.intrinsics.height, image.intrinsics.width)
-    taken, found = np.zeros(shape, dtype=bool), dict[int, Position | None]()
+    taken: Mask = np.zeros(shape, dtype=bool)
+    found = dict[int, Position | None]()
     for k in sorted(range(len(detections)), key=lambda k: _is_long(detections[k])):
         long = _is_long(detections[k])
-        position = found[k] = position_of(image, detections[k], taken if long else None)
+        position = found[k] = locate(image, detections[k], taken if long else None)
         if position is not None and not long:
-            taken |= position.segment.pixel_mask(*shape)
+            taken |= closed_mask(position.segment.pixels, *shape)
     return [found[k] for k in range(len(detections))]
 
 
@@ -99,7 +102,7 @@ def _detection_3d(
     p_W = np.asarray(X_WO @ position.p_OT)
     covariance = R_WO @ position.covariance_O @ R_WO.T
     p_WB = X_WO @ image.frames.pose("body").translation() if "body" in image.frames.edges else X_WO.translation()
-    pixels = _pixels(image, position)
+    pixels = position.segment.pixels
     return Detection3D(
         stamp_s=image.stamp_s,
         detection=detection,
@@ -116,14 +119,14 @@ def _detection_3d(
 
 
 def place_covariance(p_W: FloatArray, p_WB: FloatArray, covariance: FloatArray) -> FloatArray:
-    """What the robot's uncertain place (x, y, yaw) does to a point seen from there: covariance (3, 3)."""
+    """Covariance (3, 3) that the robot's pose covariance (x, y, yaw) gives a point p_W seen from p_WB."""
     dx, dy = p_W[0] - p_WB[0], p_W[1] - p_WB[1]
     jacobian = np.array([[1.0, 0.0, -dy], [0.0, 1.0, dx], [0.0, 0.0, 0.0]])
     return np.asarray(jacobian @ covariance @ jacobian.T)
 
 
 def surface_below(p_W: FloatArray, base_m: float, surfaces: Sequence[Surface]) -> str | None:
-    """The surface on which an object at p_W rests whose base is at a height (m), "floor", or None."""
+    """Name of the surface below an object at p_W with its base at a height (m): "floor" for the floor, or None."""
     off = {surface.name: abs(base_m - surface.height_m) for surface in surfaces if _above(surface, p_W)}
     near = [name for name in sorted(off, key=lambda name: off[name]) if off[name] < _SURFACE_HEIGHT_M]
     return near[0] if near else FLOOR if abs(base_m) < _FLOOR_HEIGHT_M else None
@@ -133,16 +136,8 @@ def _above(surface: Surface, p_W: FloatArray) -> bool:
     return bool(inside_polygon(p_W[None, :2], surface.polygon_W, _SURFACE_MARGIN_M)[0])
 
 
-def _pixels(image: Image, position: Position) -> NDArray[np.int64]:
-    """The object's own pixels (N, 2)."""
-    window, mask = position.segment.window, position.segment.mask
-    u = np.clip(np.rint(window.u[mask]), 0, image.intrinsics.width - 1)
-    v = np.clip(np.rint(window.v[mask]), 0, image.intrinsics.height - 1)
-    return np.stack([u, v], axis=1).astype(np.int64)
-
-
 def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> ObjectObservation:
-    """A 3D detection as an observation."""
+    """Observation of a 3D detection."""
     x, y, z = (float(value) for value in detected.position_W)
     return ObjectObservation(
         stamp_s=detected.stamp_s,
@@ -155,17 +150,16 @@ def observation(detected: Detection3D, attributes: tuple[str, ...] = ()) -> Obje
     )
 
 
-def depth_ahead_m(image: Image, X_WO: RigidTransform, points_W: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """For points (N, 3): how deep they are in the picture (NaN outside of it), and how deep it is there (NaN: none)."""
-    lens, X_CW = image.depth_intrinsics, camera_pose_W(image, X_WO).inverse()
-    p_C = points_W @ X_CW.rotation().matrix().T + X_CW.translation()
-    z = np.where(p_C[:, 2] > 0.05, p_C[:, 2], np.nan)
-    with np.errstate(invalid="ignore"):
-        u, v = p_C[:, 0] / z * lens.fx + lens.cx, p_C[:, 1] / z * lens.fy + lens.cy
-        rows, columns = image.depth_m.shape[:2]
-        inside = (u >= 0) & (u <= columns - 1) & (v >= 0) & (v <= rows - 1)
-    z = np.where(inside, z, np.nan)
-    seen = np.full(len(points_W), np.nan)
-    found = image.depth_m[np.rint(v[inside]).astype(int), np.rint(u[inside]).astype(int)].astype(np.float64)
-    seen[inside] = np.where(np.isfinite(found) & (found > 0.0), found, np.nan)
-    return z, seen
+def has_attribute(detected: Detection3D, attribute: str) -> bool:
+    """Returns whether a detected object has an attribute: by its own pixels' colours, or its size in its class.
+
+    Raises KeyError for an unknown word.
+    """
+    word = attribute.lower()
+    if word in MEANS_BIG:
+        form = class_forms().get(detected.class_name)
+        if form is None:
+            return False
+        is_big = max(detected.size_m) > math.sqrt(form.length_m[0] * form.length_m[1])
+        return is_big is MEANS_BIG[word]
+    return len(detected.colours) > 0 and colour_words()[word].share(detected.colours) > _LEAST_COLOUR_SHARE

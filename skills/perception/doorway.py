@@ -1,4 +1,4 @@
-"""What the rays of a LiDAR tell of a doorway: how much of its width lets them through."""
+"""Doorways, and the width that a LiDAR scan shows to be open."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Counts = NDArray[np.int64]
 class Doorway:
     """A doorway: its middle (x, y) in the world (m), its clear width (m), and the direction through it (rad).
 
-    From which side the direction leads through does not matter. It leads from one room to the other of `between`.
+    The direction may lead either way. `between` names the two rooms that it joins.
     """
 
     middle_W: tuple[float, float]
@@ -40,17 +40,17 @@ class Doorway:
     between: tuple[str, str] = ("", "")
 
     def distance_m(self, place_W: tuple[float, float]) -> float:
-        """How far its middle is from a place."""
+        """Distance of its middle from a point (m)."""
         return math.dist(self.middle_W, place_W)
 
     def axis(self, far_m: float, every_m: float) -> FloatArray:
-        """Points (N, 2) on the line through it, so far to both sides."""
+        """Points (N, 2) on the line through it, far_m to both sides."""
         steps = np.arange(-far_m, far_m + every_m, every_m)
         through = np.array([math.cos(self.through_rad), math.sin(self.through_rad)])
         return np.asarray(np.array(self.middle_W) + steps[:, None] * through)
 
     def view_angle_rad(self, place_W: tuple[float, float]) -> float:
-        """How flat it is seen from a place: 0 from straight before it, pi/2 from within its wall."""
+        """Angle between its direction and the view from a point: 0 straight before it, pi/2 from within its wall."""
         bearing = math.atan2(self.middle_W[1] - place_W[1], self.middle_W[0] - place_W[0])
         off = abs(math.remainder(bearing - self.through_rad, math.tau))
         return min(off, math.pi - off)
@@ -58,9 +58,9 @@ class Doorway:
 
 @dataclass(frozen=True)
 class Opening:
-    """How wide a doorway is open, in one piece (m): seen to be free, and if all that is not seen were free.
+    """Width of a doorway that is open in one piece (m): what is seen to be free, and what would be if all unseen were.
 
-    `rays` is how many rays told something.
+    `rays` is the number of rays that crossed the doorway.
     """
 
     least_m: float
@@ -68,22 +68,22 @@ class Opening:
     rays: int
 
 
-def opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]]) -> Opening:
-    """How wide a door is open, from scans with the pose X_WL of the LiDAR.
+def measure_opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]]) -> Opening:
+    """Measures how wide a door is open, from scans with the pose X_WL of the LiDAR.
 
-    A strip of the doorway is free when its rays go clearly beyond the doorway, and shut when they end within it. What
-    is shut and joined to no side of the doorway is no door: somebody who stands in it, say. It counts as not seen.
+    A strip of the doorway is free when its rays go clearly beyond the doorway, and shut when they end in it. Shut
+    strips that reach neither side of the doorway, such as a person who stands in it, count as unseen.
     """
     strips = max(1, round(door.width_m / _STRIP_M))
     counts: Counts = np.array([_counts(door, strips, scan, X_WL) for scan, X_WL in scans]).sum(axis=0)
-    free, shut = (_clearly(part, counts.sum(axis=0)) for part in counts[:2])
+    free, shut = (_is_clear(part, counts.sum(axis=0)) for part in counts[:2])
     closed = np.logical_and.accumulate(shut) | np.logical_and.accumulate(shut[::-1])[::-1]
     strip_m = door.width_m / strips
     return Opening(_longest(free) * strip_m, _longest(~closed) * strip_m, int(counts.sum()))
 
 
 def _counts(door: Doorway, strips: int, scan: Scan, X_WL: RigidTransform) -> Counts:
-    """How many rays (3, strips) towards each strip go through, end in the doorway, or end elsewhere."""
+    """Counts the rays (3, strips) towards each strip that go through, end in the doorway, or end elsewhere."""
     origin, middle = X_WL.translation(), np.array(door.middle_W)
     through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
     through = through if (middle - origin[:2]) @ through > 0.0 else -through
@@ -93,20 +93,20 @@ def _counts(door: Doorway, strips: int, scan: Scan, X_WL: RigidTransform) -> Cou
     crossing = ((middle - origin[:2]) @ through) / towards
     aside = (origin[:2] - middle) @ along + crossing * (rays[..., :2] @ along) + 0.5 * door.width_m
     height = origin[2] + crossing * rays[..., 2]
-    tells = np.isfinite(scan.ranges_m) & (towards > _LEAST_TOWARDS) & (aside >= 0.0) & (aside < door.width_m)
-    tells &= (height > _HEIGHTS_M[0]) & (height < _HEIGHTS_M[1])
-    beyond = ((scan.ranges_m - crossing) * towards)[tells]
-    strip = np.minimum((aside[tells] / door.width_m * strips).astype(np.int64), strips - 1)
+    crosses = np.isfinite(scan.ranges_m) & (towards > _LEAST_TOWARDS) & (aside >= 0.0) & (aside < door.width_m)
+    crosses &= (height > _HEIGHTS_M[0]) & (height < _HEIGHTS_M[1])
+    beyond = ((scan.ranges_m - crossing) * towards)[crosses]
+    strip = np.minimum((aside[crosses] / door.width_m * strips).astype(np.int64), strips - 1)
     goes, ends = beyond > _BEYOND_M, np.abs(beyond) <= _IN_PLANE_M
     return np.array([np.bincount(strip[kind], minlength=strips) for kind in (goes, ends, ~goes & ~ends)])
 
 
-def _clearly(counts: Counts, of: Counts) -> Bools:
-    """Where enough rays, and nearly all, say the same."""
-    return np.asarray((counts >= _FEWEST) & (counts >= _CLEARLY * of))
+def _is_clear(counts: Counts, total: Counts) -> Bools:
+    """Returns for which strips enough rays, and nearly all, agree."""
+    return np.asarray((counts >= _FEWEST) & (counts >= _CLEARLY * total))
 
 
 def _longest(flags: Bools) -> int:
-    """The length of the longest run of true ones."""
+    """Length of the longest run of true flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return int((edges[1::2] - edges[::2]).max(initial=0))

@@ -1,6 +1,6 @@
-"""People: who was seen where, by camera or LiDAR. In a scan a person is upright, wide as shoulders, and alone.
+"""Positions of people, and their detection in LiDAR scans: an upright cluster as wide as shoulders that stands alone.
 
-A LiDAR of one ring sees no more than a pair of legs, or a leg, that stands alone.
+For a LiDAR of one ring, a person is a pair of legs, or one leg, that stands alone.
 """
 
 from __future__ import annotations
@@ -22,18 +22,22 @@ _HIGHEST_M = 1.8
 _WIDTH_M = (0.15, 0.75)
 _ALONE_M = 0.2
 _FEWEST_POINTS = 12
-_LEGS_LOWEST_M, _LEGS_CELL_M, _LEGS_WIDTH_M, _LEGS_FEWEST_POINTS = 0.1, 0.12, (0.08, 0.6), 6
+_LEGS_LOWEST_M = 0.1
+_LEGS_CELL_M = 0.12
+_LEGS_WIDTH_M = (0.08, 0.6)
+_LEGS_FEWEST_POINTS = 6
 _FRONT_TO_AXIS_M = 0.1
 _AXIS_SIGMA_M = 0.08
 _OWN_M = (0.1, 0.19, 0.05)
-"""What the robot holds and its arm reach so far beyond its outline: behind, ahead, to the sides."""
+"""Reach of the arm and the held object beyond the robot's outline: behind, ahead, to the sides."""
 
 
 @dataclass(frozen=True)
 class SeenPerson:
-    """Somebody seen: the upright axis (x, y) in the world (m), its covariance (2, 2), when last and how often.
+    """A person: the upright axis (x, y) in the world (m), its covariance (2, 2), and the time of the last view.
 
-    `here_W` is where the robot was then, and `missed` how many looks since then should have shown them.
+    `here_W` is the robot's pose at that time, `looks` the number of views that showed the person, and `missed` the
+    number of views since then that should have.
     """
 
     place_W: tuple[float, float]
@@ -46,14 +50,14 @@ class SeenPerson:
 
     @property
     def distance_m(self) -> float:
-        """Distance from where the robot was."""
+        """Distance of the person from the robot at the last view, in metres."""
         return math.dist(self.place_W, (self.here_W.x_m, self.here_W.y_m))
 
 
-def merged(known: Sequence[SeenPerson], new: SeenPerson, same_m: float) -> tuple[SeenPerson, ...]:
-    """What is known with somebody seen anew: in the place of the nearest within same_m, or as one more.
+def add_person(known: Sequence[SeenPerson], new: SeenPerson, same_m: float) -> tuple[SeenPerson, ...]:
+    """Adds a person to those known: replaces the nearest within same_m, or is one more.
 
-    The newer place counts: people walk. Two cameras that see one person at once count as one look.
+    The newer position counts, since people walk. Two cameras that see a person at once count as one view.
     """
     near = [one for one in known if math.dist(one.place_W, new.place_W) <= same_m]
     if not near:
@@ -66,12 +70,12 @@ def merged(known: Sequence[SeenPerson], new: SeenPerson, same_m: float) -> tuple
 def people_in_scan(
     scan: Scan, X_WB: RigidTransform, footprint_m: Sequence[tuple[float, float]], furthest_m: float = 3.5
 ) -> list[SeenPerson]:
-    """People in a LiDAR scan, the nearest first; what is within and just before the robot's footprint is its own."""
+    """Detects people in a LiDAR scan, nearest first; ignores points in and right around the robot's footprint."""
     points_B = scan.points_B()
     level = points_B @ scan.X_OB.rotation().matrix().T
     height = level[:, 2] + scan.X_OB.translation()[2]
     distance = np.hypot(points_B[:, 0], points_B[:, 1])
-    own = _own(points_B, np.array(footprint_m))
+    own = _is_own(points_B, np.array(footprint_m))
     planar = len(scan.elevations_rad) == 1
     near = (
         (height > (_LEGS_LOWEST_M if planar else _LOWEST_M))
@@ -80,17 +84,17 @@ def people_in_scan(
         & ~own
     )
     clusters = _clusters(points_B[near], _LEGS_CELL_M if planar else _CELL_M)
-    sized = _legs_sized if planar else _person_sized
+    is_sized = _is_leg_sized if planar else _is_person_sized
     people = [
         _person(scan.stamp_s, X_WB, cluster)
         for k, cluster in enumerate(clusters)
-        if sized(cluster) and _alone(cluster, [other for j, other in enumerate(clusters) if j != k])
+        if is_sized(cluster) and _is_alone(cluster, [other for j, other in enumerate(clusters) if j != k])
     ]
     return sorted((p for p in people if p.distance_m < furthest_m), key=lambda person: person.distance_m)
 
 
-def _own(points_B: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
-    """Points of the robot's own arm and what it holds."""
+def _is_own(points_B: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
+    """Returns which points belong to the robot's own arm and the held object."""
     (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
     behind, ahead, aside = _OWN_M
     x, y = points_B[:, 0], points_B[:, 1]
@@ -98,7 +102,7 @@ def _own(points_B: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
 
 
 def _clusters(points_B: FloatArray, cell_m: float) -> list[FloatArray]:
-    """Points (N, 3) joined where they are neighbours on a grid seen from above."""
+    """Clusters points (N, 3) by neighbourhood on a grid seen from above."""
     if len(points_B) == 0:
         return []
     labels, count = grid_labels(points_B[:, :2], cell_m, dilated=True)
@@ -106,19 +110,19 @@ def _clusters(points_B: FloatArray, cell_m: float) -> list[FloatArray]:
     return [group for group in groups if len(group) >= 3]
 
 
-def _person_sized(points_B: FloatArray) -> bool:
+def _is_person_sized(points_B: FloatArray) -> bool:
     spans = np.ptp(points_B[:, :2] - points_B[:, :2].mean(axis=0), axis=0)
     width = float(np.hypot(*spans))
     tall = float(np.ptp(points_B[:, 2])) > 0.1
     return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and tall
 
 
-def _legs_sized(points_B: FloatArray) -> bool:
+def _is_leg_sized(points_B: FloatArray) -> bool:
     width = float(np.hypot(*np.ptp(points_B[:, :2], axis=0)))
     return len(points_B) >= _LEGS_FEWEST_POINTS and _LEGS_WIDTH_M[0] < width < _LEGS_WIDTH_M[1]
 
 
-def _alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
+def _is_alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
     """Returns whether no other cluster is close; walls and cupboards seldom stand alone."""
     centre = points_B[:, :2].mean(axis=0)
     reach = float(np.max(np.linalg.norm(points_B[:, :2] - centre, axis=1))) + _ALONE_M
@@ -126,7 +130,7 @@ def _alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
 
 
 def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenPerson:
-    """Somebody whose front is seen: the axis is a little behind its middle."""
+    """Person whose front is a cluster: the axis is a little behind its middle."""
     centre = points_B[:, :2].mean(axis=0)
     behind = centre + _FRONT_TO_AXIS_M * centre / max(float(np.linalg.norm(centre)), 1e-6)
     x, y, _ = (float(value) for value in X_WB @ np.array([*behind, 0.0]))

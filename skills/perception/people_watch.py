@@ -1,4 +1,4 @@
-"""Watching for people by the body cameras that look where the robot goes."""
+"""Detection of people by the body cameras that face the direction of motion."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from pydrake.math import RigidTransform
 from skills.api import Detection, Detector, Job, LayeredView, SkillContext
 from skills.geometry import relative
 from skills.perception.class_forms import PERSON
-from skills.perception.detector.camera_images import found_in_grey
-from skills.perception.people import SeenPerson, merged
-from skills.perception.position import position_of
+from skills.perception.detector.camera_images import detect_class_in_grey
+from skills.perception.people import SeenPerson, add_person
+from skills.perception.point_cloud import camera_pose_W, project
+from skills.perception.position import locate
 from skills.quantities import Count, Delay, Duration, Length, Margin, Share, Turn
 from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError, Pose2D
 
@@ -30,13 +31,13 @@ _SAME_YAW_RAD: Final = 0.05
 
 @dataclass(frozen=True)
 class PeopleOptions:
-    """How often the watch looks (s), how late the answer comes (s), and what counts as a person.
+    """Periods of the watch (s), the latency of a detection (s), and conditions for a person to count.
 
-    A camera looks every `period_s` while it may show somebody: a known person, or something in the costmap that the map
-    does not explain, within `near_m` and no farther than `view_rad` off its axis. All look every `idle_s` anyway.
-    A person counts once seen twice within `same_m`, at least `least_score` sure; a second look follows the first after
-    `again_s`. Who should be in a picture and is not for `misses` times has gone. Who is out of all pictures is
-    remembered for `memory_s`, and for `beside_s` as long as the costmap knows something within `beside_m` of the place.
+    A camera takes a picture every `period_s` while it may show a person: a known one, or a cell of the costmap that the
+    map does not explain, within `near_m` and within `view_rad` of its axis. Every `idle_s` all cameras take one. A
+    person counts when two views within `same_m` show them with `least_score`; the second view follows after `again_s`.
+    The watch forgets a person whom `misses` pictures should show and do not. Out of view, it remembers a person for
+    `memory_s`, and for `beside_s` as long as the costmap has an obstacle within `beside_m` of the position.
     """
 
     period_s: Duration = 0.5
@@ -56,9 +57,9 @@ class PeopleOptions:
 
 @dataclass(frozen=True)
 class _Look:
-    """Who is in the pictures of one moment, and the pictures without their pixels: frames and lenses.
+    """People in pictures taken at one time, and these pictures.
 
-    `suspected`: the pictures were taken without depth and show somebody; the next ones are taken with depth, at once.
+    `suspected` pictures have no depth and show a person; the next ones are taken at once, with depth.
     """
 
     found: tuple[SeenPerson, ...]
@@ -68,16 +69,16 @@ class _Look:
     suspected: bool = False
 
     def shows(self, one: SeenPerson, reach_m: float) -> bool:
-        """Whether somebody who has not moved would be seen: from where they were seen before, or well in a picture."""
+        """Returns whether a still person would be visible: from the pose of the last view, or well in a picture."""
         off = relative(one.here_W, self.here_W)
         if math.hypot(off.x_m, off.y_m) < _SAME_PLACE_M and abs(off.yaw_rad) < _SAME_YAW_RAD:
             return True
         upright_W = np.array([[*one.place_W, height_m] for height_m in _HEIGHTS_M])
-        return any(_inside(image, self.X_WO, upright_W, reach_m) for image in self.images)
+        return any(_is_inside(image, self.X_WO, upright_W, reach_m) for image in self.images)
 
 
 class PeopleWatch:
-    """Knows who is near while its `step` is called. Idle where the detector knows no people, or without cameras."""
+    """Watch for people near the robot. Does nothing without cameras, or when the detector has no class of people."""
 
     def __init__(self, context: SkillContext, options: PeopleOptions | None = None) -> None:
         self._context = context
@@ -90,16 +91,16 @@ class PeopleWatch:
         self._seen: tuple[SeenPerson, ...] = ()
 
     def people(self) -> tuple[SeenPerson, ...]:
-        """Those who count now."""
+        """People who count now."""
         return tuple(one for one in self._seen if one.looks > 1 and self._remembered(one))
 
     def step(self, velocity: FloatArray) -> None:
-        """Takes in what was seen; look again in time, towards a body-frame velocity (3,). Never blocks."""
+        """Processes finished views, and starts the next one towards a body-frame velocity (3,). Never blocks."""
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
                 with contextlib.suppress(NoImageError):
-                    self._take(job.result())
+                    self._update(job.result())
             return
         now_s = self._context.clock.now()
         cameras, with_depth = self._due(cameras_towards(velocity, self._cameras), now_s)
@@ -114,18 +115,18 @@ class PeopleWatch:
             )
 
     def _due(self, cameras: Sequence[CameraCapabilities], now_s: float) -> tuple[Sequence[CameraCapabilities], bool]:
-        """The cameras whose next picture is due, and whether depth is wanted with it."""
+        """Cameras whose next picture is due, and whether it needs depth."""
         options, since_s = self._options, now_s - self._looked_s
         if self._suspected:
             return cameras, True
         if now_s >= self._all_looked_s + options.idle_s:
             self._all_looked_s = now_s
-            return cameras, bool(self._showing_something(cameras))
+            return cameras, bool(self._may_show_person(cameras))
         period_s = options.again_s if self._soon else options.period_s
-        return (self._showing_something(cameras) if since_s >= period_s else ()), True
+        return (self._may_show_person(cameras) if since_s >= period_s else ()), True
 
-    def _showing_something(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
-        """Those with a known person or something unexplained in view; all where the costmap cannot tell."""
+    def _may_show_person(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
+        """Cameras with a known person or an unexplained obstacle in view; all of them without a layered costmap."""
         costmap, here = self._context.costmap, self._context.pose()
         if not isinstance(costmap, LayeredView):
             return cameras
@@ -133,10 +134,10 @@ class PeopleWatch:
         off_W = places_W - (here.x_m, here.y_m)
         near_W = off_W[np.linalg.norm(off_W, axis=1) < self._options.near_m]
         bearings_rad = np.arctan2(near_W[:, 1], near_W[:, 0]) - here.yaw_rad
-        return [each for each in cameras if _shown(bearings_rad - each.heading_rad, self._options.view_rad)]
+        return [each for each in cameras if _is_near_axis(bearings_rad - each.heading_rad, self._options.view_rad)]
 
     def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
-        """People in one picture of each camera; without depth only whether there may be somebody."""
+        """Detects people in one picture of each camera; without depth, only whether there are any."""
         detector, options = self._context.detector, self._options
         if not with_depth:
             suspected = bool(_detected(detector, images, options.least_score))
@@ -144,26 +145,26 @@ class PeopleWatch:
         found = people_in_images(detector, images, X_WO, here_W, options.least_score, options.reach_m)
         return _Look(tuple(found), tuple(images), X_WO, here_W)
 
-    def _take(self, look: _Look) -> None:
-        """Brings what is known up to date, tells of it, and looks again soon when somebody is new."""
+    def _update(self, look: _Look) -> None:
+        """Updates and publishes the known people; schedules the next view early for a new one."""
         before, stamp_s = self._seen, self._context.clock.now()
         for one in look.found:
             stamp_s = one.stamp_s
-            self._seen = merged(self._seen, one, self._options.same_m)
-        self._seen = tuple(self._missed(one, look, stamp_s) for one in self._seen)
+            self._seen = add_person(self._seen, one, self._options.same_m)
+        self._seen = tuple(self._count_miss(one, look, stamp_s) for one in self._seen)
         self._seen = tuple(one for one in self._seen if self._remembered(one))
         self._suspected = look.suspected
         self._soon = look.suspected or any(one.looks == 1 for one in self._seen)
         if look.found or before:
             self._context.publish(PEOPLE_TOPIC, self._message())
 
-    def _missed(self, one: SeenPerson, look: _Look, stamp_s: float) -> SeenPerson:
-        """Somebody after a look, which counts as a miss when it should have shown them and did not."""
+    def _count_miss(self, one: SeenPerson, look: _Look, stamp_s: float) -> SeenPerson:
+        """Counts a miss of a person whom the view should have shown and did not."""
         due = one.stamp_s < stamp_s and look.shows(one, self._options.reach_m)
         return replace(one, missed=one.missed + 1) if due else one
 
     def _remembered(self, one: SeenPerson) -> bool:
-        """Returns whether somebody is still to be reckoned with."""
+        """Returns whether the watch still remembers a person."""
         options = self._options
         age_s = self._context.clock.now() - one.stamp_s
         if one.missed >= options.misses or age_s > options.beside_s:
@@ -196,23 +197,22 @@ def people_in_images(
     least_score: float,
     reach_m: float,
 ) -> list[SeenPerson]:
-    """Where the people in some pictures with depth are; those are left out who are farther from the camera than
-    reach_m, or whose depth is not known."""
+    """Locates the people in pictures with depth, except those beyond reach_m from the camera, or without depth."""
     found = _detected(detector, images, least_score)
-    seen = (_placed(image, one, X_WO, here_W, reach_m) for image, one in found)
+    seen = (_located(image, one, X_WO, here_W, reach_m) for image, one in found)
     return [one for one in seen if one is not None]
 
 
 def _detected(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
-    """The people in the pictures, each with its picture."""
-    found = found_in_grey(detector, images, PERSON)
+    """Detects people in the pictures, each with its picture."""
+    found = detect_class_in_grey(detector, images, PERSON)
     pairs = ((image, one) for image, ones in zip(images, found, strict=True) for one in ones)
     return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]
 
 
-def _placed(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float) -> SeenPerson | None:
-    """Where a detected person is; None when out of reach, or where the depth is not known."""
-    position = position_of(image, one)
+def _located(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float) -> SeenPerson | None:
+    """Locates a detected person; None when out of reach, or without depth."""
+    position = locate(image, one)
     if position is None:
         return None
     p_OC = image.frames.pose(image.camera_frame).translation()
@@ -224,22 +224,21 @@ def _placed(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, 
     return SeenPerson((x, y), covariance, one.score, image.stamp_s, here_W)
 
 
-def _inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: float) -> bool:
+def _is_inside(image: Image, X_WO: RigidTransform, points_W: FloatArray, reach_m: float) -> bool:
     """Returns whether any of some points (N, 3) lies well inside a picture, within reach of its camera."""
-    p_C = (X_WO @ image.frames.pose(image.camera_frame)).inverse().multiply(points_W.T)
-    lens, z = image.intrinsics, np.maximum(p_C[2], 1e-6)
-    u, v = p_C[0] / z * lens.fx + lens.cx, p_C[1] / z * lens.fy + lens.cy
+    lens, p_C = image.intrinsics, camera_pose_W(image, X_WO).inverse().multiply(points_W.T).T
+    u, v = project(np.maximum(p_C, [-np.inf, -np.inf, 1e-6]), lens)
     inside = (np.abs(u / lens.width - 0.5) < _WELL_INSIDE) & (np.abs(v / lens.height - 0.5) < _WELL_INSIDE)
-    return bool(np.any(inside & (p_C[2] > _NEAREST_M) & (p_C[2] < reach_m)))
+    return bool(np.any(inside & (p_C[:, 2] > _NEAREST_M) & (p_C[:, 2] < reach_m)))
 
 
-def _shown(off_axis_rad: FloatArray, view_rad: float) -> bool:
-    """Returns whether any of some bearings lies so near to a camera's axis."""
+def _is_near_axis(off_axis_rad: FloatArray, view_rad: float) -> bool:
+    """Returns whether any of some bearings lies within view_rad of a camera's axis."""
     return bool(np.any(np.cos(off_axis_rad) > math.cos(view_rad)))
 
 
 def cameras_towards(velocity: FloatArray, known: Sequence[CameraCapabilities]) -> tuple[CameraCapabilities, ...]:
-    """The body cameras that look where a body-frame velocity leads; those ahead when the robot stands or turns."""
+    """Body cameras that face the direction of a body-frame velocity; the front ones when the robot stands or turns."""
     vx, vy = float(velocity[0]), float(velocity[1])
     heading_rad = 0.0
     if abs(vy) > 2.0 * abs(vx):

@@ -1,4 +1,4 @@
-"""Depth pictures as points with their pixels and colours."""
+"""Depth images as point clouds, points as pixels, and clusters of points."""
 
 from __future__ import annotations
 
@@ -15,6 +15,9 @@ from skills.robot import FloatArray, Image, Intrinsics
 
 MIN_DEPTH_M = 0.15
 MAX_DEPTH_M = 4.0
+_GAP_PX = 11
+
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -28,13 +31,13 @@ class PointCloud:
     def __len__(self) -> int:
         return len(self.p_W)
 
-    def where(self, keep: NDArray[np.bool_]) -> PointCloud:
-        """The points that a mask (N,) keeps."""
-        return PointCloud(self.p_W[keep], self.pixels[keep], self.colours[keep])
+    def where(self, mask: Mask) -> PointCloud:
+        """Points that a mask (N,) selects."""
+        return PointCloud(self.p_W[mask], self.pixels[mask], self.colours[mask])
 
 
 def camera_pose_W(image: Image, X_WO: RigidTransform) -> RigidTransform:
-    """X_WC at the picture's capture time."""
+    """Pose X_WC of the camera when it took the picture."""
     return X_WO @ image.frames.pose(image.camera_frame)
 
 
@@ -44,49 +47,70 @@ def cloud_from_image(
     max_depth_m: float = MAX_DEPTH_M,
     heights_m: tuple[float, float] = (-math.inf, math.inf),
 ) -> PointCloud:
-    """All valid depth pixels between two heights as world points; those of a grey picture are grey."""
+    """Back-projects all valid depth pixels between two heights to the world; a grey picture gives grey points."""
     colour = np.repeat(image.grey[..., None], 3, axis=2) if image.colour is None else image.colour
     depth, X_WC = image.depth_m, camera_pose_W(image, X_WO)
     x_C, y_C = lens_rays(image.depth_intrinsics)
     R_WC, p_WC = X_WC.rotation().matrix(), X_WC.translation()
     height = depth * (R_WC[2, 0] * x_C + R_WC[2, 1] * y_C[:, None] + R_WC[2, 2]).astype(np.float32) + p_WC[2]
     low_m, high_m = heights_m
-    kept = (depth > MIN_DEPTH_M) & (depth < max_depth_m) & (height > low_m) & (height < high_m)
-    rows, columns = np.nonzero(kept)
+    valid = (depth > MIN_DEPTH_M) & (depth < max_depth_m) & (height > low_m) & (height < high_m)
+    rows, columns = np.nonzero(valid)
     rays = np.column_stack([x_C[columns], y_C[rows]])
-    z = depth[kept].astype(np.float64)[:, None]
+    z = depth[valid].astype(np.float64)[:, None]
     p_W = z * (rays @ R_WC[:, :2].T + R_WC[:, 2]) + p_WC
-    pixels = _colour_pixels(image, rays)
+    lens = image.intrinsics
+    pixels = nearest_pixels(rays[:, 0] * lens.fx + lens.cx, rays[:, 1] * lens.fy + lens.cy, lens)
     return PointCloud(p_W, pixels, colour[pixels[:, 1], pixels[:, 0]])
 
 
 @lru_cache(maxsize=8)
 def lens_rays(lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
-    """x/z of each column (W,) and y/z of each row (H,) of a lens."""
+    """Ray slopes of a lens: x/z of each column (W,), and y/z of each row (H,)."""
     return (np.arange(lens.width, dtype=np.float64) - lens.cx) / lens.fx, (
         np.arange(lens.height, dtype=np.float64) - lens.cy
     ) / lens.fy
 
 
-def _colour_pixels(image: Image, rays: FloatArray) -> NDArray[np.int64]:
-    """Pixels (N, 2) of the colour picture along rays (N, 2) with x/z and y/z."""
-    lens = image.intrinsics
-    u = np.clip(np.rint(rays[:, 0] * lens.fx + lens.cx), 0, lens.width - 1)
-    v = np.clip(np.rint(rays[:, 1] * lens.fy + lens.cy), 0, lens.height - 1)
-    return np.stack([u, v], axis=1).astype(np.int64)
+def project(p_C: FloatArray, lens: Intrinsics) -> tuple[FloatArray, FloatArray]:
+    """Projects points (..., 3) of the camera frame to pixel coordinates u and v."""
+    z = p_C[..., 2]
+    return p_C[..., 0] / z * lens.fx + lens.cx, p_C[..., 1] / z * lens.fy + lens.cy
+
+
+def nearest_pixels(u: FloatArray, v: FloatArray, lens: Intrinsics) -> NDArray[np.int64]:
+    """Pixels (..., 2) of a picture nearest to the coordinates u and v."""
+    columns, rows = np.clip(np.rint(u), 0, lens.width - 1), np.clip(np.rint(v), 0, lens.height - 1)
+    return np.stack([columns, rows], axis=-1).astype(np.int64)
+
+
+def closed_mask(pixels: NDArray[np.int64], height: int, width: int) -> Mask:
+    """Mask (height, width) of some pixels (N, 2) with the gaps between them closed."""
+    mask = np.zeros((height, width), dtype=np.uint8)
+    mask[pixels[:, 1], pixels[:, 0]] = 1
+    return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((_GAP_PX, _GAP_PX), np.uint8)) > 0)
 
 
 def grid_labels(
     xy: FloatArray, cell_m: float, *, fewest: int = 1, dilated: bool = False
 ) -> tuple[NDArray[np.int32], int]:
-    """Points (N, 2) grouped by neighbourhood on a grid: the label of each, 0 for none, and the number of labels.
+    """Clusters points (N, 2) by neighbourhood on a grid: label of each, 0 for none, and the number of labels.
 
-    Cells with less than `fewest` points are empty; `dilated`, groups also join across a gap of one cell or two.
+    Cells with fewer than `fewest` points are empty; `dilated` also joins clusters across a gap of a cell or two.
     """
-    cells = np.floor((xy - xy.min(axis=0)) / cell_m).astype(np.int64) + 1
-    counts = np.zeros(cells.max(axis=0) + 2, dtype=np.int32)
+    cells = np.floor((xy - xy.min(axis=0)) / cell_m).astype(np.int64)
+    return cell_labels(cells, fewest=fewest, reach=int(dilated))
+
+
+def cell_labels(cells: NDArray[np.int64], *, fewest: int = 1, reach: int = 0) -> tuple[NDArray[np.int32], int]:
+    """Clusters grid cells (N, 2), with repetitions: label of each, 0 for none, and the number of labels.
+
+    Cells that occur less than `fewest` times are empty; clusters that `reach` cells of dilation connect are joined.
+    """
+    cells = cells - cells.min(axis=0) + reach + 1
+    counts = np.zeros(cells.max(axis=0) + reach + 2, dtype=np.int32)
     np.add.at(counts, (cells[:, 0], cells[:, 1]), 1)
     occupied = (counts >= fewest).astype(np.uint8)
-    joined = cv2.dilate(occupied, np.ones((3, 3), np.uint8)) if dilated else occupied
+    joined = cv2.dilate(occupied, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) if reach else occupied
     count, grid = cv2.connectedComponents(joined, connectivity=8)
     return np.asarray(np.where(occupied > 0, grid, 0)[cells[:, 0], cells[:, 1]]), int(count)

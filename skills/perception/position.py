@@ -1,16 +1,16 @@
-"""Where a detected object is: the middle of the whole object, not of the side that is seen, with its covariance.
+"""Position of a detected object: the middle of the whole object, not of its visible side, with the covariance.
 
-The segment of the box gives the side that is seen. The form of the class says how far the object goes on behind it:
+The segment in the box gives the visible side. The form of the class says how far the object extends behind it:
 
 | form | middle |
 |---|---|
 | round, upright | the axis: behind the nearest points by half the width across the view, or of the circle that fits |
-| round, lying | the outline from above, made as wide as the object is high, from its near side on |
-| box | the outline from above, made as wide and long as the object is high, from its near sides on |
-| long | the outline from above; where too little of it rises above the plane, the ray of the box's middle meets it |
-| person | behind the nearest points by half a body's depth; from the floor to the top that is seen, or a usual height |
+| round, lying | the outline from above, extended from its near side to the object's height |
+| box | the outline from above, extended from its near sides to the object's height |
+| long | the outline from above; for a flat object, the point where the ray of the box's middle meets the plane |
+| person | behind the nearest points by half a body's depth; from the floor to the visible top, or a usual height |
 
-Heights are halfway from the plane below to the top. What the picture's edge cuts off is taken to be of usual length.
+The middle is halfway up from the plane to the top. An object that the picture's edge cuts off has its usual length.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ import numpy as np
 
 from skills.api import Detection
 from skills.perception.class_forms import ClassForm, class_forms
-from skills.perception.object_segmentation import Mask, ObjectSegment, Window, segment_object, window_about
-from skills.perception.plane import LevelPlane
-from skills.perception.shape import circle_seen, smallest_rectangle, without_strays
+from skills.perception.fitting import LevelPlane, fit_circle, fit_rectangle, without_strays
+from skills.perception.object_segmentation import ObjectSegment, Window, segment_object, window_about
+from skills.perception.point_cloud import Mask
 from skills.robot import FloatArray, Image
 
 _UPRIGHT = 1.15
@@ -32,17 +32,20 @@ _LEAST_LONG_COVERED = 0.75
 _STRIP_M = 0.006
 _REACH_M = 0.25
 _GRAZING = 0.08
-_PERSON_DEPTH_M, _PERSON_BEHIND_M = 0.30, 0.10
-_PERSON_HEIGHT_M, _PERSON_HALF_M = 1.70, 0.4
+_PERSON_DEPTH_M = 0.30
+_PERSON_BEHIND_M = 0.10
+_PERSON_HEIGHT_M = 1.70
+_PERSON_HALF_M = 0.4
+_FEWEST_POINTS = 12
 _BORDER_PX = 2.0
 _END_AT_BORDER_PX = 30.0
 
 
 @dataclass(frozen=True)
 class Extents:
-    """An upright box about an object in the level frame: middle, length, width, height (m), yaw of its length.
+    """Upright box about an object in the level frame: middle, length, width, height (m), yaw of its length.
 
-    `sure_m` is how well the middle is known along the view, across it and upwards (one sigma, m).
+    `sigma_m` are the standard deviations of the middle along the view, across it and upwards (m).
     """
 
     middle: tuple[float, float, float]
@@ -51,12 +54,12 @@ class Extents:
     height_m: float
     yaw_rad: float
     round: bool
-    sure_m: tuple[float, float, float]
+    sigma_m: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Position:
-    """Where an object is in the odometry frame at capture: p_OT (m), covariance (3, 3), extents and points."""
+    """Position of an object in the odometry frame at capture: p_OT (m), covariance (3, 3), extents and segment."""
 
     p_OT: FloatArray
     covariance_O: FloatArray
@@ -65,17 +68,17 @@ class Position:
 
     @property
     def spanned_m(self) -> float:
-        """How long the longer side of the box is at the depth of the object."""
+        """Length of the longer side of the box at the depth of the object, in metres."""
         window = self.segment.window
         u0, v0, u1, v1 = window.box
         depth_m = float((window.R_OC.T @ (self.p_OT - window.p_OC))[2])
         return depth_m * max((u1 - u0) / window.lens.fx, (v1 - v0) / window.lens.fy)
 
 
-def position_of(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
-    """Where the object of a box is; None where no depth is seen there. Raises KeyError for a class without a form.
+def locate(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
+    """Locates the object of a detection; None without depth. Raises KeyError for a class without a form.
 
-    `taken` (H, W) says which pixels are known to be other objects.
+    `taken` (H, W) marks the pixels that belong to other objects.
     """
     form = class_forms()[detection.class_name]
     window = window_about(image, detection.box, taken)
@@ -87,12 +90,12 @@ def position_of(image: Image, detection: Detection, taken: Mask | None = None) -
     if extents is None:
         return None
     p_OT = np.array(extents.middle)
-    return Position(p_OT, _covariance(p_OT - window.p_OC, _doubted(extents, segment, cut)), extents, segment)
+    return Position(p_OT, _covariance(p_OT - window.p_OC, _with_doubt(extents, segment, cut)), extents, segment)
 
 
-def _doubted(extents: Extents, segment: ObjectSegment, cut: _Cut) -> tuple[float, float, float]:
-    """The sigmas of the extents, larger where the object reaches beyond the picture or its base is not seen."""
-    along, across, up = extents.sure_m
+def _with_doubt(extents: Extents, segment: ObjectSegment, cut: _Cut) -> tuple[float, float, float]:
+    """Sigmas of the extents, larger for an object that the picture cuts off, or whose base is hidden."""
+    along, across, up = extents.sigma_m
     longest = max(extents.length_m, extents.height_m)
     if cut.anywhere:
         along, across, up = along + 0.12 * longest, across + 0.15 * longest, up + 0.1 * extents.height_m
@@ -104,7 +107,7 @@ def _doubted(extents: Extents, segment: ObjectSegment, cut: _Cut) -> tuple[float
 
 @dataclass(frozen=True)
 class _Cut:
-    """Which sides of the box lie on the picture's edge."""
+    """Sides of the box that the picture's edge cuts off."""
 
     top: bool
     bottom: bool
@@ -112,7 +115,7 @@ class _Cut:
 
     @property
     def anywhere(self) -> bool:
-        """Returns whether any does."""
+        """Returns whether any side is cut off."""
         return self.top or self.bottom or self.side
 
 
@@ -125,7 +128,7 @@ def _cut(image: Image, detection: Detection) -> _Cut:
 
 def _extents(segment: ObjectSegment, form: ClassForm, cut: _Cut) -> Extents | None:
     points = segment.points_O
-    few = len(points) < 12
+    few = len(points) < _FEWEST_POINTS
     if form.form == "person":
         return None if few else _person(points, segment, cut)
     if form.form == "long" and segment.plane is not None and (few or segment.covered < _LEAST_LONG_COVERED):
@@ -146,7 +149,7 @@ def _extents(segment: ObjectSegment, form: ClassForm, cut: _Cut) -> Extents | No
 
 
 def _uncut(base_m: float, height_m: float, form: ClassForm, segment: ObjectSegment, cut: _Cut) -> tuple[float, float]:
-    """Base and height of a standing object, of usual height where the picture ends above or below it."""
+    """Base and height of a standing object; its usual height where the picture cuts it off above or below."""
     missing_m = max(0.0, form.usual_m - height_m)
     if cut.top:
         return base_m, height_m + missing_m
@@ -156,14 +159,14 @@ def _uncut(base_m: float, height_m: float, form: ClassForm, segment: ObjectSegme
 
 
 def _base(segment: ObjectSegment, points: FloatArray) -> float:
-    """Height of what the object rests on; of its lowest points where that is not seen."""
+    """Height of the plane below the object, or of its lowest points where the plane is unseen."""
     if segment.plane is None:
         return float(np.percentile(points[:, 2], 1))
     return float(segment.plane.z(np.median(points[:, :2], axis=0)))
 
 
 def _view(points: FloatArray, p_OC: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Level unit vectors along and across the view of some points."""
+    """Horizontal unit vectors along and across the view of some points."""
     along = np.median(points[:, :2], axis=0) - p_OC[:2]
     along = along / max(float(np.linalg.norm(along)), 1e-6)
     return along, np.array([-along[1], along[0]])
@@ -176,11 +179,11 @@ def _across(points: FloatArray, p_OC: FloatArray) -> float:
 
 
 def _upright(points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m: float, height_m: float) -> Extents:
-    """A standing round object: its axis behind the side that is seen."""
+    """Extents of a standing round object, whose axis is behind the visible side."""
     above = points[:, 2] - base_m
     body = points[(above > 0.12 * height_m) & (above < 0.6 * height_m), :2]
-    body = body if len(body) >= 12 else points[:, :2]
-    circle = circle_seen(body, segment.window.p_OC, 0.5 * form.width_m[1])
+    body = body if len(body) >= _FEWEST_POINTS else points[:, :2]
+    circle = fit_circle(body, segment.window.p_OC, 0.5 * form.width_m[1])
     if circle is None:
         along, across = _view(points, segment.window.p_OC)
         left, right = (float(value) for value in np.percentile(body @ across, [1, 99]))
@@ -190,19 +193,19 @@ def _upright(points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m
         x, y = float(centre[0]), float(centre[1])
     else:
         x, y, radius = circle
-    sure = (0.004 + 0.2 * radius, 0.003 + 0.15 * radius, 0.004 + 0.03 * height_m)
+    sigma_m = (0.004 + 0.2 * radius, 0.003 + 0.15 * radius, 0.004 + 0.03 * height_m)
     if form.form == "tank":
         about = _near_axis(points, np.array([x, y]), segment.window.p_OC)
-        return _with_appendages(about, (x, y, radius), base_m, height_m, sure)
-    return Extents((x, y, base_m + 0.5 * height_m), 2 * radius, 2 * radius, height_m, 0.0, True, sure)
+        return _with_appendages(about, (x, y, radius), base_m, height_m, sigma_m)
+    return Extents((x, y, base_m + 0.5 * height_m), 2 * radius, 2 * radius, height_m, 0.0, True, sigma_m)
 
 
 def _near_axis(points: FloatArray, axis: FloatArray, p_OC: FloatArray) -> FloatArray:
-    """Points that are no farther behind or before an axis than the object reaches to its sides."""
+    """Points no farther before or behind an axis than the object reaches to its sides."""
     along, across = _view(points, p_OC)
     reach = min(_REACH_M, float(np.percentile(np.abs((points[:, :2] - axis) @ across), 98)))
-    kept = points[np.abs((points[:, :2] - axis) @ along) < reach]
-    return kept if len(kept) >= 12 else points
+    near = points[np.abs((points[:, :2] - axis) @ along) < reach]
+    return near if len(near) >= _FEWEST_POINTS else points
 
 
 def _with_appendages(
@@ -210,20 +213,20 @@ def _with_appendages(
     tank: tuple[float, float, float],
     base_m: float,
     height_m: float,
-    sure_m: tuple[float, float, float],
+    sigma_m: tuple[float, float, float],
 ) -> Extents:
-    """The outline from above of a standing tank and of what hangs on it."""
+    """Extents of a standing tank with its hose and handle."""
     x, y, radius = tank
     turns = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
     rim = np.stack([x + radius * np.cos(turns), y + radius * np.sin(turns)], axis=1)
-    (cx, cy), length, width, yaw = smallest_rectangle(np.concatenate([without_strays(points[:, :2]), rim]))
-    return Extents((float(cx), float(cy), base_m + 0.5 * height_m), length, width, height_m, yaw, False, sure_m)
+    (cx, cy), length, width, yaw = fit_rectangle(np.concatenate([without_strays(points[:, :2]), rim]))
+    return Extents((float(cx), float(cy), base_m + 0.5 * height_m), length, width, height_m, yaw, False, sigma_m)
 
 
 def _lying(
     points: FloatArray, segment: ObjectSegment, form: ClassForm, base_m: float, height_m: float, cut: _Cut
 ) -> Extents:
-    """The outline from above, completed on the far side and beyond the picture's edge."""
+    """Extents of a lying object: its outline from above, extended on the far side and beyond the picture's edge."""
     centre, length, width, yaw = _outline(points, base_m, height_m, form)
     if form.form == "box" and segment.plane is None and width > height_m:
         base_m, height_m = base_m + height_m - width, width
@@ -235,15 +238,15 @@ def _lying(
     if form.form == "box":
         wanted = (_towards(length, height_m), _towards(width, height_m))
     centre = _completed(centre, (length, width), wanted, yaw, segment.window.p_OC)
-    sure = (0.005 + 0.06 * length, 0.004 + 0.05 * length, 0.004 + 0.05 * height_m)
+    sigma_m = (0.005 + 0.06 * length, 0.004 + 0.05 * length, 0.004 + 0.05 * height_m)
     middle = (float(centre[0]), float(centre[1]), base_m + 0.5 * height_m)
-    return Extents(middle, *wanted, height_m, yaw, False, sure)
+    return Extents(middle, *wanted, height_m, yaw, False, sigma_m)
 
 
 def _continued(
     centre: FloatArray, length_m: float, yaw_rad: float, height_m: float, window: Window, form: ClassForm
 ) -> tuple[FloatArray, float]:
-    """Middle and length of what the picture's edge cuts off, as long as is usual beyond the end that is cut."""
+    """Middle and length of an outline that the picture cuts off, extended there to the usual length."""
     missing_m = max(0.0, form.usual_m - length_m)
     along = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
     ends = [window.border_px(np.array([*(centre + side * 0.5 * length_m * along), height_m])) for side in (1.0, -1.0)]
@@ -254,21 +257,21 @@ def _continued(
 
 
 def _towards(seen_m: float, side_m: float) -> float:
-    """The side of a cube: as seen, or as high as it is where that is plainly more, or less."""
+    """Side of a cube: the visible one, or its height where that differs clearly."""
     return side_m if seen_m < side_m or seen_m > 1.5 * side_m else seen_m
 
 
 def _outline(
     points: FloatArray, base_m: float, height_m: float, form: ClassForm
 ) -> tuple[FloatArray, float, float, float]:
-    """A rectangle about points seen from above: middle, length, width, yaw of the length."""
+    """Rectangle about points seen from above: middle, length, width, yaw of the length."""
     upper = points[points[:, 2] - base_m > 0.25 * height_m, :2]
-    xy = without_strays(upper if len(upper) >= 12 else points[:, :2])
-    return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else smallest_rectangle(xy)
+    xy = without_strays(upper if len(upper) >= _FEWEST_POINTS else points[:, :2])
+    return _rectangle_along(xy, _main_yaw(xy)) if form.form == "long" else fit_rectangle(xy)
 
 
 def _main_yaw(xy: FloatArray) -> float:
-    """The direction of the longest straight part, such as a handle: across it most cells fall into few strips."""
+    """Direction of the longest straight part, such as a handle: across it most cells fall into few strips."""
     cells = np.unique(np.floor((xy - xy.min(axis=0)) / _STRIP_M), axis=0) * _STRIP_M
 
     def gathered(yaw: float) -> int:
@@ -281,7 +284,7 @@ def _main_yaw(xy: FloatArray) -> float:
 
 
 def _rectangle_along(xy: FloatArray, yaw_rad: float) -> tuple[FloatArray, float, float, float]:
-    """The rectangle about points whose length has a direction."""
+    """Rectangle about points with its length in a direction: middle, length, width, yaw."""
     axes = np.array([[math.cos(yaw_rad), math.sin(yaw_rad)], [-math.sin(yaw_rad), math.cos(yaw_rad)]])
     low, high = np.percentile(xy @ axes.T, [0.5, 99.5], axis=0)
     length, width = high - low
@@ -291,7 +294,7 @@ def _rectangle_along(xy: FloatArray, yaw_rad: float) -> tuple[FloatArray, float,
 def _completed(
     centre: FloatArray, seen: tuple[float, float], wanted: tuple[float, float], yaw_rad: float, p_OC: FloatArray
 ) -> FloatArray:
-    """The middle of an outline whose near sides stay where they are while its sides take other lengths."""
+    """Middle of an outline whose sides change length while the near sides stay."""
     along = np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
     view = centre - p_OC[:2]
     view = view / max(float(np.linalg.norm(view)), 1e-6)
@@ -302,7 +305,7 @@ def _completed(
 
 
 def _flat(segment: ObjectSegment, plane: LevelPlane, form: ClassForm) -> Extents | None:
-    """A flat object: where the ray through the middle of its box meets the plane that it lies on."""
+    """Extents of a flat object, where the ray through the middle of its box meets the plane below it."""
     window = segment.window
     meeting = _on_plane(window, plane, 0.35 * form.width_m[0])
     if meeting is None:
@@ -312,16 +315,16 @@ def _flat(segment: ObjectSegment, plane: LevelPlane, form: ClassForm) -> Extents
     length = min(max(spans), form.length_m[1])
     points = segment.points_O
     yaw, height = 0.0, float(form.width_m[0])
-    if len(points) >= 12:
+    if len(points) >= _FEWEST_POINTS:
         _, seen, _, yaw = _outline(points, _base(segment, points), 0.01, form)
         length = max(length, min(seen, form.length_m[1]))
-    sure = (0.006 + 0.08 * length, 0.004 + 0.06 * length, 0.006)
+    sigma_m = (0.006 + 0.08 * length, 0.004 + 0.06 * length, 0.006)
     x, y, z = (float(value) for value in middle)
-    return Extents((x, y, z), length, form.width_m[0], height, yaw, False, sure)
+    return Extents((x, y, z), length, form.width_m[0], height, yaw, False, sigma_m)
 
 
 def _on_plane(window: Window, plane: LevelPlane, above_m: float) -> list[FloatArray] | None:
-    """Where the rays of `Window.rays_O` meet a level plane raised by above_m; None where one hardly does."""
+    """Points where the rays of `Window.rays_O` meet a plane raised by above_m; None where one grazes it."""
     found = []
     for ray in window.rays_O():
         if ray[2] > -_GRAZING * np.linalg.norm(ray):
@@ -335,7 +338,7 @@ def _on_plane(window: Window, plane: LevelPlane, above_m: float) -> list[FloatAr
 
 
 def _person(points: FloatArray, segment: ObjectSegment, cut: _Cut) -> Extents:
-    """Somebody who stands or sits on the floor."""
+    """Extents of a person who stands or sits on the floor."""
     along, across = _view(points, segment.window.p_OC)
     sideways = points[:, :2] @ across
     body = points[np.abs(sideways - np.median(sideways)) < _PERSON_HALF_M]
@@ -348,9 +351,9 @@ def _person(points: FloatArray, segment: ObjectSegment, cut: _Cut) -> Extents:
     return Extents((x, y, 0.5 * top), float(right - left), _PERSON_DEPTH_M, top, 0.0, False, (0.08, 0.06, 0.1))
 
 
-def _covariance(p_CT_O: FloatArray, sure_m: tuple[float, float, float]) -> FloatArray:
-    """Covariance (3, 3) from sigmas along the level view, across it and upwards."""
+def _covariance(p_CT_O: FloatArray, sigma_m: tuple[float, float, float]) -> FloatArray:
+    """Covariance (3, 3) from sigmas along the horizontal view, across it and upwards."""
     along = np.array([p_CT_O[0], p_CT_O[1], 0.0])
     along = along / max(float(np.linalg.norm(along)), 1e-6)
     axes = np.stack([along, np.cross([0.0, 0.0, 1.0], along), [0.0, 0.0, 1.0]], axis=1)
-    return np.asarray(axes @ np.diag(np.square(sure_m)) @ axes.T)
+    return np.asarray(axes @ np.diag(np.square(sigma_m)) @ axes.T)

@@ -1,9 +1,9 @@
-"""Objects seen over several views: one track for each, with its place, its class and how sure it is that it is there.
+"""Tracker of objects over several views: position, class and belief in the existence of each.
 
-A detection belongs to the track that it fits by place (Mahalanobis distance) and class; places are fused as information
-(inverse covariances add). A track that a picture should show and that is not detected there loses belief. What is seen
-faintly begins no track, but supports a little one that a surer one began. A segment without a label (`THING`) says
-where an object is, and nothing about its class.
+A detection belongs to the track that it fits by position (Mahalanobis distance) and class; positions are fused in
+information form (inverse covariances add). A track that a picture should show and does not loses belief. A faint
+detection begins no track, but supports one. A segment without a label (`THING`) has a position, and no evidence of a
+class.
 """
 
 from __future__ import annotations
@@ -20,30 +20,31 @@ from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
 
 GATE = 16.3
-"""Squared Mahalanobis distance within which 99.9 % of the detections of an object lie."""
+"""Squared Mahalanobis distance that holds 99.9 % of the detections of an object."""
 DIFFERENT_PLACES_M = 0.03
 CONFIRMED_BELIEF = 0.6
 SURE_SCORE = 0.5
 FAINT_SCORE = 0.3
-"""Scores from which on a detection begins a track, or supports one."""
+"""Least scores of a detection that begins a track, and of one that supports it."""
 _JITTER_M = 0.012
 _NEAR_M = 0.03
 _CONFUSED = 0.02
-_MISSED_IF_THERE, _MISSED_IF_NOT = 0.15, 0.88
+_MISSED_IF_THERE = 0.15
+_MISSED_IF_NOT = 0.88
 _SEEN_BY_CHANCE = 0.25
-"""The share of objects among all that is seen at least faintly."""
+"""Share of objects among all detections, faint ones included."""
 _NEW_IN_A_VIEW = 0.5
-"""How much of what a view tells the others have not told yet; 1 were views that err independently."""
+"""Share of a view's evidence that is new; 1 would be views with independent errors."""
 _MOST_SURE = 0.97
 _MOST_BELIEF, _LEAST_BELIEF = 0.999, 0.05
 
 
 @dataclass(frozen=True)
 class Track:
-    """One object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
+    """Track of one object. `position_W` with `covariance` (3, 3) from the views, without the localisation's error.
 
-    `classes` says how likely each class is, `belief` how likely it is that something is there at all. `views` counts
-    the places that it was seen from; `latest` is its last detection, `best` its surest one.
+    `classes` are the probabilities of the classes, `belief` is that of the object's existence. `eyes_W` are the camera
+    positions that saw it; `latest` is its last detection, `best` the one with the best score.
     """
 
     number: int
@@ -58,37 +59,37 @@ class Track:
 
     @property
     def class_name(self) -> str:
-        """The likeliest class; `THING` where no view had a label for it."""
+        """Likeliest class; `THING` where no view had a label."""
         return THING if self.best.class_name == THING else max(self.classes, key=lambda name: self.classes[name])
 
     @property
     def class_belief(self) -> float:
-        """How likely it is of `class_name`; 1 for a `THING`, which everything is."""
+        """Probability of `class_name`; 1 for a `THING`, which every object is."""
         return self.classes.get(self.class_name, 1.0)
 
     @property
     def views(self) -> int:
-        """From how many different places it was seen."""
+        """Number of different camera positions that saw it."""
         return len(self.eyes_W)
 
     @property
     def last_seen_s(self) -> float:
-        """When it was seen last."""
+        """Time of its last detection."""
         return self.latest.stamp_s
 
-    def confirmed(self, views: int = 2) -> bool:
-        """An object for sure, believed to be of its class, and taken for the same when it was seen last."""
+    def is_confirmed(self, views: int = 2) -> bool:
+        """Returns whether the object exists, is likely of its class, and was so at its last detection."""
         return (
-            self.stands(views) and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
+            self.exists(views) and self.class_belief >= CONFIRMED_BELIEF and self.latest.class_name == self.class_name
         )
 
-    def stands(self, views: int = 2) -> bool:
-        """Seen from so many places and believed, whatever it is."""
+    def exists(self, views: int = 2) -> bool:
+        """Returns whether enough views saw an object of any class, with enough belief."""
         return self.views >= views and self.belief >= CONFIRMED_BELIEF
 
 
 class Tracker:
-    """Keeps tracks up to date with the detections of each picture."""
+    """Tracker that is updated with the detections of each picture."""
 
     def __init__(self, class_names: Sequence[str]) -> None:
         self._names = tuple(class_names)
@@ -96,12 +97,12 @@ class Tracker:
         self._count = 0
 
     def snapshot(self) -> tuple[Track, ...]:
-        """All tracks, the surest first."""
+        """All tracks, highest belief first."""
         return tuple(sorted(self._tracks.values(), key=lambda track: (-track.belief, track.number)))
 
     def update(self, seen: Sequence[Detection3D], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
-        """Takes in the detections of one picture; `in_plain_view` says whether it should show a track."""
-        before, seen = tuple(self._tracks.values()), distinct(seen)
+        """Updates the tracks with the detections of a picture; `in_plain_view` tells whether it should show a track."""
+        before, seen = tuple(self._tracks.values()), without_duplicates(seen)
         pairs = _matched_surest_first(before, seen)
         for track in before:
             if track.number not in pairs.values() and in_plain_view(track):
@@ -136,22 +137,22 @@ class Tracker:
             self._tracks[track.number] = replace(track, belief=belief, missed=track.missed + 1)
 
 
-def distinct(seen: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
-    """The detections of one picture, each object once where it was detected as two classes."""
-    kept: list[Detection3D] = []
+def without_duplicates(seen: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
+    """Removes the worse detection of an object that one picture shows as two classes."""
+    unique: list[Detection3D] = []
     for one in sorted(seen, key=lambda detected: -detected.detection.score):
-        if not any(_is_same_thing(one, other) for other in kept):
-            kept.append(one)
-    return tuple(kept)
+        if not any(_is_same_object(one, other) for other in unique):
+            unique.append(one)
+    return tuple(unique)
 
 
-def _is_same_thing(one: Detection3D, other: Detection3D) -> bool:
+def _is_same_object(one: Detection3D, other: Detection3D) -> bool:
     apart_m = float(np.linalg.norm(one.position_W - other.position_W))
     return one.class_name != other.class_name and apart_m < _NEAR_M
 
 
 def _matched_surest_first(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, int]:
-    """The same as `_matched`, in which faint detections are given what the sure ones leave."""
+    """Matches sure detections first, then faint ones with the other tracks: track number by detection index."""
     sure, faint = (
         [k for k, s in enumerate(seen) if (s.detection.score >= SURE_SCORE) is wanted] for wanted in (True, False)
     )
@@ -163,8 +164,10 @@ def _matched_surest_first(tracks: Sequence[Track], seen: Sequence[Detection3D]) 
 
 
 def _matched(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, int]:
-    """Which detection (its index) belongs to which track (its number): the nearest pairs first, one to one."""
-    options = [(distance2(track, s), k, track.number) for track in tracks for k, s in enumerate(seen) if fits(track, s)]
+    """Matches detections and tracks one to one, nearest pairs first: track number by detection index."""
+    options = [
+        (squared_distance(track, s), k, track.number) for track in tracks for k, s in enumerate(seen) if fits(track, s)
+    ]
     pairs: dict[int, int] = {}
     for _, k, number in sorted(options):
         if k not in pairs and number not in pairs.values():
@@ -173,28 +176,28 @@ def _matched(tracks: Sequence[Track], seen: Sequence[Detection3D]) -> dict[int, 
 
 
 def fits(track: Track, detected: Detection3D) -> bool:
-    """Returns whether a detection can be of a track's object: near enough, and of a class that it may have.
+    """Returns whether a detection may show a track's object: near enough, and of a possible class.
 
-    What is within 3 cm is the same object, whatever its class.
+    A detection within 3 cm shows the same object, whatever its class.
     """
     apart_m = float(np.linalg.norm(track.position_W - detected.position_W))
     possible = track.classes.get(detected.class_name, 1.0) > _CONFUSED or apart_m < _NEAR_M
-    return possible and distance2(track, detected) < GATE
+    return possible and squared_distance(track, detected) < GATE
 
 
-def distance2(track: Track, detected: Detection3D) -> float:
-    """The squared Mahalanobis distance of a detection from a track."""
+def squared_distance(track: Track, detected: Detection3D) -> float:
+    """Squared Mahalanobis distance of a detection from a track."""
     off = track.position_W - detected.position_W
     return float(off @ np.linalg.solve(track.covariance + _spread(detected), off))
 
 
 def _spread(detected: Detection3D) -> FloatArray:
-    """The covariance of a detection with what the localisation jitters between two views."""
+    """Covariance of a detection with the jitter of the localisation between two views."""
     return np.asarray(detected.covariance + _JITTER_M**2 * np.eye(3))
 
 
 def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
-    """The track with one more detection."""
+    """Fuses a track with one more detection."""
     track_information, information = np.linalg.inv(track.covariance), np.linalg.inv(_spread(detected))
     covariance = np.linalg.inv(track_information + information)
     position = covariance @ (track_information @ track.position_W + information @ detected.position_W)
@@ -211,9 +214,9 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
 
 
 def _latest(track: Track, detected: Detection3D) -> Detection3D:
-    """What was seen last.
+    """Last detection of a track.
 
-    A faint detection tells no more than that it was still there, if it is of the same class; so does a segment.
+    A faint detection of the same class, or a segment, only renews the time of the one before.
     """
     unlabelled = detected.class_name == THING != track.latest.class_name
     if detected.detection.score >= SURE_SCORE and not unlabelled:
@@ -223,7 +226,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
 
 def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
-    """Class beliefs after a detection: its scores for its class and the alternatives, the rest spread over others."""
+    """Class probabilities after a detection; the rest of its scores is spread over the other classes."""
     if detected.class_name == THING:
         return before
     score = float(np.clip(detected.detection.score, 0.3, 0.97))
@@ -237,17 +240,17 @@ def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str,
 
 
 def _evidence(detected: Detection3D) -> float:
-    """How much likelier a detection is of an object than of nothing.
+    """Likelihood ratio of a detection with and without an object.
 
-    Scores are taken for the shares of detections that are right, as they are about (docs/finding-things.md).
+    Assumes that scores are the shares of right detections, as they nearly are (docs/finding-things.md).
     """
-    likelier = _odds(min(detected.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)
-    return math.pow(likelier, _NEW_IN_A_VIEW)
+    ratio = _odds(min(detected.detection.score, _MOST_SURE)) / _odds(_SEEN_BY_CHANCE)
+    return math.pow(ratio, _NEW_IN_A_VIEW)
 
 
-def _updated(belief: float, likelier: float) -> float:
-    """Bayes' rule for something that is there or not, by how much likelier what is seen is when it is there."""
-    odds = _odds(belief) * likelier
+def _updated(belief: float, ratio: float) -> float:
+    """Updates a belief by Bayes' rule with a likelihood ratio."""
+    odds = _odds(belief) * ratio
     return min(odds / (1.0 + odds), _MOST_BELIEF)
 
 
@@ -258,7 +261,7 @@ def _odds(probability: float) -> float:
 def _with_eye(
     eyes: tuple[tuple[float, float, float], ...], eye: tuple[float, float, float]
 ) -> tuple[tuple[float, float, float], ...]:
-    """The places seen from, with one more when it is a different one."""
+    """Camera positions with one more, if it is a different one."""
     return eyes if any(math.dist(one, eye) < DIFFERENT_PLACES_M for one in eyes) else (*eyes, eye)
 
 

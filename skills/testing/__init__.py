@@ -1,1 +1,1 @@
-"""What skills are tried out with: a clock moved by hand, a scripted robot among blocks, and faults by name."""
+"""Tools to test skills: a clock that the test moves, and a scripted robot with exact estimators in a small world."""

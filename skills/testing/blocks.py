@@ -1,4 +1,4 @@
-"""A little world of upright blocks, and what rays see of it."""
+"""A small world of upright blocks, and LiDAR scans and depth images of it by ray casting."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.estimate.compiled import compiled
 from skills.estimate.grid_map import GridMap
-from skills.robot import FloatArray
+from skills.robot import CameraCapabilities, FloatArray, FrameTree, Image, Intrinsics, Mount, Scan, unit_rays
 
 Colour = tuple[int, int, int]
 FLOOR_COLOUR: Colour = (150, 140, 130)
@@ -20,9 +21,9 @@ NOTHING_COLOUR: Colour = (20, 20, 20)
 
 @dataclass(frozen=True)
 class Block:
-    """An upright block from (x0, y0) to (x1, y1) in the world frame (m), from height z0 to z1, of one colour (RGB).
+    """Upright block from (x0, y0) to (x1, y1) in the world frame (m), from height z0 to z1, of one colour (RGB).
 
-    A loose one can be taken. Raises ValueError for a block without extent.
+    A robot can grasp a `loose` block. Raises ValueError for a block without extent.
     """
 
     x0: float
@@ -44,13 +45,13 @@ class Block:
         return bool(np.all(point_W >= low - margin_m) and np.all(point_W <= high + margin_m))
 
     def standing_at(self, x: float, y: float, z: float) -> Block:
-        """The same block with the middle of its base at (x, y, z)."""
+        """Moves the block: the middle of its base is then at (x, y, z)."""
         dx, dy = 0.5 * (self.x1 - self.x0), 0.5 * (self.y1 - self.y0)
         return replace(self, x0=x - dx, y0=y - dy, x1=x + dx, y1=y + dy, z0=z, z1=z + self.z1 - self.z0)
 
 
 def can_at(x: float, y: float, z: float, colour: Colour = (200, 20, 25)) -> Block:
-    """A can, 66 mm across and 115 mm high, that stands at (x, y) on a surface at height z; red by default."""
+    """Makes a can, 66 mm across and 115 mm high, that stands at (x, y) on a surface at height z; red by default."""
     return Block(x - 0.033, y - 0.033, x + 0.033, y + 0.033, z, z + 0.115, colour, loose=True)
 
 
@@ -62,14 +63,14 @@ ROOM: tuple[Block, ...] = (
     Block(1.2, -0.6, 1.8, 0.6, 0.70, 0.75, (130, 90, 60)),  # a table's top, and its four legs
     *(Block(x, y, x + 0.05, y + 0.05, 0.0, 0.70, (90, 60, 40)) for x in (1.2, 1.75) for y in (-0.6, 0.55)),
 )
-"""A room of 6 m by 5 m with a table 0.75 m high before the origin."""
+"""A room of 6 m by 5 m with a table 0.75 m high in front of the origin."""
 
 TABLE_CAN: Block = can_at(1.38, 0.0, 0.75)
 """A red can near the edge of the room's table that faces the origin."""
 
 
 def block_array(blocks: Sequence[Block]) -> FloatArray:
-    """Rows x0, y0, z0, x1, y1, z1 (B, 6)."""
+    """Rows x0, y0, z0, x1, y1, z1 (B, 6) of blocks."""
     return np.array([(b.x0, b.y0, b.z0, b.x1, b.y1, b.z1) for b in blocks], dtype=np.float64).reshape(-1, 6)
 
 
@@ -77,10 +78,10 @@ def block_array(blocks: Sequence[Block]) -> FloatArray:
 def cast_rays(
     origin: FloatArray, directions: FloatArray, blocks: FloatArray, limit: float
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Distance along each direction (N, 3) to what it meets, and what that is.
+    """Casts rays in directions (N, 3): distance to the first hit, and the number of the block that is hit.
 
-    NaN and -1 beyond the limit; the number of the block; -2 for the floor at height 0. Distances count in lengths of
-    the direction, so that directions with z = 1 in a camera give depth.
+    A miss within the limit gives NaN and -1, and the floor at height 0 the number -2. Distances are multiples of the
+    direction's length, so that directions with z = 1 in a camera give depth.
     """
     ranges = np.empty(directions.shape[0])
     hits = np.empty(directions.shape[0], dtype=np.int64)
@@ -104,14 +105,14 @@ def cast_rays(
 
 
 def colours_of(blocks: Sequence[Block], hits: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """RGB (N, 3) of what rays met."""
+    """Colours RGB (N, 3) of the hits of rays."""
     palette = np.array([*(b.colour for b in blocks), FLOOR_COLOUR, NOTHING_COLOUR], dtype=np.uint8)
     index = np.where(hits == -2, len(blocks), np.where(hits == -1, len(blocks) + 1, hits))
     return np.asarray(palette[index])
 
 
 def grid_of(blocks: Sequence[Block], band_m: tuple[float, float], resolution_m: float = 0.05) -> GridMap:
-    """The grid that a surveyor would make of the blocks that stand in a band of heights."""
+    """Exact grid map of the blocks that stand in a band of heights."""
     x0, y0 = min(b.x0 for b in blocks) - 0.2, min(b.y0 for b in blocks) - 0.2
     columns = math.ceil((max(b.x1 for b in blocks) + 0.2 - x0) / resolution_m)
     rows = math.ceil((max(b.y1 for b in blocks) + 0.2 - y0) / resolution_m)
@@ -122,3 +123,82 @@ def grid_of(blocks: Sequence[Block], band_m: tuple[float, float], resolution_m: 
         if b.z0 < band_m[1] and b.z1 > band_m[0]:
             occupied |= ((y > b.y0) & (y < b.y1))[:, None] & ((x > b.x0) & (x < b.x1))[None, :]
     return GridMap(occupied, resolution_m, (x0, y0), height_band_m=band_m)
+
+
+X_BL = RigidTransform(np.array([-0.2, 0.0, 0.4]))
+ELEVATIONS_RAD: FloatArray = np.deg2rad(np.arange(-15.0, 16.0, 2.0))
+SCAN_LIMIT_M = 100.0
+SCAN_NEAREST_M = 0.5
+_AHEAD = RotationMatrix(np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]))
+_DOWN_30 = RotationMatrix(RollPitchYaw(0.0, math.radians(30.0), 0.0)) @ _AHEAD
+
+
+@dataclass(frozen=True)
+class CameraMount:
+    """A camera on a frame of the robot ("body", "hand" or "head"): X_FC, lens, and the range of depth (m)."""
+
+    frame: str
+    X_FC: RigidTransform
+    lens: Intrinsics
+    reach_m: float = 4.0
+
+
+_BODY_LENS = Intrinsics(80, 60, 41.0, 41.0, 39.5, 29.5)
+_HAND_LENS = Intrinsics(320, 240, 276.0, 276.0, 160.0, 120.0)
+_AT_FRONT = RigidTransform(_DOWN_30, np.array([0.42, 0.0, 0.02]))
+FRONT_CAMERAS = tuple(CameraCapabilities(name, _AT_FRONT) for name in ("frontleft", "frontright"))
+"""Cameras of a body without an arm."""
+
+
+def mount_of(camera: CameraCapabilities) -> CameraMount:
+    """Mount of a robot's camera, with a lens of this module."""
+    lens = _BODY_LENS if camera.mount is Mount.BODY else _HAND_LENS
+    return CameraMount(camera.mount.value, camera.X_FC, lens)
+
+
+def take_scan(
+    blocks: Sequence[Block],
+    X_WB: RigidTransform,
+    X_OB: RigidTransform,
+    stamp_s: float,
+    rng: np.random.Generator,
+    *,
+    azimuths: int = 360,
+    noise_m: float = 0.01,
+) -> Scan:
+    """Takes a LiDAR scan at the true pose X_WB."""
+    around = np.linspace(-math.pi, math.pi, azimuths, endpoint=False)
+    X_WL = X_WB @ X_BL
+    rays = unit_rays(ELEVATIONS_RAD, around).reshape(-1, 3)
+    rays_W = np.ascontiguousarray(rays @ X_WL.rotation().matrix().T)
+    ranges, _ = cast_rays(X_WL.translation(), rays_W, block_array(blocks), SCAN_LIMIT_M)
+    ranges = ranges + noise_m * rng.standard_normal(ranges.shape)
+    ranges[ranges < SCAN_NEAREST_M] = np.nan
+    shaped = ranges.reshape(len(ELEVATIONS_RAD), -1).astype(np.float32)
+    return Scan(stamp_s, shaped, ELEVATIONS_RAD, around, X_BL, X_OB)
+
+
+def take_picture(
+    blocks: Sequence[Block],
+    X_WF: RigidTransform,
+    mount: CameraMount,
+    frames: FrameTree,
+    source: str,
+    stamp_s: float,
+    rng: np.random.Generator,
+    *,
+    noise_m: float = 0.001,
+) -> Image:
+    """Takes a picture by a camera on the frame F at its true pose X_WF."""
+    lens = mount.lens
+    u, v = np.meshgrid(np.arange(lens.width), np.arange(lens.height))
+    rays_C = np.stack([(u - lens.cx) / lens.fx, (v - lens.cy) / lens.fy, np.ones_like(u, dtype=float)], axis=-1)
+    X_WC = X_WF @ mount.X_FC
+    rays_W = np.ascontiguousarray(rays_C.reshape(-1, 3) @ X_WC.rotation().matrix().T)
+    depth, hits = cast_rays(X_WC.translation(), rays_W, block_array(blocks), mount.reach_m)
+    depth = np.nan_to_num(depth + noise_m * rng.standard_normal(depth.shape), nan=0.0)
+    colour = colours_of(blocks, hits).reshape(lens.height, lens.width, 3)
+    grey = np.ascontiguousarray(colour.mean(axis=2).astype(np.uint8))
+    edges = {**frames.edges, f"{source}_camera": (mount.frame, mount.X_FC)}
+    depth_m = depth.reshape(grey.shape).astype(np.float32)
+    return Image(stamp_s, source, f"{source}_camera", lens, lens, colour, grey, depth_m, FrameTree(edges))

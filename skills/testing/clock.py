@@ -1,4 +1,4 @@
-"""A clock that only the test moves."""
+"""Clock that only the test moves."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ STEP_S = 0.01
 
 
 class VirtualClock:
-    """Time that only `advance` moves; what is attached moves along in steps of 0.01 s.
+    """Clock that only `advance` moves; it calls what is attached in steps of 0.01 s.
 
     Implements `skills.robot.Clock`.
     """
@@ -22,11 +22,11 @@ class VirtualClock:
         self._followers.append(follower)
 
     def now(self) -> float:
-        """Seconds since the clock began."""
+        """Seconds since the start of the clock."""
         return self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Lets dt_s seconds pass, in whole steps of 0.01 s and a remainder."""
+        """Advances by dt_s seconds, in whole steps of 0.01 s and a remainder."""
         whole, rest = divmod(round(dt_s, 9), STEP_S)
         steps = [STEP_S] * int(whole) + ([rest] if rest > 1e-9 else [])
         for step_s in steps:

@@ -1,23 +1,27 @@
-"""Estimators that know the scripted robot's world exactly."""
+"""Exact localiser, costmap and detector for the scripted robot in its world of blocks."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
+from skills.detection import Detection
 from skills.robot import Pose2D, Robot, Scan
-from skills.testing.blocks import Block
+from skills.testing.blocks import TABLE_CAN, Block, Colour
 
 OPEN_M = 9.0
 
 
 class KnownPlace:
-    """A localiser that knows where odometry starts and trusts it. Implements `skills.api.SearchingLocaliser` too.
+    """Localiser that knows the start of the odometry and trusts it. Implements `skills.api.SearchingLocaliser` too.
 
-    Set `localised` to False to be lost. Its stamp is that of the odometry it last took in.
+    Set `localised` to False to make the robot lost. The stamp is that of the last odometry.
     """
 
     def __init__(self, start: Pose2D | None = None) -> None:
@@ -25,24 +29,24 @@ class KnownPlace:
         self._X_WO, self._stamp_s = (start or Pose2D(0.0, 0.0, 0.0)).transform(), 0.0
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest estimate."""
+        """Latest estimate."""
         return LocalisationEstimate(self._stamp_s, self._X_WO, np.eye(3) * 1e-4, self.localised)
 
     def update(self, robot: Robot) -> None:
-        """Takes in the odometry's stamp."""
+        """Reads the stamp of the odometry."""
         self._stamp_s = robot.odometry().stamp_s
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where the robot is; what a search of the map would find."""
+        """Returns the true pose, as a search of the whole map would."""
         return LocalisationEstimate(scan.stamp_s, self._X_WO, np.eye(3) * 1e-4, True)
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """No longer lost."""
+        """Accepts an estimate; the robot is no longer lost."""
         self._X_WO, self.localised = estimate.X_WO, True
 
 
 class BlockCostmap:
-    """Clearance from the blocks that the body would touch (0.05 to 1.0 m), and from nothing else.
+    """Costmap of the blocks that the body could touch (heights 0.05 to 1.0 m).
 
     Implements `skills.api.Costmap`.
     """
@@ -52,7 +56,7 @@ class BlockCostmap:
         self._boxes = np.array(rows, dtype=np.float64).reshape(-1, 4)
 
     def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance from each (x, y) row to the nearest block, negative within one."""
+        """Distance of each point (x, y) from the nearest block (m), negative within one."""
         if not len(self._boxes):
             return np.full(len(points_W), OPEN_M)
         x, y = np.asarray(points_W)[:, 0:1], np.asarray(points_W)[:, 1:2]
@@ -62,11 +66,45 @@ class BlockCostmap:
         return np.asarray(np.min(np.where(outside > 0.0, outside, np.maximum(dx, dy)), axis=1))
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Nothing changes."""
+        """Does nothing: the blocks are known."""
 
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
-        """Nothing changes."""
+        """Does nothing: the blocks are known."""
 
     def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
-        """Nothing was seen that is not there."""
+        """Clears nothing, since there are no other obstacles, and returns 0."""
         return 0
+
+
+_FEWEST_PIXELS = 6
+
+
+@dataclass(frozen=True)
+class PlainColours:
+    """Detector that finds an object in every patch of exactly its class's colour; by default red cans are cokes."""
+
+    colours: Mapping[str, Colour] = field(default_factory=lambda: MappingProxyType({"coke": TABLE_CAN.colour}))
+    score: float = 0.9
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        """Classes that have a colour."""
+        return tuple(self.colours)
+
+    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+        """Detects the patches in each picture, largest first; none in a grey one. Raises ValueError for no picture."""
+        return [self._found(picture) for picture in pictures]
+
+    def _found(self, picture: NDArray[np.uint8]) -> tuple[Detection, ...]:
+        if picture.ndim not in (2, 3) or picture.dtype != np.uint8:
+            raise ValueError(f"no picture: {picture.dtype} of shape {picture.shape}")
+        if picture.ndim == 2:
+            return ()
+        found = [each for name, colour in self.colours.items() for each in self._patches(picture, name, colour)]
+        return tuple(detection for _, detection in sorted(found, key=lambda entry: -entry[0]))
+
+    def _patches(self, picture: NDArray[np.uint8], name: str, colour: Colour) -> list[tuple[int, Detection]]:
+        mask = np.all(picture == np.array(colour, dtype=np.uint8), axis=2).astype(np.uint8)
+        _, _, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
+        rows = ((int(area), (float(x), float(y), float(x + w), float(y + h))) for x, y, w, h, area in stats[1:])
+        return [(area, Detection(name, self.score, box)) for area, box in rows if area >= _FEWEST_PIXELS]

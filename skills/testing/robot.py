@@ -1,4 +1,4 @@
-"""A robot without dynamics that keeps the whole Robot protocol: expiry, lease, limits, LiDAR, depth, arm, gripper."""
+"""Kinematic robot with the whole Robot protocol: expiry, lease, limits, LiDAR, depth, arm, gripper."""
 
 from __future__ import annotations
 
@@ -32,10 +32,9 @@ from skills.robot import (
     Pose2D,
     Scan,
 )
-from skills.testing.blocks import Block, can_at
+from skills.testing.blocks import FRONT_CAMERAS, Block, can_at, mount_of, take_picture, take_scan
 from skills.testing.clock import VirtualClock
-from skills.testing.commands import Commands
-from skills.testing.sensing import FRONT_CAMERAS, mount_of, picture, sweep
+from skills.testing.part_commands import Commands
 
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
@@ -61,15 +60,16 @@ BASE_ONLY = Capabilities(
     cameras=FRONT_CAMERAS,
     description="",
 )
-"""A body that can go about, with two cameras, and no arm."""
+"""A mobile base with two cameras and no arm."""
 
 
 @dataclass(frozen=True)
 class Start:
-    """The initial state: the true pose in the world, arm angles (default: stowed), gripper, charge.
+    """Initial state: true pose in the world, arm angles (default: stowed), gripper, charge.
 
-    `in_gripper_rad` is the opening at which a closing gripper meets what lies between its fingers (None: nothing).
-    `holding` begins with the gripper closed about it. A `docked` robot charges. From `pulled_at_s` on somebody pulls.
+    `in_gripper_rad` is the opening at which a closing gripper meets an object between its fingers (None: no object).
+    With `holding` the gripper begins closed about the object. A `docked` robot charges. From `pulled_at_s` on, a person
+    pulls the object.
     """
 
     pose: Pose2D = field(default_factory=lambda: Pose2D(0.0, 0.0, 0.0))
@@ -82,11 +82,11 @@ class Start:
 
 
 class ScriptedRobot:
-    """Moves exactly as commanded, and skips a real robot's precautions; `calls` records the verbs used.
+    """Robot that moves exactly as commanded, without a real robot's precautions; `calls` records the verbs used.
 
-    It stands in a world of `blocks`; it drives through them, but takes loose ones between its fingers and puts them
-    down. What it grips with less than 2 N falls. Odometry is the truth unless `odometry_scale` and
-    `yaw_drift_rad_per_m` say otherwise. Time passes by its clock. Implements `skills.robot.Robot`.
+    It drives through the `blocks` of its world, but can pick and place loose ones. A grip of less than 2 N drops the
+    object. Odometry is exact but for `odometry_scale` and `yaw_drift_rad_per_m`. Its clock moves it. Implements
+    `skills.robot.Robot`.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class ScriptedRobot:
         self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
         self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
-        self._hangs_down_m = 0.057  # of what is held, below the fingers' middle
+        self._hangs_down_m = 0.057  # of the held object, below the fingers' middle
         self.charge, self.docked, self._pulled_at_s = start.charge, start.docked, start.pulled_at_s
         self.present_faults: tuple[str, ...] = ()
         self.refuse_because: dict[str, str] = {}
@@ -132,22 +132,22 @@ class ScriptedRobot:
 
     @property
     def name(self) -> str:
-        """The robot's name."""
+        """Name of the robot."""
         return self._name
 
     @property
     def arm(self) -> ArmModel:
-        """The arm's kinematics. Raises ValueError when the robot has none."""
+        """Kinematics of the arm. Raises ValueError for a robot without an arm."""
         return arm_model(self._capabilities)
 
     @property
     def holding(self) -> bool:
-        """Returns whether the gripper is closed about something."""
+        """Returns whether the gripper is closed about an object."""
         met_rad = self.in_gripper_rad
         return met_rad is not None and self.clamp_force_n > 0.0 and self.opening <= met_rad + 0.02
 
     def capabilities(self) -> Capabilities:
-        """What the robot is and can do."""
+        """Capabilities of the robot."""
         return self._capabilities
 
     def odometry(self) -> Odometry:
@@ -162,15 +162,15 @@ class ScriptedRobot:
         return Imu(self._clock.now(), (0.0, 0.0, float(self.velocity[2])), (0.0, 0.0, 9.81))
 
     def scan(self) -> Scan | None:
-        """Latest LiDAR revolution, ten a second."""
+        """Latest LiDAR scan, at 10 Hz."""
         self.calls.append("scan")
         now_s = self._clock.now()
         if self._scan is None or now_s - self._scan.stamp_s > _SCAN_PERIOD_S - 1e-9:
-            self._scan = sweep(self.blocks, self._X_WB(), self._X_OB(), now_s, self._rng)
+            self._scan = take_scan(self.blocks, self._X_WB(), self._X_OB(), now_s, self._rng)
         return self._scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """Takes a picture with depth now, whichever is asked for. Raises ValueError for an unknown source."""
+        """Takes a picture with colour and depth, whatever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
         cameras = {each.source: each for each in self._capabilities.cameras}
         camera = cameras.get(source)
@@ -184,7 +184,7 @@ class ScriptedRobot:
             edges["head"] = ("body", self._capabilities.head.X_BF(*self.head_rad))
         X_BF = FrameTree(edges).pose(mount.frame, "body")
         stamp_s = self._clock.now()
-        return picture(self.blocks, self._X_WB() @ X_BF, mount, FrameTree(edges), source, stamp_s, self._rng)
+        return take_picture(self.blocks, self._X_WB() @ X_BF, mount, FrameTree(edges), source, stamp_s, self._rng)
 
     def joints(self) -> Joints:
         """Latest joint state."""
@@ -209,12 +209,12 @@ class ScriptedRobot:
         return Battery(self._clock.now(), self.charge)
 
     def faults(self) -> tuple[str, ...]:
-        """Present faults, empty when well."""
+        """Present faults, empty when there are none."""
         self.calls.append("faults")
         return self.present_faults
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Walks at a body-frame velocity until the clock reads until_s."""
+        """Drives at a body-frame velocity until the clock reads until_s."""
         fault = "" if all(map(math.isfinite, (vx, vy, wz))) else f"velocity ({vx}, {vy}, {wz}) is not finite"
         if vy != 0.0 and self._capabilities.base_kind is BaseKind.DIFFERENTIAL:
             fault = fault or "this base cannot go sideways"
@@ -231,12 +231,12 @@ class ScriptedRobot:
         return self._begin("stand", (0.2, 0.0), until_s, lease, "", verb="sit")
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follows a joint trajectory from about where the arm is."""
+        """Follows a joint trajectory that begins near the arm's angles."""
         fault = self._arm_fault(trajectory)
         return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, fault)
 
     def _arm_fault(self, trajectory: ArmTrajectory) -> str:
-        """Why the arm cannot follow a trajectory; empty when it can."""
+        """Reason why the arm cannot follow a trajectory; empty when it can."""
         if self._capabilities.arm is None:
             return "there is no arm"
         if trajectory.positions_rad.shape[1] != len(self.q_rad):
@@ -246,17 +246,17 @@ class ScriptedRobot:
         return "" if near else "the trajectory does not begin where the arm is"
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Turns the head; it is there at once."""
+        """Points the head, which arrives at once."""
         head = self._capabilities.head
         fault = "there is no head" if head is None else ""
         if head is not None:
-            ways = (pan_rad, head.pan_range_rad), (tilt_rad, head.tilt_range_rad)
-            within = all(low <= angle <= high for angle, (low, high) in ways)
+            axes = (pan_rad, head.pan_range_rad), (tilt_rad, head.tilt_range_rad)
+            within = all(low <= angle <= high for angle, (low, high) in axes)
             fault = "" if within else f"the head cannot turn to pan {pan_rad:.2f}, tilt {tilt_rad:.2f} rad"
         return self._begin("point_head", (pan_rad, tilt_rad), until_s, lease, fault)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Moves the gripper; it stops where something lies between its fingers."""
+        """Moves the gripper, which stops at an object between its fingers."""
         fault = "" if self._capabilities.gripper is not None else "there is no gripper"
         return self._begin("set_gripper", (opening, force_n), until_s, lease, fault)
 
@@ -264,12 +264,12 @@ class ScriptedRobot:
         """Stops all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
         if lease != self._lease:
-            return self._commands.note(CommandStatus(CommandState.REFUSED, "the lease was taken away"))
+            return self._commands.add(CommandStatus(CommandState.REFUSED, "the lease was taken away"))
         self._commands.stop(only)
-        return self._commands.note(CommandStatus(CommandState.DONE))
+        return self._commands.add(CommandStatus(CommandState.DONE))
 
     def command_status(self, command: CommandId) -> CommandStatus:
-        """What became of a command. Raises KeyError for an id never given."""
+        """Status of a command. Raises KeyError for an unknown id."""
         self.calls.append("command_status")
         return self._commands.status(command)
 
@@ -280,26 +280,26 @@ class ScriptedRobot:
         return self.take_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Takes the lease from whoever holds it; the robot stops."""
+        """Takes the lease from any holder; the robot stops."""
         self._commands.stop(None)
         self._lease_number += 1
         self._lease = Lease(self._name, holder, self._lease_number)
         return self._lease
 
     def return_lease(self, lease: Lease) -> None:
-        """Gives the lease back; the robot stops."""
+        """Returns the lease; the robot stops."""
         self.calls.append("return_lease")
         if lease == self._lease:
             self._commands.stop(None)
             self._lease = None
 
     def lease_holder(self) -> Lease | None:
-        """The lease that counts now; None while it is free."""
+        """Valid lease; None while it is free."""
         return self._lease
 
     @property
     def moving_parts(self) -> tuple[str, ...]:
-        """What truly moves now: "drive", "stand", "move_arm", "point_head", "set_gripper"."""
+        """Parts that truly move now: "drive", "stand", "move_arm", "point_head", "set_gripper"."""
         driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
@@ -310,7 +310,7 @@ class ScriptedRobot:
         self.calls.append(verb)
         refusal = "the lease was taken away" if lease != self._lease else fault or self.refuse_because.get(verb, "")
         if refusal:
-            return self._commands.note(CommandStatus(CommandState.REFUSED, refusal))
+            return self._commands.add(CommandStatus(CommandState.REFUSED, refusal))
         return self._commands.begin(part, goal, self._clock.now(), until_s)
 
     def _X_WB(self) -> RigidTransform:
@@ -333,17 +333,17 @@ class ScriptedRobot:
         self.charge = min(1.0, max(0.0, self.charge - used))
 
     def _move_base(self, dt_s: float) -> None:
-        """Towards the commanded velocity within the acceleration; without a command it brakes harder."""
+        """Accelerates towards the commanded velocity; brakes harder without a command."""
         active = self._commands.active("drive")
         wanted = np.zeros(3) if active is None else active.goal
         most = (_BRAKING_M_S2 if active is None else _ACCELERATION_M_S2) * dt_s
         self.velocity = self.velocity + np.clip(wanted - self.velocity, -most, most)
         step = self.velocity * dt_s
-        way_m = math.hypot(step[0], step[1])
-        if way_m == 0.0 and step[2] == 0.0:
+        path_m = math.hypot(step[0], step[1])
+        if path_m == 0.0 and step[2] == 0.0:
             return
         self.pose = compose(self.pose, Pose2D(*step.tolist()))
-        scale, turn = self.odometry_scale, step[2] + self.yaw_drift_rad_per_m * way_m
+        scale, turn = self.odometry_scale, step[2] + self.yaw_drift_rad_per_m * path_m
         self.odometry_pose = compose(self.odometry_pose, Pose2D(scale * step[0], scale * step[1], turn))
 
     def _move_body(self, dt_s: float) -> None:
@@ -367,7 +367,7 @@ class ScriptedRobot:
         t, before = self._clock.now() - active.since_s, self.q_rad
         self.q_rad = np.array([np.interp(t, times, positions[:, j]) for j in range(positions.shape[1])])
         if self.held is not None and self._below_fingers_m() < self._hangs_down_m:
-            self.q_rad = before  # what is held stands already
+            self.q_rad = before  # the held object stands already
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
 
@@ -383,11 +383,11 @@ class ScriptedRobot:
             return
         opening, self.clamp_force_n = active.goal
         if opening < self.opening and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
-            self._feel()
+            self._grasp()
         if self.held is not None and self.clamp_force_n < _LEAST_CLAMP_N:
-            self._let_go(self.held)
+            self._release(self.held)
         if self.held is not None and self.in_gripper_rad is not None and opening > self.in_gripper_rad + 0.02:
-            self._let_go(self.held)
+            self._release(self.held)
         before, least = self.opening, self.in_gripper_rad
         most = _GRIPPER_RAD_S * dt_s
         self.opening += max(-most, min(most, opening - self.opening))
@@ -402,26 +402,26 @@ class ScriptedRobot:
         grip_m = 0.0 if gripper is None else gripper.grip_x_m
         return np.asarray(self._X_WB() @ self.arm.X_BH(self.q_rad) @ np.array([grip_m, 0.0, 0.0]))
 
-    def _feel(self) -> None:
-        """A closing gripper takes the loose block between its fingers, if there is one."""
+    def _grasp(self) -> None:
+        """Takes the loose block between the fingers, if there is one."""
         gripper = self._capabilities.gripper
         place_W = self._between_fingers_W()
-        taken = next((b for b in self.blocks if b.loose and b.holds(place_W, _FINGER_M)), None)
-        if taken is None or gripper is None:
+        block = next((b for b in self.blocks if b.loose and b.holds(place_W, _FINGER_M)), None)
+        if block is None or gripper is None:
             return
-        width_m = min(taken.x1 - taken.x0, taken.y1 - taken.y0)
+        width_m = min(block.x1 - block.x0, block.y1 - block.y0)
         self.in_gripper_rad = gripper.widest * min(1.0, width_m / gripper.max_opening_m)
-        self.held, self._hangs_down_m = taken, float(place_W[2]) - taken.z0
-        self.blocks.remove(taken)
+        self.held, self._hangs_down_m = block, float(place_W[2]) - block.z0
+        self.blocks.remove(block)
 
-    def _let_go(self, held: Block) -> None:
-        """What was held stands on whatever is below."""
+    def _release(self, held: Block) -> None:
+        """Puts the held block onto the block or floor below."""
         x, y, z = (float(v) for v in self._between_fingers_W())
         self.blocks.append(held.standing_at(x, y, z - self._below_fingers_m()))
         self.held = self.in_gripper_rad = None
 
     def _below_fingers_m(self) -> float:
-        """How high the fingers' middle is above the top, or the floor, below it."""
+        """Height of the fingers' middle above the block or floor below it (m)."""
         x, y, z = (float(v) for v in self._between_fingers_W())
         tops = [b.z1 for b in self.blocks if b.x0 <= x <= b.x1 and b.y0 <= y <= b.y1 and b.z1 <= z]
         return z - max(tops, default=0.0)

@@ -26,7 +26,7 @@ from skills.robot import (
     Lease,
     Odometry,
 )
-from skills.testing.detector import PlainColours
+from skills.testing.estimators import PlainColours
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)

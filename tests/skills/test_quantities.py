@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from skills.files.schema_errors import first_error
+from skills.files.schema import first_error
 from skills.quantities import (
     Angle,
     Coordinate,

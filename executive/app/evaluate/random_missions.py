@@ -15,7 +15,7 @@ from executive.app.feasibility import abilities_in
 from executive.app.worlds import knowledge_of, open_world
 from executive.mission.request import Request
 from executive.words.knowledge import Knowledge
-from skills.detect.words import plural
+from skills.detect.descriptions import plural
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml

@@ -22,7 +22,7 @@ from executive.tree.plan import PlanBuilder
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import EVERYTHING
 from skills.api import Cause, ObjectKind, ObjectObservation
-from skills.detect.words import numbered
+from skills.detect.descriptions import count_of
 from skills.files.errors import listing
 from skills.perception.class_forms import THING
 from skills.robot import Robot
@@ -133,7 +133,7 @@ class ForEachFound(MemoryComposite):
         """ "moved one cube and two things to the bench"."""
         verb, to = self.did
         kinds = Counter(str(each.kind) for each in self._noted(self.done))
-        return f"{verb} {listing(numbered(count, kind) for kind, count in kinds.items())} {to}"
+        return f"{verb} {listing(count_of(count, kind) for kind, count in kinds.items())} {to}"
 
     def _noted(self, key: str) -> Seen:
         noted: Seen = self.board.get(key) if key in self.board else ()

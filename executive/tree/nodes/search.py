@@ -19,7 +19,7 @@ from executive.words.command import Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge, Pose
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish
-from skills.detect.words import counted, numbered, plural, told_apart
+from skills.detect.descriptions import count_of, count_sentence, distinct_objects, plural
 from skills.files.errors import listing
 
 ANSWER_TOPIC: Final = "answer"
@@ -95,14 +95,14 @@ class Answer(ExplainedDecorator):
     def _counted(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
         seen = [key for leaf, key in self.tallies.items() if leaf in nodes and nodes[leaf].status == Status.SUCCESS]
         looks: list[tuple[ObjectObservation, ...]] = [self.board.get(key) for key in seen]
-        found = told_apart(looks)
+        found = distinct_objects(looks)
         enough = len(found) >= self.needed
         if self.count_key:
             self.board.put(self.count_key, float(len(found)))
         if unseen and not enough:
             return self._not_looked(nodes, unseen)
         limits = f", as far as was seen: not {', '.join(unseen)}" if unseen else ""
-        return self._answered(enough, f"{counted(found, ())}{limits}" if found else "")
+        return self._answered(enough, f"{count_sentence(found, ())}{limits}" if found else "")
 
     def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
         return self.fail(Failed(_obstacle(nodes), f"could not look at {', '.join(unseen)}: {self.message}"))
@@ -349,7 +349,7 @@ def _asked_for(item: str, count: int) -> str:
     """What a question is about: "beer", "two beers", or "beers" for any number."""
     if count == 1:
         return item
-    return numbered(count, item) if count else plural(item)
+    return count_of(count, item) if count else plural(item)
 
 
 def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:

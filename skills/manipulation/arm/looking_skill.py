@@ -13,8 +13,8 @@ from skills.manipulation.arm.gaze import head_angles, without_arm
 from skills.manipulation.arm.poses import look_configuration
 from skills.manipulation.arm.solid_cells import with_picture, with_view
 from skills.patience import PATIENCE_S
-from skills.perception.at_rest import APART_S, at_rest
-from skills.perception.detector.camera_images import is_dark, without_depth
+from skills.perception.detector.camera_images import is_dark, lacks_depth
+from skills.perception.visibility import APART_S, is_at_rest
 from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError
 from skills.routine import Routine, SkillFailure
 
@@ -93,7 +93,7 @@ class LookingSkill(ArmSkill[InputsT]):
         while True:
             begun_s = self.context.clock.now()
             image = yield from self._picture_now(camera, message)
-            if self._doubted_s > PATIENCE_S or not (is_dark(image) or without_depth(image)):
+            if self._doubted_s > PATIENCE_S or not (is_dark(image) or lacks_depth(image)):
                 break
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
             self._doubted_s += self.context.clock.now() - begun_s
@@ -132,7 +132,7 @@ class LookingSkill(ArmSkill[InputsT]):
             later = yield from self.sense(
                 lambda: robot.image(source, visual=False), latency_s=PICTURE_LATENCY_S, name="again", message=message
             )
-            if not at_rest(before, later, X_WO, p_W, within_m):
+            if not is_at_rest(before, later, X_WO, p_W, within_m):
                 return False
             before = later
         return True

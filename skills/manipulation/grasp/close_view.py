@@ -17,7 +17,14 @@ from skills.manipulation.grasp.planning import Obstacle
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
-from skills.perception.surface_segmentation import Cluster, SurfaceView, apart, cluster_of, parted, view_surface
+from skills.perception.surface_segmentation import (
+    Cluster,
+    SurfaceView,
+    matching_cluster,
+    segment_surface,
+    split_detected,
+    split_touching,
+)
 from skills.robot import FloatArray, Image
 
 LOOK_HALF_SIDE_M, SURFACE_AROUND_M = 0.4, 0.2
@@ -61,17 +68,17 @@ def examine(
     within_m: float,
 ) -> CloseView | None:
     """The object of a class, looked for within a distance (m) of where it was seen; None: it is not there."""
-    view = view_surface(image, place.X_WO, surface, margin_m=0.0)
+    view = segment_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
     own = [each for each in found if seen.kind.name in (THING, each.detection.class_name)]
-    view = reduce(parted, own, view)
+    view = reduce(split_detected, own, view)
     if seen.kind.name == THING:
-        view, own = apart(view, camera_pose_W(image, place.X_WO).translation()), []
+        view, own = split_touching(view, camera_pose_W(image, place.X_WO).translation()), []
     cluster = _same_object(view, seen, own, within_m)
     if cluster is None:
         return None
-    names = {id(cluster_of(view.clusters, each)): each.class_name for each in found}
+    names = {id(matching_cluster(view.clusters, each)): each.class_name for each in found}
     others = tuple(
         Obstacle(_observed(each, names.get(id(each), THING), seen, image), tuple(cluster_boxes([each], X_WB)))
         for each in view.clusters
@@ -107,7 +114,7 @@ def _same_object(
     def off(cluster: Cluster) -> float:
         return float(np.linalg.norm(np.array(cluster.shape.centre) - expected))
 
-    classed = [cluster for each in found if (cluster := cluster_of(view.clusters, each)) is not None]
+    classed = [cluster for each in found if (cluster := matching_cluster(view.clusters, each)) is not None]
     for clusters in (classed, view.clusters):
         near = [cluster for cluster in clusters if off(cluster) < within_m]
         if near:

@@ -33,7 +33,7 @@ from skills.manipulation.grasp.servo import Aim, aimed_approach, seen_shift
 from skills.manipulation.grasp.unseen import look_into_unseen
 from skills.perception.class_forms import THING
 from skills.perception.detection_3d import detections_3d
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
@@ -273,7 +273,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 
         def look() -> CloseView | None:
-            found = detections_in(detector, image)
+            found = detect_in_image(detector, image)
             named = [each for each in found if seen.kind.name in (THING, each.class_name)]
             rest = [each for each in found if each not in named]
             placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))

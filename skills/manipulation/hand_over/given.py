@@ -14,7 +14,7 @@ from skills.api import Surface
 from skills.perception.class_forms import PERSON
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import cloud_from_image
-from skills.perception.surface_segmentation import view_surface
+from skills.perception.surface_segmentation import segment_surface
 from skills.robot import FloatArray, Image
 
 _TALL_M, _UPPER_PART, _ABOVE_TOP_M = 0.05, 0.5, 0.06
@@ -100,7 +100,7 @@ def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
     """Whether a picture shows something on a level plate at about the height at which an object was let go of."""
     corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     square = tuple((release.x_m + _PLATE_M * x, release.y_m + _PLATE_M * y) for x, y in corners)
-    view = view_surface(image, X_WO, Surface("plate", square, release.low_m))
+    view = segment_surface(image, X_WO, Surface("plate", square, release.low_m))
     if view is None:
         return False
     middles = [np.median(cluster.points.p_W[:, :2], axis=0) for cluster in view.clusters]

@@ -18,7 +18,7 @@ from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import UP_B, carry_configuration, overview_viewpoints, towards_shoulder
 from skills.manipulation.hand_over.given import Release, Seen, Sight, names_in, seen_given
 from skills.perception.detection_3d import detections_3d
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detections_in
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.robot import ArmCapabilities, FloatArray, Image
 from skills.routine import Routine, SkillFailure
 
@@ -127,7 +127,7 @@ class HandOverVerification(LookingSkill[InputsT]):
         place, names = context.localiser.estimate(), names_in(thing, context.detector.class_names)
 
         def look() -> Sight:
-            found = detections_3d(image, place, detections_in(context.detector, image), ())
+            found = detections_3d(image, place, detect_in_image(context.detector, image), ())
             return seen_given(image, place.X_WO, found, names, release)
 
         return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="look who has it", message=message))

@@ -8,7 +8,7 @@ import numpy as np
 
 from skills.api import Surface
 from skills.geometry import grid_inside
-from skills.perception.plane import LevelPlane
+from skills.perception.fitting import LevelPlane
 from skills.perception.point_cloud import PointCloud
 from skills.perception.surface_segmentation import SurfaceView
 from skills.robot import FloatArray

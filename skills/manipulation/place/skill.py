@@ -45,7 +45,7 @@ from skills.manipulation.place.placement import (
 from skills.manipulation.place.ports import PlaceInputs, PlacePorts
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.ports import NavigateInputs
-from skills.perception.surface_segmentation import SurfaceView, view_surface
+from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.quantities import Length, Tries, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
 from skills.routine import Routine, SkillFailure
@@ -313,7 +313,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         image = yield from self.picture(message)
         X_WO = self.context.localiser.estimate().X_WO
         view = yield from self.compute(
-            lambda: view_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
+            lambda: segment_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
         )
         robot, near = self.context.robot, np.mean(image.depth_m < _AT_HAND_M)
         hidden = near > _HIDDEN and robot.gripper().holding and robot.scan() is not None
@@ -331,7 +331,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
                 continue
             take = partial(robot.image, camera.source)
             image = yield from self.sense(take, latency_s=PICTURE_LATENCY_S, name="floor picture", message=message)
-            segment = partial(view_surface, image, X_WO, surface)
+            segment = partial(segment_surface, image, X_WO, surface)
             view = yield from self.compute(segment, latency_s=0.15, name="segment", message=message)
             views += [] if view is None else [view]
         return max(views, key=lambda view: len(view.plane_points), default=None)

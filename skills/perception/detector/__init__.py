@@ -1,1 +1,1 @@
-"""The detector of things in pictures: a cascade of three small networks in ONNX Runtime."""
+"""Detector of objects in pictures: a cascade of three small networks in ONNX Runtime."""

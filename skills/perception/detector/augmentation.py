@@ -1,8 +1,8 @@
-"""Test-time augmentation: several views of one picture, also mirrored and smaller, fused into one answer.
+"""Test-time augmentation: detections of mirrored and smaller views of one picture, fused.
 
-Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021). An object is
-judged by the views that show it neither small nor very large. Where the first view leaves no doubt, the others are not
-taken.
+Boxes of one object in several views are fused after Solovyev et al., "Weighted boxes fusion" (2021). Only the views
+that show an object neither small nor very large judge it. The detector skips the other views where the first one leaves
+no doubt.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from skills.detection import Detection, box_overlap
 from skills.perception.detector.letterbox import PADDING, Letterbox, check_picture
 from skills.perception.detector.onnx_detector import OnnxDetector
-from skills.perception.detector.suppression import Candidates, detections_of
+from skills.perception.detector.suppression import Candidates, detections_from
 from skills.robot import Picture
 
 Box = tuple[float, float, float, float]
@@ -31,30 +31,30 @@ _LEAST_LARGE_SIDE_PX: Final = 140.0
 
 @dataclass(frozen=True)
 class View:
-    """A picture as it is, or mirrored from left to right, or smaller by `scale` (up to 1) in the same frame."""
+    """View of a picture: unchanged, mirrored from left to right, or smaller by `scale` (up to 1) in the same frame."""
 
     mirrored: bool = False
     scale: float = 1.0
 
-    def of(self, picture: Picture) -> Picture:
-        """The view of a picture (H, W) or (H, W, 3), of the same size."""
-        turned = picture[:, ::-1] if self.mirrored else picture
+    def apply(self, picture: Picture) -> Picture:
+        """Makes the view of a picture (H, W) or (H, W, 3), of the same size."""
+        flipped = picture[:, ::-1] if self.mirrored else picture
         if self.scale == 1.0:
-            return np.ascontiguousarray(turned)
-        small = cv2.resize(turned, None, fx=self.scale, fy=self.scale, interpolation=cv2.INTER_AREA)
+            return np.ascontiguousarray(flipped)
+        small = cv2.resize(flipped, None, fx=self.scale, fy=self.scale, interpolation=cv2.INTER_AREA)
         framed = np.full_like(picture, PADDING)
         framed[: small.shape[0], : small.shape[1]] = small
         return framed
 
-    def back(self, box: Box, width_px: int) -> Box:
-        """A box of the view in the picture, which is so wide."""
+    def box_in_picture(self, box: Box, width_px: int) -> Box:
+        """Converts a box of the view to the picture, which is width_px wide."""
         u0, v0, u1, v1 = (value / self.scale for value in box)
         return (width_px - u1, v0, width_px - u0, v1) if self.mirrored else (u0, v0, u1, v1)
 
     def suits(self, box: Box, shape: Sequence[int], *, large: bool) -> bool:
-        """Whether an object with a box in a picture (H, W, ...) has a size in the view at which it is judged best.
+        """Returns whether the view shows a box of a picture (H, W, ...) at a size that the networks judge well.
 
-        Sizes are those in the letterbox, which the network sees. Objects of a `large` class have sizes of their own.
+        The size is that in the letterbox. Objects of a `large` class have limits of their own.
         """
         letterbox = Letterbox(width_px=shape[1], height_px=shape[0])
         side_px = max(box[2] - box[0], box[3] - box[1]) * self.scale * letterbox.scale_xy[0]
@@ -63,31 +63,31 @@ class View:
 
 
 VIEWS: Final = (View(), View(mirrored=True), View(scale=0.7), View(True, 0.5), View(scale=0.35))
-"""The first one is taken always, the others where it leaves doubts."""
+"""The detector always uses the first view, and the others where the first leaves doubts."""
 
 
 @runtime_checkable
 class DetectsInViews(Protocol):
-    """A detector that can take more time for one picture."""
+    """A detector with test-time augmentation."""
 
     def detect_in_views(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
-        """What is in a picture, the surest first, from the detector's usual score on, or from `least_score` on.
+        """Detects the objects in a picture, best first, from the usual threshold or from `least_score` on.
 
-        Raises ValueError for what is no picture.
+        Raises ValueError for anything but a picture.
         """
 
 
 @runtime_checkable
 class DetectsClass(Protocol):
-    """A detector that can look quickly for the objects of one class."""
+    """A detector with a quick search for one class."""
 
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
-        """The objects of a class in each picture, the surest first. Raises ValueError for what is no picture."""
+        """Detects the objects of a class in each picture, best first. Raises ValueError for anything but pictures."""
 
 
 @dataclass(frozen=True)
 class AugmentationOptions:
-    """The views, and when the first one is enough: no score, also of alternatives, lies between `low` and `high`."""
+    """The views; the first one is enough when no score, of alternatives either, lies between `low` and `high`."""
 
     views: tuple[View, ...] = VIEWS
     low: float = 0.3
@@ -96,28 +96,28 @@ class AugmentationOptions:
 
 @dataclass(frozen=True)
 class AugmentedDetector:
-    """A detector that takes one view, or several when asked to."""
+    """Detector that uses one view, or several in `detect_in_views`."""
 
     detector: OnnxDetector
     options: AugmentationOptions = field(default_factory=AugmentationOptions)
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """The classes that it knows."""
+        """Classes of the networks."""
         return self.detector.class_names
 
     def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
-        """What is in each picture at one view."""
+        """Detects the objects in one view of each picture."""
         return self.detector.detect(pictures)
 
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
-        """The objects of one class in each picture at one quick view."""
+        """Detects the objects of one class in one view of each picture, quickly."""
         return self.detector.detect_class(pictures, class_name)
 
     def detect_in_views(self, picture: Picture, least_score: float | None = None) -> tuple[Detection, ...]:
-        """What the views of a picture agree on, from the threshold or from `least_score` on.
+        """Fuses the detections of the views, from the threshold or from `least_score` on.
 
-        Raises ValueError for what is no picture.
+        Raises ValueError for anything but a picture.
         """
         check_picture(picture)
         options = self.detector.options
@@ -126,13 +126,13 @@ class AugmentedDetector:
             self.detector.model, replace(options, threshold=_LEAST_SCORE, alternative_threshold=_LEAST_SCORE)
         )
         views = self.options.views
-        found = sensitive.detect([views[0].of(picture)])
+        found = sensitive.detect([views[0].apply(picture)])
         if not self._in_doubt(found[0]):
             views = views[:1]
         else:
-            found += sensitive.detect([view.of(picture) for view in views[1:]])
+            found += sensitive.detect([view.apply(picture) for view in views[1:]])
         fused = _fused(views, found, picture.shape, self.class_names)
-        return detections_of(
+        return detections_from(
             fused.from_score(min(threshold, options.alternative_threshold)),
             self.class_names,
             threshold,
@@ -140,7 +140,7 @@ class AugmentedDetector:
         )
 
     def _in_doubt(self, found: Sequence[Detection]) -> bool:
-        """Returns whether one view finds what may or may not be there."""
+        """Returns whether the first view leaves doubts."""
         scores = [score for one in found for score in (one.score, *(score for _, score in one.alternatives))]
         return any(self.options.low < score < self.options.high for score in scores)
 
@@ -148,10 +148,10 @@ class AugmentedDetector:
 def _fused(
     views: Sequence[View], found: Sequence[Sequence[Detection]], shape: Sequence[int], class_names: Sequence[str]
 ) -> Candidates:
-    """One candidate for each object and class."""
+    """Fuses the detections of all views to one candidate for each object and class."""
     groups: list[_Group] = []
     for one, number in sorted(_numbered(found), key=lambda pair: -pair[0].score):
-        box = views[number].back(one.box, shape[1])
+        box = views[number].box_in_picture(one.box, shape[1])
         same = [group for group in groups if group.is_of(one.class_name, box)]
         if not same:
             groups.append(_Group(one.class_name, box, {number: (one.score, box)}))
@@ -167,28 +167,28 @@ def _fused(
 
 @dataclass
 class _Group:
-    """One object in several views: score and box by the view's number; `box` is the surest one's."""
+    """One object in several views: score and box by the view's number; `box` has the best score."""
 
     class_name: str
     box: Box
     seen: dict[int, tuple[float, Box]] = field(default_factory=dict)
 
     def is_of(self, class_name: str, box: Box) -> bool:
-        """Returns whether a box is on the same object, and of the same class."""
+        """Returns whether a box shows the same object and class."""
         return class_name == self.class_name and box_overlap(self.box, box) > _SAME_OBJECT
 
     def row(self, views: Sequence[View], shape: Sequence[int]) -> tuple[NDArray[np.float64], float, str]:
-        """Mean box, weighted by the scores, mean score, and class; by the views that suit it, or by all."""
+        """Mean box, weighted by the scores, mean score, and class, over the views that suit the object, or over all."""
         large = self.class_name in _LARGE_CLASSES
         suiting = [k for k, view in enumerate(views) if view.suits(self.box, shape, large=large)] or range(len(views))
         own = [self.seen[number] for number in suiting if number in self.seen]
-        judging = own or list(self.seen.values())
-        box = np.average([box for _, box in judging], axis=0, weights=[score for score, _ in judging])
+        judges = own or list(self.seen.values())
+        box = np.average([box for _, box in judges], axis=0, weights=[score for score, _ in judges])
         return box, sum(score for score, _ in own) / len(suiting), self.class_name
 
 
 def _numbered(found: Iterable[Sequence[Detection]]) -> Iterable[tuple[Detection, int]]:
-    """Detections and their alternatives, each with its view's number."""
+    """Yields detections and their alternatives with the number of their view."""
     for number, ones in enumerate(found):
         for one in ones:
             yield one, number

@@ -1,4 +1,9 @@
-"""The detector: the cascade of networks in ONNX Runtime on pictures in the letterbox, and one box for each object."""
+"""The detector's cascade: proposal network, refinement network, classifier network, non-maximum suppression.
+
+Boxes are in pixels of the letterbox. The refinement network sees a crop about each proposal, scaled to one size
+(Girshick, "Fast R-CNN", 2015, without shared features); the classifier network judges the crops about its results
+(Cai and Vasconcelos, "Cascade R-CNN", 2018).
+"""
 
 from __future__ import annotations
 
@@ -14,175 +19,235 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.detection import Detection
-from skills.perception.detector.cascade_files import MODEL_FILE, DetectorModel, load_model
-from skills.perception.detector.letterbox import Letterbox, letterbox
-from skills.perception.detector.network_file import Network
-from skills.perception.detector.proposals import (
-    CLASSIFIED,
-    CROP_PX,
-    ProposalOptions,
-    Proposals,
-    crop_map,
-    mapped,
-    proposals_of,
-    rows_of,
+from skills.perception.detector.letterbox import Letterbox, Scales, halve, letterbox
+from skills.perception.detector.model_files import CROP_PX, MODEL_FILE, DetectorModel, load_model
+from skills.perception.detector.suppression import (
+    Floats,
+    SuppressionOptions,
+    are_sound,
+    detections_from,
+    select_candidates,
+    select_distinct,
 )
-from skills.perception.detector.scales import Scales, halved
-from skills.perception.detector.suppression import SuppressionOptions, candidates_of, detections_of
 from skills.robot import Picture
 
 if TYPE_CHECKING:
     from onnxruntime import InferenceSession
 
-Floats = NDArray[np.float32]
-
-
-def refined(
-    session: InferenceSession, scales: Scales, boxes: Floats, scores: Floats, options: ProposalOptions
-) -> tuple[Floats, Floats]:
-    """Boxes (R, 4) and scores (R, K) of what a network sees at the proposals among boxes (A, 4) with scores (A, K).
-
-    Boxes are in pixels of the letterbox (480, 640, 3), of which `scales` are. Where the options ask for the mirror
-    image too, the result is the mean of both.
-    """
-    proposals = proposals_of(boxes, scores, options)
-    if not len(proposals):
-        return proposals.boxes, np.zeros_like(proposals.logits)
-    found, seen = _seen(session, scales, proposals, mirrored=False)
-    if options.mirrored_from is None:
-        return found, seen
-    rows = np.flatnonzero(seen.max(axis=1) >= options.mirrored_from)
-    if len(rows):
-        again, others = _seen(session, scales, Proposals(proposals.boxes[rows], proposals.logits[rows]), mirrored=True)
-        found[rows] = 0.5 * (found[rows] + again)
-        seen[rows] = 0.5 * (seen[rows] + others)
-    return found, seen
-
-
-def classified(
-    session: InferenceSession, scales: Scales, boxes: Floats, scores: Floats, options: ProposalOptions
-) -> tuple[Floats, Floats]:
-    """Boxes (R, 4) and scores (R, K), with those that `options` choose replaced by what a network sees there."""
-    rows = rows_of(boxes, scores, options)
-    boxes, scores = boxes.copy(), scores.copy()
-    boxes[rows], scores[rows] = refined(session, scales, boxes[rows], scores[rows], options)
-    return boxes, scores
-
-
-def crops_about(scales: Scales, proposals: Proposals, *, mirrored: bool = False) -> dict[str, NDArray[Any]]:
-    """The inputs of such a network: crops about proposals or their mirror images, proposals in them, and logits."""
-    maps = _maps(proposals, mirrored)
-    return {
-        "chips": np.stack([scales.cut(to_crop, (CROP_PX, CROP_PX)) for to_crop in maps]),
-        "regions": mapped(proposals.boxes, maps),
-        "logits": proposals.logits,
-    }
-
-
-def _maps(proposals: Proposals, mirrored: bool) -> Floats:
-    return np.stack([crop_map(box, mirrored=mirrored) for box in proposals.boxes])
-
-
-def _seen(session: InferenceSession, scales: Scales, proposals: Proposals, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Boxes in the letterbox and scores of what is seen in crops about proposals, or in their mirror images."""
-    found, scores = session.run(["boxes", "scores"], crops_about(scales, proposals, mirrored=mirrored))
-    back = np.stack([cv2.invertAffineTransform(to_crop) for to_crop in _maps(proposals, mirrored)])
-    return mapped(found, back), scores
-
-
+OBJECT_PX: Final = 84.0
+LEAST_SIDE_PX: Final = 20.0
 THREADS: Final = 2
-"""So many pictures are looked at side by side."""
+"""Pictures that are processed in parallel."""
+_LOWEST_SCORE: Final = 1e-4
+
+
+@dataclass(frozen=True)
+class ProposalOptions:
+    """Selection of the boxes that are proposals.
+
+    Takes the `most_candidates` best boxes of any class with at least `least_score`, drops those that overlap a better
+    one by more than `same`, and keeps `most`. Where the next network gives at least `mirrored_from`, it also sees the
+    mirror image.
+    """
+
+    least_score: float = 0.01
+    same: float = 0.6
+    most: int = 12
+    most_candidates: int = 250
+    mirrored_from: float | None = 0.3
+
+
+CLASSIFIER_PROPOSALS: Final = ProposalOptions(least_score=0.05, same=1.0, most=12, mirrored_from=None)
+"""Boxes of the refinement network that the classifier network judges."""
 
 
 @dataclass(frozen=True)
 class DetectorOptions:
-    """The least score of a detection, also of an alternative class, and how boxes of one object become one.
+    """Thresholds of detections and of their alternative classes, and the options of the stages.
 
-    `proposals` are judged by the refinement network, and of those the `classified` by the classifier network. A quick
-    look for one class is content with the proposals that give that class at least `quick_score`.
+    The refinement network judges `proposals`, and the classifier network `reclassified` of its results. A quick search
+    for one class uses only the proposals that give that class at least `quick_score`.
     """
 
     threshold: float = 0.5
     alternative_threshold: float = 0.1
     suppression: SuppressionOptions = field(default_factory=SuppressionOptions)
     proposals: ProposalOptions = field(default_factory=ProposalOptions)
-    classified: ProposalOptions = CLASSIFIED
+    reclassified: ProposalOptions = CLASSIFIER_PROPOSALS
     quick_score: float = 0.02
 
 
 @dataclass(frozen=True)
 class OnnxDetector:
-    """Finds objects with loaded networks. Safe to call from several threads."""
+    """Detector of loaded networks. Several threads may use it at once."""
 
     model: DetectorModel
     options: DetectorOptions = field(default_factory=DetectorOptions)
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """The classes that it knows."""
+        """Classes of the networks."""
         return self.model.class_names
 
     def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
-        """What is in each picture, the surest first; boxes in the pictures' own pixels.
+        """Detects the objects in each picture, best first; boxes are in the picture's own pixels.
 
-        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Raises ValueError for what is no such picture.
+        Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. Raises ValueError for anything else.
         """
-        return _side_by_side(self._detect, pictures)
+        return _in_parallel(self._detect, pictures)
 
     def detect_class(self, pictures: Sequence[Picture], class_name: str) -> list[tuple[Detection, ...]]:
-        """The objects of one class in each picture, quickly.
+        """Detects the objects of one class in each picture, quickly.
 
-        The proposal network sees the picture, and the others only what it gives a score of the class.
-        Raises ValueError for what is no picture, and for a class that the detector does not know.
+        The later networks see only the proposals that may be of the class. Raises ValueError for anything but
+        pictures, and for an unknown class.
         """
         if class_name not in self.class_names:
             raise ValueError(f"the detector knows no class {class_name!r}")
-        return _side_by_side(partial(self._detect_class, number=self.class_names.index(class_name)), pictures)
+        return _in_parallel(partial(self._detect_class, number=self.class_names.index(class_name)), pictures)
 
     def _detect(self, picture: Picture) -> tuple[Detection, ...]:
         image, placed = letterbox(picture)
-        return self._judged(image, placed, *_proposed(self.model.proposal, image))
+        return self._judge(image, placed, *self._propose(image))
 
     def _detect_class(self, picture: Picture, number: int) -> tuple[Detection, ...]:
         image, placed = letterbox(picture)
-        boxes, scores = _proposed(self.model.proposal, image)
-        rows = rows_of(boxes, scores, self.options.proposals)
+        boxes, scores = self._propose(image)
+        rows = _proposal_rows(boxes, scores, self.options.proposals)
         likely = rows[scores[rows, number] >= self.options.quick_score]
         if not len(likely):
             return ()
-        found = self._judged(image, placed, boxes[likely], scores[likely])
+        found = self._judge(image, placed, boxes[likely], scores[likely])
         return tuple(one for one in found if one.class_name == self.class_names[number])
 
-    def _judged(self, image: Picture, placed: Letterbox, boxes: Floats, scores: Floats) -> tuple[Detection, ...]:
-        """The objects of a picture in the letterbox from proposals: boxes (A, 4) and scores (A, K)."""
-        model, scales = self.model, Scales(image, halved(image))
+    def _propose(self, image: Picture) -> tuple[Floats, Floats]:
+        """Boxes (A, 4) and scores (A, K) of the proposal network in a letterbox (H, W, 3)."""
+        boxes, scores = self.model.proposal.session.run(["boxes", "scores"], {"images": image[None]})
+        return boxes[0], scores[0]
+
+    def _judge(self, image: Picture, placed: Letterbox, boxes: Floats, scores: Floats) -> tuple[Detection, ...]:
+        """Runs the later stages on proposals, boxes (A, 4) and scores (A, K), of a letterbox."""
+        model, scales, options = self.model, Scales(image, halve(image)), self.options
         if model.refinement is not None:
-            boxes, scores = refined(model.refinement.session, scales, boxes, scores, self.options.proposals)
+            boxes, scores = refine(model.refinement.session, scales, boxes, scores, options.proposals)
         if model.classifier is not None:
-            boxes, scores = classified(model.classifier.session, scales, boxes, scores, self.options.classified)
-        options = self.options
+            rows = _proposal_rows(boxes, scores, options.reclassified)
+            boxes, scores = boxes.copy(), scores.copy()
+            boxes[rows], scores[rows] = refine(
+                model.classifier.session, scales, boxes[rows], scores[rows], options.reclassified
+            )
         least = min(options.threshold, options.alternative_threshold)
-        found = candidates_of(boxes, scores, least, options.suppression.most_candidates)
+        found = select_candidates(boxes, scores, least, options.suppression.most_candidates)
         in_picture = replace(found, boxes=placed.to_picture(found.boxes))
-        return detections_of(in_picture, self.class_names, options.threshold, options.suppression)
+        return detections_from(in_picture, self.class_names, options.threshold, options.suppression)
 
 
-def _side_by_side(
+def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:
+    """Loads the detector of a file. Raises `skills.perception.detector.model_files.ModelFileError`."""
+    return OnnxDetector(load_model(file), options or DetectorOptions())
+
+
+def _in_parallel(
     detect: Callable[[Picture], tuple[Detection, ...]], pictures: Sequence[Picture]
 ) -> list[tuple[Detection, ...]]:
-    """What is in each picture, several at a time."""
     if len(pictures) < 2:
         return [detect(picture) for picture in pictures]
     with ThreadPoolExecutor(THREADS) as threads:
         return list(threads.map(detect, pictures))
 
 
-def _proposed(network: Network, image: Picture) -> tuple[Floats, Floats]:
-    """Boxes (A, 4) and scores (A, K) of the proposal network in a letterbox (H, W, 3)."""
-    boxes, scores = network.session.run(["boxes", "scores"], {"images": image[None]})
-    return boxes[0], scores[0]
+@dataclass(frozen=True)
+class Proposals:
+    """Boxes (R, 4) of (u0, v0, u1, v1) and the logits (R, K) of their classes."""
+
+    boxes: Floats
+    logits: Floats
+
+    def __len__(self) -> int:
+        return len(self.boxes)
 
 
-def load_detector(file: Path = MODEL_FILE, options: DetectorOptions | None = None) -> OnnxDetector:
-    """The detector of a file. Raises `skills.perception.detector.network_file.ModelFileError`."""
-    return OnnxDetector(load_model(file), options or DetectorOptions())
+def select_proposals(boxes: Floats, scores: Floats, options: ProposalOptions) -> Proposals:
+    """Selects the proposals among boxes (A, 4) with scores (A, K) of a network, best first."""
+    rows = _proposal_rows(boxes, scores, options)
+    return Proposals(boxes[rows], logits(scores[rows]))
+
+
+def _proposal_rows(boxes: Floats, scores: Floats, options: ProposalOptions) -> NDArray[np.int64]:
+    """Rows of boxes (A, 4) with scores (A, K) that are proposals, best first."""
+    best = scores.max(axis=1)
+    rows = np.flatnonzero(best >= options.least_score)
+    rows = rows[np.argsort(-best[rows], kind="stable")][: options.most_candidates]
+    rows = rows[are_sound(boxes[rows])]
+    return np.asarray(rows[select_distinct(boxes[rows], options.same)[: options.most]], dtype=np.int64)
+
+
+def logits(scores: Floats) -> Floats:
+    """Logits of scores from 0 to 1, limited to those of 1e-4 and 1 - 1e-4."""
+    sound = np.clip(scores, _LOWEST_SCORE, 1.0 - _LOWEST_SCORE)
+    return np.asarray(np.log(sound / (1.0 - sound)), dtype=np.float32)
+
+
+def refine(
+    session: InferenceSession, scales: Scales, boxes: Floats, scores: Floats, options: ProposalOptions
+) -> tuple[Floats, Floats]:
+    """Runs a network on the proposals among boxes (A, 4) with scores (A, K): new boxes (R, 4) and scores (R, K).
+
+    `scales` holds the letterbox. Where the options ask for the mirror image too, the result is the mean of both.
+    """
+    proposals = select_proposals(boxes, scores, options)
+    if not len(proposals):
+        return proposals.boxes, np.zeros_like(proposals.logits)
+    found, seen = _run_on_crops(session, scales, proposals, mirrored=False)
+    if options.mirrored_from is None:
+        return found, seen
+    rows = np.flatnonzero(seen.max(axis=1) >= options.mirrored_from)
+    if len(rows):
+        sure = Proposals(proposals.boxes[rows], proposals.logits[rows])
+        mirrored_found, mirrored_seen = _run_on_crops(session, scales, sure, mirrored=True)
+        found[rows] = 0.5 * (found[rows] + mirrored_found)
+        seen[rows] = 0.5 * (seen[rows] + mirrored_seen)
+    return found, seen
+
+
+def crop_inputs(scales: Scales, proposals: Proposals, *, mirrored: bool = False) -> dict[str, NDArray[Any]]:
+    """Inputs of a later network: crops about proposals, or their mirror images, the proposals in them, and logits."""
+    maps = _crop_maps(proposals, mirrored)
+    return {
+        "chips": np.stack([scales.warp(to_crop, (CROP_PX, CROP_PX)) for to_crop in maps]),
+        "regions": transform_boxes(proposals.boxes, maps),
+        "logits": proposals.logits,
+    }
+
+
+def _crop_maps(proposals: Proposals, mirrored: bool) -> Floats:
+    return np.stack([crop_map(box, mirrored=mirrored) for box in proposals.boxes])
+
+
+def _run_on_crops(
+    session: InferenceSession, scales: Scales, proposals: Proposals, *, mirrored: bool
+) -> tuple[Floats, Floats]:
+    """Boxes in the letterbox and scores of a network on the crops about proposals, or on their mirror images."""
+    found, scores = session.run(["boxes", "scores"], crop_inputs(scales, proposals, mirrored=mirrored))
+    back = np.stack([cv2.invertAffineTransform(to_crop) for to_crop in _crop_maps(proposals, mirrored)])
+    return transform_boxes(found, back), scores
+
+
+def crop_map(box: NDArray[np.floating], *, mirrored: bool = False) -> Floats:
+    """Affine map (2, 3) from the letterbox to the crop about a box (4,), which fills about two thirds of the crop.
+
+    A very small box fills less. `mirrored` flips the crop from left to right.
+    """
+    u0, v0, u1, v1 = (float(value) for value in box)
+    scale = OBJECT_PX / max(u1 - u0, v1 - v0, LEAST_SIDE_PX)
+    linear = np.diag([-scale if mirrored else scale, scale])
+    shift = CROP_PX / 2 - linear @ (np.array([u0 + u1, v0 + v1]) / 2)
+    return np.concatenate([linear, shift[:, None]], axis=1).astype(np.float32)
+
+
+def transform_boxes(boxes: NDArray[np.floating], affine: NDArray[np.floating]) -> Floats:
+    """Boxes about the corners of boxes (N, 4) under an affine map (2, 3), or under one map each (N, 2, 3)."""
+    u0, v0, u1, v1 = np.asarray(boxes, dtype=np.float64).T
+    corners = np.stack([np.stack([u0, u1, u0, u1], axis=1), np.stack([v0, v0, v1, v1], axis=1)], axis=1)
+    moved = affine[..., :2] @ corners + affine[..., 2:]
+    return np.concatenate([moved.min(axis=2), moved.max(axis=2)], axis=1).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Many boxes on one thing become one: the surest of each class, and the surer of two classes."""
+"""Non-maximum suppression: many boxes on one object become one detection with alternative classes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class SuppressionOptions:
-    """Which of many boxes stay.
+    """Overlaps (intersection over union) at which boxes are one object, and limits of their number.
 
-    Boxes of one class that overlap by more than `same_class` (shared area / area of both) are one thing. So are boxes
-    of two classes over `other_class`, when the surer of the two has at least `sure_score`. Of more than
-    `most_candidates` boxes in a picture the surest are looked at, and `most_kept` of those that stay are told. What a
-    thing may be as well is told by boxes of other classes that overlap its own by more than `alternative`.
+    Boxes of one class that overlap by more than `same_class` are one object. So are boxes of two classes that overlap
+    by more than `other_class`, if the better one has at least `sure_score`. Boxes of other classes that overlap a
+    detection by more than `alternative` are its alternatives. At most `most_candidates` boxes of a picture are
+    considered, and `most_kept` of them become detections.
     """
 
     same_class: float = 0.45
@@ -33,7 +33,7 @@ class SuppressionOptions:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Boxes (N, 4) of (u0, v0, u1, v1), their scores (N,) and the indices (N,) of their classes, the surest first."""
+    """Boxes (N, 4) of (u0, v0, u1, v1), their scores (N,) and the indices (N,) of their classes, best first."""
 
     boxes: Floats
     scores: Floats
@@ -43,45 +43,48 @@ class Candidates:
         return len(self.scores)
 
     def at(self, rows: NDArray[np.int64]) -> Candidates:
-        """Those of some rows."""
+        """Candidates at some rows."""
         return Candidates(self.boxes[rows], self.scores[rows], self.classes[rows])
 
     def from_score(self, threshold: float) -> Candidates:
-        """Those with at least a score."""
+        """Candidates with at least a score."""
         return self.at(np.flatnonzero(self.scores >= threshold))
 
 
-def candidates_of(boxes: Floats, scores: Floats, threshold: float, most: int) -> Candidates:
-    """Boxes (A, 4) of which a class has at least the threshold, by scores (A, K); `most` of them, the surest first.
+def select_candidates(boxes: Floats, scores: Floats, threshold: float, most: int) -> Candidates:
+    """Selects the `most` best pairs of box (A, 4) and class whose scores (A, K) reach the threshold.
 
-    What is not finite, or has no area, is none. Equal scores keep their order.
+    Leaves out boxes that are not finite or have no area. Equal scores keep their order.
     """
     rows, classes = np.nonzero(scores >= threshold)
-    found = boxes[rows]
-    sound = np.isfinite(found).all(axis=1) & (found[:, 2:] > found[:, :2]).all(axis=1)
-    found, rows, classes = found[sound], rows[sound], classes[sound]
+    sound = are_sound(boxes[rows])
+    rows, classes = rows[sound], classes[sound]
     values = scores[rows, classes]
     order = np.argsort(-values, kind="stable")[:most]
-    return Candidates(found[order], values[order], classes[order].astype(np.int64))
+    return Candidates(boxes[rows[order]], values[order], classes[order].astype(np.int64))
+
+
+def are_sound(boxes: Floats) -> NDArray[np.bool_]:
+    """Returns which boxes (N, 4) are finite and have an area."""
+    return np.asarray(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1))
 
 
 def suppress(candidates: Candidates, options: SuppressionOptions) -> Candidates:
-    """The candidates without those that a surer one stands for.
-
-    Greedy, after the usual non-maximum suppression: the surest stays, what it stands for goes, and so on.
-    """
-    if not len(candidates):
-        return candidates
-    return candidates.at(_standing(_replaced_by(candidates, options))[: options.most_kept])
-
-
-def apart(boxes: Floats, overlap: float) -> NDArray[np.int64]:
-    """Rows of boxes (N, 4), the surest first, that share no more than `overlap` with a surer one that stays."""
-    return _standing(_overlaps(boxes, boxes) > overlap)
+    """Removes the candidates that a better one represents: greedy non-maximum suppression."""
+    shared = overlaps(candidates.boxes, candidates.boxes)
+    same = candidates.classes[:, None] == candidates.classes[None, :]
+    sure = (candidates.scores >= options.sure_score)[:, None]
+    replaced = np.where(same, shared > options.same_class, sure & (shared > options.other_class))
+    return candidates.at(_greedy_rows(replaced)[: options.most_kept])
 
 
-def _standing(replaced: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Rows that stay, when each that stays takes away those later ones (N, N) that it replaces."""
+def select_distinct(boxes: Floats, overlap: float) -> NDArray[np.int64]:
+    """Selects the rows of boxes (N, 4), best first, that overlap no better selected one by more than `overlap`."""
+    return _greedy_rows(overlaps(boxes, boxes) > overlap)
+
+
+def _greedy_rows(replaced: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Rows that stay when each row that stays removes the later ones that it replaces (N, N)."""
     alive = np.ones(len(replaced), dtype=bool)
     for k in range(len(replaced)):
         if alive[k]:
@@ -89,25 +92,17 @@ def _standing(replaced: NDArray[np.bool_]) -> NDArray[np.int64]:
     return np.flatnonzero(alive)
 
 
-def _replaced_by(candidates: Candidates, options: SuppressionOptions) -> NDArray[np.bool_]:
-    """(N, N): whether the one of the row stands for the one of the column, if that is less sure."""
-    shared = _overlaps(candidates.boxes, candidates.boxes)
-    same = candidates.classes[:, None] == candidates.classes[None, :]
-    sure = (candidates.scores >= options.sure_score)[:, None]
-    return np.asarray(np.where(same, shared > options.same_class, sure & (shared > options.other_class)))
-
-
-def detections_of(
+def detections_from(
     candidates: Candidates, class_names: Sequence[str], threshold: float, options: SuppressionOptions
 ) -> tuple[Detection, ...]:
-    """What is told of candidates in a picture: those from a score on that stay, with what else they may be."""
+    """Detections of a picture: candidates from the threshold on after suppression, with their alternatives."""
     candidates = candidates.at(np.flatnonzero((candidates.boxes[:, 2:] > candidates.boxes[:, :2]).all(axis=1)))
-    kept = suppress(candidates.from_score(threshold), options)
+    selected = suppress(candidates.from_score(threshold), options)
     rows = zip(
-        kept.classes.tolist(),
-        kept.scores.tolist(),
-        kept.boxes.astype(np.float64).tolist(),
-        alternatives_of(kept, candidates, options),
+        selected.classes.tolist(),
+        selected.scores.tolist(),
+        selected.boxes.astype(np.float64).tolist(),
+        alternative_scores(selected, candidates, options),
         strict=True,
     )
     return tuple(
@@ -118,18 +113,20 @@ def detections_of(
     )
 
 
-def alternatives_of(kept: Candidates, candidates: Candidates, options: SuppressionOptions) -> list[dict[int, float]]:
-    """For each of those kept, the other classes that it may be with their best scores on the same thing."""
-    alike = _overlaps(kept.boxes, candidates.boxes) > options.alternative
-    alike &= kept.classes[:, None] != candidates.classes[None, :]
-    alternatives: list[dict[int, float]] = [{} for _ in range(len(kept))]
+def alternative_scores(
+    selected: Candidates, candidates: Candidates, options: SuppressionOptions
+) -> list[dict[int, float]]:
+    """Best scores of the other classes on the object of each selected candidate, by class."""
+    alike = overlaps(selected.boxes, candidates.boxes) > options.alternative
+    alike &= selected.classes[:, None] != candidates.classes[None, :]
+    alternatives: list[dict[int, float]] = [{} for _ in range(len(selected))]
     for row, column in np.argwhere(alike).tolist():
         alternatives[row].setdefault(int(candidates.classes[column]), float(candidates.scores[column]))
     return alternatives
 
 
-def _overlaps(first: Floats, second: Floats) -> Floats:
-    """Shared area / area of both together (N, M)."""
+def overlaps(first: Floats, second: Floats) -> Floats:
+    """Intersection over union (N, M) of boxes (N, 4) with boxes (M, 4)."""
     low = np.maximum(first[:, None, :2], second[None, :, :2])
     high = np.minimum(first[:, None, 2:], second[None, :, 2:])
     shared = np.clip(high - low, 0.0, None).prod(axis=2)

@@ -17,10 +17,13 @@ from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import CropLearner  # noqa: E402
 from errand_train.detector.proposal_table import refined_in  # noqa: E402
 from errand_train.detector.quantisation import quantised  # noqa: E402
-from skills.perception.detector.cascade_files import CLASSIFIER, load_model  # noqa: E402
-from skills.perception.detector.network_file import load_network  # noqa: E402
-from skills.perception.detector.proposals import CROP_PX  # noqa: E402
-from skills.perception.detector.scales import Scales, halved  # noqa: E402
+from skills.perception.detector.letterbox import Scales, halve  # noqa: E402
+from skills.perception.detector.model_files import (  # noqa: E402
+    CLASSIFIER,
+    load_model,
+    load_network,
+)
+from skills.perception.detector.onnx_detector import CROP_PX  # noqa: E402
 
 onnx = pytest.importorskip("onnx")
 CPU, NAMES = torch.device("cpu"), ("beer", "coke", "cube")
@@ -164,7 +167,7 @@ def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_
     picture = picture_of(("hammer", 0.2, (100, 100, 200, 200)))
     picture[50:250, 50:250, 0] = 255
     look = partial(refined_in, load_model(write_pair(tmp_path / "m.onnx")))
-    found = look(Scales(picture, halved(picture)))
+    found = look(Scales(picture, halve(picture)))
     assert found.boxes.round().tolist() == [[105.0, 105.0, 195.0, 195.0]]
     assert found.logits.argmax(axis=1).tolist() == [CLASSES.index("beer")]
 
@@ -172,7 +175,7 @@ def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_
 def test_without_a_refinement_network_there_is_nothing_to_learn_from(tmp_path: Path) -> None:
     pair = load_model(write_pair(tmp_path / "m.onnx"), networks=1)
     with pytest.raises(ValueError, match="no refinement network"):
-        refined_in(pair, Scales(picture_of(), halved(picture_of())))
+        refined_in(pair, Scales(picture_of(), halve(picture_of())))
 
 
 def test_learning_goes_on_from_no_refinement_networks_file(tmp_path: Path) -> None:

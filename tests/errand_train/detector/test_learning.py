@@ -18,7 +18,7 @@ from errand_train.detector.losses import Losses, complete_overlap, losses  # noq
 from errand_train.detector.network import DetectorNetwork, cells  # noqa: E402
 from errand_train.detector.overlaps import overlap  # noqa: E402
 from errand_train.detector.placing import Targets  # noqa: E402
-from skills.perception.detector.cascade_files import load_model  # noqa: E402
+from skills.perception.detector.model_files import load_model  # noqa: E402
 
 NAMES = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "person", "cylinder", "cube")
 CPU = torch.device("cpu")

@@ -17,7 +17,7 @@ from onnxruntime import InferenceSession  # noqa: E402
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.onnx_files import trained_weights  # noqa: E402
 from errand_train.detector.quantisation import main, quantised, quantised_detector  # noqa: E402
-from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file  # noqa: E402
+from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
 
 
 def convolutions(*, separable: bool = False) -> "onnx.ModelProto":

@@ -19,7 +19,7 @@ from errand_train.detector.loop import CHECKPOINT  # noqa: E402
 from errand_train.detector.refine import TABLE, refine  # noqa: E402
 from errand_train.detector.schedule import Budget, RefineOptions, Report, Schedule  # noqa: E402
 from errand_train.detector.train import MODEL  # noqa: E402
-from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file  # noqa: E402
+from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
 from skills.perception.detector.onnx_detector import OnnxDetector  # noqa: E402
 
 

@@ -22,9 +22,9 @@ from errand_train.detector.network import Residual  # noqa: E402
 from errand_train.detector.proposal_table import ProposalTable, proposals_in, table_of  # noqa: E402
 from errand_train.detector.refinement_network import RefinementNetwork, surest_about  # noqa: E402
 from errand_train.detector.store import PictureStore  # noqa: E402
-from skills.perception.detector.cascade_files import load_model, refinement_file  # noqa: E402
-from skills.perception.detector.proposals import CROP_PX  # noqa: E402
-from skills.perception.detector.scales import Scales, halved  # noqa: E402
+from skills.perception.detector.letterbox import Scales, halve  # noqa: E402
+from skills.perception.detector.model_files import load_model, refinement_file  # noqa: E402
+from skills.perception.detector.onnx_detector import CROP_PX  # noqa: E402
 
 CPU = torch.device("cpu")
 THING, FAR = (100, 100, 200, 200), (300, 300, 400, 400)
@@ -44,7 +44,7 @@ def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> Traini
 def table(file: Path, picture: TrainingPicture, *things: tuple[str, float, tuple[float, ...]]) -> ProposalTable:
     look = partial(proposals_in, load_model(write_model(file)))
     seen = picture_of(*things)
-    return table_of(look, [(Scales(seen, halved(seen)), picture.labels)])
+    return table_of(look, [(Scales(seen, halve(seen)), picture.labels)])
 
 
 def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
@@ -87,7 +87,7 @@ def feed() -> CropFeed:
     logits = np.zeros((rows, len(CLASSES)), np.float32)
     classes = np.where(on, 1, -1)
     told = ProposalTable(np.where(on, 0, 1), boxes, logits, boxes, classes)
-    store = PictureStore(np.stack([bright, dark]), np.stack([halved(bright), halved(dark)]))
+    store = PictureStore(np.stack([bright, dark]), np.stack([halve(bright), halve(dark)]))
     return CropFeed(told, store, 5)
 
 

@@ -17,7 +17,7 @@ from errand_train.detector.loop import CHECKPOINT
 from errand_train.detector.schedule import Budget, Phase, Schedule
 from errand_train.detector.train import MODEL, Report, TrainOptions, train
 from errand_train.detector.validate import examination
-from skills.perception.detector.cascade_files import load_model
+from skills.perception.detector.model_files import load_model
 
 NAMES = ("beer", "coke")
 SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))

@@ -15,7 +15,7 @@ from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Placement, PointRoute, PointStop, Receiving
-from skills.files.kept_values import packed, unpacked
+from skills.files.json_values import packed, unpacked
 from skills.robot import ArmTrajectory, Pose2D
 
 FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">

@@ -3,7 +3,7 @@
 import pytest
 
 from skills.api import ObjectKind, ObjectObservation
-from skills.detect.words import told_apart
+from skills.detect.descriptions import distinct_objects
 
 
 def beer(x_m, name="beer"):
@@ -23,4 +23,4 @@ def beer(x_m, name="beer"):
     ids=["apart", "seen twice", "two close together", "one more beside it", "another class", "nothing"],
 )
 def test_each_thing_is_counted_once(looks, places_m):
-    assert [seen.position_W[0] for seen in told_apart(looks)] == places_m
+    assert [seen.position_W[0] for seen in distinct_objects(looks)] == places_m

@@ -1,7 +1,14 @@
 """The forms of the classes."""
 
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_detections import detected_3d
+
 from plant.models.catalogue import load_catalogue
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import class_forms, known_attributes
+from skills.perception.detection_3d import has_attribute
 
 
 def test_the_skills_and_the_models_number_the_classes_alike():
@@ -25,3 +32,59 @@ def test_the_least_mass_by_size_stays_within_the_range_of_the_class():
 def test_masses_are_ranges():
     ranges = [form.mass_kg for form in class_forms().values() if form.mass_kg is not None]
     assert all(0.0 < least < most for least, most in ranges)
+
+
+def coloured(*colours):
+    return replace(detected_3d(), colours=np.array(colours * 20, np.uint8))
+
+
+@pytest.mark.parametrize(
+    ("colour", "word"),
+    [
+        ((190, 20, 25), "red"),
+        ((25, 60, 190), "blue"),
+        ((40, 140, 60), "green"),
+        ((230, 210, 40), "yellow"),
+        ((90, 55, 25), "brown"),
+        ((20, 20, 22), "black"),
+        ((235, 235, 230), "white"),
+        ((235, 130, 20), "orange"),
+        ((110, 40, 150), "purple"),
+        ((130, 130, 132), "grey"),
+    ],
+)
+def test_a_thing_shows_its_colour_and_no_opposite(colour, word):
+    assert has_attribute(coloured(colour), word)
+    assert not has_attribute(coloured(colour), "green" if word != "green" else "red")
+
+
+def test_a_third_of_the_pixels_is_enough():
+    assert has_attribute(coloured((190, 20, 25), (120, 120, 125), (120, 120, 125)), "red")
+    assert not has_attribute(coloured((190, 20, 25), *[(120, 120, 125)] * 6), "red")
+
+
+def test_a_thing_in_a_grey_picture_shows_no_colour():
+    assert not has_attribute(detected_3d(), "red")
+
+
+def test_big_and_small_go_by_what_is_usual_in_the_class():
+    big = replace(detected_3d(name="hammer"), size_m=(0.8, 0.2, 0.06))
+    small = replace(detected_3d(name="hammer"), size_m=(0.25, 0.1, 0.03))
+    assert [
+        has_attribute(big, "big"),
+        has_attribute(big, "small"),
+        has_attribute(small, "large"),
+        has_attribute(small, "small"),
+    ] == [1, 0, 0, 1]
+
+
+def test_an_unknown_word_is_an_error():
+    assert "shiny" not in known_attributes()
+    with pytest.raises(KeyError):
+        has_attribute(coloured((1, 2, 3)), "shiny")
+
+
+def test_known_words_can_all_be_judged():
+    assert {"red", "blue", "big", "small"} <= known_attributes()
+    for word in known_attributes():
+        has_attribute(coloured((190, 20, 25)), word)

@@ -6,8 +6,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from table_scene import BLUE, CAMERA, COKE, LENS, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
-from skills.detect.viewpoints import in_plain_view
-from skills.perception.detection_3d import depth_ahead_m, detections_3d, observation, place_covariance, surface_below
+from skills.perception.detection_3d import detections_3d, observation, place_covariance, surface_below
+from skills.perception.visibility import depth_at_points, in_plain_view
 
 SURE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 COKE_W = np.array([COKE.x, COKE.y, 0.8075])
@@ -91,7 +91,7 @@ def test_an_observation_tells_what_was_seen():
 def test_depth_ahead_is_that_of_the_points_and_of_what_is_there():
     image = scene([COKE], noise_m=0.0)
     points = np.array([[1.2, 0.3, 0.75], [COKE.x + 0.2, COKE.y, 0.76], [-1.0, 0.0, 0.75]])
-    depth, seen = depth_ahead_m(image, RigidTransform(), points)
+    depth, seen = depth_at_points(image, RigidTransform(), points)
     assert depth[0] == pytest.approx(seen[0], abs=0.005)
     assert np.isnan(depth[2])
     assert np.isnan(seen[2])

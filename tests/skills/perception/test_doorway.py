@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from skills.perception.doorway import Doorway, opening
+from skills.perception.doorway import Doorway, measure_opening
 from skills.robot import Pose2D
-from skills.testing.blocks import Block
-from skills.testing.sensing import sweep
+from skills.testing.blocks import Block, take_scan
 
 DOOR = Doorway((2.0, 0.0), 0.9, 0.0)
 WALL = (Block(1.95, 0.45, 2.05, 3.0), Block(1.95, -3.0, 2.05, -0.45), Block(1.95, -0.45, 2.05, 0.45, 2.05, 2.5))
@@ -20,9 +19,9 @@ def seen(*blocks, at=None, believed=None, door=DOOR, count=5):
     """How wide it is open, in scans from a pose, which is taken to be the believed one."""
     at, rng = at or Pose2D(0.5, 0.0, 0.0), np.random.default_rng(0)
     X_WB = at.transform(0.52)
-    scans = [sweep((*WALL, BEYOND, *blocks), X_WB, RigidTransform(), 0.0, rng, noise_m=0.03) for _ in range(count)]
+    scans = [take_scan((*WALL, BEYOND, *blocks), X_WB, RigidTransform(), 0.0, rng, noise_m=0.03) for _ in range(count)]
     X_believed = (believed or at).transform(0.52)
-    return opening(door, [(scan, X_believed @ scan.X_BL) for scan in scans])
+    return measure_opening(door, [(scan, X_believed @ scan.X_BL) for scan in scans])
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from planar_people import PeopleDetector, person_at
 from planar_robot import Bench, Box
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.perception.people import SeenPerson, merged
+from skills.perception.people import SeenPerson, add_person
 from skills.perception.people_watch import PeopleOptions, PeopleWatch, cameras_towards
 from skills.robot import CameraCapabilities, Pose2D
 
@@ -192,15 +192,15 @@ def seen(x, y, stamp_s, looks=1):
 
 def test_somebody_seen_again_is_the_same_at_the_newer_place():
     known = (seen(1.0, 1.0, 0.0), seen(3.0, 1.0, 0.0))
-    first, second = merged(known, seen(1.3, 1.0, 0.5), 0.7)
+    first, second = add_person(known, seen(1.3, 1.0, 0.5), 0.7)
     assert (first.place_W, first.looks) == ((1.3, 1.0), 2)
     assert second is known[1]
 
 
 def test_two_cameras_at_once_are_one_look():
-    (one,) = merged((seen(1.0, 1.0, 0.5),), seen(1.1, 1.0, 0.5), 0.7)
+    (one,) = add_person((seen(1.0, 1.0, 0.5),), seen(1.1, 1.0, 0.5), 0.7)
     assert one.looks == 1
 
 
 def test_somebody_elsewhere_is_somebody_else():
-    assert len(merged((seen(1.0, 1.0, 0.0),), seen(2.0, 1.0, 0.5), 0.7)) == 2
+    assert len(add_person((seen(1.0, 1.0, 0.0),), seen(2.0, 1.0, 0.5), 0.7)) == 2

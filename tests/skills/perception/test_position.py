@@ -9,7 +9,7 @@ from table_scene import BLUE, CAMERA, COKE, GREY, LENS, RED, TABLE, Can, scene, 
 
 from skills.api import Detection
 from skills.manipulation.arm.poses import camera_pose
-from skills.perception.position import position_of
+from skills.perception.position import locate
 from skills.robot import FrameTree, Image
 
 MIDDLE = (COKE.x, COKE.y, TABLE.height_m + 0.5 * COKE.height)
@@ -21,7 +21,7 @@ def off_m(position, middle=MIDDLE):
 
 def test_a_can_is_where_its_axis_is_and_not_its_front():
     image = scene([COKE])
-    position = position_of(image, seen_as("coke", image))
+    position = locate(image, seen_as("coke", image))
     assert off_m(position) < 0.006
     assert position.extents.round
     assert (position.extents.width_m, position.extents.height_m) == pytest.approx((0.066, 0.115), abs=0.008)
@@ -30,7 +30,7 @@ def test_a_can_is_where_its_axis_is_and_not_its_front():
 @pytest.mark.parametrize("noise_m", [0.0015, 0.004])
 def test_the_error_is_within_what_the_covariance_says(noise_m):
     image = scene([COKE], noise_m=noise_m)
-    position = position_of(image, seen_as("coke", image))
+    position = locate(image, seen_as("coke", image))
     off = position.p_OT - np.array(MIDDLE)
     assert off @ np.linalg.solve(position.covariance_O, off) < 16.3
     assert np.all(np.linalg.eigvalsh(position.covariance_O) > 0.0)
@@ -39,19 +39,19 @@ def test_the_error_is_within_what_the_covariance_says(noise_m):
 def test_a_thing_close_before_another_is_told_from_it():
     behind = Can(COKE.x + 0.10, COKE.y, 0.05, 0.20, BLUE)
     image = scene([COKE, behind])
-    assert off_m(position_of(image, seen_as("coke", image))) < 0.008
+    assert off_m(locate(image, seen_as("coke", image))) < 0.008
 
 
 def test_a_thing_half_hidden_is_found_behind_what_hides_it():
     before = Can(COKE.x - 0.12, COKE.y - 0.045, 0.03, 0.06, BLUE)
     image = scene([COKE, before])
-    assert off_m(position_of(image, seen_as("coke", image))) < 0.02
+    assert off_m(locate(image, seen_as("coke", image))) < 0.02
 
 
 def test_a_thin_thing_on_the_table_is_on_the_table():
     thin = Can(1.0, 0.1, 0.05, 0.008, RED)  # a disk of 8 mm, as thick as a wrench
     image = scene([thin])
-    position = position_of(image, seen_as("wrench", image))
+    position = locate(image, seen_as("wrench", image))
     assert off_m(position, (1.0, 0.1, TABLE.height_m + 0.004)) < 0.012
 
 
@@ -60,20 +60,20 @@ def test_a_flat_thing_that_depth_cannot_tell_from_its_table_is_where_its_box_mee
     lens, X_CW = image.intrinsics, image.frames.pose("hand_camera").inverse()
     x, y, z = X_CW @ np.array([1.0, 0.1, TABLE.height_m])
     u, v = x / z * lens.fx + lens.cx, y / z * lens.fy + lens.cy
-    position = position_of(image, Detection("screwdriver", 0.8, (u - 25, v - 8, u + 25, v + 8)))
+    position = locate(image, Detection("screwdriver", 0.8, (u - 25, v - 8, u + 25, v + 8)))
     assert off_m(position, (1.0, 0.1, TABLE.height_m)) < 0.015
 
 
 def test_a_thing_at_the_edge_of_the_table_is_not_the_floor_behind():
     edge = Can(1.36, 0.2, 0.033, 0.115, RED)
     image = scene([edge])
-    assert off_m(position_of(image, seen_as("coke", image)), (1.36, 0.2, TABLE.height_m + 0.0575)) < 0.01
+    assert off_m(locate(image, seen_as("coke", image)), (1.36, 0.2, TABLE.height_m + 0.0575)) < 0.01
 
 
 def test_a_thing_whose_picture_is_cut_is_less_sure():
     image = scene([COKE])
     u0, v0, u1, v1 = seen_as("coke", image).box
-    whole = position_of(image, Detection("coke", 0.9, (u0, v0, u1, v1)))
+    whole = locate(image, Detection("coke", 0.9, (u0, v0, u1, v1)))
     narrow = replace(image.intrinsics, height=int(v0 + 0.6 * (v1 - v0)))
     cut = Image(**{**image.__dict__, "intrinsics": narrow, "depth_intrinsics": narrow})
     cut = replace(
@@ -82,7 +82,7 @@ def test_a_thing_whose_picture_is_cut_is_less_sure():
         grey=image.grey[: narrow.height],
         depth_m=image.depth_m[: narrow.height],
     )
-    part = position_of(cut, Detection("coke", 0.9, (u0, v0, u1, float(narrow.height))))
+    part = locate(cut, Detection("coke", 0.9, (u0, v0, u1, float(narrow.height))))
     assert part.covariance_O.trace() > 2.0 * whole.covariance_O.trace()
 
 
@@ -90,20 +90,20 @@ def test_depth_of_fewer_pixels_than_the_picture_will_do():
     image = scene([COKE])
     half = replace(LENS, width=160, height=120, fx=138.0, fy=138.0, cx=79.75, cy=59.75)
     small = Image(**{**image.__dict__, "depth_intrinsics": half, "depth_m": image.depth_m[::2, ::2].copy()})
-    assert off_m(position_of(small, seen_as("coke", image))) < 0.015
+    assert off_m(locate(small, seen_as("coke", image))) < 0.015
 
 
 @pytest.mark.parametrize("depth", [0.0, np.nan, np.inf, -1.0], ids=["none", "NaN", "infinite", "negative"])
 def test_without_depth_there_is_no_position(depth):
     image = scene([COKE])
     blind = replace(image, depth_m=np.full_like(image.depth_m, depth))
-    assert position_of(blind, seen_as("coke", image)) is None
+    assert locate(blind, seen_as("coke", image)) is None
 
 
 def test_an_empty_depth_picture_gives_no_position():
     image = scene([COKE])
     empty = replace(image, depth_m=np.empty((0, 0), dtype=np.float32))
-    assert position_of(empty, seen_as("coke", image)) is None
+    assert locate(empty, seen_as("coke", image)) is None
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_an_empty_depth_picture_gives_no_position():
     ids=["left of it", "right of it", "of no size"],
 )  # fmt: skip
 def test_a_box_beside_the_picture_gives_no_position_or_one_that_is_a_number(box):
-    position = position_of(scene([COKE]), Detection("coke", 0.9, box))
+    position = locate(scene([COKE]), Detection("coke", 0.9, box))
     assert position is None or np.all(np.isfinite(position.p_OT))
 
 
@@ -119,7 +119,7 @@ def test_half_the_depth_lost_on_the_thing_is_enough():
     image = scene([COKE])
     lost = np.random.default_rng(3).random(image.depth_m.shape) < 0.5
     holes = replace(image, depth_m=np.where(lost, np.float32(0.0), image.depth_m))
-    assert off_m(position_of(holes, seen_as("coke", image))) < 0.01
+    assert off_m(locate(holes, seen_as("coke", image))) < 0.01
 
 
 def test_of_a_cube_of_which_only_the_top_is_seen_the_height_is_its_width():
@@ -129,7 +129,7 @@ def test_of_a_cube_of_which_only_the_top_is_seen_the_height_is_its_width():
     depth[92:148, 132:188] = 0.8  # 56 pixels are 0.162 m, seen from above; what is around it has no depth
     colour = np.full((LENS.height, LENS.width, 3), GREY, dtype=np.uint8)
     image = Image(0.0, "hand", "hand_camera", LENS, LENS, colour, colour[..., 0], depth, frames)
-    position = position_of(image, Detection("cube", 0.9, (132.0, 92.0, 188.0, 148.0)))
+    position = locate(image, Detection("cube", 0.9, (132.0, 92.0, 188.0, 148.0)))
     assert position.p_OT == pytest.approx([0.5, 0.0, 0.2 - 0.5 * 0.162], abs=0.01)
     assert position.extents.height_m == pytest.approx(0.162, abs=0.01)
 
@@ -140,7 +140,7 @@ def test_a_person_is_from_the_floor_to_the_top_of_the_head():
     depth[24:230, 130:190] = 2.0  # a flat man, 1.49 m high and 43 cm wide, who stands 2 m away
     colour = np.full((LENS.height, LENS.width, 3), GREY, dtype=np.uint8)
     image = Image(0.0, "hand", "hand_camera", LENS, LENS, colour, colour[..., 0], depth, frames)
-    position = position_of(image, Detection("person", 0.9, (130.0, 24.0, 190.0, 230.0)))
+    position = locate(image, Detection("person", 0.9, (130.0, 24.0, 190.0, 230.0)))
     top_m = 0.9 + (120.0 - 24.0) / 276.0 * 2.0
     assert position.p_OT == pytest.approx([2.1, 0.0, 0.5 * top_m], abs=0.05)
 
@@ -156,11 +156,11 @@ def test_the_camera_may_be_turned_about_its_axis():
     other = Image(
         0.0, "hand", "hand_camera", lens, lens, colour, colour[..., 0], turned, FrameTree({"hand_camera": ("odom", X)})
     )
-    assert off_m(position_of(other, seen_as("coke", other))) < 0.01
+    assert off_m(locate(other, seen_as("coke", other))) < 0.01
 
 
 def test_the_class_must_have_a_form():
     image = scene([COKE])
     with pytest.raises(KeyError, match="unicorn"):
-        position_of(image, seen_as("unicorn", image))
+        locate(image, seen_as("unicorn", image))
     assert CAMERA[2] > TABLE.height_m

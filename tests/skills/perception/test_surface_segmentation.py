@@ -7,14 +7,20 @@ from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.perception.detection_3d import detections_3d
-from skills.perception.surface_segmentation import cluster_of, parted, resting, view_surface
+from skills.perception.surface_segmentation import (
+    matching_cluster,
+    may_rest,
+    segment_surface,
+    split_detected,
+    touching_parts,
+)
 from skills.robot import Image
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 
 
 def viewed(image, X_WO=None, surface=TABLE):
-    view = view_surface(image, X_WO or RigidTransform(), surface)
+    view = segment_surface(image, X_WO or RigidTransform(), surface)
     assert view is not None
     return view
 
@@ -61,7 +67,7 @@ def test_more_depth_noise_gives_no_ghosts():
 
 def test_a_surface_out_of_the_picture_is_not_judged():
     away = Surface("shelf", ((-3.0, -0.5), (-2.0, -0.5), (-2.0, 0.5), (-3.0, 0.5)), 0.75)
-    assert view_surface(scene([COKE]), RigidTransform(), away) is None
+    assert segment_surface(scene([COKE]), RigidTransform(), away) is None
 
 
 def test_a_grey_picture_has_clusters_without_colour():
@@ -75,7 +81,7 @@ def test_the_cluster_of_a_detection_is_the_one_in_its_box():
     blue = Can(0.95, 0.12, 0.033, 0.115, BLUE)
     image = scene([COKE, blue])
     (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
-    cluster = cluster_of(viewed(image).clusters, detected)
+    cluster = matching_cluster(viewed(image).clusters, detected)
     assert cluster.shape.centre == pytest.approx((blue.x, blue.y), abs=0.008)
 
 
@@ -83,7 +89,7 @@ def test_a_detection_beside_all_clusters_has_none():
     image = scene([COKE, Can(0.95, 0.12, 0.033, 0.115, BLUE)])
     (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
     only_red = tuple(c for c in viewed(image).clusters if c.shape.centre[1] < 0.0)
-    assert cluster_of(only_red, detected) is None
+    assert matching_cluster(only_red, detected) is None
 
 
 def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
@@ -92,16 +98,16 @@ def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
     view = viewed(image)
     assert len(view.clusters) == 1
     (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
-    alone = parted(view, detected)
+    alone = split_detected(view, detected)
     assert len(alone.clusters) == 2
-    assert cluster_of(alone.clusters, detected).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
+    assert matching_cluster(alone.clusters, detected).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
 
 
 def test_a_thing_for_itself_stays_whole():
     image = scene([COKE])
     (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
     view = viewed(image)
-    assert parted(view, detected) is view
+    assert split_detected(view, detected) is view
 
 
 def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
@@ -110,7 +116,7 @@ def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
     low = Detection("beer", 0.8, (u0, v0 + 0.4 * (v1 - v0), u1, v1))
     (detected,) = detections_3d(image, PLACE, [low], [TABLE])
     view = viewed(image)
-    assert parted(view, detected) is view
+    assert split_detected(view, detected) is view
 
 
 def test_the_camera_is_where_the_scene_has_it():
@@ -130,9 +136,57 @@ def test_the_camera_is_where_the_scene_has_it():
 )
 def test_what_hangs_over_a_surface_does_not_rest_on_it(heights_m, rest):
     xy = np.tile([0.51, 0.31], (len(heights_m), 1))
-    assert tuple(resting(xy, np.array(heights_m))) == rest
+    assert tuple(may_rest(xy, np.array(heights_m))) == rest
 
 
 def test_columns_beside_each_other_are_judged_alone():
     xy = np.array([[0.5, 0.3], [0.9, 0.3], [0.5, 0.3], [0.9, 0.3]])
-    assert resting(xy, np.array([0.39, 0.02, 0.4, 0.06])).tolist() == [False, True, False, True]
+    assert may_rest(xy, np.array([0.39, 0.02, 0.4, 0.06])).tolist() == [False, True, False, True]
+
+
+RNG_SEED = 4
+
+
+def box(x, y, length, width):
+    points = np.random.default_rng(RNG_SEED).uniform(-0.5, 0.5, (6000, 2))
+    return points * [length, width] + [x, y]
+
+
+def disc(x, y, radius):
+    rng = np.random.default_rng(RNG_SEED)
+    turn, off = rng.uniform(0.0, 2.0 * np.pi, 6000), radius * np.sqrt(rng.uniform(0.0, 1.0, 6000))
+    return np.column_stack([x + off * np.cos(turn), y + off * np.sin(turn)])
+
+
+@pytest.mark.parametrize(
+    ("objects", "count"),
+    [
+        ((disc(0.0, 0.0, 0.033),), 1),
+        ((disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033)), 2),
+        ((disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033), disc(0.132, 0.0, 0.033)), 3),
+        ((box(0.0, 0.0, 0.05, 0.05), box(0.03, 0.05, 0.05, 0.05)), 2),
+    ],
+)
+def test_objects_that_touch_are_as_many_as_there_are(objects, count):
+    labels, found = touching_parts(np.concatenate(objects))
+    assert found == count
+    assert sorted(np.unique(labels)) == list(range(count))
+
+
+def test_each_point_goes_with_its_object():
+    labels, _ = touching_parts(np.concatenate([disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033)]))
+    halves = labels.reshape(2, -1)
+    assert all(np.mean(half == np.bincount(half).argmax()) > 0.95 for half in halves)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (box(0.0, 0.0, 0.26, 0.026), box(0.13, 0.0, 0.03, 0.12)),  # a hammer
+        (box(0.0, 0.0, 0.2, 0.02), box(0.1, 0.0, 0.05, 0.05), box(-0.1, 0.0, 0.05, 0.05)),  # a wrench
+        (box(0.0, 0.0, 0.1, 0.036), box(0.1, 0.0, 0.12, 0.007)),  # a screwdriver
+        (box(0.0, 0.0, 0.05, 0.05), box(0.05, 0.0, 0.05, 0.05)),  # flush boxes, as was said
+    ],
+)
+def test_one_object_of_several_parts_stays_one(parts):
+    assert touching_parts(np.concatenate(parts))[1] == 1

@@ -24,13 +24,13 @@ LEFT, RIGHT = (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)
 
 def test_two_views_from_different_places_confirm_a_track():
     (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(1.01, eye=RIGHT)]).snapshot()
-    assert track.confirmed()
+    assert track.is_confirmed()
     assert (track.views, track.class_name) == (2, "coke")
 
 
 def test_two_views_from_one_place_do_not():
     (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(eye=LEFT)]).snapshot()
-    assert (track.views, track.confirmed()) == (1, False)
+    assert (track.views, track.is_confirmed()) == (1, False)
 
 
 def test_places_are_fused_by_how_sure_they_are():
@@ -125,15 +125,15 @@ def test_what_was_taken_for_something_else_when_last_seen_is_not_confirmed():
     seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
     doubt = [detected_3d(name="coke", score=0.55, eye=LEFT)]
     (track,) = tracker_of(*seen, doubt).snapshot()
-    assert (track.class_name, track.confirmed()) == ("beer", False)
+    assert (track.class_name, track.is_confirmed()) == ("beer", False)
     (track,) = tracker_of(*seen, doubt, seen[0]).snapshot()
-    assert (track.class_name, track.confirmed()) == ("beer", True)
+    assert (track.class_name, track.is_confirmed()) == ("beer", True)
 
 
 def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
     seen = [[detected_3d(eye=LEFT)], [detected_3d(eye=RIGHT)]]
-    assert tracker_of(*seen).snapshot()[0].confirmed()
-    assert not tracker_of(*seen, [], []).snapshot()[0].confirmed()
+    assert tracker_of(*seen).snapshot()[0].is_confirmed()
+    assert not tracker_of(*seen, [], []).snapshot()[0].is_confirmed()
 
 
 def test_the_latest_and_the_surest_detection_are_kept():
@@ -167,7 +167,7 @@ def test_a_faint_detection_supports_a_track_a_little(scores, belief, confirmed):
     pictures = [[detected_3d(score=score, eye=(0.0, 0.1 * k, 1.0))] for k, score in enumerate(scores)]
     (track,) = tracker_of(*pictures).snapshot()
     assert track.belief == pytest.approx(belief, abs=0.005)
-    assert (track.views, track.confirmed()) == (len(scores), confirmed)
+    assert (track.views, track.is_confirmed()) == (len(scores), confirmed)
 
 
 # the faint detection   seen last at   told
@@ -212,7 +212,7 @@ def test_a_segment_says_where_something_is_and_nothing_about_its_class(names, cl
     scores = [0.7 if name == "thing" else 0.9 for name in names]
     first, second = (detected_3d(name=n, score=s, eye=e) for n, s, e in zip(names, scores, (LEFT, RIGHT), strict=True))
     (track,) = tracker_of([first], [second]).snapshot()
-    assert (track.class_name, track.confirmed(), track.stands()) == (class_name, confirmed, True)
+    assert (track.class_name, track.is_confirmed(), track.exists()) == (class_name, confirmed, True)
 
 
 def test_a_label_keeps_its_size_when_a_segment_is_seen_after_it():

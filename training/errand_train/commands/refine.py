@@ -24,7 +24,7 @@ from errand_train.libraries import check_libraries
 from executive.cli.number_options import quantity_option
 from executive.cli.output import console_for
 from skills.files.errors import InputError
-from skills.perception.detector.cascade_files import MODEL_FILE
+from skills.perception.detector.model_files import MODEL_FILE
 from skills.quantities import Count, Seed
 
 __all__ = ["refine_command"]

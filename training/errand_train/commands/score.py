@@ -26,7 +26,7 @@ from skills.detection import Detection
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 from skills.perception.detector.augmentation import AugmentedDetector
-from skills.perception.detector.camera_images import turned, turned_back
+from skills.perception.detector.camera_images import rotate_180, rotate_boxes_180
 from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetector
 from skills.quantities import Count
 from skills.robot import Picture
@@ -125,11 +125,12 @@ def _all_found(work: _Work, console: Console) -> list[Found]:
 
 
 def _found(work: _Work, group: range) -> list[Found]:
-    """What is in some pictures. Those that stand on their heads are turned first, as on the robot."""
+    """Detects the objects in some pictures; turns those that are upside down first, as the robot does."""
     taken, labelled = [_read(work, k) for k in group], [work.pictures[k] for k in group]
-    upright = [turned(picture) if one.on_its_head else picture for picture, one in zip(taken, labelled, strict=True)]
-    seen = zip(_looked(work.detector, upright, work.views), taken, labelled, strict=True)
-    return [turned_back(found, *picture.shape[1::-1]) if one.on_its_head else found for found, picture, one in seen]
+    turn = [one.is_upside_down for one in labelled]
+    upright = [rotate_180(picture) if turned else picture for picture, turned in zip(taken, turn, strict=True)]
+    seen = zip(_looked(work.detector, upright, work.views), taken, turn, strict=True)
+    return [rotate_boxes_180(found, *picture.shape[1::-1]) if turned else found for found, picture, turned in seen]
 
 
 def _looked(detector: OnnxDetector, pictures: Sequence[Picture], views: bool) -> list[Found]:

@@ -146,4 +146,4 @@ def _warp(store: PictureStore, index: int, affine: Floats, canvas: Picture, cell
     """Draws a stored picture into a cell of the canvas under an affine map of pixel edges."""
     local = affine.astype(np.float64)
     local[:, 2] -= (cell.x0, cell.y0)
-    canvas[cell.y0 : cell.y1, cell.x0 : cell.x1] = store.scales(index).cut(local, cell.size)
+    canvas[cell.y0 : cell.y1, cell.x0 : cell.x1] = store.scales(index).warp(local, cell.size)

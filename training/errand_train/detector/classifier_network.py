@@ -13,8 +13,7 @@ from torch import Tensor, nn
 from errand_train.detector.crop_network import MOST_LOGIT, CropNetwork, covered, moved
 from errand_train.detector.lite_backbone import AT_8, AT_16, AT_32, LiteBackbone
 from errand_train.detector.network import ConvUnit
-from skills.perception.detector.cascade_files import CLASSIFIER
-from skills.perception.detector.proposals import CROP_PX
+from skills.perception.detector.model_files import CLASSIFIER, CROP_PX
 
 _CELLS_16, _CELLS_32 = CROP_PX // 16, CROP_PX // 32
 _SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192

@@ -15,7 +15,8 @@ from errand_train.detector.placing import turning
 from errand_train.detector.proposal_table import ProposalTable
 from errand_train.detector.schedule import shuffled
 from errand_train.detector.store import PictureStore
-from skills.perception.detector.proposals import CROP_PX, crop_map, mapped
+from skills.perception.detector.model_files import CROP_PX
+from skills.perception.detector.onnx_detector import crop_map, transform_boxes
 
 Floats = NDArray[np.float32]
 Picture = NDArray[np.uint8]
@@ -85,10 +86,10 @@ class CropFeed:
         """A crop, and (2, 4) the region's box and the object's in it."""
         table = self.table
         affine, region = changed_map(table.boxes[row], random)
-        crop = self.store.scales(int(table.pictures[row])).cut(affine.astype(np.float64), (CROP_PX, CROP_PX))
+        crop = self.store.scales(int(table.pictures[row])).warp(affine.astype(np.float64), (CROP_PX, CROP_PX))
         if random.random() < _CHANGED:
             crop = as_seen_otherwise(crop, random)
-        return crop, mapped(np.stack([region, table.wanted[row]]), affine)
+        return crop, transform_boxes(np.stack([region, table.wanted[row]]), affine)
 
 
 def changed_map(box: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:

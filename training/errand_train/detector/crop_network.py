@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from errand_train.detector.network import CascadeNetwork
-from skills.perception.detector.proposals import CROP_PX
+from skills.perception.detector.model_files import CROP_PX
 
 MOST_LOGIT: Final = 8.0
 _MOST_GROWTH: Final = 1.5

@@ -15,8 +15,7 @@ from typing import ClassVar, Final
 import torch
 from torch import Tensor, nn
 
-from skills.perception.detector.cascade_files import PROPOSAL
-from skills.perception.detector.network_file import NetworkKind
+from skills.perception.detector.model_files import PROPOSAL, NetworkKind
 
 STRIDES: Final = (8, 16, 32)
 FIRST_SCORE: Final = 0.003

@@ -11,7 +11,7 @@ import numpy as np
 import onnx
 from numpy.typing import NDArray
 
-from skills.perception.detector.network_file import sealed
+from skills.perception.detector.model_files import seal
 
 QUANTISED: Final = "eight_bits"
 """What a file has among its metadata when its network is quantised."""
@@ -31,7 +31,7 @@ def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -
     for key, value in facts.items():
         model.metadata_props.add(key=key, value=value)
     fresh = file.with_name(f".{file.name}.new")
-    fresh.write_bytes(sealed(model.SerializeToString(deterministic=True)))
+    fresh.write_bytes(seal(model.SerializeToString(deterministic=True)))
     fresh.replace(file)
 
 

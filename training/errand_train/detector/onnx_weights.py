@@ -16,7 +16,7 @@ from errand_train.detector.export import normalised_layers
 from errand_train.detector.labels import TrainingDataError
 from errand_train.detector.network import Backbone, CascadeNetwork
 from errand_train.detector.onnx_files import offsets_in, trained_weights
-from skills.perception.detector.network_file import ModelFileError, load_network
+from skills.perception.detector.model_files import ModelFileError, load_network
 
 _BEFORE = "network."
 _BYTES = 255.0

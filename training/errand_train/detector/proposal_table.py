@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
 from errand_train.detector.labels import Labels
-from skills.perception.detector.cascade_files import DetectorModel
-from skills.perception.detector.onnx_detector import refined
-from skills.perception.detector.proposals import ProposalOptions, Proposals, proposals_of
-from skills.perception.detector.scales import Scales
+from skills.perception.detector.letterbox import Scales
+from skills.perception.detector.model_files import DetectorModel
+from skills.perception.detector.onnx_detector import ProposalOptions, Proposals, refine, select_proposals
 
 NEAR: Final = 0.3
 _WITHIN_IGNORED: Final = 0.6
@@ -65,17 +64,17 @@ def refined_by(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
     """Boxes (R, 4) and scores (R, K) of the refinement network, as in use. Raises ValueError without one."""
     if model.refinement is None:
         raise ValueError("there is no refinement network")
-    return refined(model.refinement.session, scales, *proposed(model, scales), ProposalOptions())
+    return refine(model.refinement.session, scales, *proposed(model, scales), ProposalOptions())
 
 
 def proposals_in(model: DetectorModel, scales: Scales) -> Proposals:
     """The places that the proposal network finds."""
-    return proposals_of(*proposed(model, scales), _LOOKED_AT)
+    return select_proposals(*proposed(model, scales), _LOOKED_AT)
 
 
 def refined_in(model: DetectorModel, scales: Scales) -> Proposals:
     """What the refinement network makes of them. Raises ValueError where there is none."""
-    return proposals_of(*refined_by(model, scales), _SEEN)
+    return select_proposals(*refined_by(model, scales), _SEEN)
 
 
 def table_of(look: Callable[[Scales], Proposals], pictures: Iterable[tuple[Scales, Labels]]) -> ProposalTable:

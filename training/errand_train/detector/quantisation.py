@@ -32,12 +32,15 @@ from errand_train.detector.onnx_files import QUANTISED, facts_of, write_sealed
 from errand_train.detector.proposal_table import proposed, refined_by
 from errand_train.detector.store import read_picture
 from errand_train.detector.validate import examination
-from skills.perception.detector.cascade_files import classifier_file, load_model, refinement_file
-from skills.perception.detector.letterbox import letterbox
-from skills.perception.detector.network_file import ModelFileError, Network
-from skills.perception.detector.onnx_detector import crops_about
-from skills.perception.detector.proposals import CLASSIFIED, ProposalOptions, Proposals, proposals_of
-from skills.perception.detector.scales import Scales, halved
+from skills.perception.detector.letterbox import Scales, halve, letterbox
+from skills.perception.detector.model_files import ModelFileError, Network, classifier_file, load_model, refinement_file
+from skills.perception.detector.onnx_detector import (
+    CLASSIFIER_PROPOSALS,
+    ProposalOptions,
+    Proposals,
+    crop_inputs,
+    select_proposals,
+)
 
 _MEASURED_BY: Final = 160
 _CROPS_AT_ONCE: Final = 8
@@ -67,18 +70,18 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
     exam = examination(data, "train", model.class_names, _MEASURED_BY)
     pictures = [letterbox(read_picture(exam.folder / picture.file))[0] for picture in exam.pictures]
     out.mkdir(parents=True, exist_ok=True)
-    scales = [Scales(picture, halved(picture)) for picture in pictures]
+    scales = [Scales(picture, halve(picture)) for picture in pictures]
     networks: tuple[tuple[Path, Network | None, Callable[[], Sequence[Given]]], ...] = (
         (file, model.proposal, lambda: [{"images": picture[None]} for picture in pictures]),
         (
             refinement_file(file),
             model.refinement,
-            lambda: _crops(lambda one: proposals_of(*proposed(model, one), ProposalOptions()), scales),
+            lambda: _crops(lambda one: select_proposals(*proposed(model, one), ProposalOptions()), scales),
         ),
         (
             classifier_file(file),
             model.classifier,
-            lambda: _crops(lambda one: proposals_of(*refined_by(model, one), CLASSIFIED), scales),
+            lambda: _crops(lambda one: select_proposals(*refined_by(model, one), CLASSIFIER_PROPOSALS), scales),
         ),
     )
     belongs: dict[str, str] = {}
@@ -169,7 +172,7 @@ def _reached(graph: onnx.GraphProto, nodes: Sequence[onnx.NodeProto], *, upstrea
 def _crops(look: Callable[[Scales], Proposals], pictures: Sequence[Scales]) -> list[Given]:
     """What a network is given at the places of a look at pictures in the letterbox, always of as many crops."""
     looked_at = [(picture, look(picture)) for picture in pictures]
-    found = [crops_about(picture, regions) for picture, regions in looked_at if len(regions)]
+    found = [crop_inputs(picture, regions) for picture, regions in looked_at if len(regions)]
     if not found:
         raise TrainingDataError("the proposal network finds no place to look at", hint="train it for longer first")
     together = {name: np.concatenate([one[name] for one in found]) for name in found[0]}

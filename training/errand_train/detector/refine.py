@@ -17,8 +17,13 @@ from errand_train.detector.schedule import RefineOptions, Report
 from errand_train.detector.store import PictureStore, open_store
 from errand_train.detector.train import MODEL, PICTURES, SETTLED_BY, device, run_loop
 from errand_train.detector.validate import examination
-from skills.perception.detector.cascade_files import DetectorModel, classifier_file, load_model, refinement_file
-from skills.perception.detector.network_file import ModelFileError
+from skills.perception.detector.model_files import (
+    DetectorModel,
+    ModelFileError,
+    classifier_file,
+    load_model,
+    refinement_file,
+)
 
 TABLE: Final = "proposals.npz"
 

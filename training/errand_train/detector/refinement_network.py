@@ -14,8 +14,7 @@ from torch import Tensor, nn
 from errand_train.detector.crop_network import MOST_LOGIT, CropNetwork, covered, moved
 from errand_train.detector.network import LEVELS, NECK, Backbone, ConvUnit, DetectorNetwork
 from errand_train.detector.overlaps import overlap
-from skills.perception.detector.cascade_files import REFINEMENT
-from skills.perception.detector.proposals import CROP_PX
+from skills.perception.detector.model_files import CROP_PX, REFINEMENT
 
 _RESIDUALS = (3, 2)
 _CELLS_32 = CROP_PX // 32

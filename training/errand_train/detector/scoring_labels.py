@@ -57,14 +57,14 @@ class Label:
 class LabelledPicture:
     """A picture's file, as named by its data set, all that is known to be in it, and its width and height if known.
 
-    `camera` is the name of its camera, and `on_its_head` whether that hung upside down, where the data set tells.
+    `camera` is the name of its camera, and `is_upside_down` whether that hung upside down, where the data set tells.
     `crowded` ones are of scenes with more objects than usual.
     """
 
     file: str
     labels: tuple[Label, ...] = ()
     size_px: tuple[int, int] | None = None
-    on_its_head: bool = False
+    is_upside_down: bool = False
     camera: str | None = None
     crowded: bool = False
 
@@ -105,7 +105,7 @@ def pictures_of_coco(document: object, class_names: Sequence[str]) -> tuple[Labe
             file=image.file_name,
             labels=tuple(_label(one, name) for one in labels if (name := names[one.category_id]) is not None),
             size_px=image.size_px,
-            on_its_head=abs(image.roll_deg) > LEAST_ROLL_DEG,
+            is_upside_down=abs(image.roll_deg) > LEAST_ROLL_DEG,
             camera=image.camera,
             crowded=image.crowded,
         )

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from errand_train.detector.labels import TrainingDataError, TrainingPicture
-from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX, fill_letterbox
-from skills.perception.detector.scales import Scales, halved
+from skills.perception.detector.letterbox import HEIGHT_PX, WIDTH_PX, Scales, fill_letterbox, halve
 
 Picture = NDArray[np.uint8]
 _FULL: Final = "full.u8"
@@ -46,7 +45,7 @@ def read_scales(file: Path) -> Scales:
     """A picture's letterbox, RGB, and its half. Raises TrainingDataError."""
     filled = np.empty((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
     fill_letterbox(read_picture(file), filled)
-    return Scales(filled, halved(filled))
+    return Scales(filled, halve(filled))
 
 
 def open_store(folder: Path, pictures: Sequence[TrainingPicture]) -> PictureStore:

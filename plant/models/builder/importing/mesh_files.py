@@ -17,7 +17,7 @@ from plant.models.catalogue import ObjectImportError, objects_module
 from plant.worlds.geometry_files import check_model
 from skills.files.errors import InputError
 from skills.files.outside import plain_file
-from skills.files.pictures import MOST_PIXELS
+from skills.files.picture_files import MOST_PIXELS
 from skills.robot import FloatArray, Picture
 
 MAX_BYTES: Final = 200_000_000

@@ -14,9 +14,8 @@ from skills.manipulation.place.free_spot import (
     spots,
     unseen_view,
 )
-from skills.perception.plane import LevelPlane
+from skills.perception.fitting import LevelPlane, SeenShape
 from skills.perception.point_cloud import PointCloud
-from skills.perception.shape import SeenShape
 from skills.perception.surface_segmentation import Cluster, SurfaceView
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)

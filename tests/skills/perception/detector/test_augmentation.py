@@ -146,16 +146,16 @@ def test_nothing_seen_is_nothing(seen_in):
 def test_a_box_of_a_view_lies_where_the_thing_is_in_the_picture(view, shape):
     picture = np.zeros(shape, dtype=np.uint8)
     picture[50:150, 100:300] = 255
-    varied = view.of(picture)
+    varied = view.apply(picture)
     white = varied if varied.ndim == 2 else varied[..., 0]
     rows, columns = np.nonzero(white > 200)
     box = (float(columns.min()), float(rows.min()), float(columns.max() + 1), float(rows.max() + 1))
-    assert view.back(box, shape[1]) == pytest.approx((100.0, 50.0, 300.0, 150.0), abs=3.0)
+    assert view.box_in_picture(box, shape[1]) == pytest.approx((100.0, 50.0, 300.0, 150.0), abs=3.0)
 
 
 @pytest.mark.parametrize("view", [View(), View(True), View(scale=0.35)], ids=str)
 def test_a_whole_picture_keeps_its_size(view):
-    assert view.of(np.zeros((240, 320, 3), dtype=np.uint8)).shape == (240, 320, 3)
+    assert view.apply(np.zeros((240, 320, 3), dtype=np.uint8)).shape == (240, 320, 3)
 
 
 def test_it_is_a_detector_that_views_once_unless_asked(tmp_path):

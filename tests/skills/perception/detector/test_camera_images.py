@@ -10,27 +10,27 @@ from table_scene import CAMERA, COKE, TABLE, scene
 from skills.detection import Detection
 from skills.manipulation.arm.poses import camera_pose
 from skills.perception.detector.camera_images import (
-    brightened,
-    detections_in,
-    found_in_grey,
+    brighten,
+    detect_class_in_grey,
+    detect_in_image,
     is_dark,
-    on_its_head,
-    turned,
-    turned_back,
+    is_upside_down,
+    rotate_180,
+    rotate_boxes_180,
 )
 from skills.robot import FrameTree
-from skills.testing.detector import PlainColours
+from skills.testing.estimators import PlainColours
 
 
 def test_a_turned_picture_begins_with_its_last_pixel():
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    assert turned(picture)[0, 0].tolist() == [21, 22, 23]
-    assert turned(picture).flags.c_contiguous
+    assert rotate_180(picture)[0, 0].tolist() == [21, 22, 23]
+    assert rotate_180(picture).flags.c_contiguous
 
 
 def test_boxes_are_turned_back_to_where_the_picture_was_taken():
     # in 640 x 480: u 100 to 200 and v 50 to 80 of the turned picture
-    (found,) = turned_back([Detection("hammer", 0.9, (100.0, 50.0, 200.0, 80.0))], 640, 480)
+    (found,) = rotate_boxes_180([Detection("hammer", 0.9, (100.0, 50.0, 200.0, 80.0))], 640, 480)
     assert (found.class_name, found.score, found.box) == ("hammer", 0.9, (440.0, 400.0, 540.0, 430.0))
 
 
@@ -56,18 +56,18 @@ class Recorder(PlainColours):
 )
 def test_a_picture_is_on_its_head_when_its_camera_hangs_upside_down(roll_deg, turned):
     # Spot's cameras: left and back about 0, frontleft -78, frontright -102, right 172 degrees
-    assert on_its_head(rolled(np.radians(roll_deg))) is turned
+    assert is_upside_down(rolled(np.radians(roll_deg))) is turned
 
 
 def test_a_picture_that_looks_straight_down_is_left_as_it_is():
     down = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [1.05, 0.0, 1.6])
     image = rolled(0.0)
-    assert not on_its_head(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
+    assert not is_upside_down(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
 
 
 def test_boxes_in_a_turned_picture_are_those_of_the_picture_as_it_was_taken():
     image = rolled(np.pi)
-    (seen,) = detections_in(COKES, image)
+    (seen,) = detect_in_image(COKES, image)
     (plain,) = COKES.detect([image.colour])[0]
     assert seen.box == plain.box
 
@@ -75,7 +75,7 @@ def test_boxes_in_a_turned_picture_are_those_of_the_picture_as_it_was_taken():
 @pytest.mark.parametrize("roll_rad", [0.0, np.pi], ids=["upright", "on its head"])
 def test_the_detector_sees_the_world_upright(roll_rad):
     detector, upright, image = Recorder(), rolled(0.0), rolled(roll_rad)
-    detections_in(detector, image)
+    detect_in_image(detector, image)
     (shown,) = detector.shown
     rows = np.nonzero(np.all(shown == COKE.colour, axis=2))[0]
     assert abs(rows.mean() - np.nonzero(np.all(upright.colour == COKE.colour, axis=2))[0].mean()) < 2.0
@@ -84,7 +84,7 @@ def test_the_detector_sees_the_world_upright(roll_rad):
 
 def test_each_grey_picture_is_turned_as_it_needs_to_be():
     detector, upright, head = Recorder(), rolled(0.0), rolled(np.pi)
-    assert found_in_grey(detector, [upright, head], "coke") == [(), ()]
+    assert detect_class_in_grey(detector, [upright, head], "coke") == [(), ()]
     assert np.array_equal(detector.shown[0], upright.grey)
     assert np.array_equal(detector.shown[1], head.grey[::-1, ::-1])
 
@@ -96,7 +96,7 @@ def test_a_quick_look_is_taken_where_the_detector_has_one():
             return [() for _ in pictures]
 
     detector = Quick()
-    assert found_in_grey(detector, [rolled(0.0)], "person") == [()]
+    assert detect_class_in_grey(detector, [rolled(0.0)], "person") == [()]
     assert (detector.asked, hasattr(detector, "shown")) == ("person", False)
 
 
@@ -119,18 +119,18 @@ def test_a_dim_picture_with_something_in_it_is_not_dark():
 # 5      40                 eight times, and no more
 @pytest.mark.parametrize(("mean", "shown"), [(120, 120), (20, 100), (5, 40)])
 def test_a_dim_picture_is_made_brighter(mean, shown):
-    assert brightened(np.full((4, 4, 3), mean, np.uint8)).mean() == shown
+    assert brighten(np.full((4, 4, 3), mean, np.uint8)).mean() == shown
 
 
 def test_what_is_bright_in_a_dim_picture_stays_white():
     picture = np.full((10, 10), 10, np.uint8)
     picture[0, 0] = 200
-    assert brightened(picture)[0, 0] == 255
+    assert brighten(picture)[0, 0] == 255
 
 
 def test_the_detector_is_shown_dim_pictures_brighter():
     detector, image = Recorder(), rolled(0.0)
     dim = replace(image, colour=image.colour // 8)
-    detections_in(detector, dim)
+    detect_in_image(detector, dim)
     (shown,) = detector.shown
     assert shown.mean() > 1.5 * dim.colour.mean()

@@ -7,9 +7,72 @@ import pytest
 from tiny_detector import CLASSES, picture_of, write_cascade, write_model, write_pair
 
 from skills.detection import Detection
-from skills.perception.detector.network_file import ModelFileError
-from skills.perception.detector.onnx_detector import DetectorOptions, load_detector
-from skills.perception.detector.proposals import ProposalOptions
+from skills.perception.detector.model_files import CROP_PX, ModelFileError
+from skills.perception.detector.onnx_detector import (
+    DetectorOptions,
+    ProposalOptions,
+    crop_map,
+    load_detector,
+    logits,
+    select_proposals,
+    transform_boxes,
+)
+
+WHOLE, MOST, BESIDE, EMPTY = (0, 0, 100, 100), (0, 0, 90, 100), (200, 0, 300, 50), (10, 10, 10, 20)
+
+
+def found(*rows, **options):
+    boxes, scores = zip(*rows, strict=True)
+    return select_proposals(np.array(boxes, np.float32), np.array(scores, np.float32), ProposalOptions(**options))
+
+
+def test_boxes_of_any_class_on_one_place_become_one_with_the_surest_ones_opinion():
+    regions = found((MOST, (0.3, 0.1)), (WHOLE, (0.2, 0.8)), (BESIDE, (0.4, 0.0)))
+    assert regions.boxes.tolist() == [list(WHOLE), list(BESIDE)]
+    assert regions.logits == pytest.approx(logits(np.array([[0.2, 0.8], [0.4, 0.0]], np.float32)))
+
+
+def test_the_unsure_and_the_empty_are_no_places():
+    assert len(found((WHOLE, (0.008, 0.002)), (EMPTY, (0.9, 0.0)), ((0, 0, float("nan"), 5), (0.9, 0.0)))) == 0
+
+
+def test_no_more_than_so_many_places_are_looked_at():
+    assert found((WHOLE, (0.3,)), (BESIDE, (0.4,)), most=1).boxes.tolist() == [list(BESIDE)]
+
+
+@pytest.mark.parametrize(
+    ("box", "expected"),
+    [
+        ((100, 100, 184, 184), (22, 22, 106, 106)),
+        ((0, 0, 168, 84), (22, 43, 106, 85)),
+        ((50, 50, 60, 60), (43, 43, 85, 85)),
+    ],
+    ids=["as large as in the chip", "twice as large", "very small"],
+)
+def test_a_place_is_in_the_middle_of_its_crop_and_fills_two_thirds_of_it(box, expected):
+    crop = crop_map(np.array(box, np.float32))
+    assert transform_boxes(np.array([box]), crop)[0].tolist() == pytest.approx(expected, abs=1e-3)
+    assert CROP_PX == 128
+
+
+def test_a_mirrored_crop_shows_the_left_at_the_right():
+    crop = crop_map(np.array((100, 100, 184, 184), np.float32), mirrored=True)
+    assert transform_boxes(np.array([(100, 100, 110, 184)]), crop)[0].tolist() == pytest.approx(
+        (96, 22, 106, 106), abs=1e-3
+    )
+
+
+def test_boxes_under_a_turn_hold_their_corners():
+    quarter = np.array([[0.0, -1.0, 50.0], [1.0, 0.0, 0.0]])
+    assert transform_boxes(np.array([(0, 0, 10, 20)]), quarter)[0].tolist() == [30.0, 0.0, 50.0, 10.0]
+
+
+def test_each_box_may_have_a_map_of_its_own():
+    boxes = np.array([WHOLE, BESIDE], np.float32)
+    maps = np.stack([crop_map(box) for box in boxes])
+    one_by_one = [transform_boxes(box[None], one)[0].tolist() for box, one in zip(boxes, maps, strict=True)]
+    assert transform_boxes(boxes, maps).tolist() == one_by_one
+
 
 HAMMER = ("hammer", 0.9, (100, 50, 200, 80))
 
@@ -200,7 +263,7 @@ def test_a_classifier_network_looks_where_the_refinement_network_says(tmp_path):
 def test_what_the_classifier_does_not_judge_is_what_the_refinement_network_sees(tmp_path, least_score, told):
     """The classifier network sees red in the left half alone, where there is none."""
     picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
-    options = DetectorOptions(0.05, classified=ProposalOptions(least_score=least_score, mirrored_from=None))
+    options = DetectorOptions(0.05, reclassified=ProposalOptions(least_score=least_score, mirrored_from=None))
     (found,) = load_detector(write_cascade(tmp_path / "three.onnx", left_only=True), options).detect([picture])
     assert [one.class_name for one in found] == told
 
@@ -210,7 +273,7 @@ def test_what_the_classifier_does_not_judge_is_what_the_refinement_network_sees(
 def test_the_surest_places_are_judged(tmp_path, most, told):
     picture = picture_of(("hammer", 0.6, (100, 100, 200, 200)), ("hammer", 0.6, (400, 100, 500, 200)))
     picture = reddened(reddened(picture, (150, 2, 300, 400)), (450, 2, 600, 400))
-    options = DetectorOptions(0.05, classified=ProposalOptions(same=1.0, most=most, mirrored_from=None))
+    options = DetectorOptions(0.05, reclassified=ProposalOptions(same=1.0, most=most, mirrored_from=None))
     (found,) = load_detector(write_cascade(tmp_path / "three.onnx", left_only=True), options).detect([picture])
     assert len(found) == told
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from onnxruntime import InferenceSession, SessionOptions
 
-from skills.perception.detector.cascade_files import MODEL_FILE, load_model
-from skills.perception.detector.network_file import adds_byte_products_exactly
+from skills.perception.detector.model_files import MODEL_FILE, has_exact_byte_products, load_model
 
 
 @pytest.mark.parametrize(
@@ -25,11 +24,11 @@ from skills.perception.detector.network_file import adds_byte_products_exactly
 def test_it_goes_by_the_flags_of_all_cores(tmp_path: Path, told: str, able: bool) -> None:
     file = tmp_path / "cpuinfo"
     file.write_text(told)
-    assert adds_byte_products_exactly(file) is able
+    assert has_exact_byte_products(file) is able
 
 
 def test_where_nothing_is_told_it_does_not_count_on_it(tmp_path: Path) -> None:
-    assert not adds_byte_products_exactly(tmp_path / "none")
+    assert not has_exact_byte_products(tmp_path / "none")
 
 
 def test_the_detector_says_here_what_it_says_with_the_exact_sums() -> None:

@@ -6,8 +6,8 @@ import pytest
 from skills.perception.detector.suppression import (
     Candidates,
     SuppressionOptions,
-    alternatives_of,
-    candidates_of,
+    alternative_scores,
+    select_candidates,
     suppress,
 )
 
@@ -66,7 +66,7 @@ def test_no_more_than_asked_for_are_kept():
     ids=["two alternatives", "the surer box of one", "its own class", "too little shared"],
 )
 def test_what_a_thing_may_be_as_well(rows, expected):
-    (found,) = alternatives_of(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
+    (found,) = alternative_scores(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
     assert found == pytest.approx(expected)
 
 
@@ -78,7 +78,7 @@ def test_nothing_stays_nothing():
 def test_candidates_reach_the_threshold_and_come_by_their_scores():
     boxes = np.array([WHOLE, MOST, HALF], np.float32)
     scores = np.array([[0.5, 0.1], [0.49, 0.9], [0.5, 0.0]], np.float32)
-    found = candidates_of(boxes, scores, 0.5, 10)
+    found = select_candidates(boxes, scores, 0.5, 10)
     assert found.scores.tolist() == [pytest.approx(0.9), 0.5, 0.5]
     assert found.classes.tolist() == [1, 0, 0]
     assert found.boxes.tolist() == [list(MOST), list(WHOLE), list(HALF)]
@@ -87,13 +87,13 @@ def test_candidates_reach_the_threshold_and_come_by_their_scores():
 def test_the_surest_candidates_are_taken():
     boxes = np.tile(np.array(WHOLE, np.float32), (50, 1))
     scores = np.linspace(0.5, 0.99, 50, dtype=np.float32).reshape(50, 1)
-    assert candidates_of(boxes, scores, 0.5, 3).scores.tolist() == pytest.approx([0.99, 0.98, 0.97])
+    assert select_candidates(boxes, scores, 0.5, 3).scores.tolist() == pytest.approx([0.99, 0.98, 0.97])
 
 
 @pytest.mark.parametrize("box", [(np.nan, 0, 1, 1), (0, 0, np.inf, 1), (5, 0, 5, 9), (9, 9, 2, 2)])
 def test_what_is_no_box_is_no_candidate(box):
-    assert len(candidates_of(np.array([box], np.float32), np.array([[0.9]], np.float32), 0.5, 10)) == 0
+    assert len(select_candidates(np.array([box], np.float32), np.array([[0.9]], np.float32), 0.5, 10)) == 0
 
 
 def test_scores_that_are_no_numbers_are_none():
-    assert len(candidates_of(np.array([WHOLE], np.float32), np.array([[np.nan]], np.float32), 0.5, 10)) == 0
+    assert len(select_candidates(np.array([WHOLE], np.float32), np.array([[np.nan]], np.float32), 0.5, 10)) == 0

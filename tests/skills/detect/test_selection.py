@@ -7,15 +7,15 @@ from made_detections import detected_3d
 from pydrake.math import RigidTransform
 from table_scene import BLUE, COKE, GREY, TABLE, Can, scene
 
-from skills.detect.unidentified import unnamed
-from skills.perception.surface_segmentation import view_surface
+from skills.detect.selection import unlabelled_clusters
+from skills.perception.surface_segmentation import segment_surface
 from skills.perception.tracker import Tracker
 
 BOX = Can(1.1, 0.25, 0.06, 0.10, GREY)
 
 
 def clusters(*things):
-    view = view_surface(scene(things), RigidTransform(), TABLE)
+    view = segment_surface(scene(things), RigidTransform(), TABLE)
     assert view is not None
     return view.clusters
 
@@ -26,7 +26,7 @@ def track_at(x, y, **seen):
 
 
 def test_what_has_a_track_is_named():
-    left = unnamed(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
+    left = unlabelled_clusters(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
     assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
 
 
@@ -35,18 +35,18 @@ def test_what_may_be_meant_though_it_is_likelier_something_else_is_not_named():
     rows = [("coke", (), 0), ("beer", (("coke", 0.4),), 1), ("beer", (("hammer", 0.4),), 0), ("beer", (), 0)]
     for name, alternatives, expected in rows:
         tracks = track_at(COKE.x, COKE.y, name=name, score=0.76, alternatives=alternatives)
-        assert len(unnamed(clusters(COKE), tracks, ("coke",))) == expected, (name, alternatives)
+        assert len(unlabelled_clusters(clusters(COKE), tracks, ("coke",))) == expected, (name, alternatives)
 
 
 def test_what_is_too_large_or_small_for_the_class_is_passed_over():
     tall = Can(1.1, 0.25, 0.06, 0.39, BLUE)
-    assert len(unnamed(clusters(COKE, tall), (), ("person",))) == 1
-    assert len(unnamed(clusters(COKE, tall), (), ("person", "coke"))) == 2
+    assert len(unlabelled_clusters(clusters(COKE, tall), (), ("person",))) == 1
+    assert len(unlabelled_clusters(clusters(COKE, tall), (), ("person", "coke"))) == 2
 
 
 def test_a_place_that_was_seen_twice_counts_once():
-    assert len(unnamed([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
+    assert len(unlabelled_clusters([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
 
 
 def test_an_empty_table_has_nothing_to_look_at():
-    assert unnamed(clusters(), (), ("coke",)) == []
+    assert unlabelled_clusters(clusters(), (), ("coke",)) == []

@@ -1,4 +1,4 @@
-"""What was looked for and found: several looks counted as one, and told in words."""
+"""Descriptions of objects in words, and the union of the objects of several searches."""
 
 from __future__ import annotations
 
@@ -12,51 +12,51 @@ SAME_WITHIN_M = 0.12
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
-def wanted(classes: Sequence[str], attributes: Sequence[str]) -> str:
-    """ "red coke or red beer"."""
+def wanted_names(classes: Sequence[str], attributes: Sequence[str]) -> str:
+    """Names the wanted objects: "red coke or red beer"."""
     return " or ".join(" ".join((*attributes, name)) for name in classes)
 
 
 def surface_names(surfaces: Sequence[Surface]) -> str:
-    """ "the kitchen table or the counter"."""
+    """Names surfaces: "the kitchen table or the counter"."""
     return " or ".join(f"the {surface.name}" for surface in surfaces)
 
 
 def describe(seen: ObjectObservation) -> str:
-    """ "a red coke on the kitchen table, score 0.90"; where no surface is known, its position in the world (m)."""
+    """Describes an object: "a red coke on the kitchen table, score 0.90"; gives its position (m) without a surface."""
     x, y, z = seen.position_W
     place = f"on the {seen.surface}" if seen.surface else f"at ({x:.2f}, {y:.2f}, {z:.2f})"
     return f"a {seen.kind} {place}, score {seen.score:.2f}"
 
 
-def counted(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:
-    """ "there are two wrenches on the bench"; each kind of object is counted for itself."""
+def count_sentence(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:
+    """ "there are two wrenches on the bench"; each kind of object is count_sentence for itself."""
     kinds = list(dict.fromkeys(str(seen.kind) for seen in found))
     numbers = {kind: sum(str(seen.kind) == kind for seen in found) for kind in kinds}
-    told = " and ".join(numbered(count, kind) for kind, count in numbers.items())
+    counts = " and ".join(count_of(count, kind) for kind, count in numbers.items())
     places = dict.fromkeys(seen.surface for seen in found if seen.surface)
     where = " and ".join(f"the {name}" for name in places) or surface_names(surfaces)
-    return f"there {'is' if len(found) == 1 else 'are'} {told} {'in' if kinds == [PERSON] else 'on'} {where}"
+    return f"there {'is' if len(found) == 1 else 'are'} {counts} {'in' if kinds == [PERSON] else 'on'} {where}"
 
 
-def numbered(count: int, kind: str) -> str:
-    """ "no hammer", "one hammer", "two hammers"."""
+def count_of(count: int, kind: str) -> str:
+    """Number with its noun: "no hammer", "one hammer", "two hammers"."""
     word = _NUMBERS[count] if count < len(_NUMBERS) else str(count)
     return f"{word} {kind if count == 1 else plural(kind)}"
 
 
 def plural(name: str) -> str:
-    """More than one of it; "beer" and "coke" take an s as in "two beers"."""
+    """Plural of a class name; "beer" and "coke" take an s as in "two beers"."""
     if name.endswith(PERSON):
         return f"{name.removesuffix('person')}people"
     return f"{name}es" if name.endswith(("ch", "sh", "s", "x")) else f"{name}s"
 
 
-def told_apart(looks: Iterable[Sequence[ObjectObservation]]) -> tuple[ObjectObservation, ...]:
-    """The different objects of several looks, those of the first look first.
+def distinct_objects(looks: Iterable[Sequence[ObjectObservation]]) -> tuple[ObjectObservation, ...]:
+    """Different objects of several searches, in the order in which they were seen.
 
-    What a later look saw of the same class within `SAME_WITHIN_M` of a known object is that object; the nearest pairs
-    are taken first and each object is in one pair only, so that two that stand close together stay two.
+    Two observations of one class within `SAME_WITHIN_M` are one object. The nearest pairs match first, one to one, so
+    that two objects that stand close together stay two.
     """
     known: list[ObjectObservation] = []
     for look in looks:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from skills.perception.moving import MovingOptions, MovingWatch, clusters
+from skills.perception.moving_objects import MovingOptions, MovingWatch, clusters
 
 SCAN_S = 0.1
 
@@ -24,7 +24,7 @@ def watch(place, scans=12, seen_from=lambda time_s: (0.0, 0.0), **options):
     told = []
     for n in range(scans):
         time_s = n * SCAN_S
-        told.append(watched.take(time_s, side_of(*place(time_s), seen_from=seen_from(time_s), rng=rng, **options)))
+        told.append(watched.update(time_s, side_of(*place(time_s), seen_from=seen_from(time_s), rng=rng, **options)))
     return told
 
 
@@ -54,15 +54,15 @@ def test_a_wall_that_is_revealed_bit_by_bit_does_not_move():
     watched, rng = MovingWatch(), np.random.default_rng(2)
     for n in range(20):
         x = np.linspace(0.0, 0.2 + 0.1 * n, 40)
-        told = watched.take(n * SCAN_S, np.column_stack([x, np.full(40, 2.0)]) + rng.normal(scale=0.02, size=(40, 2)))
+        told = watched.update(n * SCAN_S, np.column_stack([x, np.full(40, 2.0)]) + rng.normal(scale=0.02, size=(40, 2)))
         assert not told
 
 
 def test_the_same_scan_again_changes_nothing():
     watched = MovingWatch()
     for n in range(5):
-        told = watched.take(n * SCAN_S, side_of(2.0, 0.12 * n))
-    assert told and watched.take(4 * SCAN_S, side_of(9.0, 9.0)) == told
+        told = watched.update(n * SCAN_S, side_of(2.0, 0.12 * n))
+    assert told and watched.update(4 * SCAN_S, side_of(9.0, 9.0)) == told
 
 
 def test_where_it_will_be():

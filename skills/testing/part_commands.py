@@ -1,4 +1,4 @@
-"""The scripted robot's commands: one at a time for each part, with expiry."""
+"""Commands of the scripted robot: one at a time for each part, with expiry."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from skills.robot import CommandId, CommandState, CommandStatus
 
 @dataclass(frozen=True)
 class ActiveCommand:
-    """A command that runs: what it asks for, since when and until when (s)."""
+    """Running command with its goal, start and expiry (s)."""
 
     id: CommandId
     goal: Any
@@ -19,21 +19,21 @@ class ActiveCommand:
 
 
 class Commands:
-    """All commands ever given, and for each part ("drive", "stand", "move_arm", "set_gripper") the one that runs."""
+    """Statuses of all commands, and the running command of each part ("drive", "stand", "move_arm", "set_gripper")."""
 
     def __init__(self) -> None:
         self._statuses: dict[CommandId, CommandStatus] = {}
         self._active: dict[str, ActiveCommand] = {}
 
-    def note(self, status: CommandStatus) -> CommandId:
-        """A command that is over as soon as it is given."""
+    def add(self, status: CommandStatus) -> CommandId:
+        """Adds a command with a status."""
         command = CommandId(len(self._statuses) + 1)
         self._statuses[command] = status
         return command
 
     def begin(self, part: str, goal: Any, now_s: float, until_s: float) -> CommandId:
-        """Begins a command in place of the part's running one."""
-        command = self.note(CommandStatus(CommandState.RUNNING))
+        """Begins a command, which replaces the part's running one."""
+        command = self.add(CommandStatus(CommandState.RUNNING))
         self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
         self._active[part] = ActiveCommand(command, goal, now_s, until_s)
         return command
@@ -51,21 +51,21 @@ class Commands:
                 self.finish(part, CommandState.STOPPED, "stopped")
 
     def expire(self, now_s: float) -> None:
-        """Ends what has run out of time: a drive is done then, all else has not got there."""
+        """Ends the commands whose time is over: a drive is done, any other is stopped short of its goal."""
         for part, active in list(self._active.items()):
             if now_s > active.until_s:
                 late = (CommandState.DONE, "expired") if part == "drive" else (CommandState.STOPPED, "expired")
                 self.finish(part, *late)
 
     def active(self, part: str) -> ActiveCommand | None:
-        """The part's running command."""
+        """Running command of a part, if any."""
         return self._active.get(part)
 
     def status(self, command: CommandId) -> CommandStatus:
-        """What became of a command. Raises KeyError for an id never given."""
+        """Status of a command. Raises KeyError for an unknown id."""
         return self._statuses[command]
 
     @property
     def moving_parts(self) -> tuple[str, ...]:
-        """The parts that have a running command."""
+        """Parts that have a running command."""
         return tuple(self._active)

@@ -8,7 +8,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from skills.api import ObjectKind, ObjectObservation, Surface
-from skills.files.kept_values import from_text, to_text
+from skills.files.json_values import from_text, to_text
 from skills.robot import CommandState, Pose2D
 
 SEEN = ObjectObservation(12.5, ObjectKind("coke", ("red",)), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.3, 0.9, "counter")

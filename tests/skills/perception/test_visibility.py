@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from table_scene import GREY, TABLE, Can, scene
+from table_scene import BLUE, GREY, RED, TABLE, Can, scene
 
 from skills.api import Surface
 from skills.manipulation.arm.poses import camera_pose
-from skills.perception.coverage import Coverage, SurfaceShares
+from skills.perception.visibility import Coverage, SurfaceShares, is_at_rest
 
 AWAY = Surface("shelf", ((-3.0, -0.5), (-2.0, -0.5), (-2.0, 0.5), (-3.0, 0.5)), 0.75)
 
@@ -54,3 +54,32 @@ def test_a_surface_elsewhere_is_out_of_view():
 def test_the_shares_in_words():
     assert str(SurfaceShares(0.8, 0.15)) == "80 % seen, 15 % hidden, 5 % out of view"
     assert str(SurfaceShares(1.0, 0.0)) == "100 % seen"
+
+
+AT_W = np.array([1.0, 0.0, 0.80])
+
+
+def _can(x, y=0.0, colour=RED):
+    return Can(x, y, 0.033, 0.115, colour)
+
+
+def _rests(first, second):
+    before, after = scene(first, noise_m=0.001), scene(second, noise_m=0.002)
+    return is_at_rest(before, after, RigidTransform(), AT_W, 0.25)
+
+
+def test_noise_alone_does_not_move_an_object():
+    assert _rests([_can(1.0)], [_can(1.0)])
+
+
+@pytest.mark.parametrize("moved_m", [(0.02, 0.0), (0.0, 0.02), (0.3, 0.3)])
+def test_an_object_that_has_moved_is_not_at_rest(moved_m):
+    assert not _rests([_can(1.0)], [_can(1.0 + moved_m[0], moved_m[1])])
+
+
+def test_an_object_that_is_gone_is_not_at_rest():
+    assert not _rests([_can(1.0)], [])
+
+
+def test_what_moves_farther_away_does_not_count():
+    assert _rests([_can(1.0), _can(1.0, 0.4, BLUE)], [_can(1.0), _can(1.0, 0.5, BLUE)])

@@ -3,7 +3,7 @@
 import pytest
 
 from skills.api import ObjectKind, ObjectObservation, Surface
-from skills.detect.words import counted, plural, wanted
+from skills.detect.descriptions import count_sentence, plural, wanted_names
 
 BENCH = Surface("bench", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.8)
 
@@ -23,7 +23,7 @@ def seen(name, surface="bench", *attributes):
     ],
 )
 def test_counts_are_told(found, told):
-    assert counted(found, [BENCH]) == told
+    assert count_sentence(found, [BENCH]) == told
 
 
 def test_plurals():
@@ -36,4 +36,4 @@ def test_plurals():
 
 
 def test_what_is_wanted():
-    assert wanted(("coke", "beer"), ("red",)) == "red coke or red beer"
+    assert wanted_names(("coke", "beer"), ("red",)) == "red coke or red beer"

@@ -11,8 +11,7 @@ from tiny_detector import (
     write_pair,
 )
 
-from skills.perception.detector.cascade_files import load_model
-from skills.perception.detector.network_file import ModelFileError, sealed
+from skills.perception.detector.model_files import ModelFileError, load_model, seal
 
 
 def refused(file):
@@ -29,14 +28,14 @@ def test_a_good_file_is_loaded(tmp_path):
 
 def test_a_sealed_file_is_loaded(tmp_path):
     file = tmp_path / "model.onnx"
-    file.write_bytes(sealed(model_bytes()))
+    file.write_bytes(seal(model_bytes()))
     model = load_model(file)
     assert model.class_names == CLASSES
     assert len(model.proposal.session.get_modelmeta().custom_metadata_map["sha256"]) == 64
 
 
 def test_a_sealed_file_with_one_other_byte_is_damaged(tmp_path):
-    content = bytearray(sealed(model_bytes()))
+    content = bytearray(seal(model_bytes()))
     content[len(content) // 2] ^= 1
     (tmp_path / "model.onnx").write_bytes(content)
     assert "damaged" in refused(tmp_path / "model.onnx")
@@ -67,8 +66,8 @@ def test_a_model_of_others_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("names", ["", "[", "[]", '"beer"', "[1, 2, 3]", '["beer", ""]'])
-def test_class_names_must_be_told(tmp_path, names):
-    assert "names of its classes" in refused(write_model(tmp_path / "model.onnx", names=names))
+def test_a_model_without_class_names_is_refused(tmp_path, names):
+    assert "no list of class names" in refused(write_model(tmp_path / "model.onnx", names=names))
 
 
 @pytest.mark.parametrize("changes", [{"output": "logits"}, {"size": (640, 640)}, {"names": '["beer"]'}])

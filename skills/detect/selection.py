@@ -1,0 +1,137 @@
+"""Selection among tracks and clusters: the objects that a search counts, and those worth a closer view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skills.api import FLOOR
+from skills.detect.ports import DetectInputs
+from skills.perception.class_forms import THING, class_forms
+from skills.perception.detection_3d import has_attribute
+from skills.perception.surface_segmentation import Cluster
+from skills.perception.tracker import Track
+from skills.quantities import Angle, Duration, Length, Tries
+from skills.robot import FloatArray
+
+_NAMED_WITHIN_M = 0.06
+_SAME_PLACE_M = 0.05
+_AVOIDED_M = 0.08
+_DOUBTED = 0.08
+"""Belief in one of the wanted classes from which on a track of another class is worth a closer view."""
+_SMALLEST, _LARGEST = 0.4, 1.3
+"""Shares of the shortest and longest objects of a class, since clusters may be hidden in part or merged."""
+_FREE_M = 0.15
+"""Distance to the next object beyond which more does not count."""
+
+
+@dataclass(frozen=True)
+class DetectOptions:
+    """Extent of the search.
+
+    The skill views candidates again from the side, turned by `confirm_shifts_rad` about the shoulder, `candidates` more
+    of them than are wanted. It views at most `closer_looks` unlabelled clusters from near, and hidden areas from
+    `around_rad`. A result rests on a picture no older than `fresh_s`. An object counts within `expected_within_m` of
+    the expected position, and on the floor within `floor_within_m` of the robot.
+    """
+
+    confirm_shifts_rad: tuple[Angle, ...] = (0.25, -0.3)
+    candidates: Tries = 3
+    expected_within_m: Length = 0.35
+    floor_within_m: Length = 2.2
+    closer_looks: Tries = 3
+    fresh_s: Duration = 1.5
+    around_rad: tuple[Angle, ...] = (0.7, -0.7)
+
+
+def matching_tracks(
+    tracks: Sequence[Track], inputs: DetectInputs, options: DetectOptions, p_WB: FloatArray
+) -> list[Track]:
+    """Tracks with a wanted class, all attributes and a place that counts, likeliest first; p_WB is the robot.
+
+    Where any object is wanted, the nearest and most free ones come first, and those to avoid last.
+    """
+    tracks = [t for t in tracks if is_wanted(t, inputs) and _in_place(t, inputs, options, p_WB)]
+    fitting = [t for t in tracks if all(has_attribute(t.best, word) for word in inputs.attributes)]
+    if inputs.expected_W is not None:
+        off = {t.number: level_distance(t.position_W, inputs.expected_W) for t in fitting}
+        near = (t for t in fitting if off[t.number] < options.expected_within_m)
+        return sorted(near, key=lambda t: off[t.number])
+    if THING not in inputs.classes:
+        return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
+    avoid = [each.position_W for each in inputs.avoid]
+    return sorted(
+        _most_free_first(fitting, p_WB), key=lambda t: any(level_distance(t.position_W, p) < _AVOIDED_M for p in avoid)
+    )
+
+
+def sure_tracks(matching: Sequence[Track], inputs: DetectInputs) -> list[Track]:
+    """Tracks that need no further view, last seen first; in the given order where any object or a place is wanted."""
+    sure = [track for track in matching if is_sure(track, inputs)]
+    if inputs.expected_W is not None or THING in inputs.classes:
+        return sure
+    return sorted(sure, key=lambda track: -track.last_seen_s)
+
+
+def is_wanted(track: Track, inputs: DetectInputs) -> bool:
+    """Returns whether the class of a track is wanted."""
+    return THING in inputs.classes or track.class_name in inputs.classes
+
+
+def is_sure(track: Track, inputs: DetectInputs) -> bool:
+    """Returns whether a track needs no further view; its class does not matter where any object is wanted."""
+    views = 2 if inputs.seen_before is None else 1
+    return track.exists(views) if THING in inputs.classes else track.is_confirmed(views)
+
+
+def _in_place(track: Track, inputs: DetectInputs, options: DetectOptions, p_WB: FloatArray) -> bool:
+    if track.latest.surface in {surface.name for surface in inputs.surfaces}:
+        return True
+    near = level_distance(track.position_W, p_WB) < options.floor_within_m
+    return inputs.floor and track.latest.surface == FLOOR and near
+
+
+def _most_free_first(tracks: Sequence[Track], p_WB: FloatArray) -> list[Track]:
+    """Sorts tracks in the order in which to take the objects: near ones, with much space around them, first."""
+
+    def cost(track: Track) -> float:
+        others = (level_distance(track.position_W, other.position_W) for other in tracks if other is not track)
+        return level_distance(track.position_W, p_WB) - 2.0 * min(_FREE_M, min(others, default=_FREE_M))
+
+    return sorted(tracks, key=cost)
+
+
+def level_distance(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | FloatArray) -> float:
+    """Horizontal distance of two points (m)."""
+    return float(np.linalg.norm(np.asarray(p_W)[:2] - np.asarray(q_W)[:2]))
+
+
+def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], classes: Sequence[str]) -> list[Cluster]:
+    """Clusters about as large as objects of some classes that no track explains, each place once; largest first.
+
+    A track of another class explains none when its belief in one of the classes is high enough.
+    """
+    named = [track.position_W for track in tracks if not _is_doubted(track, classes)]
+    left: list[Cluster] = []
+    for cluster in sorted(clusters, key=lambda one: -len(one.points)):
+        shape = cluster.shape
+        old = any(level_distance(shape.centre, one.shape.centre) < _SAME_PLACE_M for one in left)
+        within_m = _NAMED_WITHIN_M + 0.5 * shape.width_m
+        known = any(level_distance(shape.centre, p_W) < within_m for p_W in named)
+        if not old and not known and _may_be(cluster, classes):
+            left.append(cluster)
+    return left
+
+
+def _is_doubted(track: Track, classes: Sequence[str]) -> bool:
+    """Returns whether a track has another class than the wanted ones, and may have one of them."""
+    return track.class_name not in classes and any(track.classes.get(name, 0.0) > _DOUBTED for name in classes)
+
+
+def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
+    """Returns whether a cluster has the size of an object of one of the classes."""
+    longest = max(cluster.shape.length_m, cluster.shape.height_m)
+    ranges = (class_forms()[name].length_m for name in classes)
+    return any(_SMALLEST * low < longest < _LARGEST * high for low, high in ranges)

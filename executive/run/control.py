@@ -7,9 +7,9 @@ From Python, with the run in one thread and its control in another:
     control.pause("somebody walks by")        # the robot stands still at the next tick
     control.step()                            # until the next node changes its status
     control.resume()
-    control.preempt(tree_of_another_mission)  # the present one is taken up again afterwards
+    control.preempt(tree_of_another_mission)  # the present mission continues afterwards
     control.cancel("enough for today")
-    control.pause("let me look at it", robot="Bob")  # one of several robots; the others go on
+    control.pause("let me look at it", robot="Bob")  # one of several robots; the others continue
 
 All methods may be called from any thread and from signal handlers. They return at once; the run polls at each tick.
 """
@@ -27,10 +27,11 @@ from executive.run.control_state import (
     ControlRequests,
     ControlState,
     Event,
+    MissionRequest,
     Mode,
     OpenQuestion,
-    Replacement,
     RobotMode,
+    Turn,
 )
 from executive.tree.compiler import CompiledTree
 from skills.api import Asked, Question
@@ -39,15 +40,15 @@ from skills.files.outside import LONGEST_ANSWER, plain_text
 from skills.robot import Clock
 
 _REASONS: Final = (Mode.STOPPED, Mode.LEASE_LOST, Mode.PAUSED)
-"""The reasons not to move, the strongest first."""
+"""Reasons not to move, the strongest first."""
 
 
 def _locked(method: Callable[..., Any]) -> Callable[..., Any]:
-    """The method, called while no other thread changes the control."""
+    """Wraps a method so that no other thread changes the control during a call."""
 
     @functools.wraps(method)
     def locked(self: Control, *arguments: Any, **options: Any) -> Any:
-        """The method under the control's lock."""
+        """Calls the method under the control's lock."""
         with self._changed:
             return method(self, *arguments, **options)
 
@@ -55,7 +56,7 @@ def _locked(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _for_any_thread(control: type[Control]) -> type[Control]:
-    """The class, each of whose public methods and properties holds its lock."""
+    """Puts all public methods and properties of the class under its lock."""
     for name, member in [each for each in vars(control).items() if not each[0].startswith("_")]:
         is_property = isinstance(member, property)
         setattr(control, name, property(_locked(member.fget)) if is_property else _locked(member))
@@ -64,10 +65,10 @@ def _for_any_thread(control: type[Control]) -> type[Control]:
 
 @_for_any_thread
 class Control:
-    """The control of one run. `attended` says that somebody is there to answer questions.
+    """Control of one run. `attended` says that somebody is there to answer questions.
 
-    While a run is held, and while an attended one asks, simulated time passes `pace` times as fast as the wall's at
-    most (None: as fast as can be).
+    While a run is held, and while an attended run has an open question, simulated time passes at most `pace` times as
+    fast as the wall clock (None: without a limit).
     """
 
     def __init__(self, *, attended: bool = False, pace: float | None = 1.0) -> None:
@@ -78,8 +79,8 @@ class Control:
         self._version = 0
         self._begun = self._ended = False
         self._requests = self._lasting = ControlRequests()
-        self._holds: dict[tuple[str | None, Mode], str] = {}  # why a robot, or all of them (None), stand still
-        self._stride: int | None = None  # ticks to go while paused; 0: until a node changes; None: none
+        self._holds: dict[tuple[str | None, Mode], str] = {}  # reason why a robot, or all (None), stand still
+        self._stride: int | None = None  # ticks left of a step; 0: until a node changes; None: no step
         self._at: str | None = None
         self._missions: dict[str, tuple[str, ...]] = {}
         self._known: frozenset[str] = frozenset()
@@ -88,7 +89,7 @@ class Control:
 
     @property
     def state(self) -> ControlState:
-        """The present state."""
+        """Present state of the control."""
         present = self._mode()
         return ControlState(
             self._version,
@@ -103,37 +104,37 @@ class Control:
         )
 
     def wait(self, version: int, timeout_s: float | None = None) -> ControlState:
-        """Block (on the wall's clock) until the state is newer than `version`, or time is over; the state then."""
+        """Blocks until the state is newer than `version`, or the time on the wall clock is over; returns the state."""
         self._changed.wait_for(lambda: self._version > version, timeout_s)
         return self.state
 
     def pause(self, reason: str = "paused by the operator", *, robot: str | None = None) -> None:
-        """Holds all robots still, or one of them; the trees keep their state. Idempotent.
+        """Pauses all robots, or one of them; the trees keep their state. Idempotent.
 
-        Raises ValueError: no such robot in the run.
+        Raises ValueError when the run has no such robot.
         """
         if robot is None:
             self._stride = None
         self._hold(robot, Mode.PAUSED, "pause", reason)
 
     def resume(self, *, robot: str | None = None) -> None:
-        """Continues after a pause, a breakpoint or steps, or after one robot's own pause; the stop button stays."""
+        """Ends a pause, a breakpoint or steps, or one robot's own pause; a pressed stop button stays pressed."""
         if robot is None:
             self._at = self._stride = None
-        self._let_go(robot, Mode.PAUSED, "resume", "the mission goes on")
+        self._end_hold(robot, Mode.PAUSED, "resume", "the mission goes on")
 
     def toggle_pause(self) -> None:
-        """Pause, or resume when paused."""
+        """Pauses the run, or resumes it when it is paused."""
         if (None, Mode.PAUSED) not in self._holds:
             self.pause()
         else:
             self.resume()
 
     def step(self, ticks: int | None = None) -> None:
-        """Goes on until a node changes its status, or for some ticks, and pauses again.
+        """Runs until a node changes its status, or for some ticks, and pauses again.
 
-        Skills in motion are suspended between steps, so that few ticks may not suffice for a motion to get anywhere.
-        Raises ValueError: ticks below 1.
+        Skills in motion are suspended between steps, so a few ticks may be too short for any motion.
+        Raises ValueError when `ticks` is below 1.
         """
         if ticks is not None and ticks < 1:
             raise ValueError(f"a step of {ticks} ticks: at least 1 is needed")
@@ -142,8 +143,10 @@ class Control:
         self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
     def cancel(self, reason: str = "cancelled by the operator", *, robot: str | None = None) -> None:
-        """End the run, or one robot's mission; the first reason stays. Once more: at once, without what missions always
-        do in the end. Raises ValueError: no such robot in the run.
+        """Ends the run, or one robot's mission; of several reasons the first counts.
+
+        A second call ends them at once, without the steps under `always`. Raises ValueError when the run has no such
+        robot.
         """
         if robot is not None:
             self._refuse_stranger(robot)
@@ -157,7 +160,7 @@ class Control:
             self._note("cancel", f"once more: {reason}")
 
     def press(self, button: str) -> None:
-        """Presses a button that missions wait for or decides by. Raises ValueError: no mission of the run has it."""
+        """Presses a button of the missions. Raises ValueError when no mission of the run waits for it or decides by it."""
         if self._begun and button not in self._buttons:
             known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
             raise ValueError(f"the run has no button '{button}'; {known}")
@@ -166,26 +169,26 @@ class Control:
 
     @property
     def presses(self) -> Mapping[str, int]:
-        """How often each button was pressed."""
+        """Number of presses of each button."""
         return self._presses
 
     def stop_button(self, reason: str = "the stop button is pressed", *, robot: str | None = None) -> None:
-        """Stops all robots, or one, until `release_stop_button`, whatever else is asked for.
+        """Stops all robots, or one, until `release_stop_button`, whatever else is requested.
 
-        Raises ValueError: no such robot in the run.
+        Raises ValueError when the run has no such robot.
         """
         self._hold(robot, Mode.STOPPED, "stop button", reason)
 
     def release_stop_button(self, *, robot: str | None = None) -> None:
-        """Continues as it was when the button was pressed, for all robots or for one."""
-        self._let_go(robot, Mode.STOPPED, "stop button released", "the stop button is released")
+        """Releases the stop button of all robots, or of one; a pause that was there before stays."""
+        self._end_hold(robot, Mode.STOPPED, "stop button released", "the stop button is released")
 
     def stop_pressed(self, robot: str) -> str | None:
-        """Why the stop button is pressed for a robot; None when it is not."""
+        """Reason why the stop button is pressed for a robot; None when it is released."""
         return self._holds.get((None, Mode.STOPPED)) or self._holds.get((robot, Mode.STOPPED))
 
     def set_breakpoint(self, path_id: str) -> None:
-        """Pause before the node begins, each time. Raises ValueError for a node that the run does not have."""
+        """Pauses the run whenever the node is about to begin. Raises ValueError when the run has no such node."""
         self._refuse_unknown(path_id)
         self._ask_for(breakpoints=self._requests.breakpoints | {path_id})
         self._note("breakpoint set", path_id)
@@ -197,32 +200,26 @@ class Control:
             self._note("breakpoint cleared", path_id)
 
     def preempt(self, tree: CompiledTree) -> None:
-        """Does another mission first; the one under way is suspended and taken up again afterwards.
+        """Inserts a mission before the rest of the present one, which is suspended and continues afterwards.
 
-        Raises ValueError: no such robot in the run, or the mission is under way already.
+        Raises ValueError when the run has no such robot, or the mission is under way already.
         """
-        self._refuse_mission(tree)
-        self._ask_for(preempts=(*self._requests.preempts, tree))
-        self._note("preempt", f"first '{tree.mission_name}'")
+        self._request(MissionRequest(tree, Turn.FIRST), "preempt", f"first '{tree.mission_name}'")
 
     def then(self, tree: CompiledTree) -> None:
-        """Does another mission when the one that the robot began with is done. Raises ValueError as `preempt`."""
-        self._refuse_mission(tree)
-        self._ask_for(later=(*self._requests.later, tree))
-        self._note("then", f"afterwards '{tree.mission_name}'")
+        """Appends a mission to the one that the robot began with. Raises ValueError like `preempt`."""
+        self._request(MissionRequest(tree, Turn.LATER), "then", f"afterwards '{tree.mission_name}'")
 
     def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Does another mission instead of the one under way, which is given up.
+        """Gives up the present mission, or the mission `instead_of`, and begins another in its place.
 
-        With `instead_of` it takes the place of the mission of that name: one that waits is not begun, and one that is
-        not under way just now is left alone, as by `preempt`. Raises ValueError: no such robot in the run.
+        A mission `instead_of` that still waits never begins; one that is suspended or over stays as it is, and the
+        other begins as with `preempt`. Raises ValueError when the run has no such robot.
         """
-        self._refuse_stranger(tree.robot_name)
-        self._ask_for(instead=(*self._requests.instead, Replacement(tree, instead_of)))
-        self._note("replace", f"instead '{tree.mission_name}'")
+        self._request(MissionRequest(tree, Turn.INSTEAD, instead_of), "replace", f"instead '{tree.mission_name}'")
 
     def answer(self, question_id: str, text: str) -> None:
-        """Answers an open question. Raises ValueError when it is not open or `text` is none of its options."""
+        """Answers an open question. Raises ValueError when it is not open, or `text` is none of its options."""
         pending = self._questions.get(question_id)
         if pending is None:
             raise ValueError(f"the question '{question_id[:80]}' is not open (any more)")
@@ -237,7 +234,7 @@ class Control:
         self._close_question(pending, said, "answer", text)
 
     def begin(self, missions: Mapping[str, CompiledTree]) -> None:
-        """The run begins. Raises ValueError for a breakpoint at a node that it does not have, or at a second run."""
+        """Notes that the run begins. Raises ValueError for a breakpoint at an unknown node, and for a second run."""
         if self._begun:
             raise ValueError("a Control controls one run only; make another")
         self._begun = True
@@ -247,7 +244,7 @@ class Control:
             self._refuse_unknown(path_id)
 
     def mission_begun(self, robot_name: str, tree: CompiledTree) -> None:
-        """A mission begins, on top of those that a robot has begun. Idempotent."""
+        """Notes that a mission begins, on top of those that the robot has begun. Idempotent."""
         before = self._missions.get(robot_name, ())
         if before[-1:] == (tree.mission_name,):
             return
@@ -257,12 +254,12 @@ class Control:
         self._bump()
 
     def mission_ended(self, robot_name: str) -> None:
-        """A robot's topmost mission is over."""
+        """Notes that a robot's present mission is over."""
         self._missions[robot_name] = self._missions.get(robot_name, ())[:-1]
         self._bump()
 
     def poll(self) -> ControlRequests:
-        """What is asked for now; new missions and events are handed out once."""
+        """Returns the present requests; new missions and events are handed out once."""
         if self._requests is self._lasting and not self._holds:
             return self._requests
         paused = None if self._stride is not None else self._holds.get((None, Mode.PAUSED))
@@ -274,7 +271,7 @@ class Control:
         return requests
 
     def ticked(self, *, changed: bool) -> None:
-        """The trees were ticked; `changed` says whether a node changed its status. Ends a step that is done."""
+        """Notes that the trees were ticked, and ends a step that is done; `changed`: a node changed its status."""
         if self._stride is None or (self._stride == 0 and not changed):
             return
         self._stride = self._stride - 1 if self._stride > 1 else None
@@ -282,20 +279,20 @@ class Control:
             self._bump()
 
     def arrived_at(self, path_id: str) -> None:
-        """The run stands at a breakpoint."""
+        """Pauses the run, which has come to a breakpoint."""
         self._holds[None, Mode.PAUSED] = why = f"at the breakpoint {path_id}"
         self._at, self._stride = path_id, None
         self._note("breakpoint", why)
 
     def lease_lost(self, robot_name: str, why: str | None) -> None:
-        """A robot's lease was lost (why), or is there again (None)."""
+        """Notes that a robot's lease was lost, and `why`, or that it is back (None)."""
         self._holds.pop((robot_name, Mode.LEASE_LOST), None)
         if why is not None:
             self._holds[robot_name, Mode.LEASE_LOST] = why
         self._note("lease lost" if why else "lease back", why or f"{robot_name} has its lease again")
 
     def ask(self, question: Question, clock: Clock, robot: str = "") -> Asked:
-        """Puts a robot's question to the operator. Raises ValueError when one of that id is open already."""
+        """Asks the operator a robot's question. Raises ValueError when a question of that id is open already."""
         if question.id in self._questions:
             raise ValueError(f"the question '{question.id}' is open already")
         opened = OpenQuestion(question, clock.now() + question.limit_s, robot)
@@ -304,7 +301,7 @@ class Control:
         return asked
 
     def _take_default(self, pending: PendingAnswer, why: str) -> None:
-        """Nobody answers a question, for a reason: its default is the answer. From any thread."""
+        """Answers a question by its default, and notes the reason. May be called from any thread."""
         with self._changed:
             if pending.answer is None:
                 self._close_question(pending, pending.open.question.default, "question over", why)
@@ -315,23 +312,23 @@ class Control:
         self._note(what, f"{pending.open.id}: {message}")
 
     def held(self, duration_s: float) -> None:
-        """The run was held so long (robot's clock); that does not count against the time of questions."""
+        """Extends the time of all questions by the time (s, robot's clock) for which the run was held."""
         for pending in self._questions.values():
             pending.open = replace(pending.open, until_s=pending.open.until_s + duration_s)
 
     def rest(self, duration_s: float) -> None:
-        """Lets the wall's clock run on, less long when something is asked for meanwhile."""
+        """Waits on the wall clock (s), shorter when something is requested meanwhile."""
         seen = self._version
         self._changed.wait_for(lambda: self._version > seen, duration_s)
 
     @property
     def slow(self) -> bool:
-        """True while simulated time should not run ahead of the people who watch."""
+        """Returns whether simulated time must not run ahead of the people who watch."""
         held = self._mode().mode is not Mode.RUNNING or bool(self._holds)
         return held or (self.attended and bool(self._questions))
 
     def end(self) -> tuple[Event, ...]:
-        """The run is over; the events that were not handed out yet."""
+        """Notes that the run is over; returns the events that were not handed out yet."""
         self._ended = True
         self._questions.clear()
         events = self._requests.events
@@ -340,7 +337,7 @@ class Control:
         return events
 
     def _mode(self, robot: str | None = None) -> RobotMode:
-        """What a robot does, or the whole run: the strongest reason not to move counts, its own or that of all."""
+        """Mode of a robot, or of the whole run, by the strongest reason not to move."""
         if self._ended:
             return RobotMode(Mode.ENDED, self._requests.cancel or "")
         for mode in _REASONS:
@@ -352,14 +349,14 @@ class Control:
         return RobotMode(Mode.READY if ready else Mode.RUNNING)
 
     def _hold(self, robot: str | None, mode: Mode, what: str, reason: str) -> None:
-        """Has a robot, or all, stands still. Raises ValueError: no such robot in the run."""
+        """Makes a robot, or all robots, stand still. Raises ValueError when the run has no such robot."""
         if robot is not None:
             self._refuse_stranger(robot)
         if (robot, mode) not in self._holds:
             self._holds[robot, mode] = reason
             self._note(what, reason if robot is None else f"{robot}: {reason}")
 
-    def _let_go(self, robot: str | None, mode: Mode, what: str, message: str) -> None:
+    def _end_hold(self, robot: str | None, mode: Mode, what: str, message: str) -> None:
         if self._holds.pop((robot, mode), None) is not None:
             self._note(what, message if robot is None else f"{robot}: {message}")
 
@@ -367,12 +364,16 @@ class Control:
         if self._begun and robot not in self._missions:
             raise ValueError(f"robot '{robot}' is not in this run; there are: {', '.join(self._missions)}")
 
-    def _refuse_mission(self, tree: CompiledTree) -> None:
-        self._refuse_stranger(tree.robot_name)
-        others = (*self._requests.preempts, *self._requests.later)
-        waiting = [other.mission_name for other in others if other.robot_name == tree.robot_name]
-        if tree.mission_name in (*self._missions.get(tree.robot_name, ()), *waiting):
-            raise ValueError(f"the mission '{tree.mission_name}' is under way already")
+    def _request(self, request: MissionRequest, what: str, message: str) -> None:
+        """Requests a mission. Raises ValueError like `preempt`; INSTEAD may be the mission under way once more."""
+        robot, name = request.tree.robot_name, request.tree.mission_name
+        self._refuse_stranger(robot)
+        others = [each.tree for each in self._requests.missions if each.turn is not Turn.INSTEAD]
+        waiting = [tree.mission_name for tree in others if tree.robot_name == robot]
+        if request.turn is not Turn.INSTEAD and name in (*self._missions.get(robot, ()), *waiting):
+            raise ValueError(f"the mission '{name}' is under way already")
+        self._ask_for(missions=(*self._requests.missions, request))
+        self._note(what, message)
 
     def _ask_for(self, **requests: Any) -> None:
         self._requests = replace(self._requests, **requests)
@@ -393,7 +394,7 @@ class Control:
 
 
 class PendingAnswer:
-    """A `skills.api.Asked`: done when answered or when its time is over, which makes the default the answer."""
+    """Question that waits for its answer (`skills.api.Asked`); when its time is over, the default is the answer."""
 
     def __init__(self, opened: OpenQuestion, clock: Clock, take_default: Callable[[PendingAnswer, str], None]) -> None:
         self.open = opened
@@ -401,17 +402,17 @@ class PendingAnswer:
         self._clock, self._take_default = clock, take_default
 
     def done(self) -> bool:
-        """True when answered; the default is taken when the time is over."""
+        """Returns whether there is an answer; takes the default when the time is over."""
         if self._clock.now() >= self.open.until_s - 1e-9:
             self._take_default(self, f"nobody answered in time, so '{self.open.question.default}'")
         return self.answer is not None
 
     def result(self) -> str:
-        """The answer. Raises RuntimeError before there is one."""
+        """Returns the answer. Raises RuntimeError before there is one."""
         if self.answer is None:
             raise RuntimeError(f"the question '{self.open.id}' is not answered yet")
         return self.answer
 
     def withdraw(self) -> None:
-        """Takes the question back."""
+        """Withdraws the question."""
         self._take_default(self, "taken back")

@@ -1,4 +1,4 @@
-"""What a control says of a run, and what it asks of the runner at one moment."""
+"""State that a run's control shows, and the requests that it makes to the runner."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from skills.api import Question
 
 
 class Mode(enum.Enum):
-    """What a run does just now; the strongest reason not to move counts."""
+    """State of a run; of several reasons not to move, the strongest counts."""
 
     READY = "ready"  # it has not begun
     RUNNING = "running"  # trees are ticked
     PAUSED = "paused"  # by the operator or at a breakpoint
-    LEASE_LOST = "lease lost"  # another moves the robot
+    LEASE_LOST = "lease lost"  # another program moves the robot
     STOPPED = "stopped"  # the stop button is pressed
     ENDED = "ended"  # it is over
 
 
 @dataclass(frozen=True)
 class RobotMode:
-    """What one robot of a run does just now, and why it does not move."""
+    """State of one robot of a run, and the reason why it does not move."""
 
     mode: Mode
     reason: str = ""
@@ -31,7 +31,7 @@ class RobotMode:
 
 @dataclass(frozen=True)
 class OpenQuestion:
-    """A robot's question and until when it may be answered, on the robot's clock."""
+    """Question of a robot, open until `until_s` of the robot's clock."""
 
     question: Question
     until_s: float
@@ -39,22 +39,22 @@ class OpenQuestion:
 
     @property
     def id(self) -> str:
-        """The question's id."""
+        """Id of the question."""
         return self.question.id
 
     @property
     def options(self) -> tuple[str, ...]:
-        """The answers to choose from; empty when any text will do."""
+        """Answers to choose from; empty when any text is an answer."""
         return self.question.options
 
 
 @dataclass(frozen=True)
 class ControlState:
-    """What can be seen of a run's control at one moment.
+    """State of a run's control at one moment.
 
-    `version` grows with every change. `mode` is that of the whole run, `robots` has that of each robot. `missions`
-    gives for each robot the missions begun and not ended, the one under way last. `at` is the path id of the breakpoint
-    that the run waits at; `buttons` are those that missions wait for or decide by.
+    `version` grows with every change. `mode` is the mode of the whole run, `robots` has the mode of each robot.
+    `missions` lists for each robot the missions begun and not ended, the present one last. `at` is the path id of the
+    breakpoint at which the run waits; `buttons` are the buttons that missions wait for or decide by.
     """
 
     version: int = 0
@@ -70,26 +70,35 @@ class ControlState:
 
 @dataclass(frozen=True)
 class Event:
-    """Something done through or told by the control, for the log."""
+    """Event of the control, for the log."""
 
     what: str
     message: str
 
 
+class Turn(enum.Enum):
+    """Order in which a robot does a requested mission and its present one."""
+
+    FIRST = "first"  # the present mission is suspended, and continues afterwards
+    INSTEAD = "instead"  # the present mission, or one that waits, is given up
+    LATER = "later"  # after the mission that the robot began with
+
+
 @dataclass(frozen=True)
-class Replacement:
-    """A mission, and the name of the one whose place it takes; None is the one under way."""
+class MissionRequest:
+    """Request for one more mission; with INSTEAD, `instead_of` names the mission to give up (None: the present one)."""
 
     tree: CompiledTree
+    turn: Turn
     instead_of: str | None = None
 
 
 @dataclass(frozen=True)
 class ControlRequests:
-    """What is asked of the run now; `preempts` are missions to do first, `instead` and `later` as they say.
+    """Requests to the run at one moment.
 
-    `insists` says that a run that is cancelled already was cancelled once more. `holds` says for single robots why they
-    stand still, `cancels` names those whose missions end, and why.
+    `insists` is set when a cancelled run was cancelled once more. `hold` is the reason why all robots stand still,
+    `holds` has the reasons for single robots. `cancels` has the robots whose missions end, each with the reason.
     """
 
     cancel: str | None = None
@@ -97,18 +106,15 @@ class ControlRequests:
     hold: str | None = None
     breakpoints: frozenset[str] = frozenset()
     events: tuple[Event, ...] = ()
-    preempts: tuple[CompiledTree, ...] = ()
-    instead: tuple[Replacement, ...] = ()
-    later: tuple[CompiledTree, ...] = ()
+    missions: tuple[MissionRequest, ...] = ()
     holds: Mapping[str, str] = field(default_factory=dict)
     cancels: tuple[tuple[str, str], ...] = ()
 
     @property
     def of_robots(self) -> bool:
-        """Returns whether anything is asked of single robots, or they are to stand still."""
-        asked = self.preempts or self.instead or self.later or self.cancels or self.holds
-        return bool(asked) or self.hold is not None
+        """Returns whether there are requests to single robots, or robots that must stand still."""
+        return bool(self.missions or self.cancels or self.holds) or self.hold is not None
 
     def held(self, robot_name: str) -> bool:
-        """Returns whether a robot stands still, alone or with all others."""
+        """Returns whether a robot must stand still, alone or with all others."""
         return self.hold is not None or robot_name in self.holds

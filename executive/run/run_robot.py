@@ -1,4 +1,4 @@
-"""The robot as a run sees it: every verb under the watchdog, under the lease that counts, its answer checked."""
+"""Robot in a run: every verb is guarded by the watchdog and the lease, and its answer is checked."""
 
 from __future__ import annotations
 
@@ -48,21 +48,21 @@ _NO_LEASE: Final = Lease("", "", 0)
 
 
 class GarbageError(RuntimeError):
-    """A verb of the Robot protocol gave back what the protocol does not allow."""
+    """Answer of a verb that the Robot protocol does not allow."""
 
 
 _NEVER_CHANGING = frozenset({"capabilities"})
-"""Verbs that a job may ask as well: their answers stay the same."""
+"""Verbs that a job may call as well, since their answers never change."""
 _NOTHING_YET: Final = object()
 
 
 class GuardedRobot:
-    """Passes every verb on to a robot; each is wrapped once, when it is first asked for.
+    """Robot whose verbs are guarded; each verb is wrapped when it is first called.
 
     A verb raises `VerbHung` when it takes too long (see `Watchdog`), and `GarbageError` when its answer has the wrong
     type, numbers that are not finite, or a stamp before the clock's beginning.
 
-    After `claim`, skills show `token` for as long as the run goes on, whatever lease stands behind it just now.
+    After `claim`, skills use `token` as their lease for the whole run; it stands for the robot's present lease.
     """
 
     def __init__(
@@ -81,20 +81,20 @@ class GuardedRobot:
         self._lease: Lease | None = None
 
     def claim(self, holder: str) -> Lease:
-        """Acquire the lease; the token that stands for it. Raises LeaseError."""
+        """Acquires the lease; returns the token that stands for it. Raises LeaseError."""
         self._holder = holder
         self.token = self._lease = self.acquire_lease(holder)
         return self.token
 
     def lease_lost(self) -> str | None:
-        """Why the robot would refuse to move for us, None when it would not."""
+        """Reason why the robot would refuse to move for this run; None while the run has the lease."""
         counts = self.lease_holder()
         if counts == self._lease:
             return None
         return f"{counts.holder} holds the lease of {self.name}" if counts else "the lease was given back"
 
     def regain_lease(self) -> bool:
-        """Acquire the lease again when it is free; True when it was."""
+        """Acquires the lease again if it is free; returns whether that worked."""
         if self.lease_holder() is not None:
             return False
         try:
@@ -123,7 +123,7 @@ class GuardedRobot:
 
         @functools.wraps(call)
         def guarded_call(*arguments: Any, **options: Any) -> Any:
-            """The verb under the watchdog and the lease that counts, its answer checked."""
+            """Calls the verb under the watchdog and the present lease, and checks its answer."""
             nonlocal good
             if "lease" in options and options["lease"] == self.token:
                 options["lease"] = self._lease
@@ -145,21 +145,23 @@ class GuardedRobot:
         return guarded_call
 
     def _elsewhere(self, verb: str, call: Callable[[], Any], limit_s: float) -> Any:
-        """A verb outside the main thread. Pictures are not watched there: what renders them is bound to its thread."""
+        """Calls a verb outside the main thread; `image` without a limit, since a renderer is bound to its thread."""
         if in_lock_step_job():
             if verb in _NEVER_CHANGING:
                 return call()
-            raise RuntimeError(f"'{verb}' was asked for inside a job: read the robot before, or by `Worker.sense`")
+            raise RuntimeError(f"'{verb}' was called inside a job: read the robot before, or by `Worker.sense`")
         return call() if verb == "image" else done_aside(call, verb, limit_s)
 
 
 class RunRobot:
-    """One robot, with or without a mission. `context` is what may be done with it, under the lease that it has; `pose`
-    is where it believed to be when it last sensed (None: it did not know).
+    """Robot of a run, with or without a mission.
+
+    `context` is what a tree may use of it, under the present lease; `pose` is its estimated pose when it last sensed
+    (None: not localised).
     """
 
     def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Raises what the robot's verbs raise."""
+        """Raises the errors of the robot's verbs."""
         self.name: Final = entry.robot.name
         limits, self._traffic = shared.settings, shared.traffic
         self.pose: Pose2D | None = None
@@ -170,7 +172,7 @@ class RunRobot:
         self.context = self._context(entry, shared)
 
     def _context(self, entry: RunEntry, shared: RunShared) -> RunContext:
-        """What the tree of a robot may use, without a lease."""
+        """Context of the robot's tree, without a lease."""
         name, control, publish = self.name, shared.control, shared.visitors.publish
         return RunContext(
             robot=cast(Robot, self._guarded),
@@ -194,15 +196,15 @@ class RunRobot:
         )
 
     def status(self, *, now: bool = False) -> RobotStatus:
-        """Where the robot is (as it last sensed, or `now`), whether it holds something, and its battery's charge.
+        """Reads the robot's pose (as last sensed, or `now`), its gripper and its battery.
 
-        Raises what its verbs raise.
+        Raises the errors of its verbs.
         """
         robot, pose = self.context.robot, self.context.known_pose() if now else self.pose
         return RobotStatus(pose, robot.gripper().holding, robot.battery().charge)
 
     def sense(self) -> None:
-        """Brings the estimators up to date, and tells the others where the robot believes to be."""
+        """Updates the estimators, and reports the robot's estimated pose to the others."""
         context = self.context
         if estimators := context.leave_others_out:
             covered_W = self._traffic.covered_W(self.name)
@@ -215,18 +217,18 @@ class RunRobot:
         self._traffic.heard(self.name, self.pose)
 
     def claim(self) -> RunContext:
-        """Claims the lease, which nobody holds; what may be used under it. Raises LeaseError."""
+        """Claims the free lease; returns the context under it. Raises LeaseError."""
         self.context = replace(self.context, lease=self._guarded.claim(HOLDER))
         return self.context
 
     def stop_and_leave(self) -> None:
-        """Stops the robot and gives its lease back. Raises nothing."""
+        """Stops the robot and returns its lease. Raises nothing."""
         context = self.context
         self.attempt("stop the robot", lambda: context.robot.stop(lease=context.lease))
         self.attempt("return the lease", self._guarded.give_lease_back)
 
     def attempt(self, what: str, call: Callable[[], object]) -> bool:
-        """Does it, and says whether that went well; a defect goes to the log, since the rest must still happen."""
+        """Calls `call` and returns whether it succeeded; logs a defect instead of raising it."""
         try:
             call()
         except (Exception, VerbHung):
@@ -236,12 +238,12 @@ class RunRobot:
 
 
 def garbage_check(verb: str) -> Check | None:
-    """Says what is wrong with a verb's answer, None when nothing is seen to be; None for verbs unknown here."""
+    """Returns the check of a verb's answer, or None for an unknown verb; a check returns the defect, or None."""
     return _CHECKS.get(verb)
 
 
-def _of(kind: type[AnswerT], check: Callable[[AnswerT], str | None] = lambda answer: None) -> Check:
-    """The type, then the check of what is in it; what the check itself trips over is garbage, too."""
+def _typed(kind: type[AnswerT], check: Callable[[AnswerT], str | None] = lambda answer: None) -> Check:
+    """Checks the type, then the contents by `check`; an exception of `check` is a defect of the answer as well."""
 
     def whole(answer: Any) -> str | None:
         if not isinstance(answer, kind) or (kind is int and isinstance(answer, bool)):
@@ -259,17 +261,17 @@ def _or_none(check: Check) -> Check:
 
 
 def _reading(kind: type[Any], more: Check = lambda reading: None) -> Check:
-    """The type, a stamp, finite numbers in all fields that are annotated as numbers, and what `more` looks at."""
+    """Checks the type, the stamp, that all fields annotated as numbers are finite, and what `more` checks."""
     numbers = [(each.name, _GOOD[str(each.type)]) for each in fields(kind) if str(each.type) in _GOOD]
 
     def check(reading: Any) -> str | None:
-        """What is wrong with a reading."""
+        """Returns the defect of a reading, or None."""
         if not reading.stamp_s >= 0.0:
             return f"a stamp of {reading.stamp_s} s"
         bad = next((name for name, good in numbers if not good(getattr(reading, name))), None)
         return more(reading) if bad is None else f"{bad} is not finite: {getattr(reading, bad)!r:.60}"
 
-    return _of(kind, check)
+    return _typed(kind, check)
 
 
 def _finite(values: Iterable[float]) -> bool:
@@ -283,7 +285,7 @@ _GOOD: Final[Mapping[str, Callable[[Any], bool]]] = {
     "Mapping[str, float]": lambda values: _finite(values.values()),
     "RigidTransform": lambda X: bool(np.isfinite(X.GetAsMatrix34()).all()),
 }
-"""Whether a value is as it should be, by the annotation of its field."""
+"""Checks of values by the annotations of their fields."""
 
 
 def _scan(it: Scan) -> str | None:
@@ -314,10 +316,10 @@ def _status(it: CommandStatus) -> str | None:
     return None if isinstance(it.state, CommandState) else f"a state of {it.state!r:.40}"
 
 
-_COMMAND: Final = _of(int)
-_LEASE: Final = _of(Lease)
+_COMMAND: Final = _typed(int)
+_LEASE: Final = _typed(Lease)
 _CHECKS: Final[Mapping[str, Check]] = {
-    "capabilities": _of(Capabilities),
+    "capabilities": _typed(Capabilities),
     "odometry": _reading(Odometry),
     "imu": _reading(Imu),
     "scan": _or_none(_reading(Scan, _scan)),
@@ -325,9 +327,9 @@ _CHECKS: Final[Mapping[str, Check]] = {
     "joints": _reading(Joints),
     "gripper": _reading(Gripper),
     "battery": _reading(Battery, _battery),
-    "faults": _of(tuple, _faults),
+    "faults": _typed(tuple, _faults),
     **dict.fromkeys(("drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "stop"), _COMMAND),
-    "command_status": _of(CommandStatus, _status),
+    "command_status": _typed(CommandStatus, _status),
     "lease_holder": _or_none(_LEASE),
     "acquire_lease": _LEASE,
     "take_lease": _LEASE,

@@ -50,17 +50,17 @@ def run(
     """Runs the missions of any number of robots to their end, robots in the order of their names.
 
     Each tick: poll `control`, advance the clock by the tick period, update each robot's estimators, tick each tree,
-    tell the `visitors`. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree
-    is not ticked, and that time counts against no limit. A robot that fails ends its own mission, and is no more than
-    an obstacle to the others then. In every case all trees and robots are stopped and all leases returned before this
-    returns. Without control, equal seeds give equal logs.
+    call the `visitors`. While a robot is held (pause, stop button, lost lease), time passes and it senses, but its tree
+    is not ticked, and that time counts against no limit. A robot that fails ends its own mission only, and is then an
+    obstacle to the others. In every case all trees and robots are stopped and all leases returned before this returns.
+    Without control, equal seeds give equal logs.
 
-    An assigner gives missions as long as it has any; the result has one entry for each mission. Robots that are `spare`
-    have no mission, or none yet: their trees do not count, and they clear paths that others reserve, as those do whose
-    missions are over.
+    An assigner gives missions as long as it has any; the result has one entry for each mission. `spare` robots have no
+    mission, or none yet: their trees do not count. Like robots whose missions are over, they clear paths that others
+    reserve.
 
-    Raises ValueError: no missions, two robots of one name, one that waits for a robot that is not there, or a
-    breakpoint at a node that there is not. Raises OSError, when all is stopped: the disk is full.
+    Raises ValueError when there are no missions, two robots have one name, a robot waits for a robot that is not in the
+    run, or a breakpoint is at an unknown node. Raises OSError, after all is stopped, when the disk is full.
     """
     assigner = missions if isinstance(missions, Assigner) else _AllAtOnce(missions)
     entries = () if isinstance(missions, Assigner) else missions
@@ -84,15 +84,15 @@ class _AllAtOnce(Assigner):
         self._entries = sorted(entries, key=lambda entry: entry.robot.name)
 
     def assign(self) -> Sequence[RunEntry]:
-        """All of them once."""
+        """Returns all missions once."""
         entries, self._entries = self._entries, []
         return entries
 
 
 class _Run:
-    """The state of one run. `_sessions` has each robot's last mission, `_ended` all that have ended, in order.
+    """State of one run. `_sessions` has each robot's last mission, `_ended` all that have ended, in order.
 
-    The visitors were told of the first `_told` of these.
+    The visitors have heard of the first `_reported` of these.
     """
 
     def __init__(self, assigner: Assigner, shared: RunShared) -> None:
@@ -104,8 +104,8 @@ class _Run:
         self._assigned: list[RunEntry] = []
         self._sessions: dict[str, Session] = {}
         self._ended: list[MissionEnd] = []
-        self._told = 0
-        self._idle: list[Session] = []  # whose missions ended in the last tick
+        self._reported = 0
+        self._idle: list[Session] = []  # robots whose missions ended in the last tick
         self._seen: dict[str, RobotStatus] = {}
         self._looks_always = type(assigner).recall is not Assigner.recall
         self._look_due_s = shared.clock.now()
@@ -116,7 +116,7 @@ class _Run:
         self._time = StoppableTime(shared.clock)
 
     def run(self, spare: Sequence[RunEntry]) -> RunResult:
-        """The whole run."""
+        """Runs until no mission is left."""
         full: BaseException | None = None
         with self._watchdog:
             ending: Ending | None = None
@@ -143,17 +143,17 @@ class _Run:
         return [session for session in self._sessions.values() if session.result is None]
 
     def _has_work(self) -> bool:
-        """Returns whether a mission is under way, after those were begun that are assigned now."""
-        while not self._stopping and (assigned := self._assigner.assign()):  # again where one cannot begin
+        """Begins the missions that are assigned now, and returns whether one is under way."""
+        while not self._stopping and (assigned := self._assigner.assign()):  # once more where one cannot begin
             self._assigned = list(assigned)
             while self._assigned:
                 self._begin(self._assigned[0])
                 self._assigned.pop(0)
-            self._tell_ends()
+            self._report_ends()
         return bool(self._live)
 
     def _begin(self, entry: RunEntry) -> None:
-        """Begins a mission of a robot that may be resting. Raises OSError: the disk is full."""
+        """Begins a mission of a robot that may be resting. Raises OSError when the disk is full."""
         name = entry.robot.name
         self._resting.leave(name)
         try:
@@ -168,7 +168,7 @@ class _Run:
         self._control.mission_begun(name, entry.tree)
 
     def _cycle(self) -> None:
-        """One period: requests are polled, time passes, estimators see, trees tick, visitors are told."""
+        """Runs one period: polls requests, advances time, updates estimators, ticks trees, calls visitors."""
         begun_wall_s = time.perf_counter()
         live, idle, self._idle = self._live, self._idle, []
         for session in idle:
@@ -177,7 +177,7 @@ class _Run:
         requests = self._poll(live)
         if not any(session.result is None for session in live):
             self._note_ends(live)
-            self._tell_ends()
+            self._report_ends()
             return
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
@@ -195,12 +195,12 @@ class _Run:
         progress = self._progress(notes, tick_wall_s)
         for each in self._visitors:
             each.tick(progress)
-        self._tell_ends()
+        self._report_ends()
         self._recall()
         self._keep_pace(begun_wall_s)
 
     def _poll(self, live: Sequence[Session]) -> ControlRequests:
-        """Does what is asked for before time passes."""
+        """Carries out the requests of the control."""
         requests = self._control.poll()
         self._publish_events(requests.events)
         if requests.cancel is not None:
@@ -222,14 +222,9 @@ class _Run:
         return requests
 
     def _obey(self, session: Session, requests: ControlRequests) -> None:
-        """Does what is asked of one robot."""
-        for request in requests.instead:
-            if request.tree.robot_name == session.name:
-                session.replace(request.tree, request.instead_of)
-        for tree in (each for each in requests.preempts if each.robot_name == session.name):
-            session.preempt(tree)
-        for tree in (each for each in requests.later if each.robot_name == session.name):
-            session.later(tree)
+        """Carries out the requests to one robot."""
+        for request in (each for each in requests.missions if each.tree.robot_name == session.name):
+            session.take(request)
         for _, reason in (each for each in requests.cancels if each[0] == session.name):
             if session.cancelled:
                 session.close()
@@ -240,7 +235,7 @@ class _Run:
             session.hold()
 
     def _stop(self, ending: Ending, at_once: bool = False) -> None:
-        """Ends all missions, and assign no more. What they always do in the end is done first, unless `at_once`."""
+        """Ends all missions, after their steps under `always` unless `at_once`, and assigns no more."""
         self._stopping = True
         for session in self._live:
             session.cancel(ending, self._settings.endings_limit_s)
@@ -248,13 +243,14 @@ class _Run:
                 session.close(ending)
 
     def _publish_paths(self) -> None:
+        """Logs the reserved paths that changed, twice a second."""
         if self._clock.now() >= self._paths_due_s:
             self._paths_due_s = self._clock.now() + _PATHS_PERIOD_S
             for path in self._traffic.news():
                 self._visitors.publish(RESERVED_PATH, path)
 
     def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
-        """Lets the robots that wait for others, and those without a mission, clears paths that are reserved."""
+        """Lets robots without a mission, and those that wait for others, clear reserved paths."""
         for session in live:
             if session in turn:
                 self._resting.leave(session.name)
@@ -263,7 +259,7 @@ class _Run:
         self._resting.tick(held)
 
     def _tick(self, moving: Sequence[Session], breakpoints: frozenset[str]) -> Mapping[str, TickNote]:
-        """Ticks the trees of robots that may move; what that brought of each."""
+        """Ticks the trees of robots that may move; returns a note of each tick by the robot's name."""
         notes: dict[str, TickNote] = {}
         changes: list[bool] = []
         for session in moving:
@@ -281,8 +277,10 @@ class _Run:
         return notes
 
     def _note_ends(self, live: Sequence[Session]) -> None:
-        """Sees how the robots are, each tick for an assigner that recalls them, else twice a second; close the missions
-        that have ended."""
+        """Closes the missions that have ended.
+
+        Reads the status of all robots twice a second; for an assigner that may recall missions, in each tick.
+        """
         due = self._looks_always or self._clock.now() >= self._look_due_s - _EPSILON_S
         self._look_due_s += _LOOK_PERIOD_S if due else 0.0
         for session in live:
@@ -295,7 +293,7 @@ class _Run:
             self._note_end(result, session.gone)
 
     def _look(self, session: Session, *, now: bool = False) -> bool:
-        """Sees how a robot is; whether it still answers."""
+        """Reads a robot's status; returns whether the robot still answers."""
         status = session.guarded(partial(session.status, now=now))
         if status is None:
             return False
@@ -307,12 +305,12 @@ class _Run:
 
     @property
     def _results(self) -> Mapping[str, RobotResult]:
-        """How the last mission of each robot ended."""
+        """Result of each robot's last mission."""
         return {end.result.robot_name: end.result for end in self._ended}
 
-    def _tell_ends(self) -> None:
-        """Tells of the missions that have ended."""
-        ends, self._told = self._ended[self._told :], len(self._ended)
+    def _report_ends(self) -> None:
+        """Reports the missions that have ended to the control and the visitors."""
+        ends, self._reported = self._ended[self._reported :], len(self._ended)
         for end in ends:
             self._control.mission_ended(end.result.robot_name)
             self._visitors.publish(OUTCOME, {**end.result.message_of_end(), "ticks": self._ticks})
@@ -320,13 +318,13 @@ class _Run:
                 each.mission_ended(end)
 
     def _recall(self) -> None:
-        """Ends the missions that are recalled now."""
+        """Ends the missions that the assigner recalls."""
         why = self._assigner.recall(self._seen)
         recalled = [session for session in self._live if session.name in why]
         for session in recalled:
             session.close(Ending(Outcome.CANCELLED, Cause.CANCELLED, why[session.name]))
         self._note_ends(recalled)
-        self._tell_ends()
+        self._report_ends()
 
     def _progress(self, notes: Mapping[str, TickNote], tick_wall_s: float) -> Progress:
         states = {name: session.states for name, session in self._sessions.items()}
@@ -335,7 +333,7 @@ class _Run:
         return Progress(now_s, self._ticks, self._overruns, states, trees, seen, notes, tick_wall_s)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
-        """Does not let simulated time run ahead of people who have something to decide."""
+        """Waits, so that simulated time does not run ahead of people who have something to decide."""
         people = self._control.attended and any(session.waits_for_people for session in self._sessions.values())
         if self._control.pace is None or not (people or self._control.slow):
             return
@@ -349,7 +347,7 @@ class _Run:
             self._visitors.publish(CONTROL, message)
 
     def _end(self, ending: Ending | None) -> None:
-        """Stops all that is under way."""
+        """Stops all robots and missions, and reports their ends."""
         self._visitors.ending = True
         self._resting.close()
         for session in self._sessions.values():
@@ -360,7 +358,7 @@ class _Run:
             for entry in self._assigned:
                 self._note_end(_never_began(entry, ending), None)
         self._publish_events(self._control.end())
-        self._tell_ends()
+        self._report_ends()
 
     def _result(self) -> RunResult:
         over = sorted((end.result for end in self._ended), key=lambda each: each.robot_name)
@@ -376,5 +374,5 @@ class _Run:
 
 
 def _never_began(entry: RunEntry, ending: Ending) -> RobotResult:
-    """The result of a robot whose mission did not begin."""
+    """Result of a mission that did not begin."""
     return RobotResult(entry.tree, ending.outcome, ending.cause, ending.message)

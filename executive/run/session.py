@@ -1,4 +1,4 @@
-"""One robot in a run: its verbs under the watchdog, its lease, its estimators, its missions, and its orderly end."""
+"""One robot's missions in a run: their turns, their ticks, and the orderly end."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from executive.record.schemas import NAVIGATION, OUTCOME, POSE, STATE, stamp
+from executive.run.control_state import MissionRequest, Turn
 from executive.run.outcome import Ending, Outcome, RobotResult, ending_of
 from executive.run.run_robot import RunRobot
 from executive.run.tree_run import TreeRun
@@ -33,15 +34,15 @@ ResultT = TypeVar("ResultT")
 
 
 class Session(RunRobot):
-    """One robot with a mission. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`,
-    then `close`.
+    """Robot with a mission. The runner calls `sense`, `may_move` and `tick` or `hold` in turn until `finished`, then
+    `close`.
 
-    `gone` says why nothing more is asked of the robot once its mission is over: its lease is another's, or a verb
-    failed. `note` is what the last tick brought of the mission that the robot began with.
+    `gone` is the reason why the robot is left alone after its mission: its lease is lost, or a verb failed. `note`
+    holds the changes that the last tick made in the mission that the robot began with.
     """
 
     def __init__(self, entry: RunEntry, shared: RunShared) -> None:
-        """Opens it under the robot's lease. Raises LeaseError, and what the robot's verbs raise."""
+        """Begins the mission under the robot's lease. Raises LeaseError, and the errors of the robot's verbs."""
         super().__init__(entry, shared)
         context = self.claim()
         try:
@@ -58,7 +59,7 @@ class Session(RunRobot):
         self._lost_since_s: float | None = None
         self._preempting: tuple[RobotResult, ...] = ()
         self._later: tuple[CompiledTree, ...] = ()
-        self._cancelled: tuple[Ending, float] | None = None  # and when it is over at the latest
+        self._cancelled: tuple[Ending, float] | None = None  # and the latest time (s) at which it is over
         self.result: RobotResult | None = None
         self.gone: str | None = None
         self.note: TickNote | None = None
@@ -69,12 +70,12 @@ class Session(RunRobot):
 
     @property
     def tree(self) -> CompiledTree:
-        """The mission under way."""
+        """Tree of the mission under way."""
         return self._top.tree
 
     @property
     def states(self) -> Snapshot:
-        """The states of all nodes, those of suspended missions included."""
+        """States of all nodes, including those of suspended missions."""
         if len(self._stack) == 1:
             return self._top.states
         merged: dict[str, NodeState] = {}
@@ -84,16 +85,16 @@ class Session(RunRobot):
 
     @property
     def finished(self) -> bool:
-        """True when the mission that the robot began with has come to an end."""
+        """Returns whether the mission that the robot began with, and all that come after it, have ended."""
         return self.result is not None or (len(self._stack) == 1 and self._top.finished and not self._later)
 
     @property
     def waiting_at(self) -> str | None:
-        """The breakpoint that the mission under way waits at."""
+        """Path id of the breakpoint at which the mission under way waits."""
         return self._top.waiting_at
 
     def guarded(self, call: Callable[[], ResultT]) -> ResultT | None:
-        """What a call for this robot gives; None where it fails, which ends its mission. Raises OSError: disk full."""
+        """Returns the call's result, or None where it fails, which ends the mission. Raises OSError for a full disk."""
         try:
             return call()
         except (Exception, VerbHung) as stop:
@@ -105,7 +106,7 @@ class Session(RunRobot):
             return None
 
     def has_its_turn(self, results: Mapping[str, RobotResult]) -> bool:
-        """Returns whether the robots that the mission waits for are done; it ends when one of them has failed."""
+        """Returns whether the robots that the mission waits for are done; ends the mission when one of them failed."""
         for name in self._after:
             if name not in results:
                 return False
@@ -116,7 +117,7 @@ class Session(RunRobot):
         return True
 
     def sense(self) -> None:
-        """Brings the estimators up to date, counts a new match of the scan, and logs pose and state twice a second."""
+        """Updates the estimators, counts new scan matches, and logs pose and state twice a second."""
         super().sense()
         self._asked_at = self._asked_at or self.pose
         context, estimate = self.context, self.context.localiser.estimate()
@@ -130,9 +131,9 @@ class Session(RunRobot):
             self._publish_navigation()
 
     def may_move(self) -> bool:
-        """Returns whether the lease counts. A lost one suspends the mission until it can be had again.
+        """Returns whether the robot has its lease; a lost lease suspends the mission until the robot has it again.
 
-        Raises nothing; when that takes longer than LEASE_PATIENCE_S, the session is closed with cause EXECUTION.
+        Raises nothing. After LEASE_PATIENCE_S without the lease, the session is closed with cause EXECUTION.
         """
         lost, now_s = self._guarded.lease_lost(), self.context.clock.now()
         if self._cancelled is not None and now_s >= self._cancelled[1]:
@@ -156,9 +157,10 @@ class Session(RunRobot):
         return False
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
-        """Ticks the mission under way once; True when a node changed its status. Its end takes up the one before.
+        """Ticks the mission under way once; returns whether a node changed its status. After its end, the mission
+        below it continues.
 
-        What a mission that was given up or cancelled always does in the end comes first.
+        Steps under `always` of missions that were given up or cancelled come first.
         """
         self._held = False
         run = self._top
@@ -178,7 +180,7 @@ class Session(RunRobot):
         return changed
 
     def _go_on_after_the_top(self) -> None:
-        """Where the mission under way has ended, take up the one before, or begin the next."""
+        """Where the mission under way has ended, continues the mission below it, or begins the next."""
         if self._top.finished and len(self._stack) > 1:
             done = self._top
             done.halt(self.attempt)
@@ -192,18 +194,18 @@ class Session(RunRobot):
 
     @property
     def waits_for_people(self) -> bool:
-        """True while the mission under way waits for somebody to press a button."""
+        """Returns whether the mission under way waits for somebody to press a button."""
         return self.result is None and self._top.waits_for_people
 
     @property
     def ends(self) -> bool:
-        """True while missions that were ended early still do what is always done in the end."""
+        """Returns whether missions that were ended early still run their steps under `always`."""
         return self.result is None and any(run.ends for run in self._runs)
 
     def cancel(self, ending: Ending, limit_s: float) -> None:
         """Ends all missions of this robot where they are; idempotent.
 
-        What they always do in the end is done by `tick`, for so long (s) at most.
+        `tick` runs their steps under `always`, for `limit_s` at most.
         """
         if self._cancelled is None:
             self._cancelled = ending, self.context.clock.now() + limit_s
@@ -218,7 +220,7 @@ class Session(RunRobot):
         return self._cancelled is not None
 
     def hold(self) -> None:
-        """Suspend the mission and stop the robot; done once until the next tick."""
+        """Suspends the missions and stops the robot, once until the next tick."""
         if not self._held:
             self._held = True
             for run in self._runs:
@@ -226,28 +228,21 @@ class Session(RunRobot):
             if self._lost_since_s is None:
                 self.context.robot.stop(lease=self.context.lease)
 
-    def preempt(self, tree: CompiledTree) -> None:
-        """Suspend the mission under way and begin another; nothing of the one leaks into the other."""
-        self.hold()
-        self._begin(tree)
-
-    def later(self, tree: CompiledTree) -> None:
-        """Begins another mission when the one that the robot began with is done; it comes back to the same start."""
-        self._later += (tree,)
-
-    def replace(self, tree: CompiledTree, instead_of: str | None = None) -> None:
-        """Gives up the mission under way, or not begin one that waits, and have another in its place, from its start.
-
-        Where the mission called `instead_of` is neither, the other is done first.
-        """
-        if any(waiting.mission_name == instead_of for waiting in self._later):
-            self._later = tuple(tree if one.mission_name == instead_of else one for one in self._later)
-        elif instead_of in (None, self.tree.mission_name):
-            self._give_up_for(tree)
+    def take(self, request: MissionRequest) -> None:
+        """Takes one more mission in its turn; a mission that waits, or takes the place of another, has its start."""
+        tree, old = request.tree, request.instead_of
+        if request.turn is Turn.LATER:
+            self._later += (tree,)
+        elif request.turn is Turn.INSTEAD and any(waiting.mission_name == old for waiting in self._later):
+            self._later = tuple(tree if one.mission_name == old else one for one in self._later)
+        elif request.turn is Turn.INSTEAD and old in (None, self.tree.mission_name):
+            self._replace_top(tree)
         else:
-            self.preempt(tree)
+            self.hold()
+            self._begin(tree)
 
-    def _give_up_for(self, tree: CompiledTree) -> None:
+    def _replace_top(self, tree: CompiledTree) -> None:
+        """Gives up the present mission and begins another in its place."""
         self.hold()
         given_up = self._top
         self.attempt("stop the tree", given_up.end_early)
@@ -262,7 +257,7 @@ class Session(RunRobot):
         self._note_result(given_up.judge(Ending(Outcome.CANCELLED, Cause.CANCELLED, message)))
 
     def close(self, ending: Ending | None = None) -> RobotResult:
-        """Stops the trees and the robot, gives the lease back, logs the end. Idempotent; raises nothing."""
+        """Stops the trees and the robot, returns the lease, logs the end. Idempotent; raises nothing."""
         if self.result is None:
             ending = ending if self._cancelled is None else self._cancelled[0]
             for run in self._runs:
@@ -280,11 +275,11 @@ class Session(RunRobot):
 
     @property
     def _runs(self) -> tuple[TreeRun, ...]:
-        """All trees, those that were given up first, then the one under way and those below it."""
+        """All trees: those that were given up first, then the one under way and those below it."""
         return (*self._given_up, *reversed(self._stack))
 
     def _start_of(self, run: TreeRun) -> Pose2D | None:
-        """Where a mission began: where it noted that, else where the robot stood at first."""
+        """Pose at which a mission began: the one that it noted, else the robot's first pose in the run."""
         key = start_key(run.tree.robot_name, run.tree.mission_name)
         start: Pose2D | None = run.context.board.get(key) if key in run.context.board else self._asked_at
         return start
@@ -298,7 +293,7 @@ class Session(RunRobot):
         self._control.mission_begun(self.name, tree)
 
     def _note_end(self, result: RobotResult) -> None:
-        """A mission that came in between is over."""
+        """Notes that a mission that came in between is over."""
         self._control.mission_ended(self.name)
         self._note_result(result)
 
@@ -326,7 +321,7 @@ class Session(RunRobot):
         )
 
     def _publish_state(self, estimate: LocalisationEstimate) -> None:
-        """What an operator looks at: the gripper, the battery, the speed, and how well the place is known."""
+        """Logs the gripper, the battery, the speed, and the quality of the localisation."""
         robot = self.context.robot
         self.context.publish(
             STATE,
@@ -342,7 +337,7 @@ class Session(RunRobot):
         )
 
     def _publish_navigation(self) -> None:
-        """Where else the robot may be, and what it sees that the map does not have (m); when either is new."""
+        """Logs particles of the localiser and obstacles that the map lacks (x, y in m), when either is new."""
         localiser, costmap = self.context.localiser, self.context.costmap
         particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
         seen = costmap.seen_m() if isinstance(costmap, LayeredView) else _NOTHING

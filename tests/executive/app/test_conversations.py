@@ -82,7 +82,8 @@ def test_one_robot_does_not_go_on_while_all_are_paused(talk, control):
 )
 def test_a_request_becomes_a_mission_of_the_robot_that_is_meant(talk, control, text, robot, expected):
     talk.hear(text, robot)
-    assert {tree.robot_name: tree.commands[0].goal for tree in control.poll().preempts} == expected
+    trees = [request.tree for request in control.poll().missions]
+    assert {tree.robot_name: tree.commands[0].goal for tree in trees} == expected
 
 
 def test_the_question_of_a_robot_is_answered_to_it(talk, control):
@@ -91,7 +92,7 @@ def test_the_question_of_a_robot_is_answered_to_it(talk, control):
     talk.hear("put the cube on the table", "Bob")
     talk.hear("the coffee table", "Bob")
     assert asked == [("Bob", True), ("Bob", False)]
-    (tree,) = control.poll().preempts
+    (tree,) = (request.tree for request in control.poll().missions)
     assert (tree.robot_name, tree.commands[-1].goal) == ("Bob", "coffee table")
 
 

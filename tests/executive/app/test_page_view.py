@@ -36,7 +36,7 @@ def page(prepared):
 def test_a_sentence_becomes_a_mission_that_is_done_first(page):
     say = sentence_action(page.hear)
     assert "[bathroom]" in say({"text": "go to the bathroom"})
-    (tree,) = page.control.poll().preempts
+    (tree,) = (request.tree for request in page.control.poll().missions)
     assert [command.goal for command in tree.commands] == ["bathroom"]
 
 
@@ -47,7 +47,7 @@ def test_a_sentence_becomes_a_mission_that_is_done_first(page):
 def test_a_sentence_that_is_not_understood_is_refused_with_the_reason(page, text, words):
     with pytest.raises(RefusedError, match=words):
         sentence_action(page.hear)({"text": text})
-    assert page.control.poll().preempts == ()
+    assert page.control.poll().missions == ()
 
 
 def test_remarks_act_at_once_and_are_answered(page):
@@ -63,13 +63,13 @@ def test_a_question_is_asked_on_the_page_and_answered_there(page):
     say = sentence_action(page.hear)
     assert say({"text": "put the cube on the table"}) == "Which table: kitchen table or coffee table?"
     assert "[coffee table]" in say({"text": "the coffee table"})
-    (tree,) = page.control.poll().preempts
+    (tree,) = (request.tree for request in page.control.poll().missions)
     assert tree.commands[-1].goal == "coffee table"
 
 
 def test_a_correction_takes_the_place_of_the_mission(page):
     assert sentence_action(page.hear)({"text": "no, to the bathroom"}).startswith("instead: ")
-    (request,) = page.control.poll().instead
+    (request,) = page.control.poll().missions
     assert (request.tree.commands[0].goal, request.instead_of) == ("bathroom", "go kitchen")
 
 

@@ -52,15 +52,10 @@ def given(control):
     """The commands of the missions that were given: first, instead, later."""
 
     def texts():
-        requests = control.poll()
-        return {
-            when: [[str(command) for command in tree.commands] for tree in trees]
-            for when, trees in (
-                ("first", requests.preempts),
-                ("instead", [request.tree for request in requests.instead]),
-                ("later", requests.later),
-            )
-            if trees
-        }
+        missions = {}
+        for request in control.poll().missions:
+            commands = [str(command) for command in request.tree.commands]
+            missions.setdefault(request.turn.value, []).append(commands)
+        return missions
 
     return texts

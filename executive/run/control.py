@@ -160,7 +160,7 @@ class Control:
             self._note("cancel", f"once more: {reason}")
 
     def press(self, button: str) -> None:
-        """Presses a button of the missions. Raises ValueError when no mission of the run waits for it or decides by it."""
+        """Presses a button. Raises ValueError when no mission of the run waits for it or decides by it."""
         if self._begun and button not in self._buttons:
             known = f"there are: {', '.join(self._buttons)}" if self._buttons else "there are none"
             raise ValueError(f"the run has no button '{button}'; {known}")

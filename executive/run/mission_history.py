@@ -1,4 +1,4 @@
-"""History of a mission: when its parts ran, what it found and said, and the text of its claim."""
+"""History of a mission: the executions of its parts, its findings, its speech, and the text of its claim."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _ENDED: Final = (Status.SUCCESS, Status.FAILURE)
 
 @dataclass(frozen=True)
 class HistoryKeys:
-    """The blackboard keys of one mission's history: its findings, its speech and when its robot last drove.
+    """Blackboard keys of one mission's history: its findings, its speech, and the time when its robot last drove.
 
-    After a restart `answered_before` are the nodes that give their answer again, and `ended_before` those that end once
-    more because they had ended before.
+    After a restart, `answered_before` has the nodes that repeat their answer, and `ended_before` those that end a
+    second time because they had ended before the restart.
     """
 
     findings: str
@@ -43,23 +43,23 @@ class HistoryKeys:
 
 
 def history_keys(robot_name: str, mission_name: str) -> HistoryKeys:
-    """The keys for a mission."""
+    """Returns the blackboard keys of a mission's history."""
     base = f"{slug(robot_name)}/{slug(mission_name)}"
     names = ("findings", "said", "moved", "answered-before", "executed-before")
     return HistoryKeys(*(f"{base}/{name}" for name in names))
 
 
 def is_speech(node: NodeSpec) -> bool:
-    """Returns whether a node is a skill that says a text."""
+    """Returns whether a node is a skill that speaks a text."""
     says = "text" in node.options.get("inputs", {})
     return node.kind == "skill" and says and node.options["skill"].uses == {Part.VOICE}
 
 
 class Executions:
-    """Notes the executions of a mission's parts and of what it says, on the blackboard, which outlives a restart.
+    """Record of the executions of a mission's parts and of its speech, on the blackboard, which outlives a restart.
 
-    `visited` is called with each node that a tick visits, then `after_tick`. A node that had ended before a restart,
-    and whose result is only given again, keeps its first times.
+    The run calls `visited` with each node that a tick visits, then `after_tick`. A node that only repeats its result
+    from before a restart keeps its first times.
     """
 
     def __init__(self, tree: CompiledTree, nodes: Iterable[Behaviour], board: Board, clock: Clock) -> None:
@@ -75,7 +75,7 @@ class Executions:
         self._nodes = {path: named[path] for path in self._below if path in named}
         self._drivers = {path: named[path] for path in self._base if path in named}
         self._driving = {path for path, node in self._drivers.items() if node.status is Status.RUNNING}
-        self._open = {path for path in self._nodes if (kept := self._of(path)) and kept[-1].ended_s is None}
+        self._open = {path for path in self._nodes if (ran := self._executions(path)) and ran[-1].ended_s is None}
         self._taken_up = set(self._open)
         self._moved_s = board.get(self._keys.moved) if self._keys.moved in board else None
         self._paths: Mapping[Behaviour, str] = {node: path for path, node in self._nodes.items()}
@@ -83,18 +83,18 @@ class Executions:
 
     @property
     def all(self) -> tuple[Execution, ...]:
-        """The executions so far, in the order of their ends; those that are not over come last."""
-        found = [one for path in self._parts for one in self._of(path)]
+        """Executions so far in the order of their ends; those that are not over come last."""
+        found = [one for path in self._parts for one in self._executions(path)]
         last = float("inf")
         return tuple(sorted(found, key=lambda one: (last if one.ended_s is None else one.ended_s, one.began_s)))
 
     @property
     def moved_s(self) -> float | None:
-        """When a skill that may drive last ran; None: never."""
+        """Time (s) when a skill that may drive last ran; None: never."""
         return self._moved_s
 
     def visited(self, node: Behaviour, stopped: bool) -> None:
-        """A tick has visited a node, after those below it; it was `stopped` since its last visit."""
+        """Notes that a tick has visited a node, which was perhaps `stopped` since its last visit."""
         path = self._paths.get(node)
         if path is None:
             return
@@ -106,7 +106,7 @@ class Executions:
             self._end(path, node.status is Status.SUCCESS)
 
     def after_tick(self, changed: Iterable[str]) -> None:
-        """Notes what was stopped in this tick, and whether the robot may drive; `changed` are nodes that changed."""
+        """Notes which nodes the tick stopped, and whether the robot may drive; `changed` are nodes that changed."""
         for path in [path for path in self._open if self._nodes[path].status is not Status.RUNNING]:
             if path not in self._taken_up:
                 self._end(path, done=False)
@@ -126,14 +126,13 @@ class Executions:
         if path in self._open:
             self._end(path, done=False)
         self._open.add(path)
-        kept = self._of(path) if path in self._parts else ()
-        self._put(path, (*kept, Execution(path, self._clock.now())))
+        before = self._executions(path) if path in self._parts else ()
+        self._put(path, (*before, Execution(path, self._clock.now())))
 
     def _end(self, path: str, done: bool) -> None:
-        """An execution is over: what ran in it, below the node, does not count unless it is done."""
+        """Ends an execution; executions below the node within its time count only if it is done."""
         self._open.discard(path)
-        executions = self._of(path)
-        *before, one = executions
+        *before, one = self._executions(path)
         again = frozenset(self._board.get(self._keys.ended_before) if self._keys.ended_before in self._board else ())
         if path in again:
             self._board.put(self._keys.ended_before, again - {path})
@@ -142,21 +141,21 @@ class Executions:
                 return
         if not done:
             for below in self._below[path] - {path}:
-                spoiled = (replace(each, done=each.done and each.began_s < one.began_s) for each in self._of(below))
-                self._put(below, spoiled)
+                executions = self._executions(below)
+                self._put(below, (replace(each, done=each.done and each.began_s < one.began_s) for each in executions))
         over = replace(one, ended_s=self._clock.now(), done=done)
         self._put(path, (*before, over) if path in self._parts else ())
 
-    def _of(self, path: str) -> tuple[Execution, ...]:
+    def _executions(self, path: str) -> tuple[Execution, ...]:
         key = _executions_key(path)
-        kept: tuple[tuple[float, float | None, bool], ...] = self._board.get(key) if key in self._board else ()
-        return tuple(Execution(path, *one) for one in kept)
+        stored: tuple[tuple[float, float | None, bool], ...] = self._board.get(key) if key in self._board else ()
+        return tuple(Execution(path, *one) for one in stored)
 
     def _put(self, path: str, executions: Iterable[Execution]) -> None:
-        kept = tuple((one.began_s, one.ended_s, one.done) for one in executions)
+        stored = tuple((one.began_s, one.ended_s, one.done) for one in executions)
         key = _executions_key(path)
-        if kept or key in self._board:
-            self._board.put(key, kept)
+        if stored or key in self._board:
+            self._board.put(key, stored)
 
 
 def _executions_key(path_id: str) -> str:
@@ -164,7 +163,7 @@ def _executions_key(path_id: str) -> str:
 
 
 def _below(node: NodeSpec, parts: frozenset[str]) -> Iterator[tuple[str, frozenset[str]]]:
-    """The parts at and below each node that has any."""
+    """Iterates over the nodes that are parts or have parts below them, each with these parts."""
     found = frozenset(below.path_id for below in node.walk()) & parts
     if found:
         yield node.path_id, found
@@ -173,12 +172,12 @@ def _below(node: NodeSpec, parts: frozenset[str]) -> Iterator[tuple[str, frozens
 
 
 class Findings:
-    """Collects the answers and the speech of one mission.
+    """Collection of the answers and the speech of one mission.
 
     Any node adds a finding by publishing under `ANSWER_TOPIC`: `node`, `question`, `answer` (a truth value, a text or
-    a number) and `message`, the sentence. The time and the robot are added here. What is collected stands on the
-    blackboard, which is kept: a mission that goes on after a restart has its earlier findings. A node that only gives
-    its earlier answer once more, as the key `answered_before` says, makes no second finding.
+    a number) and `message`, the sentence. Time and robot are added here. The collection stands on the blackboard: a
+    mission that continues after a restart has its earlier findings. A node under the key `answered_before` that repeats
+    its answer adds no second finding.
     """
 
     def __init__(self, clock: Clock, board: Board, robot_name: str, mission_name: str) -> None:
@@ -186,11 +185,11 @@ class Findings:
         self._keys = history_keys(robot_name, mission_name)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Takes note of a message of the mission; an answer gets its time and the robot's name."""
+        """Notes a message of the mission, and returns it; an answer with its time and the robot's name."""
         if topic == ANSWER_TOPIC:
             message = {**message, "robot": self._robot_name, "t": round(self._clock.now(), 6)}
             finding = _finding(message)
-            again = frozenset(self._kept(self._keys.answered_before))
+            again = frozenset(self._stored(self._keys.answered_before))
             if finding.path_id in again:
                 self._board.put(self._keys.answered_before, again - {finding.path_id})
             before = next((one for one in reversed(self.findings) if one.path_id == finding.path_id), None)
@@ -204,36 +203,35 @@ class Findings:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The findings so far."""
-        return self._kept(self._keys.findings)
+        """Findings so far."""
+        return self._stored(self._keys.findings)
 
     @property
     def said(self) -> tuple[Said, ...]:
-        """What was said so far."""
-        return self._kept(self._keys.said)
+        """Sentences that the robot has said so far."""
+        return self._stored(self._keys.said)
 
-    def _kept(self, key: str) -> tuple[Any, ...]:
-        kept: tuple[Any, ...] = self._board.get(key) if key in self._board else ()
-        return kept
+    def _stored(self, key: str) -> tuple[Any, ...]:
+        stored: tuple[Any, ...] = self._board.get(key) if key in self._board else ()
+        return stored
 
 
 def _finding(message: Mapping[str, Any]) -> Finding:
     answer = message.get("answer")
     plain = answer if answer is None or isinstance(answer, bool | str | int | float) else str(answer)
     plain = str(plain) if isinstance(plain, float) and not math.isfinite(plain) else plain
-    texts = (str(message.get(name, "")) for name in ("node", "question", "message"))
-    path_id, question, sentence = texts
+    path_id, question, sentence = (str(message.get(name, "")) for name in ("node", "question", "message"))
     return Finding(path_id, float(message["t"]), question, plain, sentence or str(answer))
 
 
 def claim(message: str, findings: Sequence[Finding], skipped: Sequence[str] = ()) -> str:
-    """What a mission that gave answers claims: the answers, then what was skipped, or else its own `message`."""
+    """Text of a claim: the answers of the mission, then the skipped steps, or else its own `message`."""
     after = f"skipped: {'; '.join(skipped)}" if skipped else message
     return "; ".join(filter(None, (findings_in_words(findings), after)))
 
 
 def findings_in_words(findings: Sequence[Finding]) -> str:
-    """The answers in a row: one in its own words, several briefly, each sentence once; "and N more" for the rest."""
+    """Text of the answers: one in full, several in short, each sentence once, and "and N more" for the rest."""
     counts = Counter(finding.sentence for finding in findings)
     if len(counts) == 1 and len(findings) == 1:
         return findings[0].sentence
@@ -248,6 +246,6 @@ def findings_in_words(findings: Sequence[Finding]) -> str:
 
 
 def _brief(sentence: str) -> str:
-    """ "no: no hammer in the office" without its first word."""
+    """Shortens "no: no hammer in the office" by its first word."""
     denied = sentence.removeprefix("no: ")
     return denied if denied.startswith(_DENIALS) else sentence

@@ -1,4 +1,4 @@
-"""How missions and runs end: by themselves, or by what stops them."""
+"""Outcomes of missions and runs, and the endings that stop them."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from skills.robot import LeaseError, Pose2D
 
 
 class Outcome(enum.Enum):
-    """The end of a mission, the worst last."""
+    """Outcome of a mission; the worst comes last."""
 
-    SUCCESS = "success"  # all that was asked for is done, as far as the tree knows
+    SUCCESS = "success"  # everything is done, as far as the tree knows
     FAILURE = "failure"  # something could not be done
     CANCELLED = "cancelled"  # somebody stopped it
     ERROR = "error"  # a defect: an exception, a hung verb
@@ -27,7 +27,7 @@ class Outcome(enum.Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One answer that a mission gave, or was given: by which node, when (s on the robot's clock), and in words."""
+    """Answer that a node of a mission gave or received at `t_s` (robot's clock), as a value and as a sentence."""
 
     path_id: str
     t_s: float
@@ -38,7 +38,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Said:
-    """Something that the robot said or `asked`, and when it began to (s on the robot's clock)."""
+    """Sentence that the robot began to say, or `asked`, at `t_s` (s on the robot's clock)."""
 
     t_s: float
     text: str
@@ -47,10 +47,10 @@ class Said:
 
 @dataclass(frozen=True)
 class Execution:
-    """One time that a part of a mission ran, from `began_s` to `ended_s` (s on the robot's clock; None: not over).
+    """One execution of a part of a mission, from `began_s` to `ended_s` (s on the robot's clock; None: not over).
 
-    It is `done` when it succeeded and nothing that holds it failed or was stopped in that time: what a failed branch,
-    attempt or round did was done in vain.
+    It is `done` when it succeeded and no node above it failed or was stopped in that time: the work of a failed branch,
+    attempt or round does not count.
     """
 
     path_id: str
@@ -61,7 +61,7 @@ class Execution:
 
 @dataclass(frozen=True)
 class Ending:
-    """An end that a tree did not come to by itself."""
+    """End of a mission that its tree did not reach by itself."""
 
     outcome: Outcome
     cause: Cause
@@ -70,12 +70,13 @@ class Ending:
 
 @dataclass(frozen=True)
 class RobotResult:
-    """How one robot's mission ended, of its `tree` or of the one that took its place, and the last state of its nodes.
+    """Result of one robot's mission, or of the mission that took its place, with the last states of its nodes.
 
-    `answers` has the last answer of each node to a status check by path id, `findings` all answers in order, and `said`
-    what the robot said. `preempting` are the results of the missions that came in between, in the order of their ends.
-    `stepped_aside` when the robot made way for another after its end. `executions` tells when each part of the mission
-    ran, and `moved_s` when a skill that may drive last did (s on the robot's clock; None: never).
+    `answers` has the last answer of each status check by the path id of its node, `findings` has all answers in order,
+    and `said` what the robot said. `preempting` has the results of the missions that came in between, in the order of
+    their ends. `stepped_aside` is set when the robot cleared a reserved path after its mission. `executions` has the
+    times at which the parts of the mission ran; `moved_s` is the time at which a skill that may drive last ran (s on
+    the robot's clock; None: never).
     """
 
     tree: CompiledTree
@@ -93,19 +94,19 @@ class RobotResult:
 
     @property
     def robot_name(self) -> str:
-        """The robot's name."""
+        """Name of the robot."""
         return self.tree.robot_name
 
     def message_of_end(self) -> Mapping[str, object]:
-        """What the log says of it."""
+        """Message of the log about the end of the mission."""
         end = {"robot": self.robot_name, "outcome": self.outcome, "cause": self.cause, "message": self.message}
         return {**end, "answers": self.answers}
 
 
 @dataclass(frozen=True)
 class RobotStatus:
-    """A robot at one moment: where it believes to be (world frame; None when lost), whether it holds something, and
-    its battery's charge (0 to 1; None: not asked for)."""
+    """Status of a robot at one moment: its estimated pose (world frame; None: not localised), whether its gripper holds
+    an object, and the charge of its battery (0 to 1; None: not read)."""
 
     pose: Pose2D | None
     holding: bool
@@ -114,10 +115,10 @@ class RobotStatus:
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a run ended. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall's.
+    """Result of a run. Times in seconds: `sim_time_s` on the robots' clock, `wall_time_s` on the wall clock.
 
-    `overruns` counts the ticks that took longer on the wall clock than the tick period; `work` is what was computed, by
-    name.
+    `overruns` counts the ticks that took longer on the wall clock than the tick period; `work` has the counters of what
+    was computed, by name.
     """
 
     robots: tuple[RobotResult, ...]
@@ -129,23 +130,23 @@ class RunResult:
 
     @property
     def trees(self) -> Mapping[str, CompiledTree]:
-        """The trees of the missions by robot."""
+        """Trees of the missions by the robot's name."""
         return {each.robot_name: each.tree for each in self.robots}
 
     @property
     def worst(self) -> RobotResult:
-        """The robot that ended worst, the first by name among equals."""
+        """Result of the robot with the worst outcome, the first by name among equals."""
         order = list(Outcome)
         return max(self.robots, key=lambda result: order.index(result.outcome))
 
     @property
     def outcome(self) -> Outcome:
-        """Success only when all robots succeeded."""
+        """Outcome of the whole run: success only when all robots succeeded."""
         return self.worst.outcome
 
 
 def ending_of(stop: BaseException, publish: Publish) -> Ending:
-    """The end of a mission that an exception stopped; the trace of a defect is logged."""
+    """Returns the ending for an exception that stopped a mission; logs the traceback of a defect."""
     for kind, (outcome, cause, sentence) in _ENDINGS.items():
         if isinstance(stop, kind):
             return Ending(outcome, cause, str(stop) or sentence)

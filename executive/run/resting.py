@@ -1,4 +1,4 @@
-"""Robots without work in a run of several: each stands where it is, and clears ways that others reserve."""
+"""Robots without work in a run of several: each stands where it is, and clears paths that others reserve."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _LOOK_S = 0.5
 
 
 class SteppingAside:
-    """Drives one robot to a waiting place whenever it stands in a way that another has reserved. It stays there."""
+    """Driver of a robot without work: to a waiting place whenever it stands in a path that another has reserved."""
 
     def __init__(self, context: SkillContext) -> None:
         self._context, self._skill = context, Navigate(context)
@@ -29,21 +29,21 @@ class SteppingAside:
         self.moved = False
 
     def step(self) -> None:
-        """One tick. Raises what the robot's verbs raise."""
+        """Runs one tick. Raises the errors of the robot's verbs."""
         if not self.drives:
-            self._begin_where_asked()
+            self._clear_path()
         elif not isinstance(self._skill.step(), Running):
             self.end()
 
     def end(self) -> None:
-        """Stand. Idempotent; raises what the robot's verbs raise."""
+        """Ends the drive. Idempotent; raises the errors of the robot's verbs."""
         if self.drives:
             self.drives = False
             self._due_s = self._context.clock.now() + _LOOK_S
             self._skill.end()
 
-    def _begin_where_asked(self) -> None:
-        """Sets off where somebody who goes first needs the place, and there is another to go to."""
+    def _clear_path(self) -> None:
+        """Drives off when a robot with the right of way needs the space, and another place is free."""
         if self._context.clock.now() < self._due_s or not self._context.localiser.estimate().localised:
             return
         self._due_s = self._context.clock.now() + _LOOK_S
@@ -67,7 +67,7 @@ class _Robot:
 
 @dataclass
 class Resting:
-    """The robots of a run that have no work now: they wait for their turn, are done, or were given none.
+    """Robots of a run that have no work now: they wait for their turn, are done, or never had a mission.
 
     A robot whose verbs fail is left alone from then on.
     """
@@ -79,16 +79,16 @@ class Resting:
     _robots: dict[str, _Robot] = field(default_factory=dict)
 
     def wait(self, who: RunRobot) -> None:
-        """A robot whose mission has not begun; the run senses for it."""
+        """Adds a robot whose mission waits for others; the run updates its estimators."""
         if who.name not in self._robots:
             self._begin(who, who.context, own_lease=False)
 
     def rest(self, who: RunRobot) -> None:
-        """A robot whose lease nobody holds, since its mission is over or it has none; it is sensed for as well."""
+        """Adds a robot without a mission, claims its free lease, and updates its estimators from now on."""
         who.attempt("resting", lambda: self._begin(who, who.claim(), own_lease=True))
 
     def leave(self, name: str) -> None:
-        """The robot has work again, or the run is over. Idempotent; raises nothing."""
+        """Removes a robot that has work again, or whose run is over. Idempotent; raises nothing."""
         robot = self._robots.pop(name, None)
         if robot is None:
             return
@@ -101,12 +101,12 @@ class Resting:
             robot.who.stop_and_leave()
 
     def close(self) -> None:
-        """The run is over."""
+        """Removes all robots."""
         for name in tuple(self._robots):
             self.leave(name)
 
     def tick(self, held: Callable[[str], bool]) -> None:
-        """One tick of all, in the order of their names; those that are held stand."""
+        """Runs one tick of all robots in the order of their names; robots that are held stand."""
         for name, robot in sorted(self._robots.items()):
             step = partial(self._step, robot, hold=held(name))
             with self.watchdog.over_tick(name, self.tick_limit_s):
@@ -119,17 +119,13 @@ class Resting:
 
     def _step(self, robot: _Robot, *, hold: bool) -> None:
         if robot.own_lease:
-            self._look_out(robot)
+            now_s = robot.who.context.clock.now()
+            if robot.aside.drives or now_s >= robot.sense_due_s:  # a robot that stands senses seldom
+                robot.sense_due_s = now_s + _LOOK_S
+                robot.who.sense()
+            else:
+                self.table.heard(robot.who.name, robot.who.context.known_pose())
         if hold:
             robot.aside.end()
         else:
             robot.aside.step()
-
-    def _look_out(self, robot: _Robot) -> None:
-        """Brings the estimators up to date, seldom while the robot stands; it is there all the same."""
-        context = robot.who.context
-        if robot.aside.drives or context.clock.now() >= robot.sense_due_s:
-            robot.sense_due_s = context.clock.now() + _LOOK_S
-            robot.who.sense()
-        else:
-            self.table.heard(robot.who.name, context.known_pose())

@@ -16,7 +16,7 @@ import numpy as np
 from executive.record.work import CountedDetector
 from executive.run.outcome import RobotStatus
 from executive.run.visitor import RunEntry, RunShared
-from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog, done_aside, hung
+from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog, call_aside, hung
 from executive.run.worker import in_lock_step_job
 from executive.tree.board import Board
 from executive.tree.context import RunContext
@@ -150,7 +150,7 @@ class GuardedRobot:
             if verb in _NEVER_CHANGING:
                 return call()
             raise RuntimeError(f"'{verb}' was called inside a job: read the robot before, or by `Worker.sense`")
-        return call() if verb == "image" else done_aside(call, verb, limit_s)
+        return call() if verb == "image" else call_aside(call, verb, limit_s)
 
 
 class RunRobot:
@@ -304,18 +304,6 @@ def _image(it: Image) -> str | None:
     return None
 
 
-def _battery(it: Battery) -> str | None:
-    return None if 0.0 <= it.charge <= 1.0 else f"a charge of {it.charge}"
-
-
-def _faults(it: tuple[Any, ...]) -> str | None:
-    return None if all(isinstance(fault, str) for fault in it) else f"faults {it!r:.80}"
-
-
-def _status(it: CommandStatus) -> str | None:
-    return None if isinstance(it.state, CommandState) else f"a state of {it.state!r:.40}"
-
-
 _COMMAND: Final = _typed(int)
 _LEASE: Final = _typed(Lease)
 _CHECKS: Final[Mapping[str, Check]] = {
@@ -326,10 +314,12 @@ _CHECKS: Final[Mapping[str, Check]] = {
     "image": _reading(Image, _image),
     "joints": _reading(Joints),
     "gripper": _reading(Gripper),
-    "battery": _reading(Battery, _battery),
-    "faults": _typed(tuple, _faults),
+    "battery": _reading(Battery, lambda it: None if 0.0 <= it.charge <= 1.0 else f"a charge of {it.charge}"),
+    "faults": _typed(tuple, lambda it: None if all(isinstance(one, str) for one in it) else f"faults {it!r:.80}"),
     **dict.fromkeys(("drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "stop"), _COMMAND),
-    "command_status": _typed(CommandStatus, _status),
+    "command_status": _typed(
+        CommandStatus, lambda it: None if isinstance(it.state, CommandState) else f"a state of {it.state!r:.40}"
+    ),
     "lease_holder": _or_none(_LEASE),
     "acquire_lease": _LEASE,
     "take_lease": _LEASE,

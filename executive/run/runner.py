@@ -78,7 +78,7 @@ def run(
 
 
 class _AllAtOnce(Assigner):
-    """Assigns all missions at the beginning."""
+    """Assigner of all missions at the beginning."""
 
     def __init__(self, entries: Sequence[RunEntry]) -> None:
         self._entries = sorted(entries, key=lambda entry: entry.robot.name)
@@ -182,7 +182,10 @@ class _Run:
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
             session.guarded(session.sense)
-        self._publish_paths()
+        if self._clock.now() >= self._paths_due_s:
+            self._paths_due_s = self._clock.now() + _PATHS_PERIOD_S
+            for path in self._traffic.news():
+                self._visitors.publish(RESERVED_PATH, path)
         turn = [session for session in live if session.result is None and session.has_its_turn(self._results)]
         free = [session for session in turn if session.guarded(session.may_move)]
         self._rest(live, turn, requests.held)
@@ -192,7 +195,10 @@ class _Run:
         tick_wall_s = time.perf_counter() - began_wall_s
         self._overruns += tick_wall_s > self._settings.tick_period_s
         self._note_ends(live)
-        progress = self._progress(notes, tick_wall_s)
+        states = {name: session.states for name, session in self._sessions.items()}
+        trees = {name: session.tree for name, session in self._sessions.items()}
+        counts, seen = (self._ticks, self._overruns), dict(self._seen)
+        progress = Progress(self._clock.now(), *counts, states, trees, seen, notes, tick_wall_s)
         for each in self._visitors:
             each.tick(progress)
         self._report_ends()
@@ -241,13 +247,6 @@ class _Run:
             session.cancel(ending, self._settings.endings_limit_s)
             if at_once:
                 session.close(ending)
-
-    def _publish_paths(self) -> None:
-        """Logs the reserved paths that changed, twice a second."""
-        if self._clock.now() >= self._paths_due_s:
-            self._paths_due_s = self._clock.now() + _PATHS_PERIOD_S
-            for path in self._traffic.news():
-                self._visitors.publish(RESERVED_PATH, path)
 
     def _rest(self, live: Sequence[Session], turn: Sequence[Session], held: Callable[[str], bool]) -> None:
         """Lets robots without a mission, and those that wait for others, clear reserved paths."""
@@ -325,12 +324,6 @@ class _Run:
             session.close(Ending(Outcome.CANCELLED, Cause.CANCELLED, why[session.name]))
         self._note_ends(recalled)
         self._report_ends()
-
-    def _progress(self, notes: Mapping[str, TickNote], tick_wall_s: float) -> Progress:
-        states = {name: session.states for name, session in self._sessions.items()}
-        trees = {name: session.tree for name, session in self._sessions.items()}
-        now_s, seen = self._clock.now(), dict(self._seen)
-        return Progress(now_s, self._ticks, self._overruns, states, trees, seen, notes, tick_wall_s)
 
     def _keep_pace(self, begun_wall_s: float) -> None:
         """Waits, so that simulated time does not run ahead of people who have something to decide."""

@@ -1,4 +1,4 @@
-"""One mission's tree under way: ticked, suspended, stopped, its changes logged, its end judged."""
+"""Run of one mission's tree: ticks, suspension, stops, the log of its changes, and its result."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Attempt = Callable[[str, Callable[[], object]], bool]
 
 
 class TreeRun:
-    """One tree, built and ticked. Its nodes' last states are in `states`."""
+    """Run of one tree; `states` has the last states of its nodes."""
 
     def __init__(self, tree: CompiledTree, context: RunContext, visitors: Visitors) -> None:
         self.tree = tree
@@ -66,22 +66,22 @@ class TreeRun:
 
     @property
     def finished(self) -> bool:
-        """True when the tree has come to an end, and all is done that is always done in the end."""
+        """Returns whether the tree has ended, and all steps under `always` are done."""
         return self.root.status in (Status.SUCCESS, Status.FAILURE) and self.context.endings.due is None
 
     @property
     def waits_for_people(self) -> bool:
-        """True while a node waits for somebody to press a button."""
+        """Returns whether a node waits for somebody to press a button."""
         return any(node.status is Status.RUNNING for node in self._for_buttons)
 
     @property
     def ends(self) -> bool:
-        """True while it only does what is always done in the end, since it was ended early."""
+        """Returns whether it was ended early and still runs its steps under `always`."""
         return self._ended_early and self.context.endings.due is not None
 
     @property
     def waiting_at(self) -> str | None:
-        """The path id of the breakpoint that a node waits at."""
+        """Path id of the breakpoint at which a node waits."""
         return next((path_id for path_id, gate in self._gates.items() if gate.waiting), None)
 
     def show(self) -> None:
@@ -90,13 +90,13 @@ class TreeRun:
         self.context.publish(TREE, {"robot": self.tree.robot_name, "root": structure})
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
-        """Tick once and log what changed; True when anything did."""
+        """Ticks once and logs the changes; returns whether anything changed."""
         self._breakpoints = breakpoints
         if not breakpoints <= self._gates.keys():
             for node in self._observed.nodes:
                 path_id = node.path_id if isinstance(node, Explained) else None
                 if path_id in breakpoints and path_id is not None and path_id not in self._gates:
-                    self._gates[path_id] = Gate(node, self._closed(path_id))
+                    self._gates[path_id] = Gate(node, lambda path_id=path_id: path_id in self._breakpoints)  # type: ignore[misc]
         self._tick()
         self._changes = self.log_changes()
         for path_id, _, after in (change for change in self._changes if change.path_id in self._skills):
@@ -108,12 +108,12 @@ class TreeRun:
         return bool(self._changes)
 
     def note(self, *, ticked: bool) -> TickNote:
-        """What the last tick brought; of a mission that another comes before, nothing was `ticked`."""
+        """Returns the note of the last tick; a mission that another one preempts was not `ticked`."""
         context, changes = self.context, self._changes
         now_s, board = context.clock.now(), context.board.values()
         if not ticked:
             return TickNote(self.tree, now_s, (), board, None, {})
-        checkpoints = {path_id: kept for path_id, leaf in self._running.items() if (kept := leaf.checkpoint)}
+        checkpoints = {path_id: point for path_id, leaf in self._running.items() if (point := leaf.checkpoint)}
         pose = charge = None
         if changes or now_s >= self._pose_due_s:
             self._pose_due_s, pose = now_s + POSE_NOTE_PERIOD_S, context.known_pose()
@@ -121,7 +121,7 @@ class TreeRun:
         return TickNote(self.tree, now_s, changes, board, pose, checkpoints, charge)
 
     def _tick(self) -> None:
-        """Ticks the tree; or, while the rest of it stands still, what a node that was stopped was still to do."""
+        """Ticks the tree, or suspends it and ticks the steps under `always` of a stopped node."""
         endings = self.context.endings
         due = endings.due
         if due is None:
@@ -143,35 +143,36 @@ class TreeRun:
             self._executions.visited(node, stopped)
 
     def end_early(self) -> None:
-        """Stops the tree where it is, and do no more of it than what is always done in the end."""
+        """Stops the tree where it is; only its steps under `always` still run."""
         if not self._ended_early and not self.finished:
             self.root.stop(Status.INVALID)
             self._ended_early = True
 
     def suspend(self) -> None:
-        """Keeps the place and lets go of the robot."""
+        """Suspends all running nodes, which release the robot."""
         suspend(self.root)
 
     @property
     def states(self) -> Snapshot:
-        """What every node said last."""
+        """Last states of all nodes by path id."""
         return self._observed.states
 
     def log_changes(self, *, of_all: bool = False) -> Sequence[Change]:
-        """Logs the transitions since the last time, and what running skills do by now; the transitions."""
+        """Logs and returns the transitions since the last call, and logs new actions of running skills."""
         changes = self._observed.changes(of_all=of_all)
         transitions = [change for change in changes if change.is_transition]
-        for change in transitions:
-            self.context.publish(TRANSITIONS, self._transition(change))
+        for path_id, before, after in transitions:
+            states = {"from": before.status.value, "to": after.status.value, "cause": after.cause}
+            self.context.publish(TRANSITIONS, {**self._activity(path_id, after), **states})
         for change in changes:
             if change.path_id in self._skills and change.is_activity:
                 self.context.publish(ACTIVITY, self._activity(change.path_id, change.after))
         return transitions
 
     def halt(self, attempt: Attempt) -> None:
-        """Stops all that runs; results that are there stay in sight. Also after an exception in the middle of a tick.
+        """Stops all running nodes, also after an exception in the middle of a tick; results stay visible.
 
-        Each part is done through `attempt`, so that a defect in one does not keep the others from being done.
+        Each part is called through `attempt`, so that a defect in one does not prevent the others.
         """
         for node in self.context.endings.close():
             self._endings.append(f"in the end, broken off: {message_of(node)}")
@@ -183,7 +184,7 @@ class TreeRun:
         self.log_changes(of_all=True)
 
     def judge(self, ending: Ending | None, preempting: tuple[RobotResult, ...] = ()) -> RobotResult:
-        """How it ended: by itself, else by `ending`."""
+        """Returns the result of the mission: the tree's own end, else `ending`."""
         root = self.root
         cause = root.cause if isinstance(root, Explained) else None
         message = root.message if isinstance(root, Explained) else root.feedback_message
@@ -203,7 +204,9 @@ class TreeRun:
         if findings and outcome is Outcome.SUCCESS:
             skips = (node for node in self._observed.nodes if isinstance(node, Skip) and node.status is Status.SUCCESS)
             skipped = [f"{node.step} ({node.skipped})" for node in skips if node.skipped is not None]
-            message = claim("" if self._tells_nothing_more() else message, findings, skipped)
+            last = self.tree.parts[-1] if self.tree.parts else None
+            only_answers = last is None or last.goal is None or last.goal.kind in _GOALS_WITHOUT_NEWS
+            message = claim("" if only_answers else message, findings, skipped)
         elif findings and outcome is Outcome.FAILURE:
             message = f"{message} (found out: {findings_in_words(findings)})"
         return RobotResult(
@@ -220,37 +223,19 @@ class TreeRun:
             moved_s=self._executions.moved_s,
         )
 
-    def _tells_nothing_more(self) -> bool:
-        """Whether the last sentence of a mission that gave answers is one of them, or merely where the robot stands."""
-        last = self.tree.parts[-1] if self.tree.parts else None
-        plain = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN)
-        return last is None or last.goal is None or last.goal.kind in plain
-
-    def _closed(self, path_id: str) -> Callable[[], bool]:
-        return lambda: path_id in self._breakpoints
-
-    def _transition(self, change: Change) -> dict[str, object]:
-        after = change.after
-        return {
-            **self._activity(change.path_id, after),
-            "from": change.before.status.value,
-            "to": after.status.value,
-            "cause": after.cause,
-        }
-
     def _activity(self, path_id: str, state: NodeState) -> dict[str, object]:
         now_s = round(self.context.clock.now(), 6)
         return {"t": now_s, "robot": self.tree.robot_name, "node": path_id, "message": state.message}
 
 
 class Gate:
-    """A breakpoint before one node. While `closed()`, a tick that would begin the node makes it wait instead, once.
+    """Breakpoint before one node. While `closed()`, a tick that would begin the node makes it wait instead, once.
 
-    The next tick lets it pass; so whoever watches `waiting` must see to it that there is none too soon.
+    The next tick lets it pass, so the runner pauses as soon as the gate is `waiting`.
     """
 
     def __init__(self, node: Behaviour, closed: Callable[[], bool]) -> None:
-        """Stand before `node` from now on."""
+        """Wraps the `tick` of `node`."""
         self.node, self._closed = node, closed
         self._pass_on: Callable[[], Iterator[Behaviour]] = node.tick
         self.waiting = False
@@ -262,16 +247,14 @@ class Gate:
         if waited:
             node.status = Status.INVALID
         elif node.status != Status.RUNNING and self._closed():
-            self._wait()
+            self.waiting, node.status = True, Status.RUNNING
+            if isinstance(node, Explained):
+                node.cause, node.message = None, "waits at the breakpoint"
             yield node
             return
         yield from self._pass_on()
 
-    def _wait(self) -> None:
-        self.waiting = True
-        self.node.status = Status.RUNNING
-        if isinstance(self.node, Explained):
-            self.node.cause, self.node.message = None, "waits at the breakpoint"
-
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}
+_GOALS_WITHOUT_NEWS = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN)
+"""Goals of a last step after which the claim is the answers alone: it would repeat one, or say where the robot is."""

@@ -1,4 +1,4 @@
-"""What a run is given, and what it tells those who watch it: the log, a page, the store, counters, whoever assigns."""
+"""Inputs of a run, and the visitors that watch it: log, page, store, counters, and the assigner of missions."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from skills.stack import RobotStack, default_stack
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One robot with its tree, estimators, detector and stack.
+    """Robot with its tree, estimators, detector and stack.
 
-    The mission begins when the robots `after` have done theirs, and cannot when one of them fails; whoever asked for it
-    stands at `speaker_W` (world frame; None: where the robot begins).
+    The mission begins when the robots `after` have succeeded with theirs, and fails when one of them fails. The person
+    who asked for it stands at `speaker_W` (world frame; None: where the robot begins).
     """
 
     tree: CompiledTree
@@ -43,11 +43,11 @@ class RunEntry:
 
 @dataclass(frozen=True)
 class RunSettings:
-    """Seed, tick period and limits. `time_limit_s` counts the robots' clock for the whole run, without pauses, and
-    `endings_limit_s` what missions that were cancelled always do in the end. `time_of_day_s` is the time of day (s
-    after midnight) at which the run begins; None: what it is on this machine.
+    """Seed, tick period and limits of a run.
 
-    The other limits are the watchdog's, on the wall clock: for one verb, for taking a picture, for one robot's tick.
+    `time_limit_s` limits the whole run on the robots' clock, without pauses, and `endings_limit_s` the steps under
+    `always` of cancelled missions. `time_of_day_s` is the time of day (s after midnight) at which the run begins (None:
+    the time of this machine). The watchdog's limits count the wall clock: for one verb, one picture, one robot's tick.
     """
 
     seed: int = 0
@@ -62,11 +62,11 @@ class RunSettings:
 
 @dataclass(frozen=True)
 class TickNote:
-    """What a tick brought of the mission that a robot began with, or that took its place; not the halt at its end.
+    """Note of one tick of the mission that a robot began with, or that took its place; the halt at its end has none.
 
-    `changes` are the nodes that changed, `board` all values on the blackboard, and `checkpoints` those of the running
-    skills by path id. `pose` is X_WB, given with changes and once a second while the robot is localised, else None;
-    `charge` is the battery's (0 to 1), given as often as the pose.
+    `changes` are the nodes that changed, `board` has all values on the blackboard, and `checkpoints` those of the
+    running skills by path id. `pose` is X_WB, noted with changes and once a second while the robot is localised, else
+    None; `charge` is the battery's (0 to 1), noted as often as the pose.
     """
 
     tree: CompiledTree
@@ -80,10 +80,10 @@ class TickNote:
 
 @dataclass(frozen=True)
 class Progress:
-    """The state of a run after each tick: node states and mission of each robot, and how it was seen in the last 0.5 s.
+    """State of a run after a tick: node states, mission and status of each robot (not older than 0.5 s).
 
-    `notes` has the robots whose trees were ticked. Computing the tick took `tick_wall_s` on the wall's clock, which was
-    too long `overruns` times so far.
+    `notes` has the robots whose trees were ticked. The tick took `tick_wall_s` on the wall clock; `overruns` counts the
+    ticks that took too long so far.
     """
 
     now_s: float
@@ -98,9 +98,9 @@ class Progress:
 
 @dataclass(frozen=True)
 class MissionEnd:
-    """How one robot's mission ended, and how the robot was last seen (None: never).
+    """End of one robot's mission, with the robot's last status (None: never read).
 
-    `gone` is why nothing more is asked of this robot in the run: it does not answer, or its lease is another's.
+    `gone` is the reason why the run leaves the robot alone from now on: it does not answer, or its lease is lost.
     """
 
     result: RobotResult
@@ -109,45 +109,45 @@ class MissionEnd:
 
 
 class RunVisitor:
-    """Watches a run, which calls its visitors in the order of their list. Each method does nothing by itself."""
+    """Base class of a run's visitors; the run calls them in the order of their list. Each method does nothing here."""
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """The run begins. What this raises, `run` raises: no robot has been touched yet."""
+        """Handles the beginning of the run, before any robot is used; `run` raises the errors of this method."""
 
     def mission_begun(self, nodes: Sequence[Behaviour], context: RunContext) -> None:
-        """A tree of these nodes, parents first, is about to be ticked for the first time."""
+        """Handles a new tree of these nodes, parents first, before its first tick."""
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Something was published. Returns it, perhaps with more in it, for the visitors that come after."""
+        """Handles a published message; returns it, perhaps extended, for the visitors that come after."""
         return message
 
     def tick(self, progress: Progress) -> None:
-        """A tick has passed."""
+        """Handles the state of the run after a tick."""
 
     def mission_ended(self, end: MissionEnd) -> None:
-        """A robot's mission has come to an end, after the tick that ended it was told."""
+        """Handles the end of a robot's mission, after the `tick` that ended it."""
 
     def end(self, result: RunResult) -> None:
-        """The run is over and all robots stand."""
+        """Handles the end of the run, when all robots stand."""
 
 
 class Assigner(RunVisitor):
-    """Assigns missions to robots while a run goes on; the run's first visitor."""
+    """Assigner of missions to robots during a run; the run's first visitor."""
 
     def assign(self) -> Sequence[RunEntry]:
-        """The missions that begin now, each for a robot that has none; called before each tick.
+        """Returns the missions that begin now, each for a robot that has none; called before each tick.
 
-        The run ends when there is none, and none is under way.
+        The run ends when it returns no mission, and no mission is under way.
         """
         raise NotImplementedError
 
     def recall(self, seen: Mapping[str, RobotStatus]) -> Mapping[str, str]:
-        """The robots whose missions end now, and why, by how all were last seen."""
+        """Returns the robots whose missions end now, with the reasons; `seen` has the last status of all robots."""
         return {}
 
 
 class Visitors:
-    """All visitors of a run, in order. While the run is `ending`, a broken log keeps no robot from being stopped."""
+    """All visitors of a run, in order. While the run is `ending`, errors of visitors are ignored."""
 
     def __init__(self, visitors: Sequence[RunVisitor]) -> None:
         self._all = tuple(visitors)
@@ -158,7 +158,7 @@ class Visitors:
         return iter(self._all)
 
     def publish(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Tells all of a message. Raises what a visitor raises, but not while the run is ending."""
+        """Passes a message to all visitors. Raises their errors, but not while the run is ending."""
         try:
             for read in self._readers:
                 message = read(topic, message)
@@ -169,7 +169,7 @@ class Visitors:
 
 @dataclass
 class RunShared:
-    """What all robots of a run share. `day_began_s` is the time of day (s after midnight) at the clock's zero."""
+    """Objects that all robots of a run share; `day_began_s` is the time of day (s after midnight) at clock zero."""
 
     clock: Clock
     worker: Worker
@@ -182,9 +182,9 @@ class RunShared:
     day_began_s: float = field(init=False)
 
     def __post_init__(self) -> None:
-        limits, told_s = self.settings, self.settings.time_of_day_s
+        limits, begin_s = self.settings, self.settings.time_of_day_s
         self.traffic = TrafficTable({}, self.clock.now)
         self.watchdog = Watchdog(min(limits.verb_limit_s, limits.image_limit_s, limits.tick_limit_s))
         now = time.localtime()
         here_s = 3600.0 * now.tm_hour + 60.0 * now.tm_min + now.tm_sec
-        self.day_began_s = (here_s if told_s is None else told_s) - self.clock.now()
+        self.day_began_s = (here_s if begin_s is None else begin_s) - self.clock.now()

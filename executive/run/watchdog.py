@@ -1,4 +1,4 @@
-"""A watchdog on the wall's clock over the verbs of a robot and over ticks: what hangs ends the run."""
+"""Watchdog on the wall clock over a robot's verbs and over ticks: one that hangs ends the run."""
 
 from __future__ import annotations
 
@@ -23,26 +23,23 @@ _LONGEST_PERIOD_S: Final = 0.25
 
 
 class VerbHung(BaseException):
-    """A verb of the Robot protocol, or a tick, did not come back in time.
-
-    Like KeyboardInterrupt, no skill may swallow it.
-    """
+    """Verb of the Robot protocol, or tick, that did not return in time; like KeyboardInterrupt, no skill catches it."""
 
     stops_run: Final = True
 
 
 class Watchdog:
-    """Raises `VerbHung` in the main thread when a verb or a tick takes too long there; a context manager.
+    """Context manager that raises `VerbHung` in the main thread when a verb or a tick takes too long there.
 
-    To watch costs two assignments: `verb` and `tick` hold what is under way as (due time, sentence). A thread compares
-    them with the wall's clock and interrupts the main thread by SIGALRM; an alarm of somebody else goes to its handler.
+    A call costs two assignments: `verb` and `tick` hold the calls under way as (due time, sentence). A thread compares
+    them with the wall clock and interrupts the main thread by SIGALRM; other alarms go to the handler from before.
 
-    What this cannot do: compiled code is interrupted only when it returns to Python, and outside the main thread
-    nothing is interrupted; see `done_aside`.
+    Compiled code is interrupted only when it returns to Python, and only the main thread is interrupted; see
+    `call_aside` for others.
     """
 
     def __init__(self, shortest_limit_s: float = VERB_LIMIT_S) -> None:
-        """`shortest_limit_s` of those to watch says how often is looked."""
+        """`shortest_limit_s` of all limits determines the period of the checks."""
         self.verb: tuple[float, str] | None = None
         self.tick: tuple[float, str] | None = None
         self._period_s = min(shortest_limit_s / _LOOKS_PER_LIMIT, _LONGEST_PERIOD_S)
@@ -66,7 +63,7 @@ class Watchdog:
 
     @contextmanager
     def over_tick(self, robot_name: str, limit_s: float) -> Iterator[None]:
-        """Break off a tick that takes longer than its limit: a skill in an endless loop."""
+        """Interrupts a tick that takes longer than its limit, such as a skill in an endless loop."""
         self.tick = (time.monotonic() + limit_s, f"a tick of {robot_name} took longer than {limit_s:g} s")
         try:
             yield
@@ -82,7 +79,7 @@ class Watchdog:
                 signal.pthread_kill(main, signal.SIGALRM)
 
     def _overdue(self) -> str | None:
-        """The sentence of what has taken too long; the tick before the verb in it."""
+        """Sentence of the overdue tick, else of the overdue verb, else None."""
         now_s = time.monotonic()
         return next((what for due_s, what in filter(None, (self.tick, self.verb)) if now_s >= due_s), None)
 
@@ -96,15 +93,15 @@ class Watchdog:
 
 
 def hung(verb: str, limit_s: float) -> str:
-    """What is said of a verb that did not come back."""
+    """Sentence for a verb that did not return in time."""
     return f"the robot did not answer '{verb}' within {limit_s:g} s"
 
 
-def done_aside(call: Callable[[], ResultT], verb: str, limit_s: float) -> ResultT:
-    """The call's result, for callers outside the main thread: a thread does it, which is left alone when it hangs.
+def call_aside(call: Callable[[], ResultT], verb: str, limit_s: float) -> ResultT:
+    """Calls a verb in a thread of its own, for callers outside the main thread, and returns the result.
 
-    It may still act when it comes back; by then the run has returned the lease, under which that is refused. Raises
-    VerbHung: it took longer than the limit.
+    A thread that hangs is abandoned; when the call returns later, the robot refuses the motion, since the run has
+    returned the lease by then. Raises VerbHung when the call takes longer than the limit.
     """
     future: Future[ResultT] = Future()
     threading.Thread(target=fulfil, args=(future, call), name=f"errand-{verb}", daemon=True).start()

@@ -1,4 +1,4 @@
-"""The two workers: lock-step for simulation, real time. Both do the work in one thread beside the ticks, in order."""
+"""Workers for simulation (lock-step) and for real time. Both run jobs in order, in one thread beside the ticks."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ _Work = tuple[Callable[[], Any], "Future[Any]"]
 
 
 def in_lock_step_job() -> bool:
-    """Returns whether this is called by a job in lock-step, which may touch nothing that the ticks change."""
+    """Returns whether the caller is a job in lock-step, which may use nothing that the ticks change."""
     return threading.current_thread().name == _LOCK_STEP_THREAD
 
 
 class WorkThread:
-    """Does one piece of work after the other; ends when it is closed or let go of."""
+    """Thread that runs one job after the other; it ends when it is closed or deleted."""
 
     def __init__(self, name: str) -> None:
         self._work: SimpleQueue[_Work | None] = SimpleQueue()
         self._closed = False
-        self._thread = threading.Thread(target=_work_off, args=(self._work,), name=name, daemon=True)
+        self._thread = threading.Thread(target=_run_jobs, args=(self._work,), name=name, daemon=True)
         self._thread.start()
 
     def do(self, work: Callable[[], ResultT]) -> Future[ResultT]:
-        """Has `work` done after all that was given before. Raises RuntimeError when closed."""
+        """Runs `work` after all earlier jobs. Raises RuntimeError when the thread is closed."""
         if self._closed:
             raise RuntimeError("the worker is closed")
         future: Future[ResultT] = Future()
@@ -47,7 +47,7 @@ class WorkThread:
         return future
 
     def close(self, wait_s: float) -> None:
-        """Drops what has not begun, and waits so long for what runs; idempotent."""
+        """Drops jobs that have not begun, and waits up to `wait_s` for the running one; idempotent."""
         self._closed = True
         with suppress(Empty):
             while (given := self._work.get_nowait()) is not None:
@@ -60,10 +60,10 @@ class WorkThread:
 
 
 class _NoCollection:
-    """Keeps the process's garbage collector still while any worker is busy.
+    """Context that disables the process's garbage collector while any worker is busy.
 
-    It runs in whichever thread allocates, and what it finds may be an earlier run's renderer, whose graphics context
-    belongs to the main thread: freed by a worker it aborts the process.
+    The collector runs in the thread that allocates, and may free an earlier run's renderer, whose graphics context
+    belongs to the main thread: freed by a worker, it aborts the process.
     """
 
     def __init__(self) -> None:
@@ -86,7 +86,7 @@ class _NoCollection:
 _NO_COLLECTION: Final = _NoCollection()  # one, since a process has one collector
 
 
-def _work_off(given: SimpleQueue[_Work | None]) -> None:
+def _run_jobs(given: SimpleQueue[_Work | None]) -> None:
     for work, future in iter(given.get, None):
         with _NO_COLLECTION:
             if future.set_running_or_notify_cancel():
@@ -95,7 +95,7 @@ def _work_off(given: SimpleQueue[_Work | None]) -> None:
 
 
 def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:
-    """Does the work; the future gets its result, or what it raised."""
+    """Runs the work and sets the future to its result, or to its exception."""
     try:
         future.set_result(work())
     except BaseException as defect:
@@ -104,53 +104,53 @@ def fulfil(future: Future[ResultT], work: Callable[[], ResultT]) -> None:
 
 @dataclass(frozen=True)
 class _ThreadJob(Generic[ResultT]):
-    """Work in the thread."""
+    """Job in a work thread."""
 
     future: Future[ResultT]
 
     def done(self) -> bool:
-        """True once the result may be read."""
+        """Returns whether the result may be read."""
         return self.future.done()
 
     def result(self) -> ResultT:
-        """The result, or what the work raised. Raises RuntimeError before it is done."""
+        """Returns the result, or raises the job's exception. Raises RuntimeError before the job is done."""
         if not self.done():
             raise RuntimeError("the work is not done yet")
         return self.future.result()
 
     def withdraw(self) -> None:
-        """Nobody waits for the result any more; work that has not begun is dropped."""
+        """Withdraws the job: one that has not begun is dropped."""
         self.future.cancel()
 
 
 @dataclass(frozen=True)
 class _LockStepJob(_ThreadJob[ResultT]):
-    """Work whose result shows itself when its time has come; who reads it waits for work that takes longer."""
+    """Job whose result appears at `ready_s` of the robot's clock; reading it waits for a job that takes longer."""
 
     clock: Clock
     ready_s: float
 
     def done(self) -> bool:
-        """True once the declared latency has passed on the robot's clock."""
+        """Returns whether the declared latency has passed on the robot's clock."""
         return self.clock.now() >= self.ready_s - 1e-9
 
     def withdraw(self) -> None:
-        """Nobody waits for the result any more; returns when the work is done, so that what it uses is free."""
+        """Withdraws the job; returns when it is done, so that nothing uses its inputs any more."""
         wait((self.future,))
 
 
 class LockStepWorker:
-    """Starts work at once in a thread beside the plant's steps; its result appears after the declared latency.
+    """Worker for simulation: a job starts at once in a thread, and its result appears after the declared latency.
 
-    Work uses only what was read before it was submitted, so that a seed gives the same run twice. Use it as a context
-    manager or close it: no work outlives the run.
+    A job uses only inputs that were read before it was submitted, so that a seed gives the same run twice. Use it as a
+    context manager or close it: no job outlives the run.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock, self._thread = clock, WorkThread(_LOCK_STEP_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Starts `work`. What it raises is raised by `result`. Raises ValueError for a negative latency."""
+        """Starts `work`, whose exception `result` raises. Raises ValueError for a negative latency."""
         if latency_s < 0.0:
             raise ValueError(f"{name}: a latency of {latency_s} s")
         return _LockStepJob(self._thread.do(work), self._clock, self._clock.now() + latency_s)
@@ -158,7 +158,7 @@ class LockStepWorker:
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Reads the robot's sensors now, in this thread, and starts work on what they gave."""
+        """Reads the robot's sensors now, in this thread, and starts work on the readings."""
         try:
             given = read()
         except Exception as defect:
@@ -168,7 +168,7 @@ class LockStepWorker:
         return self.submit(lambda: work(given), latency_s=latency_s, name=name)
 
     def close(self) -> None:
-        """Drops what has not begun; wait for what runs."""
+        """Drops jobs that have not begun, and waits for the running one."""
         self._thread.close(_PATIENCE_S)
 
     def __enter__(self) -> LockStepWorker:
@@ -179,21 +179,21 @@ class LockStepWorker:
 
 
 class ThreadWorker:
-    """Runs work in one thread beside the ticks, one piece after the other; for real time. Latencies are its own."""
+    """Worker for real time: runs jobs in one thread beside the ticks, one after the other, with their true latency."""
 
     def __init__(self) -> None:
         self._thread = WorkThread(_REAL_TIME_THREAD)
 
     def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """Hand `work` to the thread."""
+        """Starts `work` in the thread."""
         return _ThreadJob(self._thread.do(work))
 
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Lets the thread read the robot's sensors, which may block, and work on what they gave."""
+        """Reads the robot's sensors in the thread, since that may block, and works on the readings there."""
         return self.submit(lambda: work(read()), latency_s=latency_s, name=name)
 
     def close(self) -> None:
-        """Drops what has not begun; what runs is left to end by itself."""
+        """Drops jobs that have not begun; the running one ends by itself."""
         self._thread.close(0.0)

@@ -90,7 +90,7 @@ def test_closing_waits_for_what_runs_drops_the_rest_and_ends_the_thread(clock):
 
 def test_a_job_may_not_touch_the_robot(worker, robot):
     guarded = GuardedRobot(robot, Watchdog())
-    with pytest.raises(RuntimeError, match=r"'odometry' was asked for inside a job"):
+    with pytest.raises(RuntimeError, match=r"'odometry' was called inside a job"):
         worker.submit(guarded.odometry, latency_s=0.0, name="bad").result()
 
 

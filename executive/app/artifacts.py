@@ -17,7 +17,7 @@ import numpy as np
 from executive.record.history import Event
 from executive.record.schemas import DESTINATION, TRANSITIONS
 from executive.run.visitor import RunVisitor
-from executive.store.resuming import told_before
+from executive.store.resuming import is_from_before
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
@@ -88,7 +88,7 @@ class Artifacts(RunVisitor):
             own.detection = own.detection or own.seen
         if topic == ANSWER_TOPIC:
             message = self._shown(message, own)
-        if topic == TRANSITIONS and message["to"] == "SUCCESS" and not told_before(str(message["message"])):
+        if topic == TRANSITIONS and message["to"] == "SUCCESS" and not is_from_before(str(message["message"])):
             name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
             if name is not None:
                 own.moments[name] = float(message["t"])

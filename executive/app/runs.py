@@ -327,7 +327,7 @@ class ResumedMission:
     @property
     def lines(self) -> tuple[str, ...]:
         """Lines for the user on the restored parts of the mission."""
-        return tuple(line for each in self.recollections for line in each.told)
+        return tuple(line for each in self.recollections for line in each.log)
 
 
 def resume_mission(store: MissionStore, mission: StoredMission, *, ask: Answerer | None = None) -> ResumedMission:

@@ -170,7 +170,7 @@ def _due(standing: StandingMission) -> datetime | None:
 def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed | None) -> Trigger | None:
     """The trigger of the options; None where there is none. Raises InputError."""
     given: list[Trigger] = [schedule_of(at)] if at is not None else []
-    given += [Every.of(every)] if every is not None else []
+    given += [Every.from_text(every)] if every is not None else []
     given += [event_of(on)] if on is not None else []
     if len(given) > 1:
         raise InputError("--at, --every and --on are one trigger each", hint="queue the mission once for each of them")

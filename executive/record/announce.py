@@ -1,4 +1,4 @@
-"""Messages at the beginning of a log: the run's facts, one for each command, and the map."""
+"""First messages of a log: the run's facts, one message for each command, and the map."""
 
 from __future__ import annotations
 
@@ -54,15 +54,14 @@ def announce(
 
 
 def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
-    """A command as numbers.
+    """Encodes a command as numbers.
 
-    Types are class ids, several where a category was asked for ("drink"); 0 is Nothing. `goal_x`, `goal_y` are in the
-    world frame (m), NaN where the goal was left open. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place, 4 wait,
-    5 charge.
+    Types are class ids, several for a category ("drink"); 0 is Nothing. `goal_x`, `goal_y` are in the world frame (m),
+    NaN where the goal was left open. `cmd_type`: 0 go or take, 1 grasp, 2 find, 3 place, 4 wait, 5 charge.
     """
 
     def ids(item: ObjectKind | None) -> tuple[int, ...]:
-        """The numbers of an object's classes."""
+        """Returns the numbers of an object's classes."""
         if item is None:
             return (_NOTHING_ID,)
         return tuple(
@@ -83,7 +82,7 @@ def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
 
 
 def command_type(task: Task | None) -> int:
-    """The number of a task: 0 for Nothing, else its place among the tasks from 1."""
+    """Number of a task: 0 for Nothing, else its position among the tasks, from 1."""
     return 0 if task is None else [*Task].index(task) + 1
 
 
@@ -100,19 +99,18 @@ def goal_position(knowledge: Knowledge, command: Command) -> tuple[float, float]
 
 
 def versions(packages: Sequence[str]) -> dict[str, str]:
-    """The versions of Python and of installed packages."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in packages}}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"
+    """Returns the versions of Python and of packages; "not installed" for a missing one."""
+    found = {"python": platform.python_version()}
+    for package in packages:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "not installed"
+    return found
 
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
-    """The grid as a grey PNG (first row: largest y), its place in the world frame (m), and the middles of the rooms."""
+    """Encodes the map: a grey PNG (first row: largest y), its origin in the world frame (m), labels of the rooms."""
     grey = np.full(grid.occupied.shape, FREE, np.uint8)
     if grid.unknown is not None:
         grey[grid.unknown] = UNKNOWN

@@ -1,6 +1,6 @@
-"""Writes the event log: one MCAP file of JSON messages, stamped by the robot's clock, readable after a kill.
+"""Writer of the event log: one MCAP file of JSON messages, stamped by the robot's clock, readable after a kill.
 
-Two runs of one seed give equal logs: wall times stand in a topic of their own, and nowhere else.
+Two runs of one seed give equal logs: wall times stand in one topic only.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ Listener = Callable[[str, float, Message], None]
 
 
 class EventLog(RunVisitor):
-    """An open event log: logs all messages of a run that it visits, and once a second how long its ticks took.
+    """Open event log; it logs all messages of a run that it visits, and once a second the durations of the ticks.
 
     Call it to log a message (`skills.api.Publish`); `close` it at the end.
 
-    Whatever is older than a second of the robot's clock has reached the file, so that a killed process leaves a log
-    that can be read. When the disk is full, nothing more is written, and what was written can be read. `bytes` counts
-    those of all messages but the wall's times, which differ from run to run.
+    Messages older than a second of the robot's clock are in the file, so that a killed process leaves a readable log.
+    When the disk is full, nothing more is written, and the log stays readable. `bytes` counts all messages except those
+    with wall times, which differ from run to run.
 
-    With `apart` each robot's messages go to channels of its own, such as `bob/pose`, so that log viewers do not mix
-    several robots up; the channel's metadata names the topic.
+    With `apart` each robot's messages go to channels of its own, such as `bob/pose`, so that log viewers keep several
+    robots apart; the channel's metadata names the topic.
     """
 
     def __init__(self, path: Path, clock: Clock, *, apart: bool = False) -> None:
@@ -71,23 +71,23 @@ class EventLog(RunVisitor):
         self._ticks_logged_s = -math.inf
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """A tick that takes longer than the tick period overruns."""
+        """Notes the tick period; a tick that takes longer overruns."""
         self._tick_limit_s = settings.tick_period_s
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Log it."""
+        """Logs the message."""
         self(topic, message)
         return message
 
     def tick(self, progress: Progress) -> None:
-        """Gather how long the tick took on the wall's clock."""
+        """Collects the duration of the tick on the wall clock, and logs the durations once a second."""
         self._ticks_s.append(progress.tick_wall_s)
         if progress.now_s - self._ticks_logged_s >= TICKS_EVERY_S:
             self._ticks_logged_s = progress.now_s
             self._log_ticks({"overruns": progress.overruns})
 
     def end(self, result: RunResult) -> None:
-        """Logs the ticks that are left, and how long the whole run took."""
+        """Logs the remaining ticks, and the duration of the whole run."""
         if self._failure is None:
             self._log_ticks({"overruns": result.overruns, "wall_time_s": result.wall_time_s})
 
@@ -96,11 +96,11 @@ class EventLog(RunVisitor):
         self(WALL, {"tick_s": ticks, "limit_s": self._tick_limit_s, **more})
 
     def listen(self, listener: Listener) -> None:
-        """Tells `listener` of every message from now on: topic, the robot's clock (s), and the plain values."""
+        """Passes every message to `listener` from now on: topic, the robot's clock (s), and JSON values."""
         self._listeners.append(listener)
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Logs a message under a topic. Raises ValueError on a closed log, OSError: it cannot be written."""
+        """Logs a message under a topic. Raises ValueError on a closed log, OSError when it cannot be written."""
         if self._closed:
             raise ValueError("the event log is closed")
         if self._failure is not None:
@@ -129,12 +129,12 @@ class EventLog(RunVisitor):
             listener(topic, now_s, plain)
 
     def flush(self) -> None:
-        """Writes everything to the file."""
+        """Writes all buffered messages to the file."""
         self._flushed_s = self._clock.now()
         self._writer.flush()
 
     def close(self) -> None:
-        """Finish the file; idempotent. Raises OSError when it cannot be written, but not twice for one reason."""
+        """Completes the file; idempotent. Raises OSError when it cannot be written, but not twice for one reason."""
         if self._closed:
             return
         self._closed, broken = True, self._failure is not None
@@ -154,7 +154,7 @@ class EventLog(RunVisitor):
 
 
 def plain_values(value: Any) -> Any:
-    """A value as JSON has it: dataclasses become objects, arrays lists, enums their values, NaN and infinity null."""
+    """Converts a value to JSON: dataclasses become objects, arrays lists, enums their values, NaN and infinity null."""
     return to_jsonable_python(value, inf_nan_mode="null", fallback=_plain)
 
 
@@ -165,14 +165,14 @@ def _plain(value: Any) -> Any:
 
 
 def drawable(topic: str, message: Message, now_s: float) -> Iterator[tuple[str, Message]]:
-    """The message as it is logged, and messages beside it that only viewers need."""
+    """Iterates over the message as it is logged, and additional messages for viewers, each with its topic."""
     yield topic, with_picture(_path(message, now_s) if topic == PATH else message, now_s)
     if topic == DETECTIONS and isinstance(message.get("image"), np.ndarray):
         yield BOXES, boxes(message.get("detections", ()), now_s)
 
 
 def with_picture(message: Message, now_s: float) -> Message:
-    """A message with a numpy picture (RGB or grey, uint8) under "image" becomes a compressed picture."""
+    """Compresses the numpy picture (RGB or grey, uint8) under "image" of a message, if there is one."""
     picture = message.get("image")
     if not isinstance(picture, np.ndarray):
         return message
@@ -186,7 +186,7 @@ def with_picture(message: Message, now_s: float) -> Message:
 
 
 def boxes(detections: Sequence[Message], now_s: float) -> Message:
-    """Boxes (u0, v0, u1, v1) with the name and score beside each, as annotations of the picture."""
+    """Converts detections to annotations of the picture: boxes (u0, v0, u1, v1) with class and score."""
     when = stamp(now_s)
     return {
         "circles": [],
@@ -210,7 +210,7 @@ def _caption(detection: Message, when: Message) -> Message:
 
 
 def planar_pose(x_m: float, y_m: float, yaw_rad: float) -> Message:
-    """A pose on the floor as position and orientation."""
+    """Converts a planar pose to position and orientation."""
     turn = {"x": 0.0, "y": 0.0, "z": math.sin(yaw_rad / 2), "w": math.cos(yaw_rad / 2)}
     return {"position": {"x": x_m, "y": y_m, "z": 0.0}, "orientation": turn}
 

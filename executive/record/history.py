@@ -1,4 +1,4 @@
-"""Reads event logs, even those that a killed process left behind: the trees at any time, a timeline, objects seen."""
+"""Reader of event logs, also of a killed process: the trees at any time, a timeline, the detected objects."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
 @dataclass(frozen=True)
 class Event:
-    """One message: topic, the robot's clock in seconds, and its values."""
+    """Logged message: topic, time on the robot's clock (s), and values."""
 
     topic: str
     stamp_s: float
@@ -55,7 +55,7 @@ class Event:
 
 
 def read_events(path: Path) -> tuple[Event, ...]:
-    """All events in the order in which they were written; of a log that was cut off, those before the cut.
+    """Reads all events in the order in which they were written; of a log that was cut off, those before the cut.
 
     Raises InputError if there is no such file, or it is no event log.
     """
@@ -86,24 +86,24 @@ _KEYS: Final = ("node", "from", "to", "cause", "message")
 
 @dataclass(frozen=True)
 class History:
-    """The events of one log, and its file."""
+    """History of a run: the events of one log, and its file."""
 
     file: Path
     events: tuple[Event, ...]
 
     def transitions(self) -> Iterator[dict[str, Any]]:
-        """The transitions of the nodes: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
+        """Iterates over the transitions of the nodes: `t` (s), `node`, `from`, `to`, `cause`, `message`."""
         for event in self.events:
             if event.topic == TRANSITIONS:
                 yield {"t": event.data.get("t", event.stamp_s), **{key: event.data.get(key) for key in _KEYS}}
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The names of the robots, in order."""
+        """Names of the robots, in order."""
         return tuple(sorted({name for event in self.events if (name := robot_of(event))}))
 
     def of_robot(self, name: str) -> History:
-        """The events of one robot, and those of no robot. Raises InputError if the log has no such robot."""
+        """Selects the events of one robot, and those of no robot. Raises InputError if the log has no such robot."""
         known = find_robot(name, self.robots)
         if known is None:
             hint = f"there are: {', '.join(self.robots)}" if self.robots else "no robot's messages are in it"
@@ -111,9 +111,9 @@ class History:
         return replace(self, events=tuple(event for event in self.events if robot_of(event) in ("", known)))
 
     def trees(self, until_s: float | None = None) -> tuple[NodeView, ...]:
-        """The trees in the order of their beginning, in their state at a time (s) of the robot's clock, or the last.
+        """Returns the trees in the order of their beginning, in their last state or at a time (s, robot's clock).
 
-        Raises InputError: the log holds no tree, or a broken one.
+        Raises InputError if the log holds no tree, or a broken one.
         """
         found: list[tuple[dict[str, Any], dict[str, NodeState]]] = []
         for event in self.events:
@@ -162,7 +162,7 @@ def _latest(found: list[tuple[dict[str, Any], dict[str, NodeState]]], robot: Any
 
 @dataclass(frozen=True)
 class Entry:
-    """One line of a timeline: time on the robot's clock (s), node or topic, and text.
+    """Line of a timeline: time on the robot's clock (s), node or topic, and text.
 
     `state` is the node's state after a change, `robot` the robot's name.
     """
@@ -175,7 +175,7 @@ class Entry:
 
 
 def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
-    """The entries of a log in order.
+    """Iterates over the lines of a log's timeline.
 
     `leaves_only` omits changes of inner nodes that did not fail, and single late ticks.
     """
@@ -223,10 +223,6 @@ def _run(data: Mapping[str, Any]) -> str:
     return f"world {data.get('world')}, seed {data.get('seed')}; {versions}{scenario}"
 
 
-def _mission(data: Mapping[str, Any]) -> str:
-    return f"{data.get('id')} ({data.get('robot') or 'nobody'}): {data.get('outcome')}"
-
-
 def _outcome(data: Mapping[str, Any]) -> str:
     cause = f" ({data['cause']})" if data.get("cause") else ""
     return f"{data.get('robot')}: {data.get('outcome')}{cause}: {data.get('message')}"
@@ -255,7 +251,10 @@ _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     RUN: _run,
     OUTCOME: _outcome,
     SPEECH: lambda data: f'{data.get("robot")} says: "{data.get("text")}"',
-    MISSIONS: lambda data: "; ".join(_mission(each) for each in data.get("missions", ())),
+    MISSIONS: lambda data: "; ".join(
+        f"{each.get('id')} ({each.get('robot') or 'nobody'}): {each.get('outcome')}"
+        for each in data.get("missions", ())
+    ),
     CONTROL: lambda data: f"{data.get('what')}: {data.get('message')}",
     TO_DETECT: lambda data: f"look for {', '.join(data.get('class_name', ()))}",
     DESTINATION: _seen,
@@ -265,11 +264,11 @@ _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
 
 
 def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
-    """The confirmed objects of a run, each once, in the order of the searches.
+    """Returns the confirmed objects of a run, each once, in the order of the searches.
 
-    An object is confirmed as in `detect`: seen from two viewpoints, and still believed to be of its class at the end of
+    An object is confirmed as in `detect`: seen from two viewpoints, and of the same most probable class at the end of
     the search. Objects without a class are left out. Two objects of one class from different searches are the same if
-    they are within `SAME_WITHIN_M`. The log has no sizes, so they are 0 here; the score is the belief.
+    they are within `SAME_WITHIN_M`. The log has no sizes, so sizes are 0; the score is the belief.
     """
     searches: list[list[ObjectObservation]] = []
     open_searches: dict[str, int] = {}

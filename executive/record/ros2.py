@@ -1,6 +1,6 @@
-"""Writes an event log anew as a ROS 2 bag (MCAP with CDR messages), for tools that read nothing else.
+"""Converter of an event log to a ROS 2 bag (MCAP with CDR messages).
 
-Poses, paths and pictures become the usual message types; all else becomes `std_msgs/String` with its JSON.
+Poses, paths and pictures become the usual message types; all others become `std_msgs/String` with their JSON.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ Data = Mapping[str, Any]
 
 
 def write_ros2(events: Iterable[Event], path: Path) -> int:
-    """Writes the events as a ROS 2 bag; gives how many messages it holds.
+    """Writes the events as a ROS 2 bag; returns the number of its messages.
 
-    Raises InputError: the file cannot be written.
+    Raises InputError when the file cannot be written.
     """
     count = 0
     try:
@@ -63,7 +63,7 @@ def write_ros2(events: Iterable[Event], path: Path) -> int:
 
 
 def ros2_message(event: Event) -> tuple[str, str, Data]:
-    """A message's topic, type and fields in ROS 2."""
+    """Converts an event to a ROS 2 message: topic, type and fields."""
     form = _FORMS.get(event.topic)
     if form is None or (event.topic == DETECTIONS and "data" not in event.data):
         return f"/errand/{event.topic}", "std_msgs/msg/String", {"data": json.dumps(event.data, ensure_ascii=False)}
@@ -81,21 +81,23 @@ def _header(data: Data, stamp_s: float) -> Data:
     return {"stamp": {"sec": when["sec"], "nanosec": when["nsec"]}, "frame_id": data.get("frame_id", "world")}
 
 
-def _pose(data: Data, stamp_s: float) -> Data:
-    return {"header": _header(data, stamp_s), "pose": data["pose"]}
-
-
 def _path(data: Data, stamp_s: float) -> Data:
     header = _header(data, stamp_s)
     return {"header": header, "poses": [{"header": header, "pose": pose} for pose in data["poses"]]}
 
 
-def _picture(data: Data, stamp_s: float) -> Data:
-    return {"header": _header(data, stamp_s), "format": data["format"], "data": base64.b64decode(data["data"])}
-
-
 _FORMS: Final[Mapping[str, tuple[str, Callable[[Data, float], Data]]]] = {
-    POSE: ("geometry_msgs/msg/PoseStamped", _pose),
+    POSE: (
+        "geometry_msgs/msg/PoseStamped",
+        lambda data, stamp_s: {"header": _header(data, stamp_s), "pose": data["pose"]},
+    ),
     PATH: ("nav_msgs/msg/Path", _path),
-    DETECTIONS: ("sensor_msgs/msg/CompressedImage", _picture),
+    DETECTIONS: (
+        "sensor_msgs/msg/CompressedImage",
+        lambda data, stamp_s: {
+            "header": _header(data, stamp_s),
+            "format": data["format"],
+            "data": base64.b64decode(data["data"]),
+        },
+    ),
 }

@@ -1,4 +1,4 @@
-"""The topics of the event log and their JSON schemas (`schemas.yaml`); images and poses are as Foxglove draws them."""
+"""Topics of the event log and their JSON schemas (`schemas.yaml`); images and poses have Foxglove's schemas."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ TASK: Final = "taskChannel"
 TO_DETECT: Final = "object_to_detect"
 DESTINATION: Final = "object_destination"
 TOPIC: Final = "topic"
-"""Names the topic in the metadata of a channel that is one robot's."""
+"""Key of the topic in the metadata of one robot's channel."""
 BOXES: Final = "detections/boxes"
 _PICTURE: Final = "picture"
 _OTHERS: Final = "any"
@@ -42,36 +42,36 @@ _OTHERS: Final = "any"
 
 @dataclass(frozen=True)
 class Schema:
-    """A named JSON schema."""
+    """Named JSON schema."""
 
     name: str
     properties: Mapping[str, Any]
 
     def json(self) -> dict[str, Any]:
-        """The schema itself."""
+        """Returns the schema as JSON values."""
         return {"type": "object", "title": self.name, "properties": dict(self.properties)}
 
 
 @cache
 def schemas() -> Mapping[str, Schema]:
-    """The schemas by topic."""
+    """Returns the schemas by topic."""
     data = dict(read_yaml(Path(__file__).with_name("schemas.yaml")).data)
     types = data.pop("types")
-    return MappingProxyType({topic: _schema(types, **entry) for topic, entry in data.items()})
+    found = dict[str, Schema]()
+    for topic, entry in data.items():  # an entry has the names of its fields by type
+        names = {kind: fields.split() for kind, fields in entry.items() if kind != "schema"}
+        properties = {name: types[kind] for kind, fields in names.items() for name in fields}
+        found[topic] = Schema(entry["schema"], properties)
+    return MappingProxyType(found)
 
 
 def schema_of(topic: str, message: Mapping[str, Any]) -> Schema:
-    """The schema of a topic; pictures have theirs wherever they come, other topics an open one."""
+    """Returns the schema of a topic: one for pictures of any topic, and an open one for unknown topics."""
     known = schemas()
     return known[_PICTURE] if message.get("format") == "jpeg" else known.get(topic, known[_OTHERS])
 
 
-def _schema(types: Mapping[str, Any], schema: str, **fields: str) -> Schema:
-    """A schema from the names of its fields by type, as they stand in the file."""
-    return Schema(schema, {name: types[kind] for kind, names in fields.items() for name in names.split()})
-
-
 def stamp(time_s: float) -> dict[str, int]:
-    """Seconds as the message formats have them."""
+    """Converts seconds to the time of the message formats: seconds and nanoseconds."""
     nanoseconds = round(time_s * 1e9)
     return {"sec": nanoseconds // 10**9, "nsec": nanoseconds % 10**9}

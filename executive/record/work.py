@@ -14,7 +14,7 @@ from skills.api import Detector
 
 
 class Work:
-    """Counters by name; implements `skills.api.WorkCounter`. Threads may share it."""
+    """Counters by name (`skills.api.WorkCounter`), which threads may share."""
 
     def __init__(self) -> None:
         self._counts: Counter[str] = Counter()
@@ -26,14 +26,14 @@ class Work:
             self._counts[name] += amount
 
     def totals(self, more: Mapping[str, int] = MappingProxyType({})) -> Mapping[str, int]:
-        """All counters that are not 0, in the order of their names; `more` are those of others."""
+        """Returns all counters above 0 in the order of their names, with `more` added."""
         with self._lock:
             both = self._counts + Counter(dict(more))
         return MappingProxyType(dict(sorted(both.items())))
 
 
 class CountedDetector:
-    """A detector that counts the pictures it looks through, by method; it has all `methods` of the one within."""
+    """Wrapper of a detector that counts its pictures by method; it has all `methods` of the detector."""
 
     def __init__(self, detector: Detector, work: Work) -> None:
         self._detector = detector
@@ -44,7 +44,7 @@ class CountedDetector:
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """The classes that it knows."""
+        """Classes that the detector knows."""
         return self._detector.class_names
 
     def __getattr__(self, name: str) -> Any:
@@ -66,7 +66,7 @@ OTHER: Final = "other threads and the end"
 
 
 class Profile:
-    """CPU-seconds by subsystem. A second counts once, for the innermost timed call of its thread."""
+    """Profile of CPU seconds by subsystem; a second counts once, for the innermost timed call of its thread."""
 
     def __init__(self) -> None:
         self._spent: dict[str, float] = {}
@@ -75,11 +75,11 @@ class Profile:
         self._began_s: float | None = None
 
     def timed(self, name: str, call: Callable[..., ResultT]) -> Callable[..., ResultT]:
-        """The call, whose time counts for the subsystem of this name."""
+        """Wraps a call so that its time counts for the subsystem of this name."""
 
         @functools.wraps(call)
         def timed_call(*arguments: Any, **options: Any) -> ResultT:
-            """The call; what it takes, without the timed calls within, is added to the subsystem's time."""
+            """Adds the time of the call, without the timed calls within, to the subsystem's time."""
             begun_s = self.enter()
             try:
                 return call(*arguments, **options)
@@ -89,12 +89,12 @@ class Profile:
         return timed_call
 
     def enter(self) -> float:
-        """A call begins in this thread; its CPU time then (s)."""
+        """Notes that a call begins in this thread; returns the thread's CPU time (s)."""
         self._calls().append(0.0)
         return time.thread_time()
 
     def leave(self, name: str, begun_s: float) -> None:
-        """The call of a subsystem that began last has ended."""
+        """Notes that the last call of a subsystem has ended."""
         whole_s, calls = time.thread_time() - begun_s, self._calls()
         within_s = calls.pop()
         if calls:
@@ -103,23 +103,23 @@ class Profile:
             self._spent[name] = self._spent.get(name, 0.0) + whole_s - within_s
 
     def attach(self, name: str, owner: object, *methods: str) -> None:
-        """Time methods of one object from now on."""
+        """Times methods of one object from now on."""
         for method in methods:
             setattr(owner, method, self.timed(name, getattr(owner, method)))
 
     def begin(self) -> None:
-        """The run begins: what the process used until now counts as its start."""
+        """Notes that the run begins; CPU time until now counts as START."""
         self._began_s = time.process_time()
 
     def table(self) -> Mapping[str, float]:
-        """CPU-seconds by subsystem, the dearest first, then what was used before the run and outside of all calls."""
+        """Returns CPU seconds by subsystem, the largest first, then the time outside all calls and before the run."""
         spent = dict(sorted(self._spent.items(), key=lambda item: -item[1]))
         began_s = self._began_s or 0.0
         other_s = time.process_time() - began_s - sum(spent.values())
         return {**spent, OTHER: max(0.0, other_s), START: began_s}
 
     def _calls(self) -> list[float]:
-        """The timed calls under way in this thread: how much of each was spent in those within."""
+        """Stack of this thread's timed calls: for each the time (s) that was spent in the calls within."""
         if not hasattr(self._inner, "calls"):
             self._inner.calls = []
         calls: list[float] = self._inner.calls
@@ -127,7 +127,7 @@ class Profile:
 
 
 def lines(table: Mapping[str, float]) -> tuple[str, ...]:
-    """The table as text: subsystem, CPU-seconds, share of all."""
+    """Formats the table as text: subsystem, CPU seconds, share of all."""
     whole_s = sum(table.values()) or 1.0
     rows = [f"{name:<28}{spent_s:8.2f} s{100 * spent_s / whole_s:7.1f} %" for name, spent_s in table.items()]
     return (f"{'CPU time by subsystem':<28}{whole_s:8.2f} s", *rows)

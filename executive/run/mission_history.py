@@ -76,7 +76,7 @@ class Executions:
         self._drivers = {path: named[path] for path in self._base if path in named}
         self._driving = {path for path, node in self._drivers.items() if node.status is Status.RUNNING}
         self._open = {path for path in self._nodes if (ran := self._executions(path)) and ran[-1].ended_s is None}
-        self._taken_up = set(self._open)
+        self._resumed = set(self._open)
         self._moved_s = board.get(self._keys.moved) if self._keys.moved in board else None
         self._paths: Mapping[Behaviour, str] = {node: path for path, node in self._nodes.items()}
         self._running: set[Behaviour] = {node for node in self._paths if node.status is Status.RUNNING}
@@ -108,7 +108,7 @@ class Executions:
     def after_tick(self, changed: Iterable[str]) -> None:
         """Notes which nodes the tick stopped, and whether the robot may drive; `changed` are nodes that changed."""
         for path in [path for path in self._open if self._nodes[path].status is not Status.RUNNING]:
-            if path not in self._taken_up:
+            if path not in self._resumed:
                 self._end(path, done=False)
         moving = self._drivers.keys() & set(changed)
         ended = [path for path in moving if self._drivers[path].status in _ENDED]
@@ -120,8 +120,8 @@ class Executions:
                 self._board.put(self._keys.moved, self._moved_s)
 
     def _begin(self, path: str) -> None:
-        if path in self._taken_up:
-            self._taken_up.discard(path)
+        if path in self._resumed:
+            self._resumed.discard(path)
             return
         if path in self._open:
             self._end(path, done=False)

@@ -1,4 +1,4 @@
-"""Assignments of a store's missions to the robots of a fleet: who has each, how far it is, what a referee saw."""
+"""Assignments of a store's missions to the robots of a fleet, with the progress of each and the referee's verdict."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELL
 
 @dataclass(frozen=True)
 class GivenMission:
-    """The assignment of a mission to a robot of a fleet.
+    """Assignment of a mission to a robot of a fleet.
 
-    `robot` has it, or had it last; it went to another one `reassigned` times. The first `done` of its commands are done
-    and not done again; `blocked` is why it cannot begin again where it is interrupted now. `referee` is the verdict at
-    the end, as JSON values.
+    `robot` is the present or last robot; the mission was passed to another `reassigned` times. The first `done` of its
+    commands are done and are not repeated; `blocked` is the reason why the mission cannot restart from its present
+    command. `referee` is the verdict at the end, as JSON values.
 
-    A mission that no robot could do alone is done in parts, which are missions `part_of` it; a part that `follows`
-    another begins when that is done.
+    A mission that no robot could do alone is split into missions that are `part_of` it; a part that `follows` another
+    begins when that one is done.
     """
 
     robot: str | None = None
@@ -34,13 +34,13 @@ class GivenMission:
 
 
 class GivenMissions:
-    """The assignments in a store."""
+    """Table of the assignments in a store."""
 
     def __init__(self, store: MissionStore) -> None:
         self._store = store
 
     def all(self) -> Mapping[int, GivenMission]:
-        """All assignments, by the numbers of their missions."""
+        """Returns all assignments by the numbers of their missions."""
         rows = self._store.rows("SELECT id, given FROM mission WHERE given IS NOT NULL ORDER BY id")
         return {row["id"]: form(GivenMission).validate_json(row["given"]) for row in rows}
 
@@ -51,22 +51,22 @@ class GivenMissions:
         self._put(mission, replace(known, robot=robot, reassigned=known.reassigned + again, blocked=None))
 
     def progress(self, mission: int, done: int, blocked: str | None) -> None:
-        """Notes how many commands are done, and why the one under way cannot begin again (None: it can)."""
+        """Notes how many commands are done, and why the present one cannot be restarted (None: it can)."""
         self._put(mission, replace(self._of(mission), done=done, blocked=blocked))
 
     def hand_back(self, mission: int) -> None:
-        """Lets the mission wait for another robot."""
+        """Returns the mission, so that it waits for another robot."""
         self._put(mission, replace(self._of(mission), blocked=None))
 
     def split(self, mission: int, parts: Sequence[int]) -> None:
-        """Notes that the mission is done in parts, one after the other."""
+        """Notes that the mission is split into parts, which run one after the other."""
         for part, before in zip(parts, (None, *parts), strict=False):
             self._put(part, replace(self._of(part), part_of=mission, follows=before))
 
     def settle(self) -> None:
-        """Ends missions that wait for nothing any more.
+        """Ends split missions, and parts that can never begin.
 
-        A part ends as a failure where the part before it was not done; a mission in parts ends as its last part did.
+        A part fails when the part before it failed; a mission in parts ends like its last part.
         """
         given, states = self.all(), {mission.id: mission for mission in self._store.missions()}
         for number, one in given.items():

@@ -1,4 +1,4 @@
-"""Opens the SQLite files that Errand writes, and turns every failure to do so into one error with a hint."""
+"""SQLite files that Errand writes; every failure to use one becomes one error with a hint."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ BUSY_S: Final = 2.0
 
 @dataclass(frozen=True)
 class FileKind:
-    """One kind of file: its tables, what tells it from other databases, and the words of its errors.
+    """Kind of a database file: its tables, its identity among databases, and the texts of its errors.
 
-    `name` is what messages call it, `option` names another; `absent` says what writes it, `lost` what is lost with it,
-    `older` what to do with one of another version, `claimed` what the process does that has claimed it. `go_on` says
-    how to go on after the disk was full, where "{path}" stands for the file.
+    `name` is its name in messages, `option` the option that names another file. The others are parts of messages:
+    `absent` names the command that writes such a file, `lost` the data that is lost with it, `older` the action for a
+    file of another version, `claimed` the work of the process that has claimed it. `go_on` says how to continue after
+    the disk was full; "{path}" in it stands for the file.
     """
 
     name: str
@@ -41,12 +42,12 @@ class FileKind:
     go_on: str
 
     def full_disk(self, path: Path) -> StoreError:
-        """The disk has become full while the file was written."""
+        """Error for a disk that became full while the file was written."""
         go_on = self.go_on.format(path=path)
         return StoreError("the disk is full", hint=f"what was written is kept: free space, then {go_on}")
 
     def damaged(self, path: Path, why: object) -> StoreError:
-        """The file cannot be read."""
+        """Error for a file that cannot be read."""
         hint = f"move it away ({self.lost} are lost), or name another by {self.option}"
         return StoreError(f"the {self.name} is damaged ({why})", hint=hint, file=path)
 
@@ -72,19 +73,19 @@ class FileKind:
 
 
 class StoreError(InputError):
-    """A file cannot be read or written, whichever part of it is asked for."""
+    """Error of a file that cannot be read or written at all."""
 
 
 class Database:
-    """One open file. Use it as a context manager, or close it."""
+    """Open database file; use it as a context manager, or close it."""
 
     kind: FileKind
 
     def __init__(self, path: Path, *, create: bool = False) -> None:
-        """Opens the file, made new where `create` allows it.
+        """Opens the file, or creates it where `create` allows it.
 
-        A killed process loses nothing that was committed: the file is in write-ahead mode. Raises InputError: there is
-        none, it cannot be opened, it is damaged, or another version wrote it.
+        A killed process loses no committed data: the file is in write-ahead mode. Raises InputError when there is no
+        file, it cannot be opened, it is damaged, or another version wrote it.
         """
         self.path = path
         if not create and not path.is_file():
@@ -107,14 +108,14 @@ class Database:
         self.close()
 
     def close(self) -> None:
-        """Closes it; idempotent."""
+        """Closes the file; idempotent."""
         self._connection.close()
 
     @contextmanager
     def claimed(self) -> Iterator[None]:
-        """Only one process at a time works on a file; the claim ends with the process, however that ends.
+        """Claims the file for this process; the claim ends with the context, or with the process.
 
-        Raises InputError: another process has claimed it.
+        Raises InputError when another process has claimed it.
         """
         with ExitStack() as stack:
             with self.kind.failures(self.path):
@@ -133,19 +134,19 @@ class Database:
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """The database, for changes of which all are kept or none. Raises StoreError: it cannot be written."""
+        """Opens one transaction for changes. Raises StoreError when the file cannot be written."""
         with self.kind.failures(self.path), transaction(self._connection):
             yield self._connection
 
     def rows(self, query: str, *values: object) -> list[sqlite3.Row]:
-        """The rows that a query finds. Raises StoreError: the database cannot be read."""
+        """Returns the rows of a query. Raises StoreError when the file cannot be read."""
         with self.kind.failures(self.path):
             cursor = self._connection.cursor()
             cursor.row_factory = sqlite3.Row
             return cursor.execute(query, values).fetchall()
 
     def _prepare(self) -> None:
-        """Sets the modes, checks whose file it is, and makes the tables of a new one."""
+        """Sets the modes, checks kind and version of the file, and creates the tables of a new one."""
         kind, connection = self.kind, self._connection
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         (version,) = connection.execute("PRAGMA user_version").fetchone()
@@ -169,13 +170,13 @@ class Database:
 
 @cache
 def form(kind: Any) -> TypeAdapter[Any]:
-    """The JSON form of a type that is known, such as a request: writes and reads its values."""
+    """Returns the adapter that writes and reads values of a type, such as a request, as JSON."""
     return TypeAdapter(kind)
 
 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing."""
+    """Runs the statements within as one transaction."""
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield

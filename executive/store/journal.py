@@ -1,4 +1,4 @@
-"""Writes a mission's notes to the store, one transaction for each tick that brought something new."""
+"""Journal of a mission in the store, with one transaction for each tick that changed something."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ last_charge = coalesce(:last, last_charge), ended = NULL WHERE id = :id
 
 
 class StoreJournal(RunVisitor):
-    """Keeps the mission of one robot in the store, from tick to tick.
+    """Journal of one robot's mission, from tick to tick.
 
-    What cannot be written now, since another program holds the store, is written with a later tick: the robot's work
-    does not wait for it. `troubles` lists what could not be kept.
-    `keep_world` is called before what a tick brought is written, for a simulated world must not lag behind it.
+    While another program holds the store, notes wait for a later tick, and the robot works on. `troubles` lists the
+    notes that could not be written. `keep_world` is called before each write, since the stored state of a simulated
+    world must not be older than the journal.
     """
 
     def __init__(self, connection: sqlite3.Connection, mission: int, robot: str | None, *, main: str) -> None:
-        """`robot` is the one of several whose part it keeps; the battery of the `main` one is noted, too."""
+        """`robot` is the one of several robots whose part is stored (None: all); the battery of `main` is noted."""
         self._connection, self._mission, self._robot, self._main = connection, mission, robot, main
         self._board: Mapping[str, Any] = {}
         self._written: dict[str, Any] = {}
@@ -49,20 +49,20 @@ class StoreJournal(RunVisitor):
         self._values: dict[str, str] = {}
         self._checkpoints: dict[str, str] = {}
         self._pose: Pose2D | None = None
-        self._charges: tuple[float, float] | None = None  # the lowest so far, and the last
+        self._charges: tuple[float, float] | None = None  # lowest and last
         self._recollection: Recollection | None = None
         self._request_of: Callable[[CompiledTree], Request] | None = None
         self._tree: CompiledTree | None = None
-        self.keep_world: Callable[[], None] = _no_world
+        self.keep_world: Callable[[], None] = lambda: None
         self.troubles: list[str] = []
 
     def replaceable(self, tree: CompiledTree, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
-        """Allows a correction to replace the mission; `request_of` gives the new mission's request."""
+        """Allows a correction to replace the mission; `request_of` returns the new mission's request."""
         self._tree, self._request_of = tree, request_of
         return self
 
     def _replace(self, tree: CompiledTree) -> None:
-        """Keeps the mission that has taken the place of another in its stead, with nothing done of it yet."""
+        """Stores the mission that has taken the place of another, without any steps."""
         self._board, self._written, self._steps, self._values, self._checkpoints = {}, {}, {}, {}, {}
         self._pose = self._charges = self._recollection = None
         if self._request_of is None:
@@ -71,8 +71,8 @@ class StoreJournal(RunVisitor):
         try:
             with transaction(self._connection):
                 for table, key in (("step", "path_id"), ("value", "key")):
-                    delete = f"DELETE FROM {table} WHERE mission = ? AND {of_robot(key)}"
-                    self._connection.execute(delete, (self._mission, *prefix_of(self._robot)))
+                    delete = f"DELETE FROM {table} WHERE mission = ? AND {robot_condition(key)}"
+                    self._connection.execute(delete, (self._mission, *robot_prefix(self._robot)))
                 if self._robot is None:
                     self._connection.execute("UPDATE mission SET request = ? WHERE id = ?", (text, self._mission))
                 else:
@@ -82,25 +82,26 @@ class StoreJournal(RunVisitor):
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
 
     def remembering(self, recollection: Recollection, tree: CompiledTree | None = None) -> StoreJournal:
-        """The journal of a run that goes on from an earlier one with a tree: what that knew stays until it has been
-        used."""
+        """Sets the recollection of an interrupted run: its results stay in the store until they have been used."""
         self._recollection, self._tree = recollection, tree
         return self
 
     def tick(self, progress: Progress) -> None:
-        """Keeps the news of a tick."""
+        """Writes the notes of a tick."""
         for name, note in progress.notes.items():
             if self._robot in (None, name):
                 self.note(note)
 
     def note(self, note: TickNote) -> None:
-        """Keeps what a tick brought of the mission."""
+        """Writes the changes that a tick made in the mission."""
         if self._tree is not None and note.tree is not self._tree:
             self._replace(note.tree)
         self._tree = note.tree
         self._take_steps(note)
         self._take_values(note.board)
-        self._take_charge(note.charge)
+        if note.charge is not None and self._robot in (None, self._main):
+            lowest = note.charge if self._charges is None else min(self._charges[0], note.charge)
+            self._charges = lowest, note.charge
         news = bool(self._steps or self._values)
         if news:
             self.keep_world()
@@ -132,24 +133,20 @@ class StoreJournal(RunVisitor):
             except TypeError as error:
                 self._trouble(f"'{key}': {error}")
 
-    def _take_charge(self, charge: float | None) -> None:
-        if charge is not None and self._robot in (None, self._main):
-            self._charges = (charge if self._charges is None else min(self._charges[0], charge), charge)
-
     def _write(self, note: TickNote) -> None:
         pose = note.pose or self._pose
         dropped = () if self._recollection is None else tuple(self._recollection.dropped)
         steps = [(self._mission, path, form(StepRecord).dump_json(step).decode()) for path, step in self._steps.items()]
         poses = {} if pose is None else {self._robot or self._main: asdict(pose)}
         lowest, last = self._charges or (None, None)
-        told = {"id": self._mission, "clock_s": note.now_s, "lowest": lowest, "last": last, "poses": _json(poses)}
+        values = {"id": self._mission, "clock_s": note.now_s, "lowest": lowest, "last": last, "poses": _json(poses)}
         try:
             with transaction(self._connection):
                 run = self._connection.executemany
                 run("DELETE FROM step WHERE mission = ? AND path_id = ?", [(self._mission, path) for path in dropped])
                 run(_PUT_STEP, steps)
                 run(_PUT_VALUE, [(self._mission, key, value) for key, value in self._values.items()])
-                self._connection.execute(_NOTE, told)
+                self._connection.execute(_NOTE, values)
         except sqlite3.Error as error:
             self._trouble(f"the store could not be written ({error})")
             return
@@ -162,23 +159,19 @@ class StoreJournal(RunVisitor):
             self.troubles.append(sentence)
 
 
-def of_robot(column: str) -> str:
-    """The SQL condition that a column belongs to a robot; its values are `prefix_of` the robot."""
+def robot_condition(column: str) -> str:
+    """SQL condition that a column belongs to a robot; its two values are the `robot_prefix`."""
     return f"substr({column}, 1, length(?)) = ?"
 
 
-def prefix_of(robot: str | None) -> tuple[str, str]:
-    """The beginning of a robot's path ids and blackboard keys, twice; an empty one for the only robot (None)."""
+def robot_prefix(robot: str | None) -> tuple[str, str]:
+    """Prefix of a robot's path ids and blackboard keys, twice; empty for the only robot (None)."""
     prefix = "" if robot is None else f"{slug(robot)}/"
     return prefix, prefix
 
 
 def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
-
-
-def _no_world() -> None:
-    """There is no world to keep: it stays by itself."""
 
 
 def _apart(before: Pose2D | None, now: Pose2D) -> bool:

@@ -1,4 +1,4 @@
-"""The missions in the store: what was asked for, their states, and how far each has come."""
+"""Missions in the store: their requests, their states and their progress."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from pydantic import Json
 
 from executive.mission.request import Request
 from executive.store.database import STORE_FILE, Database, form
-from executive.store.journal import StoreJournal, of_robot, prefix_of
+from executive.store.journal import StoreJournal, robot_condition, robot_prefix
 from executive.store.recollection import Memory, StepRecord
 from skills.files.errors import InputError, listing
 from skills.files.json_values import from_text
 from skills.robot import Pose2D
 
 STORE: Final = "missions.sqlite"
-"""The name of a store's file unless another is given."""
+"""Name of a store's file unless another is given."""
 
 
 def utc_now() -> datetime:
-    """The wall's clock, in UTC."""
+    """Time of the wall clock, in UTC."""
     return datetime.now(UTC)
 
 
 class MissionState(enum.Enum):
-    """The state of a mission. RUNNING while no process works on it means that it was interrupted.
+    """State of a mission. A RUNNING mission without a process was interrupted.
 
-    A STANDING one is never run itself: each time its trigger fires, a queued copy of it is added.
+    A STANDING mission never runs itself: each time its trigger fires, a queued copy is added.
     """
 
     STANDING = "standing"
@@ -46,11 +46,11 @@ class MissionState(enum.Enum):
 
 @dataclass(frozen=True)
 class StoredMission:
-    """A mission in the store. `starts` counts how often it was started; `clock_s` is when a note was last written.
+    """Mission in the store. `starts` counts its starts; `clock_s` is the time (robot's clock) of the last note.
 
-    `poses` is where each robot was last (world frame), `instead` what some of several robots do in place of their parts
-    by a correction, both by name. `standing` is the number of the standing mission of which it is a copy, `why` what
-    had that fire.
+    `poses` has each robot's last pose (world frame), `instead` the corrected requests of some of several robots, both
+    by the robot's name. `standing` is the number of the standing mission of which it is a copy, `why` the occurrence of
+    the trigger.
     """
 
     id: int
@@ -67,23 +67,23 @@ class StoredMission:
 
 
 class MissionStore(Database):
-    """One store file."""
+    """Open store of missions."""
 
     kind = STORE_FILE
 
     def __init__(self, path: Path, *, create: bool = True, now: Callable[[], datetime] = utc_now) -> None:
-        """Opens it; `now` is the wall's clock. Raises InputError: there is none, or it cannot be used."""
+        """Opens the file; `now` reads the wall clock. Raises InputError when there is none, or it cannot be used."""
         super().__init__(path, create=create)
         self.now = now
 
     def add(self, request: Request, *, queued: bool) -> StoredMission:
-        """Adds a mission that is still to be run, its request understood."""
+        """Adds a mission with an understood request, to be run later; returns it."""
         with self.writing() as connection:
             number = insert(connection, request, state=MissionState.QUEUED, queued=queued)
         return self.mission(number)
 
     def mission(self, number: int) -> StoredMission:
-        """The mission of this number. Raises InputError when there is none."""
+        """Returns the mission of this number. Raises InputError when there is none."""
         rows = self.rows("SELECT * FROM mission WHERE id = ?", number)
         if not rows:
             known = [str(mission.id) for mission in self.missions()]
@@ -92,7 +92,7 @@ class MissionStore(Database):
         return self._mission(rows[0])
 
     def missions(self, *states: MissionState) -> tuple[StoredMission, ...]:
-        """All missions in the order in which they came; only those in some states where given."""
+        """Returns all missions in the order in which they came, or those in the given states."""
         found = map(self._mission, self.rows("SELECT * FROM mission ORDER BY id"))
         return tuple(mission for mission in found if not states or mission.state in states)
 
@@ -103,16 +103,16 @@ class MissionStore(Database):
             connection.execute("DELETE FROM mission WHERE id = ?", (number,))
 
     def begin(self, number: int) -> None:
-        """Notes that the mission is started, or started again."""
+        """Notes a start of the mission."""
         self._change("state = 'running', starts = starts + 1", number)
 
     def never_began(self, before: StoredMission) -> None:
-        """Puts a mission that could not begin back into the state that it had `before`."""
+        """Restores the state of a mission that could not begin."""
         values = (before.state.value, before.message, before.starts)
         self._change("state = ?, message = ?, starts = ?", before.id, *values)
 
     def finish(self, number: int, state: MissionState, message: str) -> None:
-        """Notes how the mission ended."""
+        """Notes the end of the mission."""
         values = (state.value, message, self.now().isoformat())
         self._change("state = ?, message = ?, ended = ?", number, *values)
 
@@ -121,17 +121,17 @@ class MissionStore(Database):
             connection.execute(f"UPDATE mission SET {columns} WHERE id = ?", (*values, number))
 
     def has_steps(self, number: int) -> bool:
-        """Returns whether anything was done of a mission."""
+        """Returns whether any step of a mission is stored."""
         return bool(self.rows("SELECT 1 FROM step WHERE mission = ? LIMIT 1", number))
 
     def memory(self, number: int, robot: str | None = None) -> Memory:
-        """The state in which a mission was interrupted; the skills that it was done with must be loaded.
+        """Reads the state in which a mission was interrupted; the skills that it uses must be loaded.
 
-        `robot` is the one of several whose part is meant. Raises InputError: it cannot be read.
+        `robot` names one of several robots. Raises InputError when the state cannot be read.
         """
-        own, mission = prefix_of(robot), self.mission(number)
-        steps = self.rows(f"SELECT * FROM step WHERE mission = ? AND {of_robot('path_id')}", number, *own)
-        values = self.rows(f"SELECT key, text FROM value WHERE mission = ? AND {of_robot('key')}", number, *own)
+        own, mission = robot_prefix(robot), self.mission(number)
+        steps = self.rows(f"SELECT * FROM step WHERE mission = ? AND {robot_condition('path_id')}", number, *own)
+        values = self.rows(f"SELECT key, text FROM value WHERE mission = ? AND {robot_condition('key')}", number, *own)
         try:
             board = {row["key"]: from_text(row["text"]) for row in values}
             records = {row["path_id"]: form(StepRecord).validate_json(row["record"]) for row in steps}
@@ -141,14 +141,14 @@ class MissionStore(Database):
             raise InputError(f"mission {number} cannot be taken up: {error}", hint=hint, file=self.path) from error
 
     def journal(self, number: int, robot: str | None = None) -> StoreJournal:
-        """The journal of a mission's run; `robot` is the one of several whose part it keeps.
+        """Opens the journal of a mission's run, or of the part of one of several robots.
 
-        Of several batteries, that of the robot that stands for all is noted.
+        Of several batteries, only the battery of the request's main robot is noted.
         """
         return StoreJournal(self._connection, number, robot, main=self.mission(number).request.robot)
 
     def place(self, number: int, poses: Mapping[str, Pose2D]) -> None:
-        """Notes where robots are when a mission begins (world frame); an earlier note of a robot stays."""
+        """Notes the poses of robots at the start of a mission (world frame); an earlier note of a robot stays."""
         known = {**poses, **self.mission(number).poses}
         self._change("poses = ?", number, form(dict[str, Pose2D]).dump_json(known).decode())
 
@@ -161,7 +161,7 @@ class MissionStore(Database):
 
 
 def insert(connection: sqlite3.Connection, request: Request, *, state: MissionState, **more: object) -> int:
-    """Adds a mission with values for more columns; its number."""
+    """Inserts a mission with values for more columns; returns its number."""
     values = {"state": state.value, "request": request.to_json(), **more}
     names, marks = ", ".join(values), ", ".join(f":{name}" for name in values)
     return connection.execute(f"INSERT INTO mission ({names}) VALUES ({marks})", values).lastrowid or 0

@@ -1,9 +1,8 @@
-"""Takes up a mission that was broken off: the same tree, in which finished skills give their results once more.
+"""Resumes an interrupted mission: the same tree, in which finished skills repeat their results.
 
-The tree finds its way by itself: its composites see the same results as before and come to the same node. Nothing is
-done to reach that but ticking; a skill that had finished gives its result in its first tick. Guards look at the robot
-as it is now. The skill that was under way is told to `resume`, not to `begin`, so that it looks before it repeats
-what changed the world. Counts of attempts begin again.
+Ticks alone lead the tree to the node where it was: a finished skill returns its result in its first tick, so that the
+composites see the same results as before. Guards read the robot's present state. The interrupted skill gets `resume`
+instead of `begin`, so that it checks the world before it changes it. Counts of attempts begin at one.
 """
 
 from __future__ import annotations
@@ -31,27 +30,26 @@ _DECLARED: Final = tuple(name for name, hint in Skill.__annotations__.items() if
 
 @dataclass(frozen=True)
 class ResumedTree(CompiledTree):
-    """A tree that begins with a blackboard as it was left, and whose nodes are taken up once they are built."""
+    """Tree that begins with the stored blackboard, and whose nodes are restored by `restore` once they are built."""
 
     board: Mapping[str, Any] = field(default_factory=dict)
-    take_up: Callable[[ExplainedNode], object] = field(default=lambda node: None)
+    restore: Callable[[ExplainedNode], object] = field(default=lambda node: None)
 
     def build(self, context: RunContext) -> Behaviour:
-        """The py_trees tree, its blackboard filled."""
+        """Builds the py_trees tree, and fills its blackboard."""
         for key, value in self.board.items():
             context.board.put(key, value)
         root = build(self.root, context)
         for node in root.iterate():
             if isinstance(node, ExplainedNode):
-                self.take_up(node)
+                self.restore(node)
         return root
 
 
 def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection]:
-    """The tree of a mission that goes on, and what it remembers; path ids stay the same.
+    """Returns the tree of a mission that continues, and its recollection; path ids stay the same.
 
-    What the mission is interrupted for is not taken up, but called for again where need be. A decision stays as it
-    was made, without the looks that it took.
+    Interrupts are not restored; their conditions call them again. A decision keeps its result without its looks.
     """
     nodes = {node.path_id: node for node in tree.mission.walk()}
     afresh = {path for node in nodes.values() if KINDS[node.kind].afresh for path in _paths(node)}
@@ -59,13 +57,13 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
     over = afresh.union(path for node in settled for path in _paths(node) if path != node.path_id)
     specs = {path: node for path, node in nodes.items() if path not in afresh}
     by_status = {status: {p for p, step in memory.steps.items() if step.status is status} for status in Status}
-    kept = [
+    usable = [
         path
         for path, leaf in nodes.items()
         if leaf.kind == SkillLeaf.kind and path not in over
         if path in by_status[Status.FAILURE] or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
-    recollection = Recollection(tree.path_ids, memory.steps).only(kept)
+    recollection = Recollection(tree.path_ids, memory.steps).only(usable)
     root = _with_resumed_skills(tree.root, specs.keys(), memory, recollection)
     keys = history_keys(tree.robot_name, tree.mission_name)
     asked_again = {path for path, node in specs.items() if node.children}
@@ -74,37 +72,37 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
         keys.ended_before: frozenset((by_status[Status.SUCCESS] | by_status[Status.FAILURE]) - over),
     }
     past = _Past(memory, specs)
-    return _as_resumed(tree, past.take_up, {**memory.board, **again}, root=root), recollection
+    return _as_resumed(tree, past.restore, {**memory.board, **again}, root=root), recollection
 
 
 def ended_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recollection] | None:
-    """The tree of a mission that had come to its end, while other robots went on; None where it had not.
+    """Returns the tree of a mission that had ended while other robots worked on; None where it had not.
 
-    Its nodes say what they said, its root does so in its first tick, and nothing more is done: what it brought about
-    may be gone by now, since another robot took it. One that ended with a defect had not come to its end.
+    Its nodes have their last states, the root from its first tick on, and no skill runs: the effects of the mission may
+    be gone by now, since another robot may have moved the objects. A mission that ended with a defect had not ended.
     """
     ended = memory.steps.get(tree.root.path_id)
     if ended is None or not ended.ended or ended.cause is Cause.ERROR:
         return None
 
-    def take_up(node: ExplainedNode) -> None:
-        """Lets a node say what it said; the root in its first tick."""
+    def restore(node: ExplainedNode) -> None:
+        """Restores a node's last state; the root's in its first tick."""
         step = memory.steps.get(node.path_id)
         if node.path_id == tree.root.path_id:
             _AsBefore(node, ended)
         elif step is not None and step.ended:
-            node.say_again(step.status, step.cause, step.message)
+            node.restore(step.status, step.cause, step.message)
 
     recollection = Recollection(tree.path_ids, {})
-    recollection.told.append(f"{tree.root.path_id}: {ended.status.value.lower()} {BEFORE}: {ended.message}")
-    return _as_resumed(tree, take_up, memory.board), recollection
+    recollection.log.append(f"{tree.root.path_id}: {ended.status.value.lower()} {BEFORE}: {ended.message}")
+    return _as_resumed(tree, restore, memory.board), recollection
 
 
 def _as_resumed(
-    tree: CompiledTree, take_up: Callable[[ExplainedNode], object], board: Mapping[str, Any], **changed: Any
+    tree: CompiledTree, restore: Callable[[ExplainedNode], object], board: Mapping[str, Any], **changed: Any
 ) -> ResumedTree:
     own = {each.name: getattr(tree, each.name) for each in dataclasses.fields(CompiledTree)}
-    return ResumedTree(**{**own, **changed}, board=board, take_up=take_up)
+    return ResumedTree(**{**own, **changed}, board=board, restore=restore)
 
 
 def _paths(node: NodeSpec) -> Iterator[str]:
@@ -117,11 +115,11 @@ def _is_settled(node: NodeSpec, memory: Memory) -> bool:
 
 
 def _with_resumed_skills(
-    spec: NodeSpec, taken_up: Container[str], memory: Memory, recollection: Recollection
+    spec: NodeSpec, restored: Container[str], memory: Memory, recollection: Recollection
 ) -> NodeSpec:
-    """The spec with skills that give their results from before, or do their work."""
-    if spec.kind != SkillLeaf.kind or spec.path_id not in taken_up:
-        children = (_with_resumed_skills(child, taken_up, memory, recollection) for child in spec.children)
+    """Returns the spec with skills that repeat their results from before the restart, or do their work."""
+    if spec.kind != SkillLeaf.kind or spec.path_id not in restored:
+        children = (_with_resumed_skills(child, restored, memory, recollection) for child in spec.children)
         return dataclasses.replace(spec, children=tuple(children))
     skill, outputs = spec.options["skill"], spec.options["outputs"]
     ports = {port: memory.board[key] for port, key in outputs.items() if key in memory.board}
@@ -132,17 +130,17 @@ def _with_resumed_skills(
 
 @dataclass(frozen=True)
 class _Past:
-    """How the nodes of a mission ended before the restart; `specs` are those that are taken up."""
+    """Stored states of a mission's nodes; `specs` are the nodes to restore."""
 
     memory: Memory
     specs: Mapping[str, NodeSpec]
 
-    def take_up(self, node: ExplainedNode) -> None:
-        """Lets a node come to where it was, whatever its kind: skills do so by themselves.
+    def restore(self, node: ExplainedNode) -> None:
+        """Restores a node of any kind; skills restore themselves.
 
-        A branch that was passed over is passed over once more. A composite that was under way forgets nothing. A
-        decorator asks its child once more, whatever would hold that back, since what was guarded need not be so any
-        more; one that failed by itself, and a leaf, say what they said.
+        A branch that was passed over is passed over once more. A running composite keeps its blackboard keys. A
+        decorator ticks its child once more whatever would hold it back, since its condition may have changed after the
+        child's result. A decorator that failed by itself, and a leaf, repeat their state.
         """
         spec, step = self.specs.get(node.path_id), self.memory.steps.get(node.path_id)
         if spec is None or isinstance(node, SkillLeaf):
@@ -152,7 +150,7 @@ class _Past:
         elif step is None or step.status is Status.INVALID:
             return
         elif isinstance(node, MemoryComposite) and not _is_settled(spec, self.memory):
-            node.taken_up = step.status is not Status.FAILURE
+            node.resumed = step.status is not Status.FAILURE
         elif step.ended and isinstance(node, ExplainedDecorator):
             if step.status is Status.SUCCESS or self._status(node.decorated) is Status.FAILURE:
                 node.before = step.status
@@ -167,7 +165,7 @@ class _Past:
         return Status.INVALID if step is None else step.status
 
     def _was_reached(self, node: Any) -> bool:
-        """Returns whether a branch was taken or passed over, as a later one shows that was begun."""
+        """Returns whether a branch was begun or passed over: its parent ended, or a later branch was begun."""
         parent = node.parent
         if parent is None:
             return False
@@ -177,7 +175,7 @@ class _Past:
 
 
 class _AsBefore:
-    """Stands before a node: at its first tick it says what it said before the restart, and does nothing."""
+    """Wrapper of a node's `tick`: the first tick only restores the state from before the restart."""
 
     def __init__(self, node: Any, step: StepRecord) -> None:
         self._node = node
@@ -190,12 +188,12 @@ class _AsBefore:
         if step is None:
             yield from self._pass_on()
             return
-        node.say_again(step.status, step.cause, _before(step.message))
+        node.restore(step.status, step.cause, _before(step.message))
         yield node
 
 
 class _NotHeldBack:
-    """Lets the first run of a decorator go on whatever would hold its child back."""
+    """Wrapper of a decorator that ticks the child in its first run whatever would hold it back."""
 
     def __init__(self, node: ExplainedDecorator) -> None:
         self._node, self._begun = node, False
@@ -210,25 +208,25 @@ class _NotHeldBack:
 
 
 def _applies_as_before(node: Any, applied: bool) -> None:
-    """Lets a branch say at first what it said before the restart: the blackboard knows more by now."""
+    """Makes the first `applies` of a branch repeat the answer from before the restart, since the blackboard is full."""
     answers = [applied]
     asked: Callable[[], bool] = node.applies
     vars(node)["applies"] = lambda: answers.pop() if answers else asked()
 
 
-def told_before(message: str) -> bool:
-    """Returns whether a node's sentence is that of a result from before a restart."""
+def is_from_before(message: str) -> bool:
+    """Returns whether a node's message belongs to a result from before a restart."""
     return message.endswith(f"({BEFORE})")
 
 
 def _before(message: str) -> str:
-    return message if told_before(message) else f"{message} ({BEFORE})"
+    return message if is_from_before(message) else f"{message} ({BEFORE})"
 
 
 def resumed_skill(
     skill: type[Skill[Any]], path: str, ports: Mapping[str, Any], recollection: Recollection
 ) -> type[Skill[Any]]:
-    """A stand-in for a skill at one place of a tree that goes on: gives its result from before, or does its work."""
+    """Returns a stand-in for a skill at one node of a resumed tree: it repeats the result from before, or works."""
     skill.loaded()
 
     class Resumed(_Resumed):
@@ -242,7 +240,7 @@ def resumed_skill(
 
 
 class _Resumed(Skill[Any]):
-    """Wraps a skill of a tree that goes on."""
+    """Skill of a resumed tree that wraps another."""
 
     def __init__(
         self, context: SkillContext, inner: Skill[Any], path: str, ports: Mapping[str, Any], recollection: Recollection
@@ -253,14 +251,14 @@ class _Resumed(Skill[Any]):
         self._working = False
 
     def begin(self, inputs: Any) -> None:
-        """Nothing yet: the first step says whether there is a result already."""
+        """Notes the inputs; the first step decides whether there is a result already."""
         self._inputs, self._working = inputs, False
         self.checkpoint = self._recollection.checkpoint(self._path)
 
     def step(self) -> Step:
-        """The result from before, or a step of the skill."""
+        """Returns the result from before the restart, or a step of the skill."""
         if not self._working:
-            known = self._known()
+            known = self._result()
             if known is not None:
                 return known
         step = self._inner.step()
@@ -268,22 +266,22 @@ class _Resumed(Skill[Any]):
         return step
 
     def suspend(self) -> None:
-        """As the skill, if it works."""
+        """Suspends the skill if it works."""
         if self._working:
             self._inner.suspend()
 
     def resume(self, inputs: Any) -> None:
-        """As the skill, if it works."""
+        """Resumes the skill if it works."""
         if self._working:
             self._inner.resume(inputs)
 
     def end(self) -> None:
-        """As the skill, if it works."""
+        """Ends the skill if it works."""
         if self._working:
             self._inner.end()
 
-    def _known(self) -> Step | None:
-        """The result from before the restart; None when the skill has begun to work."""
+    def _result(self) -> Step | None:
+        """Returns the result from before the restart, or begins the skill and returns None."""
         result, context = self._recollection.result(self._path), self.context
         trusted = result is not None and not self._recollection.is_last(self._path)
         if not trusted and not self._recollection.awake(context.clock.now(), context.localiser.estimate().localised):
@@ -295,7 +293,11 @@ class _Resumed(Skill[Any]):
         if undone is not None:
             self._work(f"does it again, since {undone}")
             return None
-        return self._told(result)
+        self._recollection.used(self._path, f"{result.status.value.lower()} {BEFORE}: {result.message}")
+        message = _before(result.message)
+        if result.status is Status.SUCCESS:
+            return Remembered(message, self._ports)
+        return Failed(result.cause or Cause.EXECUTION, message)
 
     def _work(self, sentence: str) -> None:
         self._working, self._inner.checkpoint = True, self.checkpoint
@@ -304,10 +306,3 @@ class _Resumed(Skill[Any]):
             self._inner.resume(self._inputs)
         else:
             self._inner.begin(self._inputs)
-
-    def _told(self, result: StepRecord) -> Step:
-        self._recollection.used(self._path, f"{result.status.value.lower()} {BEFORE}: {result.message}")
-        message = _before(result.message)
-        if result.status is Status.SUCCESS:
-            return Remembered(message, self._ports)
-        return Failed(result.cause or Cause.EXECUTION, message)

@@ -1,4 +1,4 @@
-"""Standing missions: each waits in the store with its trigger; when that fires, a queued copy of it is added."""
+"""Standing missions: each waits in the store with its trigger; when the trigger fires, a queued copy is added."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from executive.store.triggers import Every, Missed, OnBatteryFull, Once, Schedul
 from skills.files.errors import InputError
 
 LATE: Final = timedelta(seconds=90)
-"""An occurrence that is noticed later than this is missed: the clock was set, or the machine slept."""
+"""An occurrence that is noticed later than this is missed: the clock was set forward, or the machine slept."""
 SET_BACK: Final = timedelta(hours=1)
-"""A clock that is set back by less has no occurrence come twice; by more, occurrences come as it shows their times."""
+"""A clock that is set back by less repeats no occurrence; one that is set back by more does."""
 MOST_WAITING: Final = 100
 _ENDED: Final = "SELECT request, lowest_charge, last_charge, ended FROM mission WHERE ended AND last_charge IS NOT NULL"
 
 
 @dataclass(frozen=True)
 class StandingMission:
-    """A mission that is queued whenever its trigger fires.
+    """Mission that is queued whenever its trigger fires.
 
-    `anchor` is when it was given, `since` the moment up to which its occurrences have been dealt with, both aware.
+    `anchor` is the time at which it was given, `since` the time up to which its occurrences were handled, both aware.
     """
 
     id: int
@@ -36,38 +36,38 @@ class StandingMission:
     since: datetime
 
     def due_next(self, now: datetime, zone: tzinfo | None) -> datetime | None:
-        """When its next occurrence after now is due (`zone` None: the system's); None where no time says so."""
+        """Time of its next occurrence after `now` (`zone` None: the system's); None for a trigger without times."""
         if not isinstance(self.trigger, Timed):
             return None
         return self.trigger.after(max(now, self.since), self.anchor, zone)
 
 
 class StandingMissions:
-    """The standing missions of a store."""
+    """Table of the standing missions in a store."""
 
     def __init__(self, store: MissionStore, zone: tzinfo | None = None) -> None:
-        """`zone` is where local times are meant; None is the system's."""
+        """`zone` is the time zone of local times; None is the system's."""
         self._store, self._zone = store, zone
 
     def add(self, request: Request, trigger: Trigger, missed: Missed = Missed.SKIP) -> StandingMission:
-        """Keeps a mission whose request is understood. Raises InputError: its only time has passed."""
+        """Stores a standing mission with an understood request. Raises InputError when its only time has passed."""
         now = self._store.now()
         if isinstance(trigger, Once) and trigger.latest(now, now, self._zone) is not None:
             raise InputError(f"{trigger} has passed", hint="give a time to come, or queue the mission without --at")
-        told = {"trigger": str(trigger), "missed": missed.value, "anchor": now.isoformat(), "since": now.isoformat()}
+        values = {"trigger": str(trigger), "missed": missed.value, "anchor": now.isoformat(), "since": now.isoformat()}
         with self._store.writing() as connection:
-            number = insert(connection, request, state=MissionState.STANDING, queued=False, **told)
+            number = insert(connection, request, state=MissionState.STANDING, queued=False, **values)
         return StandingMission(number, request, trigger, missed, now, now)
 
     def missions(self) -> tuple[StandingMission, ...]:
-        """All of them, in the order in which they came."""
+        """Returns all standing missions in the order in which they came."""
         rows = self._store.rows("SELECT * FROM mission WHERE trigger IS NOT NULL ORDER BY id")
         return tuple(map(_standing, rows))
 
     def fire(self, chosen: Sequence[tuple[StandingMission, Request]], why: str) -> tuple[StoredMission, ...]:
-        """Queue these requests, each for its standing mission: all of them or none.
+        """Queues these requests, each as a copy of its standing mission: all of them or none.
 
-        Raises InputError: too many of one wait already, or it was removed meanwhile.
+        Raises InputError when too many copies of one wait already, or it was removed meanwhile.
         """
         with self._store.writing() as connection:
             for each, _ in chosen:
@@ -76,16 +76,16 @@ class StandingMissions:
         return tuple(map(self._store.mission, numbers))
 
     def fire_due(self, *, waiting_since: datetime, serving_since: datetime) -> tuple[StoredMission, ...]:
-        """Queue what came due since the last time, by the policies of the missions; what was queued.
+        """Queues the missions that came due since the last call, by their policies; returns the queued missions.
 
-        Occurrences from before `waiting_since`, when no mission ran any more, are missed; so are batteries that became
-        full before `serving_since`. That an occurrence has been dealt with is written together with its mission.
+        Occurrences from before `waiting_since`, when a mission still ran, are missed; so are batteries that became full
+        before `serving_since`. One transaction queues the mission and marks its occurrence as handled.
         """
         now, numbers = self._store.now(), list[int]()
         ended = self._store.rows(_ENDED)
         for each in self.missions():
             if each.since - now > SET_BACK:
-                self._deal_with(each, now, None)
+                self._handle(each, now, None)
                 continue
             at = self._latest(each, now, ended)
             if at is None or at <= each.since:
@@ -94,17 +94,17 @@ class StandingMissions:
             missed = at <= begun or now - at > LATE
             due = f", due {local(at, self._zone):%Y-%m-%d %H:%M}" if isinstance(each.trigger, Timed) else ""
             why = f"{each.trigger}{due}{', missed' if missed else ''}"
-            numbers += self._deal_with(each, now, why if not missed or each.missed is Missed.ONCE else None)
+            numbers += self._handle(each, now, why if not missed or each.missed is Missed.ONCE else None)
         return tuple(map(self._store.mission, numbers))
 
     def due_next(self) -> datetime | None:
-        """When the next occurrence of any is due; None where no time says so."""
+        """Time of the next occurrence of any standing mission; None when no trigger has times."""
         now = self._store.now()
         times = (each.due_next(now, self._zone) for each in self.missions())
         return min((at for at in times if at is not None), default=None)
 
     def _latest(self, each: StandingMission, now: datetime, ended: Sequence[sqlite3.Row]) -> datetime | None:
-        """The last occurrence of a standing mission up to now."""
+        """Time of the last occurrence of a standing mission up to now."""
         if isinstance(each.trigger, Schedule | Once | Every):
             return each.trigger.latest(now, each.anchor, self._zone)
         if not isinstance(each.trigger, OnBatteryFull):
@@ -117,11 +117,11 @@ class StandingMissions:
                 times.append(datetime.fromisoformat(row["ended"]))
         return max((at for at in times if at <= now), default=None)
 
-    def _deal_with(self, each: StandingMission, now: datetime, why: str | None) -> list[int]:
-        """Note that all occurrences up to now have been dealt with, and queue a mission where there is a reason."""
+    def _handle(self, each: StandingMission, now: datetime, why: str | None) -> list[int]:
+        """Marks all occurrences up to now as handled, and queues a mission where there is a reason `why`."""
         with self._store.writing() as connection:
-            told = (now.isoformat(), each.id)
-            still_there = connection.execute("UPDATE mission SET since = ? WHERE id = ?", told).rowcount
+            values = (now.isoformat(), each.id)
+            still_there = connection.execute("UPDATE mission SET since = ? WHERE id = ?", values).rowcount
             return [_queue(connection, each.id, each.request, why)] if why is not None and still_there else []
 
     def _refuse_more(self, connection: sqlite3.Connection, each: StandingMission) -> None:
@@ -134,7 +134,7 @@ class StandingMissions:
 
 
 class TooManyError(InputError):
-    """Too many copies of a standing mission wait already."""
+    """Error of a standing mission of which too many copies wait already."""
 
 
 def _queue(connection: sqlite3.Connection, standing: int, request: Request, why: str) -> int:

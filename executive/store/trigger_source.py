@@ -1,7 +1,7 @@
-"""Trigger sources: plug-ins that hear messages, such as those of an MQTT broker or a Zenoh network.
+"""Trigger sources: plug-ins that receive messages, such as those of an MQTT broker or a Zenoh network.
 
 A distribution registers one in the entry-point group `errand.triggers`, name = the KIND in `--on "topic KIND:TOPIC"`,
-value = "module:factory". The factory takes no arguments and gives an object that keeps the protocol below.
+value = "module:factory". The factory takes no arguments and returns an object of the protocol below.
 """
 
 from __future__ import annotations
@@ -16,37 +16,37 @@ from skills.files.plugins import PluginDefect, run_plugin
 GROUP: Final = "errand.triggers"
 
 Fire = Callable[[str, bytes], None]
-"""Takes a topic, as it was given to `start`, and the payload: nothing, or a JSON object of parameter values."""
+"""Receives a topic, as it was given to `start`, and the payload: empty, or a JSON object of parameter values."""
 
 
 class TriggerSource(Protocol):
-    """Hears the topics of one kind."""
+    """Receiver of the topics of one kind."""
 
     def start(self, topics: Sequence[str], fire: Fire) -> None:
-        """Begins to listen, and returns within 10 s; call `fire` for each message that comes.
+        """Begins to listen, and returns within 10 s; from then on calls `fire` for each message.
 
-        It is called in a thread of its own; so is `stop`, which has 10 s as well.
-
-        `fire` may be called from any thread. When it returns, the mission is kept in the store, or the reason why not
-        was printed; it raises nothing. It takes a second or more for a payload with values.
+        `start` and `stop` are called in a thread of their own, and have 10 s each. `fire` may be called from any
+        thread. When it returns, the mission is in the store, or the reason why not was printed; it raises nothing. With
+        a payload of values it takes a second or more.
         """
 
     def stop(self) -> None:
-        """Stops listening, and lets go of what was opened; `fire` is not called after it returns. Idempotent."""
+        """Stops listening and closes what it opened; `fire` is not called after it returns. Idempotent."""
 
 
 def refuse_missing_source(kind: str) -> None:
-    """Raises InputError: no installed distribution registers a trigger source of this kind, or several do."""
+    """Raises InputError unless exactly one installed distribution registers a trigger source of this kind."""
     _entry(kind)
 
 
 def trigger_source(kind: str) -> TriggerSource:
-    """A new source of a kind. Raises InputError: there is none, or it cannot be made."""
+    """Creates a trigger source of a kind. Raises InputError when there is none, or it cannot be created."""
     entry = _entry(kind)
     try:
         source: Any = run_plugin(entry, lambda: entry.load()())
     except PluginDefect as defect:
-        raise _broken(entry, defect) from defect
+        what = f"trigger source '{entry.name}' ({entry.value}) cannot be made ({defect})"
+        raise InputError(what, hint="repair or uninstall that package") from defect
     lacking = [name for name in ("start", "stop") if not callable(getattr(source, name, None))]
     if lacking:
         what = f"trigger source '{kind}' ({entry.value}) has no {listing(lacking)}"
@@ -65,8 +65,3 @@ def _entry(kind: str) -> EntryPoint:
         hint = f"install a package that registers '{kind}' in the entry-point group '{GROUP}'; {others}"
         raise InputError(f"there is no trigger source '{kind}'", hint=hint)
     return next(iter(found.values()))
-
-
-def _broken(entry: EntryPoint, defect: PluginDefect) -> InputError:
-    what = f"trigger source '{entry.name}' ({entry.value}) cannot be made ({defect})"
-    return InputError(what, hint="repair or uninstall that package")

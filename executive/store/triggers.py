@@ -1,12 +1,12 @@
-"""Triggers: when a standing mission is queued again. Data with a text form that parses back to itself.
+"""Triggers of standing missions. Each has a text form that parses back to itself.
 
     every weekday 09:00                    every monday and friday 08:15 and 17:00
     2026-12-01 09:00                       every 30m
     battery full        battery 80%        call patrol        topic mqtt:home/door
 
-Times of day are local wall time. On the day on which clocks go forward, a time that they skip comes as long after
-midnight as on any other day: 02:30 comes when clocks show 03:30. On the day on which they go back, a time that they
-show twice comes once, the first time. A period counts the time that passes, whatever clocks show.
+Times of day are local wall time. On the day on which clocks go forward, a skipped time comes as long after midnight as
+on any other day: 02:30 comes when clocks show 03:30. On the day on which they go back, a time that clocks show twice
+comes once, the first time. A period counts elapsed time, whatever clocks show.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from skills.files.errors import InputError, listing, suggestion
 
 FULL: Final = 0.95
 NOISE: Final = 0.01
-"""A charge that falls is read now below a level and now above it; one that rises was lower by more than this."""
+"""Charge below the level by more than this counts as lower; less may be noise of a falling charge."""
 LONGEST: Final = timedelta(days=366)
 _WEEK: Final = 7
 _LONGEST_SKIP: Final = timedelta(hours=3)
@@ -32,14 +32,14 @@ _EVENTS: Final = "'battery full', 'battery 80%', 'call NAME' or 'topic KIND:TOPI
 
 
 class Missed(enum.Enum):
-    """How to treat occurrences that pass while nothing serves, or while a mission runs."""
+    """Policy for occurrences while no server runs, or while a mission runs."""
 
     SKIP = "skip"
     ONCE = "once"
 
 
 class Day(enum.Enum):
-    """A day of the week; the value is Python's number of it."""
+    """Day of the week; the value is Python's number of it."""
 
     MONDAY = 0
     TUESDAY = 1
@@ -56,7 +56,7 @@ _DAYS: Final = {spelled: day for day in Day for name in [day.name.lower()] for s
 
 @dataclass(frozen=True)
 class Schedule:
-    """Some times of day (local) on some days of the week, both in order and without repetition."""
+    """Trigger at some local times of day on some days of the week, both in order and without repetition."""
 
     days: tuple[Day, ...]
     times: tuple[time, ...]
@@ -67,15 +67,15 @@ class Schedule:
         return f"every {days} {listing(each.strftime('%H:%M') for each in self.times)}"
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """The first occurrence later than a moment (aware); `zone` None is the system's. `anchor` does not matter."""
+        """Returns the first occurrence after a moment (aware); `zone` None is the system's, `anchor` is not used."""
         return min(each for each in self._around(moment, range(-1, _WEEK + 2), zone) if each > moment)
 
     def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """The last occurrence up to now."""
+        """Returns the last occurrence up to now."""
         return max(each for each in self._around(now, range(-_WEEK - 1, 2), zone) if each <= now)
 
     def _around(self, moment: datetime, offsets: Iterable[int], zone: tzinfo | None) -> list[datetime]:
-        """The occurrences on the days so far from that of a moment."""
+        """Returns the occurrences on the days at these offsets from the day of a moment."""
         today = local(moment, zone).date()
         dates = (today + timedelta(days=offset) for offset in offsets)
         on = [each for each in dates if Day(each.weekday()) in self.days]
@@ -84,7 +84,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Once:
-    """One local date and time of day."""
+    """Trigger at one local date and time of day."""
 
     date: date
     time: time
@@ -93,19 +93,19 @@ class Once:
         return f"{self.date.isoformat()} {self.time.strftime('%H:%M')}"
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """The occurrence where it is later than a moment."""
+        """Returns the occurrence if it is later than a moment."""
         at = _moment(self.date, self.time, zone)
         return at if at > moment else None
 
     def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """The occurrence where it is not later than now."""
+        """Returns the occurrence if it is not later than now."""
         at = _moment(self.date, self.time, zone)
         return at if at <= now else None
 
 
 @dataclass(frozen=True)
 class Every:
-    """Again and again after a period of whole seconds, counted from the anchor: the time at which it was given."""
+    """Periodic trigger, in whole seconds from the anchor: the time at which the standing mission was given."""
 
     period: timedelta
 
@@ -115,8 +115,8 @@ class Every:
         return f"every {seconds // size}{unit}"
 
     @staticmethod
-    def of(text: str) -> Every:
-        """The period in "30m", "1 h 30 min", "PT5M" or "1 day". Raises InputError."""
+    def from_text(text: str) -> Every:
+        """Parses "30m", "1 h 30 min", "PT5M" or "1 day". Raises InputError."""
         seconds = seconds_in(text) or 0.0
         if not (1.0 <= seconds <= LONGEST.total_seconds() and seconds.is_integer()):
             hint = "give whole seconds, from 1 s to 366 days, as in '30 min' or '1 h 30 min'"
@@ -124,12 +124,12 @@ class Every:
         return Every(timedelta(seconds=seconds))
 
     def after(self, moment: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """The first occurrence later than a moment."""
+        """Returns the first occurrence after a moment."""
         start = anchor.astimezone(UTC)  # between two times of one zone, Python counts what clocks show
         return start + max(1, (moment.astimezone(UTC) - start) // self.period + 1) * self.period
 
     def latest(self, now: datetime, anchor: datetime, zone: tzinfo | None) -> datetime | None:
-        """The last occurrence up to now."""
+        """Returns the last occurrence up to now."""
         start = anchor.astimezone(UTC)
         count = (now.astimezone(UTC) - start) // self.period
         return start + count * self.period if count > 0 else None
@@ -137,7 +137,7 @@ class Every:
 
 @dataclass(frozen=True)
 class OnBatteryFull:
-    """A mission ends with this charge (0 to 1) or more, and the charge was lower while it ran, by more than NOISE."""
+    """Trigger at the end of a mission with this charge (0 to 1) or more, which was lower before by more than NOISE."""
 
     level: float = FULL
 
@@ -145,13 +145,13 @@ class OnBatteryFull:
         return "battery full" if self.level == FULL else f"battery {100 * self.level:g}%"
 
     def rises(self, lowest: float, last: float) -> bool:
-        """Returns whether a mission with this lowest and last charge is an occurrence."""
+        """Returns whether a mission with this lowest and this last charge is an occurrence."""
         return lowest < self.level - NOISE and self.level <= last
 
 
 @dataclass(frozen=True)
 class OnCall:
-    """An HTTP call of this name."""
+    """Trigger by an HTTP call of this name."""
 
     name: str
 
@@ -161,7 +161,7 @@ class OnCall:
 
 @dataclass(frozen=True)
 class OnTopic:
-    """A message of a topic, heard by the trigger source of a kind."""
+    """Trigger by a message of a topic, received by the trigger source of a kind."""
 
     kind: str
     topic: str
@@ -182,15 +182,15 @@ _TOPIC: Final = re.compile(r"topic (?P<kind>[A-Za-z0-9_-]{1,64}):(?P<topic>\S(?:
 
 
 def trigger_of(text: str) -> Trigger:
-    """The trigger that `str` wrote. Raises InputError."""
+    """Parses the text form of a trigger. Raises InputError."""
     first, _, rest = text.partition(" ")
     if first == "every" and (rest[:1].isdigit() or rest[:2].upper() in ("PT", "P1")):
-        return Every.of(rest)
+        return Every.from_text(rest)
     return schedule_of(text) if first == "every" or first[:1].isdigit() else event_of(text)
 
 
 def schedule_of(text: str) -> Schedule | Once:
-    """The times in a text such as "every weekday 09:00" or "2026-12-01 09:00". Raises InputError, with a hint."""
+    """Parses times such as "every weekday 09:00" or "2026-12-01 09:00". Raises InputError."""
     words = " ".join(text.lower().split())
     once = _ONCE.fullmatch(words)
     if once is not None:
@@ -205,7 +205,7 @@ def schedule_of(text: str) -> Schedule | Once:
 
 
 def event_of(text: str) -> OnBatteryFull | OnCall | OnTopic:
-    """The trigger that `--on` names: a battery's charge, a call or a topic. Raises InputError, with a hint."""
+    """Parses the trigger of `--on`: a battery's charge, a call or a topic. Raises InputError."""
     words = text.strip()
     first = words.split(" ", 1)[0]
     if (topic := _TOPIC.fullmatch(words)) is not None and topic["topic"].isprintable():
@@ -229,12 +229,12 @@ _HINTS: Final = {
 
 
 def local(moment: datetime, zone: tzinfo | None) -> datetime:
-    """A moment (aware) as local wall time; `zone` None is the system's."""
+    """Converts a moment (aware) to local wall time; `zone` None is the system's."""
     return moment.astimezone(zone)
 
 
 def _moment(day: date, at: time, zone: tzinfo | None) -> datetime:
-    """A local date and time as UTC."""
+    """Converts a local date and time to UTC."""
     wall = datetime.combine(day, at)
     if zone is not None:
         return wall.replace(tzinfo=zone).astimezone(UTC)

@@ -1,7 +1,7 @@
-"""Wakes a process that waits for work: through a named pipe beside the store, to which any process may write.
+"""Named pipe beside the store that wakes a process that waits for work; any process may write to it.
 
-It says only that the store, or something in the waiting process, has changed. Threads, signal handlers and other
-processes write to it in the same way; what is written while nobody waits ends the next wait, and many count as one.
+A wake-up says only that the store, or something in the waiting process, has changed. Threads, signal handlers and other
+processes write in the same way. A wake-up while nobody waits ends the next wait; several count as one.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from executive.store.missions import MissionStore
 from skills.files.errors import InputError
 
 LONGEST_WAIT: Final = timedelta(minutes=1)
-"""A wait counts the time that passes, but the wall's clock may be set meanwhile, or the machine may sleep."""
+"""Limit of a wait (elapsed time), since the wall clock may be set meanwhile, or the machine may sleep."""
 _MOST_WAKES: Final = 4096
 
 
 class WakeupPipe:
-    """The waiting side. Use it as a context manager, or close it."""
+    """Waiting side of the pipe; use it as a context manager, or close it."""
 
     def __init__(self, store: MissionStore) -> None:
-        """Listens beside a store. Raises InputError: no pipe can be made there."""
+        """Opens the pipe beside a store. Raises InputError when that is not possible."""
         self._store, self._path = store, _path(store.path)
         with store.kind.failures(store.path):
             with suppress(FileExistsError):
@@ -43,17 +43,17 @@ class WakeupPipe:
         self.close()
 
     def close(self) -> None:
-        """Listens no more."""
+        """Removes the pipe."""
         self._path.unlink(missing_ok=True)
         os.close(self._pipe)
 
     def wake(self) -> None:
-        """Ends the wait under way, or the next one; from any thread, and from signal handlers."""
+        """Ends the present wait, or the next one; may be called from any thread and from signal handlers."""
         with suppress(BlockingIOError):
             os.write(self._pipe, b"!")
 
     def wait(self, until: datetime | None) -> None:
-        """Blocks until somebody wakes it or a moment (aware) comes, but never for longer than LONGEST_WAIT."""
+        """Blocks until a wake-up or until a moment (aware), but never for longer than LONGEST_WAIT."""
         left = LONGEST_WAIT if until is None else min(LONGEST_WAIT, until - self._store.now())
         select.select([self._pipe], [], [], max(0.0, left.total_seconds()))
         with suppress(BlockingIOError):
@@ -61,7 +61,7 @@ class WakeupPipe:
 
 
 def wake_server(store: Path) -> None:
-    """Tells the process that waits at a store, if there is one, that something has changed."""
+    """Wakes the process that waits at a store, if there is one."""
     try:
         pipe = os.open(_path(store), os.O_WRONLY | os.O_NONBLOCK)
     except OSError:

@@ -73,7 +73,7 @@ class ExplainedNode(_TakesKeywords, Explained):
         """Of the options, the blackboard keys that such a node writes, and the type of each value."""
         return {}
 
-    def say_again(self, status: Status, cause: Cause | None, message: str) -> None:
+    def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Takes over the status, cause and message that the node had before a restart."""
         self.status, self.cause, self.message = status, cause, message
 
@@ -154,7 +154,7 @@ class MemoryComposite(ExplainedNode, Composite):
     goes_on_after: ClassVar[tuple[Status, ...]] = (Status.SUCCESS,)
     least: ClassVar[int] = 1
     children: list[Behaviour]
-    taken_up: bool = field(default=False, init=False)
+    resumed: bool = field(default=False, init=False)
     """Whether the mission goes on after a restart; then the first tick forgets nothing."""
     _index: int = field(default=0, init=False)
 
@@ -201,10 +201,10 @@ class MemoryComposite(ExplainedNode, Composite):
         return self._index + 1 if goes_on else None
 
     def _restart(self) -> None:
-        taken_up, self.taken_up, self._index = self.taken_up, False, 0
+        resumed, self.resumed, self._index = self.resumed, False, 0
         self.clear_explanation()
         self._reset_children()
-        if not taken_up:
+        if not resumed:
             self._forget()
 
     def _forget(self) -> None:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from executive.record.history import read_events
-from executive.store.resuming import told_before
+from executive.store.resuming import is_from_before
 from plant.diagram import TIME_STEP_S
 from plant.snapshot_file import SnapshotError, read_snapshot
 
@@ -101,7 +101,7 @@ def _done_twice(out: Path) -> bool:
     for log in sorted(out.glob("log*.mcap")):
         for event in read_events(log):
             told = event.data
-            work = event.topic == "transitions" and told["to"] == "SUCCESS" and not told_before(told["message"])
+            work = event.topic == "transitions" and told["to"] == "SUCCESS" and not is_from_before(told["message"])
             if work and told["node"].rsplit("/", 1)[-1] in ("grasp", "place"):
                 done.append((told["robot"], told["node"].rsplit("/", 1)[-1]))
     return len(done) > len(set(done))

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from executive.record.history import read_events
-from executive.store.resuming import told_before
+from executive.store.resuming import is_from_before
 from plant.diagram import TIME_STEP_S
 from plant.snapshot_file import SnapshotError, read_snapshot
 
@@ -49,7 +49,7 @@ def began_s(leaf: str, out: Path) -> float | None:
 def done_leaves(out: Path) -> list[str]:
     """The leaves that came to a good end by their own work, in both lives."""
     events = [event.data for log in sorted(out.glob("log*.mcap")) for event in read_events(log) if "node" in event.data]
-    good = [event for event in events if event.get("to") == "SUCCESS" and not told_before(event["message"])]
+    good = [event for event in events if event.get("to") == "SUCCESS" and not is_from_before(event["message"])]
     return [event["node"].rsplit("/", 1)[-1] for event in good]
 
 

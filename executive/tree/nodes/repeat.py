@@ -64,7 +64,7 @@ class Repeat(MemoryComposite):
         yield self
 
     def _restart(self) -> None:
-        goes_on = self.taken_up and self.count in self.board
+        goes_on = self.resumed and self.count in self.board
         super()._restart()
         if goes_on:
             self._enter_round()

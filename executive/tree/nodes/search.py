@@ -69,9 +69,9 @@ class Answer(ExplainedDecorator):
         count = options.get("count_key")
         return {options["key"]: bool, **({count: float} if count else {})}
 
-    def say_again(self, status: Status, cause: Cause | None, message: str) -> None:
+    def restore(self, status: Status, cause: Cause | None, message: str) -> None:
         """Gives the answer of before, too."""
-        super().say_again(status, cause, message)
+        super().restore(status, cause, message)
         self.answer = self.board.get(self.key) if status == Status.SUCCESS else None
 
     def initialise(self) -> None:

@@ -198,7 +198,7 @@ def test_a_kill_in_any_tick_repeats_nothing(tmp_path, live, store, robot, world,
         robot.holding, world.grasps, world.places = False, 0, 0
         assert live(TIDY, kill_after=moment, lag=lag)[0] is None
         result, _, recollection = live(TIDY)
-        told = (moment, result.worst.message, recollection.told, world.work)
+        told = (moment, result.worst.message, recollection.log, world.work)
         assert result.outcome is Outcome.SUCCESS, told
         assert (world.grasps, world.places, robot.holding) == (1, 1, False), told
 
@@ -227,7 +227,7 @@ def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, s
         robot.holding, world.grasps, world.places = False, 0, 0
         assert live(CLEAR, kill_after=moment, lag=lag)[0] is None
         result, _, recollection = live(CLEAR)
-        told = (moment, result.worst.message, recollection.told, world.work)
+        told = (moment, result.worst.message, recollection.log, world.work)
         assert result.outcome is Outcome.SUCCESS, told
         assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
         assert result.worst.message.startswith("moved two cokes"), told
@@ -244,7 +244,7 @@ def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot,
         robot.holding, world.grasps, world.places, world.in_the_way = False, 0, 0, (cube,)
         assert live(TIDY, kill_after=moment, policy=allowed)[0] is None
         result, _, recollection = live(TIDY, policy=allowed)
-        told = (moment, result.worst.message, recollection.told, world.work)
+        told = (moment, result.worst.message, recollection.log, world.work)
         assert result.outcome is Outcome.SUCCESS, told
         assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
 
@@ -254,7 +254,7 @@ def test_what_was_finished_is_told_and_not_done_again(live, script, world):
     result, _, recollection = live(TIDY)
     assert result.outcome is Outcome.SUCCESS
     assert "detect" not in script.begun
-    told = "\n".join(recollection.told)
+    told = "\n".join(recollection.log)
     assert "find/counter-1/detect: success before the restart: seen" in told
     assert "goes on here" in told
 
@@ -265,7 +265,7 @@ def test_a_look_that_found_nothing_anywhere_is_not_repeated(live, script):
     script.begun.clear()
     result, _, recollection = live(FETCH_AND_ASK)
     assert result.outcome is Outcome.SUCCESS
-    looks = [told for told in recollection.told if "1-bedroom/search" in told and "/detect: " in told]
+    looks = [told for told in recollection.log if "1-bedroom/search" in told and "/detect: " in told]
     assert [look.partition(": ")[2] for look in looks] == ["failure before the restart: not seen"]
 
 
@@ -287,7 +287,7 @@ def test_a_thing_lost_over_the_restart_is_taken_anew(live, robot, world):
     result, _, recollection = live(TIDY)
     assert result.outcome is Outcome.SUCCESS
     assert world.grasps == 2
-    assert any(told.endswith("/grasp: does it again, since the gripper is empty") for told in recollection.told)
+    assert any(told.endswith("/grasp: does it again, since the gripper is empty") for told in recollection.log)
 
 
 def test_a_failed_look_before_the_kill_is_not_looked_again(live, script):

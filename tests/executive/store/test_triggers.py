@@ -84,7 +84,7 @@ def test_times_may_be_written_in_several_forms(said, canonical):
     ],
 )
 def test_periods_may_be_written_in_several_forms(said, canonical):
-    assert str(Every.of(said)) == canonical
+    assert str(Every.from_text(said)) == canonical
 
 
 @pytest.mark.parametrize("said", ["battery full", "Battery 95 %", "battery 95%"])
@@ -117,14 +117,14 @@ def test_other_times_are_refused_with_a_hint(said, words):
     [("30", "every 30s"), ("1.5h", "every 90m"), ("1 h 30 min", "every 90m"), ("PT5M", "every 5m")],
 )
 def test_a_period_takes_every_form_of_a_duration(said, written):
-    assert str(Every.of(said)) == written
+    assert str(Every.from_text(said)) == written
     assert str(trigger_of(f"every {said}")) == written
 
 
 @pytest.mark.parametrize("said", ["0m", "m", "-5m", "0.5s", "400d", "9999999999s", "30 mm", "5 daysx"])
 def test_other_periods_are_refused_with_a_hint(said):
     with pytest.raises(InputError, match="is no period; give whole seconds"):
-        Every.of(said)
+        Every.from_text(said)
 
 
 @pytest.mark.parametrize(
@@ -187,12 +187,12 @@ def test_a_time_that_clocks_show_twice_comes_once_the_first_time():
 
 
 def test_a_period_counts_the_time_that_passes_also_when_clocks_are_set():
-    every, anchor = Every.of("1d"), berlin("2026-03-28 12:00")
+    every, anchor = Every.from_text("1d"), berlin("2026-03-28 12:00")
     assert every.after(anchor, anchor, BERLIN).astimezone(BERLIN) == berlin("2026-03-29 13:00")
 
 
 def test_a_period_is_counted_from_its_anchor():
-    every = Every.of("30m")
+    every = Every.from_text("30m")
     assert every.latest(ANCHOR + timedelta(minutes=29), ANCHOR, None) is None
     assert every.latest(ANCHOR + timedelta(minutes=95), ANCHOR, None) == ANCHOR + timedelta(minutes=90)
     assert every.after(ANCHOR + timedelta(minutes=90), ANCHOR, None) == ANCHOR + timedelta(minutes=120)

@@ -17,7 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator,
 
 from executive.testing.bench import SkillBench, SkillRun, scripted_bench
 from executive.testing.small_room import room_knowledge
-from executive.tree.port_values import PortValueError, gathered, port_value
+from executive.tree.port_values import PortValueError, assign_ports, port_value
 from executive.tree.registry import missing
 from executive.tree.types import describe_type, field_types, required
 from skills.api import Cause, Skill
@@ -160,7 +160,7 @@ class SkillTestFile(_Strict):
             {**self.with_, **self.tests[index].with_},
         )
         try:
-            found = gathered(values, skill.Inputs)
+            found = assign_ports(values, skill.Inputs)
             missing = [name for name in required(skill.Inputs) if name not in found]
             if missing:
                 hint = f"give it a {describe_type(hints[missing[0]])}"

@@ -1,4 +1,4 @@
-"""From the steps of a mission to nodes: what is known at each point, and what the plans of all steps share."""
+"""Assembly of a mission's steps to nodes, and the data flow that the plans of all steps share."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ PYTHON_TYPES: Final[Mapping[Kind, type]] = {Kind.NUMBER: float, Kind.TEXT: str, 
 
 @dataclass(frozen=True)
 class Named:
-    """A value that steps may read: its blackboard key, its type, and its quantity where it has one."""
+    """Named value that steps may read: its blackboard key, its type, and its quantity where it has one."""
 
     key: str
     type: type
     quantity: Any = None
 
     def is_alike(self, kind: Any) -> bool:
-        """Returns whether expressions may compare its values with those of type `kind`."""
+        """Returns whether expressions may compare its values with values of type `kind`."""
         return self.type is kind or (kind_of(self.type) is kind_of(kind) and kind_of(kind) is not Kind.OTHER)
 
     def is_same(self, other: Named | None) -> bool:
@@ -45,11 +45,11 @@ class Named:
 
 @dataclass
 class Flow:
-    """What is known at one point of a mission, when all goes well up to there.
+    """Data flow at one point of a mission, if no step fails before it.
 
-    `names` are the values that surely have been given by then, `kinds` the types of all that any step may have given,
-    by their blackboard keys; `declared` are those that always have one. `held` is what the gripper holds; `opening` as
-    long as it is what it held at first.
+    `names` has the values that are certain to exist, `kinds` the types of all values that any step may have given, by
+    their blackboard keys; `declared` are the names that always have a value. `held` is the object in the gripper;
+    `opening` is set while it is still the object from the beginning of the mission.
     """
 
     names: dict[str, Named] = field(default_factory=dict)
@@ -59,11 +59,11 @@ class Flow:
     opening: bool = True
 
     def copy(self) -> Flow:
-        """The same, for a branch."""
+        """Returns a copy, for a branch."""
         return replace(self, names=dict(self.names))
 
     def join(self, branches: Sequence[Flow]) -> None:
-        """Goes on after one of several branches, nobody knows which."""
+        """Merges the flows of several branches, of which one runs."""
         first, *others = branches
         shared = {n: named for n, named in first.names.items() if all(named.is_same(b.names.get(n)) for b in others)}
         for name, named in shared.items():
@@ -76,18 +76,18 @@ class Flow:
         self.opening = all(branch.opening for branch in branches)
 
     def may_lack(self, before: Flow) -> None:
-        """Goes on although the last step may have been skipped: what it gave may be missing."""
+        """Merges with the flow before the last step, which may be skipped, so that its values may be missing."""
         after = {name: named for name, named in self.names.items() if named.is_same(before.names.get(name))}
         changed = {name for name, named in after.items() if before.names[name] != named}
         self.names = after | {name: replace(after[name], quantity=None) for name in changed}
 
     def keys_of(self, *each: Expression | Template) -> Mapping[str, str]:
-        """The blackboard keys of the values that expressions or texts read."""
+        """Returns the blackboard keys of the values that expressions or texts read."""
         read = {name for one in each for name in one.names}
         return {name: self.names[name].key for name in sorted(read) if name in self.names}
 
     def kind_of(self, expression: Expression, source: SourceLine | None) -> Kind:
-        """The type of an expression. Raises InputError: the names that are known do not fit it."""
+        """Returns the type of an expression. Raises InputError when the known names do not fit it."""
         try:
             kind = expression.kind({**READINGS, **{name: kind_of(named.type) for name, named in self.names.items()}})
         except ExpressionError as error:
@@ -100,13 +100,13 @@ class Flow:
 
     @property
     def ranges(self) -> Mapping[str, Any]:
-        """The quantities of all names that have one."""
+        """Quantities of all names that have one."""
         return {**RANGES, **{name: each.quantity for name, each in self.names.items() if each.quantity is not None}}
 
 
 @dataclass(frozen=True)
 class _Item:
-    """One command, or one other step: its number on its level, and its step with that step's place, from 1."""
+    """Command or other step: its number on its level, and its step with the step's place, both from 1."""
 
     number: int
     place: int
@@ -116,10 +116,10 @@ class _Item:
 
 @dataclass
 class Assembler:
-    """Makes the subtrees of one mission by the `plans` of its steps.
+    """Assembler of one mission's subtrees by the `plans` of its steps.
 
-    `pick_ups` and `move_aside` count for steps that do not say otherwise; `flow` is what is known by then. Values that
-    steps set have blackboard keys below `values_base`.
+    `pick_ups` and `move_aside` hold for steps that do not say otherwise; `flow` is the data flow at the present point.
+    Values that steps set have blackboard keys below `values_base`.
     """
 
     knowledge: Knowledge
@@ -132,11 +132,11 @@ class Assembler:
     flow: Flow = field(default_factory=Flow)
 
     def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
-        """The builder of nodes that belong to no one command."""
+        """Returns the builder of nodes that belong to no single command."""
         return PlanBuilder(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
 
     def level(self, steps: Sequence[Step], base: str) -> Assembled:
-        """The subtrees of steps in a row: those under a policy each as one, the others' parts as they are."""
+        """Assembles steps in a row; a step under a policy becomes one subtree, other steps keep theirs."""
         made, problems = Assembled(), Problems()
         for items, policy in _groups(steps):
             with problems:
@@ -154,7 +154,7 @@ class Assembler:
         return made
 
     def _group(self, items: Sequence[_Item], base: str) -> Assembled:
-        """The subtrees of items in a row; some plans are made of two."""
+        """Assembles items in a row; some plans use two items."""
         made, problems, done = Assembled(), Problems(), 0
         for item, after in zip(items, (*items[1:], None), strict=True):
             if item.number <= done:
@@ -172,25 +172,25 @@ class Assembler:
         return made
 
     def row(self, steps: Sequence[Step], builder: PlanBuilder, name: str) -> Assembled:
-        """Steps in a row as one node at the builder's path id; the flow goes on after them."""
+        """Assembles steps in a row as one node at the builder's path id; the flow is then that after them."""
         made = self.level(steps, builder.path_id)
         return replace(made, nodes=(builder.sequence(name, *made.nodes, part="steps"),))
 
     def branch(self, steps: Sequence[Step], builder: PlanBuilder, name: str, before: Flow) -> tuple[Assembled, Flow]:
-        """A branch that begins with the flow `before`, and the flow after it; the own flow stays as it is."""
+        """Assembles a branch from the flow `before`; returns it with the flow after it, and keeps its own flow."""
         here, self.flow = self.flow, before.copy()
         made = self.row(steps, builder, name) if steps else Assembled()
         self.flow, after = here, self.flow
         return made, after
 
     def give(self, name: str | None, key: str, kind: type, builder: PlanBuilder, quantity: Any = None) -> str:
-        """Lets later steps read a value under `name` (None: none); the key that it goes to.
+        """Lets later steps read a value under `name` (None: not at all); returns the value's blackboard key.
 
-        That is the key under which the name has been given before, so that a loop's steps read what its later ones
-        give; else `key`, or where that is empty the name's own.
+        It is the key that the name had before, so that in a loop earlier steps read the values of later ones; else
+        `key`, or the name's own key where `key` is empty.
 
-        Raises InputError: the name is no word, is that of a reading, or has another type elsewhere: steps may be
-        repeated.
+        Raises InputError when the name is no word, or is that of a reading, or has another type elsewhere, since steps
+        may be repeated.
         """
         if name is None:
             return key
@@ -202,30 +202,30 @@ class Assembler:
         if known is not None and (name in flow.declared or known.is_alike(kind)):
             key = known.key
         if flow.kinds.setdefault(key, kind_of(kind)) is not kind_of(kind):
-            told = "is declared as" if name in flow.declared else "is elsewhere"
-            what = f"'{name}' {told} {flow.kinds[key]}, and gets {kind_of(kind)}"
+            before = "is declared as" if name in flow.declared else "is elsewhere"
+            what = f"'{name}' {before} {flow.kinds[key]}, and gets {kind_of(kind)}"
             raise InputError.at(builder.source, what, hint="use another name")
         flow.names[name] = Named(key, kind, None if name in flow.declared else quantity)
         return key
 
     def check_template(self, text: Template, builder: PlanBuilder) -> None:
-        """Raises InputError: an expression of the text does not fit the values that are known."""
+        """Raises InputError when an expression of the text does not fit the known values."""
         for expression in text.expressions:
             self.flow.kind_of(expression, builder.source)
 
 
 StepPlan = Callable[[Assembler, Any, PlanBuilder], Assembled]
 StepPlans = Mapping[type[Step], StepPlan]
-"""The plan of each kind of step."""
+"""Plans by the class of the step."""
 
 
 def step_name(command: Command) -> str:
-    """The name of a command's step in path ids: the goal, else the object."""
+    """Name of a command's step in path ids: the goal, else the object."""
     return slug(command.goal or str(command.object or command.item or "anywhere"))
 
 
 def _part(item: _Item) -> str:
-    """What an item is called in path ids."""
+    """Name of an item in path ids."""
     match item.step:
         case UseMission():
             return slug(item.step.words)
@@ -237,7 +237,7 @@ def _part(item: _Item) -> str:
 
 
 def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy | None]]:
-    """Items that belong together: those of one step under a policy, or of steps in a row without any."""
+    """Iterates over groups of items: one step with its policy, or adjacent steps without any."""
     number, free = 1, []
     for place, step in enumerate(steps, start=1):
         commands: Sequence[Command | None] = step.commands or (None,)
@@ -255,13 +255,13 @@ def _groups(steps: Sequence[Step]) -> Iterator[tuple[tuple[_Item, ...], Policy |
 
 
 def _words(items: Sequence[_Item]) -> str:
-    """What a step is called in sentences."""
+    """Text of a step in messages."""
     commands = [item.command for item in items if item.command is not None]
     return ", then ".join(map(_command_words, commands)) or items[0].step.words
 
 
 def _command_words(command: Command) -> str:
-    """A command in a few words: "grasp coke at kitchen table"."""
+    """Short text of a command: "grasp coke at kitchen table"."""
     item = command.object or command.item
     action = command.task.value if command.task is not None else "take" if command.item is not None else "go"
     goal = "" if command.goal is None else f"{'at' if command.task is not None else 'to'} {command.goal}"

@@ -1,17 +1,18 @@
-"""What all nodes of ours are made of: a stable path id, a cause and one sentence; leaves, decorators and composites.
+"""Base classes of nodes, with a stable path id, a cause and a message: leaves, decorators and composites.
 
-A page of `executive.tree.nodes` defines a kind of node as a class with a `kind`; being there registers it. Its fields
-are the options of its specs, and what the run lends: `child` or `children`, `context`, and any field of the context.
+A page of `executive.tree.nodes` defines a kind of node as a class with a `kind`, which registers it. Its fields are the
+options of its specs, and objects of the run: `child` or `children`, `context`, and any field of the context.
 
-Suspending a tree touches no status and no memory: a composite stays at its child, a retry at its attempt. Only the
-running nodes that are `Suspendable` are told; each goes on by itself when it is ticked the next time. Time that passes
-while a node is suspended does not count against its limit.
+Suspending a tree changes no status and no memory: a composite stays at its child, a retry at its attempt. Only running
+nodes that are `Suspendable` stop; each continues when it is ticked the next time. Time that passes while a node is
+suspended does not count against its limit.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, dataclass_transform, runtime_checkable
 
 from py_trees.behaviour import Behaviour
@@ -24,10 +25,10 @@ from skills.robot import Clock
 
 
 class Explained:
-    """Mixin for behaviours, which have the `status`.
+    """Mixin for behaviours that explain their status.
 
     `cause` is None unless the node failed or was cancelled; `message` is one sentence, `progress` from 0 to 1 or None.
-    A failure is `final` where another attempt would end the same way.
+    A failure is `final` if another attempt would end the same way.
     """
 
     path_id: str
@@ -38,64 +39,66 @@ class Explained:
     final: bool = False
 
     def clear_explanation(self) -> None:
-        """Forgets cause and message."""
+        """Clears cause and message."""
         self.cause, self.message, self.final = None, "", False
 
     def explain_cancelled(self) -> None:
-        """Says that the node was stopped from outside, and while doing what."""
+        """Explains that the node was stopped from outside, with its last message."""
         self.cause = Cause.CANCELLED
         self.message = f"stopped while: {self.message}" if self.message else "stopped"
 
 
 @dataclass_transform(kw_only_default=True, eq_default=False, field_specifiers=(field,))
 class _TakesKeywords:
-    """Makes each class below a dataclass of keywords."""
+    """Base class whose subclasses become dataclasses of keywords."""
 
     def __init_subclass__(cls) -> None:
         dataclass(kw_only=True, eq=False, repr=False)(cls)
 
 
 class ExplainedNode(_TakesKeywords, Explained):
-    """An explained node of ours; `kind` is what its specs call it."""
+    """Node with an explanation; `kind` is the kind of its specs."""
 
     kind: ClassVar[str] = ""
+    output_types: ClassVar[Mapping[str, Any]] = MappingProxyType({})
+    """Types of the values that it writes, by the option that holds the blackboard key of each."""
     settled: ClassVar[bool] = False
-    """Whether its success stands after a restart, and nothing below is done once more."""
+    """After a restart its success stands, and nothing below it is repeated."""
     afresh: ClassVar[bool] = False
-    """Whether nothing of it is taken up after a restart: it is called for again where need be."""
+    """After a restart nothing of it is restored, since its condition calls it again."""
     path_id: str
     name: str
     cause: Cause | None = field(default=None, init=False)
     message: str = field(default="", init=False)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Of the options, the blackboard keys that such a node writes, and the type of each value."""
-        return {}
+    @classmethod
+    def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the blackboard keys that a node with these options writes, and the type of each value."""
+        return {options[name]: kind for name, kind in cls.output_types.items() if options.get(name)}
 
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
-        """Takes over the status, cause and message that the node had before a restart."""
+        """Restores the status, cause and message from before a restart."""
         self.status, self.cause, self.message = status, cause, message
 
     def fail(self, failure: Failed) -> Status:
-        """FAILURE for a reason of one's own."""
+        """Explains a failure of the node itself; returns FAILURE."""
         self.cause, self.message = failure.cause, failure.message
         return Status.FAILURE
 
     def say(self, message: str, status: Status = Status.SUCCESS) -> Status:
-        """The status with a sentence and no cause."""
+        """Sets a message without a cause; returns the status."""
         self.cause, self.message = None, message
         return status
 
 
 class ExplainedLeaf(ExplainedNode, Behaviour):
-    """One without children."""
+    """Node without children."""
 
     def __post_init__(self) -> None:
         Behaviour.__init__(self, self.name)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Does the work of a tick. As the library's, which also writes debug texts and checks the status' type."""
+        """Runs one tick, like the method of py_trees, but without its debug texts and type checks."""
         if self.status != Status.RUNNING:
             self.initialise()
         status = self.update()
@@ -106,17 +109,17 @@ class ExplainedLeaf(ExplainedNode, Behaviour):
 
 
 class ExplainedDecorator(ExplainedNode, Decorator):
-    """A decorator that takes its child's explanation unless it has its own."""
+    """Decorator that takes its child's explanation unless it has its own."""
 
     child: Behaviour
     before: Status | None = field(default=None, init=False)
-    """How it ended before a restart, where its child gives its result of then once more."""
+    """Status at its end before a restart, if its child repeats its result from before."""
 
     def __post_init__(self) -> None:
         Decorator.__init__(self, self.name, self.child)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Ticks the child unless something holds it back, then judge. As the library's, which also checks types."""
+        """Ticks the child unless it is held back, then updates; like py_trees, but without its type checks."""
         if self.status != Status.RUNNING:
             self.initialise()
         status = self._held_back()
@@ -129,11 +132,11 @@ class ExplainedDecorator(ExplainedNode, Decorator):
         yield self
 
     def _held_back(self) -> Status | None:
-        """The status in a tick in which the child is left alone; None where it is ticked."""
+        """Returns the status of a tick that leaves the child alone; None where the child is ticked."""
         return None
 
     def stop(self, new_status: Status) -> None:
-        """Interrupted while running: stop the child and say so. Reset: reset the child too."""
+        """Stops the child; explains an interruption while running, and clears the explanation in a reset."""
         interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
         super().stop(new_status)
         if interrupted:
@@ -142,20 +145,20 @@ class ExplainedDecorator(ExplainedNode, Decorator):
             self.clear_explanation()
 
     def pass_on(self) -> Status:
-        """The child's status and explanation as they are."""
+        """Takes the child's explanation; returns the child's status."""
         failed = self.decorated.status == Status.FAILURE
         self.cause, self.message = (cause_of(self.decorated) if failed else None), message_of(self.decorated)
         return self.decorated.status
 
 
 class MemoryComposite(ExplainedNode, Composite):
-    """Ticks its children one after the other, as `_following` says, and never goes back to one that is done."""
+    """Composite that ticks its children one after the other, by `_following`, and keeps their results."""
 
     goes_on_after: ClassVar[tuple[Status, ...]] = (Status.SUCCESS,)
     least: ClassVar[int] = 1
     children: list[Behaviour]
     resumed: bool = field(default=False, init=False)
-    """Whether the mission goes on after a restart; then the first tick forgets nothing."""
+    """Set when the mission continues after a restart: the first tick then clears no blackboard keys."""
     _index: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
@@ -164,7 +167,7 @@ class MemoryComposite(ExplainedNode, Composite):
         Composite.__init__(self, self.name, list(self.children))
 
     def tick(self) -> Iterator[Behaviour]:
-        """Ticks the present child, and those that follow it in the same tick."""
+        """Ticks the present child, and the children that follow it in the same tick."""
         if self.status != Status.RUNNING:
             self._restart()
         while True:
@@ -179,7 +182,7 @@ class MemoryComposite(ExplainedNode, Composite):
         yield self
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Interrupted while running: stop what runs and keep the rest in sight. Else: reset all children."""
+        """Stops the running children when it is interrupted, and keeps the results of others; else resets all."""
         if new_status == Status.INVALID:
             interrupted = self.status == Status.RUNNING
             for child in self.children:
@@ -196,7 +199,7 @@ class MemoryComposite(ExplainedNode, Composite):
         return False
 
     def _following(self, child: Behaviour) -> int | None:
-        """The number of the child that is ticked next in the same tick, once the present one is done; None: none."""
+        """Returns the index of the child to tick next in the same tick after the present one ended; None for none."""
         goes_on = child.status in self.goes_on_after and self._index + 1 < len(self.children)
         return self._index + 1 if goes_on else None
 
@@ -208,14 +211,14 @@ class MemoryComposite(ExplainedNode, Composite):
             self._forget()
 
     def _forget(self) -> None:
-        """Leaves nothing on the blackboard of the time before it began."""
+        """Clears the blackboard keys of an earlier run of the node."""
 
     def _reset_children(self) -> None:
         for child in self.children:
             child.stop(Status.INVALID)
 
     def _take_over(self, child: Behaviour) -> None:
-        """Takes the child's status, and its explanation where there is something to explain."""
+        """Takes the child's status and explanation."""
         status = child.status if child.status != Status.INVALID else Status.FAILURE
         self.cause, self.message = self._explanation(child) if status == Status.FAILURE else (None, message_of(child))
         if status == Status.RUNNING:
@@ -227,53 +230,53 @@ class MemoryComposite(ExplainedNode, Composite):
         return cause_of(child), message_of(child)
 
     def _go_on(self, message: str) -> None:
-        """RUNNING with this sentence."""
+        """Sets RUNNING with this message."""
         self.status, self.cause, self.message = Status.RUNNING, None, message
 
     def _end(self, cause: Cause | None, message: str) -> None:
-        """SUCCESS, or FAILURE with a cause."""
+        """Ends with SUCCESS, or with FAILURE if there is a cause."""
         self.cause, self.message = cause, message
         self.stop(Status.SUCCESS if cause is None else Status.FAILURE)
 
 
 def cause_of(node: Behaviour) -> Cause:
-    """The node's cause; EXECUTION for a foreign node that carries none."""
+    """Returns the node's cause; EXECUTION for a node of py_trees without a cause."""
     cause = node.cause if isinstance(node, Explained) else None
     return cause or Cause.EXECUTION
 
 
 def failed_for_good(node: Behaviour) -> bool:
-    """Returns whether the node, or one below it, failed and another attempt would end the same way."""
+    """Returns whether the node, or one below it, has a failure that is final."""
     return any(isinstance(one, Explained) and one.status == Status.FAILURE and one.final for one in node.iterate())
 
 
 def message_of(node: Behaviour) -> str:
-    """The node's sentence; for a foreign node its feedback message, else its name and status."""
+    """Returns the node's message; for a node of py_trees its feedback message, else its name and status."""
     message = node.message if isinstance(node, Explained) else node.feedback_message
     return message or f"{node.name} {'failed' if node.status == Status.FAILURE else 'goes on'}"
 
 
 @runtime_checkable
 class Conditional(Protocol):
-    """A child that a selector passes over untouched when it does not apply: that is no failure."""
+    """Child that a selector passes over when it does not apply; that is no failure."""
 
     def applies(self) -> bool:
-        """Returns whether there is any sense in ticking it now."""
+        """Returns whether it may be ticked now."""
 
 
 @runtime_checkable
 class Suspendable(Protocol):
-    """A node that must be told when it will not be ticked for a while."""
+    """Node that must be suspended when it will not be ticked for a while."""
 
     def suspend(self) -> None:
-        """Lets go of the robot and stops counting time until the next tick. Idempotent; never raises."""
+        """Stops the robot and its own time until the next tick. Idempotent; never raises."""
 
 
 def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
-    """Suspend all running nodes of a tree: motion that its leaves began is stopped, their place is kept.
+    """Suspends all running nodes of a tree: their motion stops, and they keep their state. Idempotent.
 
-    The node `sparing` and those below it are let go on. Tick the tree again to go on: each suspended skill is told to
-    `resume`, which begins it anew unless it knows better. Stop it to give it up. Call it again freely.
+    The node `sparing` and its descendants continue. The next tick continues the tree: each suspended skill gets
+    `resume`, which by default begins it again. Stop the tree to give it up.
     """
     spared = set() if sparing is None else set(sparing.iterate())
     for node in root.iterate():
@@ -282,7 +285,7 @@ def suspend(root: Behaviour, *, sparing: Behaviour | None = None) -> None:
 
 
 class StoppableTime:
-    """Seconds of the robot's clock since a start, without those in which it was stopped."""
+    """Stopwatch on the robot's clock, in seconds since its creation, without the time in which it was stopped."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -291,21 +294,21 @@ class StoppableTime:
 
     @property
     def stopped(self) -> bool:
-        """True between `stop` and `go_on`."""
+        """Returns whether it is between `stop` and `go_on`."""
         return self._stopped_s is not None
 
     def elapsed_s(self) -> float:
-        """Seconds that counted so far."""
+        """Returns the counted seconds so far."""
         until_s = self._clock.now() if self._stopped_s is None else self._stopped_s
         return until_s - self._start_s
 
     def stop(self) -> None:
-        """Count no more; idempotent."""
+        """Stops counting; idempotent."""
         if self._stopped_s is None:
             self._stopped_s = self._clock.now()
 
     def go_on(self) -> None:
-        """Count again from here; does nothing unless stopped."""
+        """Continues counting; does nothing unless stopped."""
         if self._stopped_s is not None:
             self._start_s += self._clock.now() - self._stopped_s
             self._stopped_s = None

@@ -1,11 +1,10 @@
-"""Whether a mission can be done at all, as far as that is knowable before it runs, and what it will take."""
+"""Check of a mission before it runs: errors that make it impossible, warnings, and its estimate."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from executive.mission.gripper import InGripper, grasp_objection, objection
 from executive.tree.compiler import CompiledTree
@@ -14,7 +13,7 @@ from executive.tree.plan import StepPart
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
-from skills.api import FreeSpace, PlanningError, Skill
+from skills.api import FreeSpace, PlanningError
 from skills.files.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
 from skills.navigate.path import path_length
@@ -25,19 +24,19 @@ __all__ = ["Abilities", "Checked", "PlannedRoutes", "check_tree"]
 
 
 Fault = tuple[str, str]
-"""What speaks against a part of a mission, and a hint."""
+"""Error in a part of a mission, and a hint."""
 
 
 @dataclass(frozen=True)
 class Abilities:
-    """What is known of robot and objects: masses (kg) of the classes that can be handled, and what the arm lifts (kg).
+    """Abilities of the robot and properties of the objects, as far as they are known before a run.
 
-    A class that is not in `masses_kg` has no model: no world has such an object. `classes` and `attributes` are those
-    that the robot knows by sight; one that it does not know spoils a search for several. `reaches_m` are the lowest and
-    the highest surface that the arm reaches, over the floor; `widths_m` is the least width of each class, and `opens_m`
-    is how wide an object the gripper takes; `gripper` says whether it has one. `takers` are the people who take what is
-    handed to them (None: not known). `taken_m2` is the area of each surface that its objects surely cover, and
-    `apart_m` what is left free around an object.
+    `masses_kg` has the masses of all classes with a model, `lift_kg` is the payload of the arm. `classes` and
+    `attributes` are those that the robot recognises; an unknown one makes a search for several fail. `reaches_m` are
+    the heights of the lowest and the highest surface that the arm reaches; `widths_m` is the least width of each class,
+    `opens_m` the largest width that the gripper takes; `gripper` is False without one. `takers` are the people who take
+    objects from the robot (None: not known). `taken_m2` is the area of each surface that objects cover, `apart_m` the
+    free distance around an object.
     """
 
     masses_kg: Mapping[str, float]
@@ -55,7 +54,7 @@ class Abilities:
 
 @dataclass(frozen=True)
 class Checked:
-    """What speaks against a mission, and what it takes when all goes well."""
+    """Result of a check: the errors, the warnings, and the estimate of a mission without failures."""
 
     errors: tuple[InputError, ...]
     estimate: Estimate
@@ -63,27 +62,24 @@ class Checked:
 
 
 class PlannedRoutes(RoutePlanner):
-    """Routes by a global planner on the map, as `navigate` plans them; each is planned once."""
+    """Planner of routes on the map with the global planner of `navigate`; each route is planned once."""
 
     def __init__(self, costmap: FreeSpace, footprint: Footprint, planner: GlobalPlanner) -> None:
         self._costmap, self._footprint, self._planner = costmap, footprint, planner
         self._routes: dict[tuple[Pose2D, Pose2D], Route | PlanningError] = {}
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """The route from start to goal. Raises ValueError with one sentence when there is none."""
+        """Plans the route from start to goal. Raises ValueError with one sentence when there is none."""
         if (start, goal) not in self._routes:
-            self._routes[start, goal] = self._planned(start, goal)
+            try:
+                path = self._planner.problem(self._costmap, self._footprint, start, goal, max_speed_m_s=math.inf)()
+                self._routes[start, goal] = Route(path_length(path), float(path.progress_m()[-1]))
+            except PlanningError as error:
+                self._routes[start, goal] = error
         route = self._routes[start, goal]
         if isinstance(route, PlanningError):
             raise ValueError(str(route)) from route
         return route
-
-    def _planned(self, start: Pose2D, goal: Pose2D) -> Route | PlanningError:
-        try:
-            path = self._planner.problem(self._costmap, self._footprint, start, goal, max_speed_m_s=math.inf)()
-        except PlanningError as error:
-            return error
-        return Route(path_length(path), float(path.progress_m()[-1]))
 
 
 def check_tree(
@@ -96,12 +92,15 @@ def check_tree(
     estimates: Estimates,
     held: InGripper | None = None,
 ) -> Checked:
-    """Checks a compiled mission that begins at `start` with `held` in the gripper: are its objects there and light
-    enough, its places in reach, and does the gripper hold in each step what that step needs?"""
+    """Checks a compiled mission that begins at `start` with `held` in the gripper.
+
+    It checks that the objects exist and can be lifted, that surfaces and places are in reach, and that the gripper
+    holds before each step the object that the step needs.
+    """
     lines = {node.path_id: node.source for node in tree.root.walk()}
 
     def errors(found: Iterable[tuple[StepPart, Fault]]) -> tuple[InputError, ...]:
-        """Errors at the lines that the parts come from."""
+        """Returns errors at the lines of their parts."""
         return tuple(InputError.at(lines.get(part.path_id), what, hint=hint) for part, (what, hint) in found)
 
     commands = ((part, part.command) for part in tree.parts if part.command is not None)
@@ -114,14 +113,10 @@ def check_tree(
 
 
 def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge) -> Fault | None:
-    """What a part needs else in the gripper than what the parts before leave there."""
-    if part.command is not None:
-        return objection(part.command, held, knowledge)
-    return None if part.skill is None else _skill_objection(part.skill, held)
-
-
-def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> Fault | None:
-    """Why a skill cannot run with what is held, and a hint; None when it can."""
+    """Returns the error of a part that cannot run with the object in the gripper, or None."""
+    skill = part.skill
+    if part.command is not None or skill is None:
+        return None if part.command is None else objection(part.command, held, knowledge)
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
     if skill.gripper_before is False and held is not None and held.sure:
@@ -130,8 +125,8 @@ def _skill_objection(skill: type[Skill[Any]], held: InGripper | None) -> Fault |
 
 
 def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
-    """What makes a command impossible: its object is not known by sight, none that it means can be taken, or its
-    surface is out of the arm's reach."""
+    """Iterates over the errors of an impossible command: an object that the robot does not recognise or cannot take, a
+    person who takes nothing, or a surface out of the arm's reach."""
     handles = command.item is not None or command.task in (Task.GRASP, Task.PLACE)
     if handles and not abilities.gripper:
         what = command.item or command.object
@@ -163,7 +158,7 @@ def _impossible(command: Command, knowledge: Knowledge, abilities: Abilities) ->
 
 
 def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
-    """That something is to be handed over where nobody is who takes it."""
+    """Iterates over the errors of a hand-over to nobody, or to a person who takes nothing."""
     if command.item is None or command.task is Task.PLACE or abilities.takers is None:
         return
     person = None if command.goal is None else knowledge.person(command.goal)
@@ -179,7 +174,7 @@ def _nobody_takes(command: Command, knowledge: Knowledge, abilities: Abilities) 
 
 
 def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilities) -> Iterator[tuple[StepPart, Fault]]:
-    """The steps that put more on a surface than there is room for, as far as sizes and objects are known."""
+    """Iterates over the parts that put more on a surface than fits there, as far as sizes are known."""
     brought_m2: dict[str, float] = {}
     for part in tree.parts:
         command = part.command
@@ -191,21 +186,21 @@ def _full_surfaces(tree: CompiledTree, knowledge: Knowledge, abilities: Abilitie
         width_m = min((abilities.widths_m.get(one, 0.0) for one in classes), default=0.0)
         brought_m2[place] = brought_m2.get(place, 0.0) + max(1, command.item_count) * (width_m + abilities.apart_m) ** 2
         surfaces = knowledge.surfaces_in(place)
-        room_m2 = sum(area_m2(knowledge.surfaces[one].polygon) for one in surfaces)
+        whole_m2 = sum(area_m2(knowledge.surfaces[one].polygon) for one in surfaces)
         taken_m2 = sum(abilities.taken_m2.get(one, 0.0) for one in surfaces)
-        if width_m and brought_m2[place] > room_m2 - taken_m2:
+        if width_m and brought_m2[place] > whole_m2 - taken_m2:
             message = f"the {place} is probably full before the {item} is put there"
             yield part, (message, "name another surface, or clear it first")
 
 
 def _narrowest_m(classes: Collection[str], abilities: Abilities) -> float:
-    """The least width of some classes that can be lifted; 0.0 where nothing is known of one."""
+    """Least width (m) of the classes that can be lifted; 0.0 if one is unknown."""
     light = [one for one in classes if abilities.masses_kg.get(one, math.inf) <= abilities.lift_kg]
     return min((abilities.widths_m.get(one, 0.0) for one in light), default=0.0)
 
 
 def _out_of_reach(goal: str, knowledge: Knowledge, abilities: Abilities) -> Iterator[Fault]:
-    """That something is to be taken from or put on a surface that is too high or too low for the arm."""
+    """Iterates over the errors of a surface that is too high or too low for the arm."""
     surface = knowledge.surfaces.get(knowledge.place(goal) or goal)
     low_m, high_m = abilities.reaches_m
     if surface is not None and not low_m <= surface.height <= high_m:

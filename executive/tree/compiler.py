@@ -1,4 +1,4 @@
-"""From missions to trees: a pure function; the same mission gives the same tree, path ids included."""
+"""Compiler from missions to trees: a pure function; the same mission gives the same tree, including path ids."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ __all__ = ["CompiledTree", "StepPart", "compile_mission"]
 
 @dataclass(frozen=True)
 class CompiledTree:
-    """A mission's tree for one robot, as data; `parts` are its steps with their goal conditions, in order,
-    `steps` what it was compiled from, and `doors` those of the world's knowledge.
+    """Tree of a mission for one robot, as data.
 
-    Its root watches over the mission itself: see `executive.tree.nodes.interrupts`.
+    `parts` are its parts with goal conditions in order, `steps` the compiled steps, and `doors` the doors of the
+    knowledge file. Its root has monitors and interrupts above the mission: see `executive.tree.nodes.interrupts`.
     """
 
     robot_name: str
@@ -54,16 +54,16 @@ class CompiledTree:
 
     @property
     def mission(self) -> NodeSpec:
-        """The mission below its watches."""
+        """Node of the mission below its monitors and interrupts."""
         return self.root.children[-1] if self.root.kind == "interrupts" else self.root
 
     def build(self, context: RunContext) -> Behaviour:
-        """The py_trees tree for one run."""
+        """Builds the py_trees tree for one run."""
         return build(self.root, context)
 
     @property
     def buttons(self) -> tuple[str, ...]:
-        """The operator's buttons that it waits for or decides by."""
+        """Operator's buttons that the mission waits for or decides by."""
         return tuple(dict.fromkeys(button for node in self.root.walk() for button in buttons_of(node)))
 
     @property
@@ -73,15 +73,15 @@ class CompiledTree:
 
 
 def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> CompiledTree:
-    """Compiles a mission to a tree and checks its wiring; each node keeps the line of the file that it comes from.
+    """Compiles a mission to a tree and checks its wiring; each node has the line of the mission file behind it.
 
     Args:
-        mission: what to do; its robot and name become the first parts of the path ids.
+        mission: the mission; its robot and name become the first parts of the path ids.
         knowledge: the world's places, surfaces, objects and people.
         registry: the skills by name.
 
-    Raises InputError: no steps, an unknown place, object or skill, ports wired wrongly, or a command that cannot be
-    carried out; with the file and line where known, and all that was found in `others`.
+    Raises InputError when there are no steps, a place, object or skill is unknown, ports are wired wrongly, or a
+    command cannot be carried out; with the file and line where known, and all further errors in `others`.
     """
     if not mission.steps:
         raise InputError(f"the mission '{mission.name}' has no commands", hint="add at least one step")
@@ -96,9 +96,14 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
 
 
 def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:
-    """A mission's steps under its policy."""
+    """Builds a mission's steps under its policy."""
     remember = builder.node("remember", "where it starts", part="remember-start", key=builder.start_key, keep=True)
-    first = [remember] if _leads_back(mission) else []
+    all_steps = list(mission.walk())
+    used = (step.mission for step in all_steps if isinstance(step, UseMission))
+    policies: tuple[Policy, ...] = (mission, *all_steps, *used)
+    returns = any(policy.on_failure is OnFailure.RETURN for policy in policies)
+    leads_back = returns or any(command.goal == START for command in mission.commands)
+    first = [remember] if leads_back else []
     if mission.is_empty and not any(map(_may_skip, steps)):
         return builder.sequence(mission.name, *first, *steps)
     body = builder.sequence("steps", *steps, part="steps")
@@ -113,20 +118,11 @@ def _may_skip(node: NodeSpec) -> bool:
     return any(below.kind in (Skip.kind, AskOperator.kind) for below in node.walk())
 
 
-def _leads_back(mission: Mission) -> bool:
-    """Returns whether something in a mission leads back to where the robot stands at its beginning."""
-    steps = list(mission.walk())
-    used = (step.mission for step in steps if isinstance(step, UseMission))
-    policies: tuple[Policy, ...] = (mission, *steps, *used)
-    returns = any(policy.on_failure is OnFailure.RETURN for policy in policies)
-    return returns or any(command.goal == START for command in mission.commands)
-
-
 def check_wiring(root: NodeSpec) -> None:
     """Checks all ports of a tree.
 
-    Raises InputError: an input port without a value, an unknown port, a value of a wrong type, a blackboard key that no
-    earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.
+    Raises InputError for an input port without a value, an unknown port, a value of a wrong type, a blackboard key that
+    no earlier node writes, an output bound to a port that the skill does not have, or a path id used twice.
     """
     written: dict[str, Any] = {}
     seen: set[str] = set()
@@ -141,7 +137,7 @@ def check_wiring(root: NodeSpec) -> None:
 
 
 def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """What is wrong with one skill's ports, and the hint."""
+    """Iterates over the errors of one skill's ports, with hints."""
     skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
     types = field_types(skill.Inputs)
     for name in required(skill.Inputs):
@@ -158,7 +154,7 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
 
 
 def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """What is wrong with one bound input."""
+    """Iterates over the errors of one bound input, with hints."""
     wanted = f"give it a {describe_type(kind)}"
     if isinstance(binding, Constant) and not conforms(binding.value, kind):
         yield f"input port '{port}' got {binding.value!r}", wanted
@@ -191,15 +187,15 @@ PLANS: Final[StepPlans] = {model: plan for page in _PAGES for model, plan in get
 
 
 def build(spec: NodeSpec, context: RunContext) -> Behaviour:
-    """The py_trees node of a spec for one run, with all nodes below it."""
+    """Builds the py_trees node of a spec for one run, with all nodes below it."""
     children = [build(child, context) for child in spec.children]
-    lent = {**vars(context), "context": context, "children": children, "child": next(iter(children), None)}
+    known = {**vars(context), "context": context, "children": children, "child": next(iter(children), None)}
     make: Any = KINDS[spec.kind]
-    taken = {each.name: lent[each.name] for each in fields(make) if each.init and each.name in lent}
-    node: Behaviour = make(**{**taken, **spec.options, "path_id": spec.path_id, "name": spec.name})
+    used = {each.name: known[each.name] for each in fields(make) if each.init and each.name in known}
+    node: Behaviour = make(**{**used, **spec.options, "path_id": spec.path_id, "name": spec.name})
     return node
 
 
 def writes(spec: NodeSpec) -> Mapping[str, Any]:
-    """The blackboard keys that a node writes, and the type of each value."""
+    """Returns the blackboard keys that a node writes, and the type of each value."""
     return KINDS[spec.kind].writes(spec.options)

@@ -1,4 +1,4 @@
-"""What the nodes of one robot's tree share while they run."""
+"""Context that the nodes of one robot's tree share while they run."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from skills.robot import Pose2D
 
 
 def leaf_seed(run_seed: int, path_id: str) -> int:
-    """A 32-bit seed made of the run's seed and a path id; the same on every machine."""
+    """Derives a 32-bit seed from the run's seed and a path id; the same on every machine."""
     digest = hashlib.sha256(f"{run_seed}:{path_id}".encode()).digest()
     return int.from_bytes(digest[:4], "big")
 
 
 class Endings:
-    """What a mission is to do in the end whatever happened, and could not do where it stands in the tree.
+    """Queue of steps under `always` whose nodes were stopped from outside.
 
-    The run takes it over from a node that was stopped from outside, and does it before anything else.
+    The run takes them over from these nodes, and ticks them before anything else.
     """
 
     def __init__(self) -> None:
@@ -33,48 +33,48 @@ class Endings:
 
     @property
     def due(self) -> Behaviour | None:
-        """What is to be ticked now; None when nothing is left."""
+        """Node to be ticked now; None when the queue is empty."""
         return self._due[0] if self._due else None
 
     def take(self, node: Behaviour) -> bool:
-        """Takes a node over, perhaps in the middle of its work; False when the run does no more of that."""
+        """Takes a node over, perhaps in the middle of its work; returns False after `close`."""
         if not self._closed:
             self._due.append(node)
         return not self._closed
 
     def has(self, node: Behaviour) -> bool:
-        """Returns whether a node was taken over, and is not done yet."""
+        """Returns whether a node was taken over and has not ended yet."""
         return any(each is node for each in self._due)
 
     def done(self) -> None:
-        """What was due has come to its end."""
+        """Removes the first node, which has ended."""
         self._due.pop(0)
 
     def close(self) -> tuple[Behaviour, ...]:
-        """Takes nothing any more; what was still due."""
+        """Closes the queue; returns the nodes that were still due."""
         left, self._due, self._closed = tuple(self._due), [], True
         return left
 
 
 @dataclass
 class ArmOrder:
-    """Whether the arm may be anywhere: its last skill was halted or suspended, failed, or leaves it out."""
+    """State of the arm between skills: it may be `anywhere` after a skill that failed, stopped, or leaves it out."""
 
     anywhere: bool = False
 
     def ended(self, skill: type[Skill[Any]], *, succeeded: bool) -> None:
-        """A skill has ended. One for the arm alone leaves it as it is to be, when it succeeds."""
+        """Notes the end of a skill: only a success of a skill for the arm alone leaves the arm in a known pose."""
         if Part.ARM in skill.uses:
             self.anywhere = not succeeded or Part.BASE in skill.uses
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunContext(SkillContext):
-    """What the run lends to all nodes of a robot's tree: what skills may touch, the blackboard, the stop button.
+    """Context of all nodes of a robot's tree: the context of skills, the blackboard, the stop button.
 
-    `seed` is the run's. `stop_pressed` says why nothing may move while a stop button is pressed, else None. `presses`
-    counts how often each of the operator's buttons was pressed. `day_began_s` is the time of day (s after midnight) at
-    zero of the robot's clock.
+    `seed` is the run's. `stop_pressed` returns why nothing may move while a stop button is pressed, else None.
+    `presses` counts the presses of each of the operator's buttons. `day_began_s` is the time of day (s after midnight)
+    at zero of the robot's clock.
     """
 
     board: Board
@@ -86,14 +86,14 @@ class RunContext(SkillContext):
 
     @cached_property
     def leave_others_out(self) -> tuple[LeavesOthersOut, ...]:
-        """The estimators that leave other robots to those who know where they are."""
+        """Estimators that ignore readings of other robots, whose poses are known."""
         return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, LeavesOthersOut))
 
     def known_pose(self) -> Pose2D | None:
-        """Where the robot believes to be, the planar part of X_WB; None while it is not localised."""
+        """Returns the robot's estimated pose, the planar part of X_WB; None while it is not localised."""
         return self.pose() if self.localiser.estimate().localised else None
 
     def for_skill(self, path_id: str) -> SkillContext:
-        """The part of it that a skill may touch, with a seed of its own."""
+        """Returns the part of the context that a skill may use, with a seed of its own."""
         lent = {each.name: getattr(self, each.name) for each in fields(SkillContext) if each.init}
         return SkillContext(**{**lent, "seed": leaf_seed(self.seed, path_id)})

@@ -1,13 +1,13 @@
-"""What a mission will take when all goes well: time, route and charge, and what of it cannot be done at all.
+"""Estimate of a mission without failures: time, distance and charge, with errors for parts that are impossible.
 
-A tree's nodes are followed in the order in which they run without failures: of several branches the first possible one.
+A walk follows the tree's nodes in the order in which they run; of alternatives it takes the first possible one.
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Protocol
@@ -23,12 +23,13 @@ from skills.robot import Pose2D
 
 __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected", "load_estimates"]
 
+_Mark = tuple[Pose2D, Mapping[str, Pose2D], float]
 Positive = Annotated[float, Field(gt=0.0)]
 NAVIGATE: Final = "navigate"
 CHARGE: Final = "charge"
 DAY_S: Final = 86400.0
 USUALLY_FOUND: Final = 3
-"""How many objects a look usually finds, one after the other; how many there are is not known before."""
+"""Assumed number of objects that are found one after the other, since their true number is unknown before the run."""
 
 
 class _Data(BaseModel):
@@ -36,14 +37,14 @@ class _Data(BaseModel):
 
 
 class DriveTimes(_Data):
-    """A drive takes `overhead_s` and `per_metre_s` for each metre of progress along its path."""
+    """Duration of a drive: `overhead_s`, and `per_metre_s` for each metre of progress along its path."""
 
     overhead_s: Positive
     per_metre_s: Positive
 
 
 class BatteryUse(_Data):
-    """What is drawn in a second, or charged, as a share of a full battery."""
+    """Charge per second that is drawn or restored, as a share of a full battery."""
 
     driving_per_s: Positive
     standing_per_s: Positive
@@ -51,7 +52,7 @@ class BatteryUse(_Data):
 
 
 class Estimates(_Data):
-    """The schema of `estimates.yaml`: typical durations and what they draw."""
+    """Schema of `estimates.yaml`: typical durations, and the charge that they draw."""
 
     drive: DriveTimes
     skills: dict[str, Positive]
@@ -61,24 +62,24 @@ class Estimates(_Data):
 
 @dataclass(frozen=True)
 class Route:
-    """A route between two poses: its length (m), and its progress (m), in which turns count as well."""
+    """Route between two poses: its length (m), and its progress (m), in which turns count as well."""
 
     length_m: float
     progress_m: float
 
 
 class RoutePlanner(Protocol):
-    """Plans routes on the map."""
+    """Planner of routes on the map."""
 
     def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """The route from start to goal. Raises ValueError with one sentence when there is none."""
+        """Plans the route from start to goal. Raises ValueError with one sentence when there is none."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Time on the robot's clock (s), distance driven (m), and charge used (share of a full battery), at least.
+    """Least duration on the robot's clock (s), distance driven (m), and charge used (share of a full battery).
 
-    It may take `spare_s` longer (infinite: nobody knows how long), for the `reasons`: "1 to 3 rounds", "until 18:00".
+    It may take `spare_s` longer (infinite: unknown) for the `reasons`: "1 to 3 rounds", "until 18:00".
     """
 
     duration_s: float = 0.0
@@ -89,7 +90,7 @@ class Estimate:
 
     @property
     def most_s(self) -> float:
-        """The longest time (s) that it may take when all goes well."""
+        """Longest duration (s) without failures."""
         return self.duration_s + self.spare_s
 
     def __add__(self, other: Estimate) -> Estimate:
@@ -102,13 +103,13 @@ class Estimate:
         )
 
     def up_to(self, most_s: float, *reasons: str) -> Estimate:
-        """The same, that may last so long for these reasons, before its own."""
-        kept = tuple(dict.fromkeys((*reasons, *self.reasons)))
-        return replace(self, spare_s=max(0.0, most_s - self.duration_s), reasons=kept)
+        """Returns the estimate with `most_s` as its longest duration, for these reasons before its own."""
+        all_reasons = tuple(dict.fromkeys((*reasons, *self.reasons)))
+        return replace(self, spare_s=max(0.0, most_s - self.duration_s), reasons=all_reasons)
 
 
 class _CannotError(Exception):
-    """A node that cannot succeed; `error` is None where that is nothing to tell the user."""
+    """Node that cannot succeed; `error` is None where the user need not know."""
 
     def __init__(self, error: InputError | None) -> None:
         super().__init__(str(error))
@@ -117,7 +118,7 @@ class _CannotError(Exception):
 
 @dataclass
 class _Walk:
-    """Where the robot would be by now, which poses it would have noted, and the charge drawn since it was last full."""
+    """State of the walk: the robot's pose, the poses it has noted, the charge drawn since the battery was full."""
 
     planner: RoutePlanner
     estimates: Estimates
@@ -128,8 +129,17 @@ class _Walk:
     warnings: list[InputError] = field(default_factory=list)
     drawn: float = 0.0
 
+    def mark(self) -> _Mark:
+        """Returns the present pose, noted poses and drawn charge."""
+        return self.pose, dict(self.noted), self.drawn
+
+    def go_to(self, mark: _Mark) -> None:
+        """Sets pose, noted poses and drawn charge."""
+        self.pose, noted, self.drawn = mark
+        self.noted = dict(noted)
+
     def draw(self, node: NodeSpec, taken: Estimate) -> Estimate:
-        """Adds the charge that a skill draws, or that it restores; warns at the skill that empties the battery."""
+        """Adds the charge that a skill draws or restores; warns at the skill that empties the battery."""
         before, self.drawn = self.drawn, 0.0 if node.name == CHARGE else self.drawn + taken.charge
         if before <= 1.0 < self.drawn:
             hint = f"charge before it (`skill: {CHARGE}`) or split the mission, or it is interrupted for the dock"
@@ -152,7 +162,7 @@ def load_estimates() -> Estimates:
 
 
 def _followed(node: NodeSpec, walk: _Walk, *, first: bool) -> Estimate:
-    """A node's estimate. What cannot be done is noted and left out; with `first` it is raised instead."""
+    """Estimates a node. An impossible part is noted and omitted; with `first` its error is raised instead."""
     try:
         return _VISITS.get(node.kind, _all_of)(node, walk, first)
     except _CannotError as cannot:
@@ -164,18 +174,18 @@ def _followed(node: NodeSpec, walk: _Walk, *, first: bool) -> Estimate:
 
 
 def expected(node: NodeSpec) -> tuple[NodeSpec, ...]:
-    """The nodes below that run, one after the other, when all goes well."""
+    """Returns the children that run one after the other without failures."""
     follow = _EXPECTED.get(node.kind)
     return node.children if follow is None else follow(node)
 
 
 def _all_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """One after the other."""
+    """Estimates the children one after the other."""
     return sum((_followed(child, walk, first=first) for child in expected(node)), Estimate())
 
 
 def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """The first branch that can be followed; when there is none, the first one's reason."""
+    """Estimates the first possible branch. Raises the first branch's error if there is none."""
     reasons: list[InputError] = []
     for child in expected(node):
         tried = _tried(child, walk, reasons)
@@ -185,7 +195,7 @@ def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """All branches that can be followed; when there is none, the first one's reason."""
+    """Estimates all possible branches. Raises the first branch's error if there is none."""
     reasons: list[InputError] = []
     done = [tried for child in expected(node) if (tried := _tried(child, walk, reasons)) is not None]
     if not done:
@@ -193,19 +203,28 @@ def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     return sum(done, Estimate())
 
 
-def _tried(way: NodeSpec, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
-    """One branch; None where it cannot be followed: then the walk stands as before, and `reasons` has its reason."""
-    here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
+def _tried(branch: NodeSpec, walk: _Walk, reasons: list[InputError]) -> Estimate | None:
+    """Estimates a branch. An impossible one gives None, leaves the walk unchanged and adds its error to `reasons`."""
+    here = walk.mark()
     try:
-        return _followed(way, walk, first=True)
+        return _followed(branch, walk, first=True)
     except _CannotError as cannot:
-        walk.pose, walk.noted, walk.drawn = here, noted, drawn
+        walk.go_to(here)
         reasons += [] if cannot.error is None else [cannot.error]
         return None
 
 
+def _each_from_here(branches: Sequence[NodeSpec], walk: _Walk, first: bool) -> list[tuple[Estimate, _Mark]]:
+    """Estimates each branch from the present state of the walk; returns each with the state at its end."""
+    here, found = walk.mark(), []
+    for branch in branches:
+        walk.go_to(here)
+        found.append((_followed(branch, walk, first=first), walk.mark()))
+    return found
+
+
 def _if_known(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """What runs only after an earlier node has written something."""
+    """Estimates a branch that is possible only after an earlier node has written its key."""
     if node.options["key"] not in walk.written:
         raise _CannotError(None)
     return _followed(node.children[0], walk, first=first)
@@ -235,7 +254,7 @@ def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
-    """Where a drive leads, as far as that is known before."""
+    """Goal of a drive, as far as it is known before the run."""
     binding = node.options["inputs"].get("goal") if node.name == NAVIGATE else None
     if isinstance(binding, FromBoard):
         return walk.noted.get(binding.key)
@@ -243,34 +262,29 @@ def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
 
 
 def _one_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """Range from the shortest branch to the longest, after the decision; a single branch may be left out."""
+    """Estimates the decision, then the range from the shortest branch to the longest; a single one may not run."""
     decides, *branches = node.children
-    begun, here, noted, drawn = _followed(decides, walk, first=first), walk.pose, dict(walk.noted), walk.drawn
-    taken = [] if len(branches) > 1 else [(Estimate(), (here, noted, drawn))]
-    for branch in branches:
-        walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
-        taken.append((_followed(branch, walk, first=first), (walk.pose, walk.noted, walk.drawn)))
+    begun, here = _followed(decides, walk, first=first), walk.mark()
+    taken = [] if len(branches) > 1 else [(Estimate(), here)]
+    taken += _each_from_here(branches, walk, first)
     shortest, _ = min(taken, key=lambda each: each[0].duration_s)
-    longest, (walk.pose, walk.noted, walk.drawn) = max(taken, key=lambda each: each[0].duration_s)
+    longest, end = max(taken, key=lambda each: each[0].duration_s)
+    walk.go_to(end)
     most_s, why = max(each.most_s for each, _ in taken), (node.name, *longest.reasons)
     return begun + (shortest if most_s == shortest.most_s else shortest.up_to(most_s, *why))
 
 
 def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """All branches at once until as many as are needed are done; the others are broken off then.
+    """Estimates parallel branches, which stop when as many as are needed are done.
 
-    The walk goes on where the one that drives farthest has led.
+    The walk continues where the branch with the longest drive ends.
     """
-    here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
-    branches = []
-    for branch in node.children:
-        walk.pose, walk.noted, walk.drawn = here, dict(noted), drawn
-        branches.append((_followed(branch, walk, first=first), (walk.pose, walk.noted, walk.drawn)))
+    branches = _each_from_here(node.children, walk, first)
     ends_s = sorted(taken.duration_s for taken, _ in branches)[node.options["needed"] - 1]
     shares = [min(1.0, ends_s / taken.duration_s) if taken.duration_s else 1.0 for taken, _ in branches]
     distance_m = sum(share * taken.distance_m for share, (taken, _) in zip(shares, branches, strict=True))
     charge = sum(share * taken.charge for share, (taken, _) in zip(shares, branches, strict=True))
-    walk.pose, walk.noted, walk.drawn = max(branches, key=lambda each: each[0].distance_m)[1]
+    walk.go_to(max(branches, key=lambda each: each[0].distance_m)[1])
     reasons = tuple(dict.fromkeys(reason for taken, _ in branches for reason in taken.reasons))
     most_s, needed = max(taken.most_s for taken, _ in branches), node.options["needed"]
     if needed < len(branches) and most_s > ends_s:
@@ -280,7 +294,7 @@ def _together(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 
 def _rounds(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """So many rounds as are known before, else from one on; the second stands for all that follow it."""
+    """Estimates a known number of rounds, else at least one; the second round stands for all later ones."""
     times, fixed = node.options["times"], node.options["mode"] == "times"
     begun = _all_of(node, walk, first)
     if fixed and times:
@@ -290,14 +304,14 @@ def _rounds(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
         return begun.up_to(math.inf, endless)
     if times == 1:
         return begun
-    here, noted, drawn = walk.pose, dict(walk.noted), walk.drawn
+    here = walk.mark()
     most_s = _repeated(node, walk, first, begun, times).most_s
-    walk.pose, walk.noted, walk.drawn = here, noted, drawn
+    walk.go_to(here)
     return begun.up_to(most_s, f"1 to {times} rounds")
 
 
 def _repeated(node: NodeSpec, walk: _Walk, first: bool, begun: Estimate, times: int) -> Estimate:
-    """All rounds, of which the first has `begun`."""
+    """Estimates all rounds, of which the first is `begun`."""
     if times == 1:
         return begun
     again, more = _all_of(node, walk, first), times - 1
@@ -307,13 +321,8 @@ def _repeated(node: NodeSpec, walk: _Walk, first: bool, begun: Estimate, times: 
     return rounds + Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
 
 
-def _wait_for(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """Until something holds: nobody knows when."""
-    return _all_of(node, walk, first).up_to(math.inf, f"until {node.options['words']}")
-
-
 def _in_time(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
-    """What a time limit leaves of the range."""
+    """Limits the estimate to a timeout."""
     taken, limit_s = _all_of(node, walk, first), node.options["limit_s"]
     return taken if taken.most_s <= limit_s else taken.up_to(limit_s, f"{limit_s:g} s at most")
 
@@ -330,7 +339,7 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "together": _together,
     "repeat": _rounds,
     "wait until": lambda node, walk, first: Estimate().up_to(DAY_S, f"until {node.options['words']}"),
-    "wait for": _wait_for,
+    "wait for": lambda node, *walk: _all_of(node, *walk).up_to(math.inf, f"until {node.options['words']}"),
     "timeout": _in_time,
 }
 

@@ -1,4 +1,4 @@
-"""Goal conditions of commands and skills: what each must bring about in the world that is known."""
+"""Goal conditions of commands and skills in the known world."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ DOOR_NEAR_M: Final = 0.3
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
-    """The condition of a command; `elsewhere` are more surfaces from which its thing may be taken.
+    """Goal condition of a command; `elsewhere` are more surfaces from which its object may be taken.
 
-    Waiting where the robot stands has none.
+    Waiting at the present pose has none.
     """
     return _GOALS[command.task](command, knowledge, tuple(elsewhere))
 
 
 def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[GoalCondition, GoalCondition]:
-    """The conditions of two commands to take everything from a place to another: nothing is left, and all is there."""
+    """Goal conditions of two commands that take everything from one place to another: it is empty, all is there."""
     source = _regions(get, knowledge, ())
     place = None if bring.goal is None else knowledge.place(bring.goal)
     assert place is not None
@@ -46,18 +46,16 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
 
 
 def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
-    """Goal condition of the question whether a door is open. Raises StopIteration: the world has no such door."""
-    door = next(each for each in knowledge.doors if set(each.between) == set(between))
-    x, y = door.at
-    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    square = tuple((x + DOOR_NEAR_M * i, y + DOOR_NEAR_M * j) for i, j in corners)
-    return GoalCondition(GoalKind.DOOR_OPEN, source=(Region(f"door between {between[0]} and {between[1]}", square),))
+    """Goal condition of the question whether a door is open. Raises StopIteration if the world has no such door."""
+    (x, y) = next(door.at for door in knowledge.doors if set(door.between) == set(between))
+    square = square_region(f"door between {between[0]} and {between[1]}", Pose(x=x, y=y, yaw=0.0), DOOR_NEAR_M)
+    return GoalCondition(GoalKind.DOOR_OPEN, source=(square,))
 
 
 def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tuple[str, ...]:
-    """The surfaces to look at, those where the thing usually is first; without a place, all that there are.
+    """Returns the surfaces to search, the usual places of the object first; without a place, all surfaces.
 
-    A usual place may be a room: then its surfaces count as usual.
+    The surfaces of a room that is a usual place count as usual.
     """
     inside = tuple(knowledge.surfaces) if place is None else knowledge.surfaces_in(place)
     usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
@@ -65,7 +63,7 @@ def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tu
 
 
 def surface_region(knowledge: Knowledge, surface: str) -> Region:
-    """The space on top of a surface in which the origin of a thing lies that rests there."""
+    """Region above a surface that holds the origin of any object resting on it."""
     facts = knowledge.surfaces[surface]
     return Region(surface, facts.polygon, facts.height - BELOW_TOP_M, facts.height + ABOVE_TOP_M)
 
@@ -128,10 +126,6 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     return GoalCondition(GoalKind.WENT, goal=(_place_region(knowledge, command.goal),))
 
 
-def _waited(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) -> GoalCondition | None:
-    return None if command.goal is None else _went(command, knowledge, elsewhere)
-
-
 def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
     if knowledge.dock is None:
         return None
@@ -139,7 +133,7 @@ def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondi
 
 
 def _place_region(knowledge: Knowledge, goal: str) -> Region:
-    """A room's outline; for a surface or the start a square about where the robot is to stand."""
+    """Outline of a room; for a surface or the start, a square around the robot's pose there."""
     place = knowledge.place(goal)
     if place in knowledge.places:
         return Region(place, knowledge.places[place].polygon)
@@ -147,7 +141,7 @@ def _place_region(knowledge: Knowledge, goal: str) -> Region:
 
 
 def square_region(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
-    """A square about a pose."""
+    """Square region around a pose, `near_m` to each side."""
     sides = ((-near_m, -near_m), (near_m, -near_m), (near_m, near_m), (-near_m, near_m))
     return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
 
@@ -158,7 +152,7 @@ _GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
         Task.GRASP: _grasped,
         Task.FIND: _answered,
         Task.PLACE: _carried,
-        Task.WAIT: _waited,
+        Task.WAIT: lambda command, *known: None if command.goal is None else _went(command, *known),
         Task.CHARGE: _charged,
         None: _went,
     }

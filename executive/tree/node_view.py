@@ -1,4 +1,4 @@
-"""What every view shows: the tree's nodes with their states, as plain data."""
+"""Views of nodes: the tree's nodes with their ports and states, as plain data that every display uses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from skills.files.errors import SourceLine
 
 @dataclass(frozen=True)
 class Port:
-    """An input or output with its value as text; `on_board` when the value is a blackboard key."""
+    """Input or output of a node with its value as text, which is a blackboard key if `on_board` is set."""
 
     name: str
     value: str
@@ -26,7 +26,7 @@ class Port:
 
 
 def _ports_of(spec: NodeSpec) -> Iterator[Port]:
-    """The ports of a skill, or the options of any other node."""
+    """Iterates over the ports of a skill, or the options of any other node."""
     options = spec.options
     if spec.kind != "skill":
         yield from (Port(name, plain(value)) for name, value in options.items())
@@ -47,7 +47,7 @@ def _ports_of(spec: NodeSpec) -> Iterator[Port]:
 
 
 def plain(value: Any) -> str:
-    """A value in few words: numbers short, enum members by name, objects and surfaces by their own text or name."""
+    """Formats a value as short text: enum members by value, objects and surfaces by their own text or name."""
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, enum.Enum):
@@ -74,7 +74,7 @@ def _record(value: Any) -> str:
 
 @dataclass(frozen=True)
 class NodeView:
-    """One node as shown. A state of INVALID without a cause means: not run yet; `hidden` nodes below are left out."""
+    """View of one node. INVALID without a cause means that it has not run yet; `hidden` counts omitted descendants."""
 
     path_id: str
     kind: str
@@ -87,30 +87,30 @@ class NodeView:
 
     @property
     def below(self) -> int:
-        """How many nodes there are below, the hidden ones included."""
+        """Number of descendants, including hidden ones."""
         return self.hidden + sum(1 + child.below for child in self.children)
 
     def walk(self, depth: int = 0) -> Iterator[tuple[int, NodeView]]:
-        """Every node with its depth, parents first."""
+        """Iterates over the node and its descendants with their depths, parents first."""
         yield depth, self
         for child in self.children:
             yield from child.walk(depth + 1)
 
     def title(self, above: NodeView | None = None) -> str:
-        """What the node does, and where or with what: a skill's texts and surfaces, the goal of a drive.
+        """Title of the node: its name, with a skill's texts and surfaces, or with the goal of a drive.
 
-        `above` is its parent, which knows what the goal of a drive is called.
+        `above` is its parent, whose name has the goal of a drive.
         """
         if self.kind != "skill":
             return self.name
         if self.name == "navigate" and above is not None and above.name.startswith("go "):
             return above.name
         given = (port for port in self.ports if not (port.output or port.on_board) and port.value)
-        texts = [port.value for port in given if _tells_what(port)]
+        texts = [port.value for port in given if _is_telling(port)]
         return self.name.replace("_", " ") + (f" ({'; '.join(texts)})" if texts else "")
 
     def structure(self, above: NodeView | None = None) -> dict[str, Any]:
-        """The tree without states, as it is logged; `above` is its parent."""
+        """Returns the tree without states, as it is logged; `above` is its parent."""
         return {
             "id": self.path_id,
             "type": self.kind,
@@ -122,13 +122,13 @@ class NodeView:
         }
 
 
-def _tells_what(port: Port) -> bool:
-    """Returns whether a port holds texts, or the name of one surface; logs of older versions say "str" for a text."""
+def _is_telling(port: Port) -> bool:
+    """Returns whether a port holds texts, or the name of one surface; older logs have "str" as the type of a text."""
     return "text" in port.type or "str" in port.type or ("Surface" in port.type and "," not in port.value)
 
 
 def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> NodeView:
-    """The view of a spec, with the states by path id where there are some."""
+    """Returns the view of a spec, with states by path id."""
     known = states or {}
     return NodeView(
         path_id=spec.path_id,
@@ -142,7 +142,7 @@ def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> 
 
 
 def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -> NodeView:
-    """The view of a logged structure. Raises KeyError or TypeError for what is no structure."""
+    """Returns the view of a logged structure. Raises KeyError or TypeError for values of another form."""
     source = structure.get("source")
     return NodeView(
         path_id=structure["id"],
@@ -156,7 +156,7 @@ def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -
 
 
 def to_json(node: NodeView) -> dict[str, Any]:
-    """The node and all below as `errand tree --format json` prints them."""
+    """Converts the node and its descendants to JSON, as `errand tree --format json` prints them."""
     state = node.state
     return {
         "id": node.path_id,

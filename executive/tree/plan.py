@@ -1,4 +1,4 @@
-"""Builds the node specs of one step's subtree, and says what its parts are to bring about."""
+"""Builder of the node specs of one step's subtree, with the goal conditions of its parts."""
 
 from __future__ import annotations
 
@@ -24,32 +24,35 @@ from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
 STOW: Final = "stow"
+_BLOCKED: Final = Recovery((Trigger(frozenset({Cause.PLANNING, Cause.EXECUTION}), "navigate"),))
+NAVIGATE_RECOVERIES: Final[Mapping[str, Recovery]] = {"clear_costmap": _BLOCKED, "back_off": _BLOCKED}
+"""Recoveries of a drive that is blocked, by the skill that each runs before the next attempt."""
 PICK_UPS: Final = 2
-"""How often what falls on the way is picked up again, unless a mission says otherwise."""
+"""Number of times that a dropped object is picked up again, unless a mission says otherwise."""
 
 
 def start_key(robot_name: str, mission_name: str) -> str:
-    """The blackboard key of the pose at which a mission began."""
+    """Blackboard key of the pose at which a mission began."""
     return f"{slug(robot_name)}/{slug(mission_name)}/start-pose"
 
 
 def pose_2d(pose: Pose) -> Pose2D:
-    """A pose of the knowledge file as the skills take it."""
+    """Converts a pose of the knowledge file to the pose of the skills."""
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
 def after(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trigger:
-    """A trigger: failures with one of the causes of a node (the attempt as a whole when none is named)."""
+    """Trigger of a recovery: a failure with one of the causes, of a node (None: of the whole attempt)."""
     return Trigger(frozenset(causes), None if of is None else of.path_id, own)
 
 
 @dataclass(frozen=True)
 class StepPart:
-    """A part of a mission with something to show for it: a command, or a skill on its own.
+    """Part of a mission with a goal condition of its own: a command, or a single skill.
 
-    `path_id` is that of its subtree, `node` that of its outermost node where it is another; `skill` the skill on its
-    own, `goal` what it must bring about (None: nothing that a referee can see). `held` is what the gripper holds before
-    it; with `opening`, that is what it held when the mission began.
+    `path_id` is the path id of its subtree, `node` that of its outermost node if it differs; `skill` is the single
+    skill, `goal` the goal condition (None: none that a referee can judge). `held` is the object that the gripper holds
+    before it; with `opening`, it is the object that the gripper held when the mission began.
     """
 
     path_id: str
@@ -63,7 +66,7 @@ class StepPart:
 
 @dataclass(frozen=True)
 class Assembled:
-    """Nodes in a row, and what they are to bring about, in order; of how many commands (`used`) they are made."""
+    """Nodes in a row and their parts with goal conditions, in order, made of `used` commands."""
 
     nodes: tuple[NodeSpec, ...] = ()
     parts: tuple[StepPart, ...] = ()
@@ -74,20 +77,20 @@ class Assembled:
 
     @property
     def node(self) -> NodeSpec:
-        """The only node."""
+        """The only node; there must be one."""
         (node,) = self.nodes
         return node
 
 
 @dataclass(frozen=True)
 class PlanBuilder:
-    """Makes the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
+    """Builder of the nodes of one step: `path_id` is the step's, `start_key` holds the pose at the mission's start.
 
-    `anywhere` says whether an object that is not in its place is looked for elsewhere, too, but never on the surfaces
-    in `avoided`: what lies there is where it is to go. With `in_gripper` an earlier step has grasped the object;
-    `carried` is what an earlier step has grasped, whatever this one is about.
-    What falls on the way is picked up again `pick_ups` times at most; of what stands in the way of an object that is to
-    be taken, `move_aside` others are moved aside at most. `following` is the command right after this one.
+    With `anywhere`, an object that is not in its place is searched elsewhere too, but never on the surfaces in
+    `avoided`: objects there are at their goal. With `in_gripper`, an earlier step has grasped the object; `carried` is
+    the object that an earlier step has grasped, whether this step uses it or not. A dropped object is picked up again
+    at most `pick_ups` times; at most `move_aside` objects that block a grasp are moved aside. `following` is the next
+    command.
     """
 
     knowledge: Knowledge
@@ -105,20 +108,20 @@ class PlanBuilder:
     following: Command | None = None
 
     def at(self, *parts: str) -> PlanBuilder:
-        """The builder of a subtree below."""
+        """Returns the builder of a subtree below."""
         return replace(self, path_id="/".join((self.path_id, *map(slug, parts))))
 
     def key(self, name: str) -> str:
-        """A blackboard key of this subtree; whoever writes it and whoever reads it are given the same one."""
+        """Returns a blackboard key of this subtree, for the node that writes it and the nodes that read it."""
         return f"{self.path_id}/{name}"
 
     def node(self, kind: str, name: str, *children: NodeSpec, part: str = "", **options: Any) -> NodeSpec:
-        """A node at this path id, or at the `part` below it."""
+        """Builds a node at this path id, or at the `part` below it."""
         path_id = f"{self.path_id}/{part}" if part else self.path_id
         return NodeSpec(kind, path_id, name, MappingProxyType(options), children, self.source)
 
     def sequence(self, name: str, *steps: NodeSpec, part: str = "") -> NodeSpec:
-        """A sequence at this path id, or at the `part` below it."""
+        """Builds a sequence at this path id, or at the `part` below it."""
         return self.node("sequence", name, *steps, part=part)
 
     def skill(
@@ -129,11 +132,11 @@ class PlanBuilder:
         *,
         here: bool = False,
     ) -> NodeSpec:
-        """A leaf that runs the registered skill `name`, below this path id or `here`; inputs that are no binding are
-        constants, `outputs` are blackboard keys.
+        """Builds a leaf that runs the skill `name`, below this path id or `here`. Inputs that are no bindings are
+        constants; `outputs` are blackboard keys.
 
-        Before a skill that moves the base and leaves the arm to others, the arm is brought in where it may be anywhere.
-        Raises InputError: no skill of that name is registered.
+        Before a skill that moves the base but not the arm, the leaf stows the arm if it may be anywhere. Raises
+        InputError when no skill of that name is registered.
         """
         if name not in self.registry:
             raise self.error(*missing(name, self.registry))
@@ -154,18 +157,18 @@ class PlanBuilder:
         part: str = "",
         forgets: tuple[str, ...] = (),
     ) -> NodeSpec:
-        """An attempt with recoveries, `attempts` at most; the blackboard keys in `forgets` are empty when it starts."""
+        """Builds at most `attempts` attempts with recoveries; the first clears the blackboard keys in `forgets`."""
         nodes, when = tuple(node for node, _ in recoveries), tuple(rule for _, rule in recoveries)
         options = {"recoveries": when, "attempts": attempts, "forgets": forgets}
         return self.node("recover", name, attempt, *nodes, part=part, **options)
 
     def tidied(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
-        """Work after which the arm is stowed, whatever came of it."""
+        """Builds work after which the arm is stowed, whether it succeeds or fails, or `only_after_failure`."""
         name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
         return self.node("afterwards", name, work, self.skill(STOW), only_after_failure=only_after_failure)
 
     def pause(self, part: str, name: str, duration_s: float) -> NodeSpec:
-        """A leaf that waits on the robot's clock."""
+        """Builds a leaf that waits on the robot's clock."""
         return self.node("pause", name, part=part, duration_s=duration_s)
 
     def navigate(
@@ -176,20 +179,20 @@ class PlanBuilder:
         exactly: bool = False,
         nearby_m: tuple[tuple[float, float], ...] = (),
     ) -> NodeSpec:
-        """Drive to a pose, called `to`; where the path is blocked, see anew what stands there, then back off a little.
+        """Builds a drive to a pose, called `to`, with `NAVIGATE_RECOVERIES`; with `exactly`, within 8 cm of the pose.
 
-        With `exactly`, within 8 cm. Poses at `nearby_m` from it, forward and left, are tried afterwards.
+        Poses at `nearby_m` from it, forward and left, are tried afterwards.
         """
         ports: dict[str, object] = {"goal": pose, **({"position_tolerance_m": 0.08} if exactly else {})}
         if nearby_m and self.has_ports("navigate", ("nearby_m",)):
             ports["nearby_m"] = nearby_m
         drive, below = self.skill("navigate", ports), self.at("way")
-        blocked = Recovery((after(Cause.PLANNING, Cause.EXECUTION, of=drive),))
-        recoveries = ((below.skill("clear_costmap"), blocked), (below.skill("back_off"), blocked))
+        paths = {"navigate": drive.path_id}
+        recoveries = [(below.skill(skill), rule.bind(paths)) for skill, rule in NAVIGATE_RECOVERIES.items()]
         return below.recover(f"go to {to}", drive, *recoveries, attempts=3)
 
     def has_ports(self, skill: str, inputs: tuple[str, ...] = (), outputs: tuple[str, ...] = ()) -> bool:
-        """Returns whether a registered skill has these ports; a skill of others may lack what is not essential."""
+        """Returns whether a registered skill has these ports; a user's skill may lack ports that are not essential."""
         kind = self.registry.get(skill)
         if kind is None:
             return False
@@ -197,40 +200,40 @@ class PlanBuilder:
         return known.issuperset(inputs) and set(kind.outputs).issuperset(outputs)
 
     def surface(self, name: str) -> Surface:
-        """A surface of the knowledge file as the skills take it."""
+        """Converts a surface of the knowledge file to the surface of the skills."""
         facts = self.knowledge.surfaces[name]
         return Surface(name=name, polygon_W=facts.polygon, height_m=facts.height)
 
     def place(self, name: str) -> str:
-        """The known place that `name` means. Raises InputError: it is not known."""
+        """Returns the known place that `name` means. Raises InputError when there is none."""
         known = self.knowledge.place(name)
         if known is None:
             raise self.error(f"the place '{name}' is not known", suggestion(name, self.knowledge.place_names()))
         return known
 
     def classes(self, name: str) -> tuple[str, ...]:
-        """The classes that an object's name stands for. Raises InputError: it is not known."""
+        """Returns the classes that an object's name stands for. Raises InputError for an unknown name."""
         classes = self.knowledge.classes(self.knowledge.object_name(name) or name)
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.object_names()))
         return classes
 
-    def known(self, item: ObjectKind | None) -> ObjectKind:
-        """The object that the command is about. Raises InputError: it names none, or none that is known."""
+    def required_object(self, item: ObjectKind | None) -> ObjectKind:
+        """Returns an object of the command. Raises InputError when the command names none, or an unknown one."""
         if item is None:
             raise self.error("the command names no object", "say what it is about")
         self.classes(item.name)
         return item
 
-    def sought(self, name: str) -> tuple[str, ...]:
-        """What the robot looks for when it is to take an object of that name: its classes, or `THING` for any object.
+    def search_classes(self, name: str) -> tuple[str, ...]:
+        """Returns the classes to search for an object of that name: its own, or `THING` for any object.
 
-        A question names what it finds, and so is about the known classes. Raises InputError: the name is not known.
+        A question names the found objects, so it searches for known classes. Raises InputError for an unknown name.
         """
         classes = self.classes(name)
         unnamed = self.knowledge.object_name(name) in (ANYTHING, EVERYTHING)
         return (THING,) if unnamed and self.command.task is not Task.FIND else classes
 
     def error(self, message: str, hint: str) -> InputError:
-        """An error at the step's line."""
+        """Builds an error at the step's line."""
         return InputError.at(self.source, f"{message} (in '{self.command}')", hint=hint)

@@ -1,8 +1,8 @@
-"""Values as they stand in YAML files, turned into what a skill's input ports take, by the ports' types.
+"""Conversion of YAML values to the types of a skill's input ports.
 
-What a type takes: numbers, texts, true and false as they are; a tuple takes a list; an enum one of its values; a
-dataclass a mapping of its fields, whose units may be left out ("yaw" for "yaw_rad"). A pose may also be the name of a
-place, a `Surface` the name of a surface, several surfaces the name of a room, an `ObjectKind` its words ("red wrench").
+Numbers, texts and truth values stay; a tuple takes a list, an enum one of its values, a dataclass a mapping of its
+fields, whose units may be omitted ("yaw" for "yaw_rad"). A pose may also be the name of a place, a `Surface` the name
+of a surface, several surfaces the name of a room, an `ObjectKind` its words ("red wrench").
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ from skills.files.errors import listing, suggestion
 from skills.quantities import QuantityError, bounds, number_of, without_unit
 from skills.robot import Pose2D
 
-__all__ = ["FROM_KEY", "PortValueError", "gathered", "port_value"]
+__all__ = ["FROM_KEY", "PortValueError", "assign_ports", "port_value"]
 
 FROM_KEY: Final = "from"
 Path = tuple[str | int, ...]
 
 
 class PortValueError(ValueError):
-    """A value that does not fit its port; `path` leads to the part of it that does not, `hint` says what would."""
+    """Error of a value that does not fit its port; `path` leads to the wrong part, `hint` says how to correct it."""
 
     def __init__(self, path: Path, message: str, hint: str) -> None:
         super().__init__(message)
         self.path, self.message, self.hint = path, message, hint
 
 
-def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, Any]]:
-    """The value for each input port of the dataclass `inputs`, with its path in `values`.
+def assign_ports(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, Any]]:
+    """Assigns values to the input ports of the dataclass `inputs`, each with its path in `values`.
 
-    A unit may be left out of a port's name. What names no port, but fields of the one port that is a dataclass with
-    such fields, goes there: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate. Raises PortValueError: a key names
-    neither a port nor such a field.
+    A unit may be omitted from a port's name. Keys that are fields of the only port with such a dataclass go to that
+    port: `{x: 1, y: 2, yaw: 0}` is the `goal` of navigate. Raises PortValueError for a key that is neither a port nor
+    such a field.
     """
     hints = field_types(inputs)
     found: dict[str, tuple[Path, Any]] = {}
@@ -63,9 +63,12 @@ def gathered(values: Mapping[str, Any], inputs: type) -> dict[str, tuple[Path, A
 
 
 def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> Any:
-    """`value` as the type `hint`, in its range. Raises PortValueError."""
+    """Converts `value` to the type `hint`, in its range. Raises PortValueError."""
     if bounds(hint):
-        return _number(value, hint, path)
+        try:
+            return number_of(value, hint)
+        except QuantityError as error:
+            raise PortValueError(path, error.what, error.hint) from error
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint is Any:
         return value
@@ -86,13 +89,13 @@ def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> 
 
 
 def _named(key: str, names: Iterable[str]) -> str | None:
-    """The name that a key means, with or without its unit."""
+    """Returns the name that a key means, with or without its unit, or None."""
     known = list(names)
     return key if key in known else next((name for name in known if without_unit(name) == key), None)
 
 
 def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
-    """The one port whose type has all these fields."""
+    """Returns the only port whose type has all these fields. Raises PortValueError."""
     records = {port: field_types(hint) for port, hint in hints.items() if _is_record(hint)}
     fitting = [
         port for port, fields in records.items() if port not in taken and all(_named(key, fields) for key in loose)
@@ -112,7 +115,7 @@ def _is_record(hint: Any) -> bool:
 
 
 def _union(value: Any, options: tuple[Any, ...], knowledge: Knowledge, path: Path) -> Any:
-    """The value as the first type that takes it; the last one's refusal when none does."""
+    """Converts the value to the first type that takes it. Raises the most specific PortValueError if none does."""
     if value is None and type(None) in options:
         return None
     refusals = []
@@ -147,7 +150,7 @@ def _mapping(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path:
 
 
 def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
-    """A dataclass from a mapping of its fields."""
+    """Converts a mapping of fields to a dataclass."""
     hints = field_types(record)
     plain = [without_unit(field.name) for field in dataclasses.fields(record)]
     if not isinstance(value, dict):
@@ -178,7 +181,7 @@ def _word(value: Any, words: type[enum.Enum], path: Path) -> enum.Enum:
 
 
 def _plain(value: Any, hint: Any, path: Path) -> Any:
-    """Numbers, texts, truth values and nothing, as they are."""
+    """Checks a number, a text, a truth value or null."""
     if hint is None or hint is type(None):
         if value is None:
             return None
@@ -193,15 +196,8 @@ def _plain(value: Any, hint: Any, path: Path) -> Any:
     return float(value) if hint is float else value
 
 
-def _number(value: Any, hint: Any, path: Path) -> float:
-    try:
-        return number_of(value, hint)
-    except QuantityError as error:
-        raise PortValueError(path, error.what, error.hint) from error
-
-
 def _pose(value: Any, knowledge: Knowledge, path: Path) -> Pose2D:
-    """The pose of a place that is named."""
+    """Converts the name of a place to its pose."""
     name = _name(value, "x, y and yaw, or the name of a place", path)
     place = knowledge.place(name)
     if place is None:
@@ -211,7 +207,7 @@ def _pose(value: Any, knowledge: Knowledge, path: Path) -> Pose2D:
 
 
 def _surface(value: Any, knowledge: Knowledge, path: Path) -> Surface:
-    """A surface that is named."""
+    """Converts the name of a surface to the surface."""
     name = _name(value, "the name of a surface", path)
     known = knowledge.place(name)
     if known is None or known not in knowledge.surfaces:
@@ -221,7 +217,7 @@ def _surface(value: Any, knowledge: Knowledge, path: Path) -> Surface:
 
 
 def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...]:
-    """All surfaces of a room, or the one that is named."""
+    """Converts the name of a room to its surfaces, or of a surface to the surface alone."""
     place = knowledge.place(name)
     surfaces = () if place is None else knowledge.surfaces_in(place)
     if not surfaces:
@@ -231,7 +227,7 @@ def _surfaces(name: str, knowledge: Knowledge, path: Path) -> tuple[Surface, ...
 
 
 def _object_kind(value: Any, knowledge: Knowledge, path: Path) -> ObjectKind:
-    """An object in words, by its own name."""
+    """Converts an object in words to the object by its own name."""
     said = parse_object(_name(value, "an object in words", path))
     known = knowledge.object_name(said.name)
     if known is None:

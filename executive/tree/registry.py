@@ -1,8 +1,8 @@
-"""The skills that a tree may use, by name: those that installed distributions register as entry points.
+"""Registry of the skills that a tree may use, by name: installed distributions register them as entry points.
 
-A distribution registers a skill in the group `errand.skills`, name = skill's name, value = "module:Class". Our own
-skills stand in `pyproject.toml` in the same way. There is only this one mechanism, so that what a user's package
-can do is what our own skills do, and so that a folder that happens to lie on the path never becomes a skill.
+A distribution registers a skill in the group `errand.skills`, name = skill's name, value = "module:Class". The shipped
+skills stand in `pyproject.toml` in the same way. There is only this one mechanism, so that packages of users can do
+what the shipped skills do, and so that a folder on the path never becomes a skill by accident.
 """
 
 from __future__ import annotations
@@ -27,29 +27,29 @@ SkillClass = type[Skill[Any]]
 
 
 class SkillRegistry(Mapping[str, SkillClass]):
-    """The skills that can be used, by name. Those of other distributions are loaded when they are used.
+    """Skills by name. Skills of other distributions are loaded when they are used.
 
-    To iterate loads all; `names` are known without.
+    Iteration loads all of them; `names` loads none.
     """
 
     def __init__(self, ours: Mapping[str, SkillClass], others: Mapping[str, tuple[EntryPoint, ...]]) -> None:
-        """`others` are the entry points of other distributions by name; several of one name are refused."""
+        """`others` are the entry points of other distributions by name; several with one name are refused."""
         self._ours, self._others = ours, others
         self._loaded: dict[str, SkillClass | InputError] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All names, those of broken skills included."""
+        """All names, including those of broken skills."""
         return tuple(sorted({*self._ours, *self._others}))
 
     @property
     def broken(self) -> Mapping[str, InputError]:
-        """Why others' skills cannot be used, naming the distribution; all are loaded for it."""
+        """Errors of broken skills by name, with the distribution; loads the skills of all distributions."""
         found = {name: self.why_broken(name) for name in self._others}
         return {name: error for name, error in found.items() if error is not None}
 
     def why_broken(self, name: str) -> InputError | None:
-        """Why a skill of another distribution cannot be used; None where it can, or there is none."""
+        """Returns the error of a broken skill of another distribution; None if it works, or does not exist."""
         found = self._of_others(name)
         return found if isinstance(found, InputError) else None
 
@@ -69,7 +69,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return sum(1 for _ in self)
 
     def _of_others(self, name: str) -> SkillClass | InputError | None:
-        """The skill of another distribution, loaded once, or why there is none."""
+        """Returns the skill of another distribution, loaded once, or its error."""
         if name not in self._loaded and name in self._others:
             try:
                 self._loaded[name] = _only(self._others[name], self._ours)
@@ -79,7 +79,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
 
 
 def missing(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
-    """Why a registry has no skill of this name, and the hint."""
+    """Message and hint for a name that is no skill of the registry."""
     broken = registry.why_broken(name) if isinstance(registry, SkillRegistry) else None
     if broken is not None:
         return broken.message, broken.hint
@@ -88,10 +88,11 @@ def missing(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
 
 
 def installed_skills() -> SkillRegistry:
-    """All registered skills, ours and others', in the order of their names.
+    """Returns all registered skills in the order of their names.
 
-    One that cannot be loaded, does not keep the rules for skills, or has the name of another is broken: it does not
-    harm the others, and never takes the place of ours. Raises InputError: ours are not registered, or one is broken.
+    A skill that cannot be loaded, breaks a rule for skills, or has the name of another is broken: it does not affect
+    the others, and never replaces a shipped one. Raises InputError when the shipped skills are not registered, or one
+    of them is broken.
     """
     found = tuple(entry_points(group=GROUP))
     if not any(distribution_of(entry) == OURS for entry in found):
@@ -106,12 +107,12 @@ def installed_skills() -> SkillRegistry:
 
 
 def built_in_skills() -> dict[str, SkillClass]:
-    """The skills that come with the project, by name. Raises InputError as `installed_skills` does."""
+    """Returns the shipped skills by name. Raises InputError like `installed_skills`."""
     return skills_of(entry for entry in entry_points(group=GROUP) if distribution_of(entry) == OURS)
 
 
 def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dict[str, SkillClass]:
-    """The skills of these entry points by name, each checked, and loaded within a time limit. Raises InputError."""
+    """Loads and checks the skills of entry points within a time limit; returns them by name. Raises InputError."""
     named: dict[str, tuple[EntryPoint, ...]] = {}
     for entry in sorted(entries, key=lambda entry: (entry.name, distribution_of(entry))):
         named[entry.name] = (*named.get(entry.name, ()), entry)
@@ -119,7 +120,7 @@ def skills_of(entries: Iterable[EntryPoint], *, limit_s: float = LIMIT_S) -> dic
 
 
 def _only(entries: Sequence[EntryPoint], ours: Mapping[str, SkillClass], limit_s: float = LIMIT_S) -> SkillClass:
-    """The one skill of a name, checked. Raises InputError: it is broken, or has the name of another."""
+    """Loads and checks the skill of one name. Raises InputError when it is broken, or another has its name."""
     first, *others = entries
     owners = [OURS] if first.name in ours else []
     owners += [distribution_of(each) for each in (first, *(other for other in others if other.value != first.value))]
@@ -143,9 +144,9 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
 
 
 def _class_of(entry: EntryPoint) -> Any:
-    """The class that declares the skill's ports, where the module `ports` of its package has one, else the skill's own.
+    """Returns the class of the package's module `ports` that names the skill by `done_by`, else the skill's own class.
 
-    The one names the other by `done_by`; so the skill's module, and all that it imports, is loaded when it is used.
+    With such a class, the skill's module and all its imports are loaded only when the skill is used.
     """
     package = entry.module.rpartition(".")[0]
     if package and find_spec(f"{package}.ports") is not None:
@@ -156,7 +157,7 @@ def _class_of(entry: EntryPoint) -> Any:
 
 
 def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
-    """What a class lacks to be a skill, each with the hint."""
+    """Iterates over the rules for skills that a class breaks, as messages with hints."""
     if not (inspect.isclass(skill) and issubclass(skill, Skill)):
         yield "it is no subclass of skills.api.Skill", "register the skill's class"
         return
@@ -176,7 +177,7 @@ def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
 
 
 def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
-    """What is wrong with the declarations of the ports."""
+    """Iterates over the errors in the declarations of the ports, with hints."""
     inputs = getattr(skill, "Inputs", None)
     frozen = dataclasses.is_dataclass(inputs) and inputs.__dataclass_params__.frozen  # type: ignore[union-attr]
     if not (inspect.isclass(inputs) and frozen):
@@ -186,7 +187,7 @@ def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
         )
         return
     try:
-        field_types(inputs)
+        field_types(skill.Inputs)
     except (NameError, TypeError) as defect:
         yield f"the types of its Inputs cannot be found ({defect})", "import them in the skill's module"
     if not (isinstance(skill.outputs, Mapping) and all(isinstance(port, str) for port in skill.outputs)):
@@ -198,7 +199,7 @@ def _port_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
 
 
 def _cause_faults(skill: SkillClass) -> Iterator[tuple[str, str]]:
-    """What is wrong with the documentation of the causes."""
+    """Iterates over the errors in the documentation of the causes, with hints."""
     if not (isinstance(skill.causes, Mapping) and skill.causes):
         yield "it documents no causes of failure", "set causes = {Cause.PRECONDITION: 'when ...', ...}"
         return

@@ -13,10 +13,7 @@ from skills.quantities import bounds, in_range, range_text, without_range
 
 
 def conforms(value: Any, hint: Any) -> bool:
-    """True when `value` is of the type that `hint` names and in its range.
-
-    An int passes as a float; parameters are checked.
-    """
+    """Returns whether `value` is of the type `hint` and in its range; an int passes as a float."""
     if bounds(hint):
         return conforms(value, without_range(hint)) and in_range(value, hint)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
@@ -25,7 +22,9 @@ def conforms(value: Any, hint: Any) -> bool:
     if origin in (Union, types.UnionType):
         return any(conforms(value, option) for option in arguments)
     if origin is tuple:
-        return isinstance(value, tuple) and _tuple_conforms(value, arguments)
+        kinds = arguments[:1] * len(value) if isinstance(value, tuple) and arguments[1:] == (Ellipsis,) else arguments
+        fits = isinstance(value, tuple) and len(value) == len(kinds)
+        return fits and all(map(conforms, value, kinds))
     if hint is float:
         return isinstance(value, int | float) and not isinstance(value, bool)
     if hint is None or hint is type(None):
@@ -33,14 +32,8 @@ def conforms(value: Any, hint: Any) -> bool:
     return isinstance(value, origin or hint)
 
 
-def _tuple_conforms(value: tuple[Any, ...], arguments: tuple[Any, ...]) -> bool:
-    if len(arguments) == 2 and arguments[1] is Ellipsis:
-        return all(conforms(item, arguments[0]) for item in value)
-    return len(value) == len(arguments) and all(map(conforms, value, arguments))
-
-
 def assignable(source: Any, target: Any) -> bool:
-    """True when every value of type `source` may go into a port of type `target`, whose range is checked elsewhere."""
+    """Returns whether a port of type `target` takes every value of type `source`; ranges are not compared."""
     source, target = without_range(source), without_range(target)
     if target is Any or source == target or (source is int and target is float):
         return True
@@ -51,13 +44,13 @@ def assignable(source: Any, target: Any) -> bool:
 
 
 def required(record: type) -> tuple[str, ...]:
-    """The fields of a dataclass that have no default."""
+    """Returns the names of a dataclass's fields that have no default."""
     missing, fields = dataclasses.MISSING, dataclasses.fields(record)
     return tuple(field.name for field in fields if field.default is missing and field.default_factory is missing)
 
 
 def describe_type(hint: Any) -> str:
-    """A type hint as a user reads it: "number above 0 and at most 3 m/s", "list of text", "text or nothing"."""
+    """Describes a type hint to users: "number above 0 and at most 3 m/s", "list of text", "text or nothing"."""
     if bounds(hint):
         return f"{describe_type(without_range(hint))} {range_text(hint)}"
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
@@ -76,11 +69,7 @@ _PLAIN: Final[Mapping[Any, str]] = types.MappingProxyType(
 )
 
 
-def field_types(record: type) -> Mapping[str, Any]:
-    """The resolved type hints of a dataclass, ranges included, by field name."""
-    return _resolved(record)
-
-
 @functools.lru_cache(maxsize=512)
-def _resolved(record: type) -> Mapping[str, Any]:
+def field_types(record: type) -> Mapping[str, Any]:
+    """Returns the resolved type hints of a dataclass, including ranges, by field name."""
     return types.MappingProxyType(typing.get_type_hints(record, include_extras=True))

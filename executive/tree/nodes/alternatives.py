@@ -1,4 +1,4 @@
-"""Branches: one that a decision chooses, and one for when another fails; the plans and the nodes."""
+"""Alternative branches: one that a decision chooses, and one for the failure of another; plans and nodes."""
 
 from __future__ import annotations
 
@@ -21,10 +21,17 @@ from executive.words.expression import Value
 
 
 class Choose(MemoryComposite):
-    """What decides (the first child, which leaves its answer under `key`), then the branch that the answer leads to.
+    """Composite of a decision (the first child, which writes its answer under `key`) and one branch for each answer.
 
-    `branches` gives the number of the child for each answer. First child RUNNING: RUNNING; FAILURE: FAILURE with its
-    cause. An answer without a branch: SUCCESS. Else as the branch, from the same tick on.
+    `branches` has the index of the child for each answer.
+
+    | decision | branch | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | FAILURE | idle | FAILURE with its cause |
+    | SUCCESS, answer without a branch | - | SUCCESS |
+    | SUCCESS, answer with a branch | ticked in the same tick | as the branch |
+    | halted, or its branch is halted | halted | INVALID with CANCELLED |
     """
 
     kind = "choose"
@@ -50,10 +57,14 @@ def _choose_plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder
 
 
 class Try(MemoryComposite):
-    """The first child, or when it fails the second.
+    """Composite that runs its second child when the first fails.
 
-    First child RUNNING or SUCCESS: the same. First child FAILURE with ERROR or CANCELLED: FAILURE with it. Else on to
-    the second in the same tick; its status, and the sentences of both.
+    | first child | second child | status |
+    |---|---|---|
+    | RUNNING, SUCCESS | idle | as the first |
+    | FAILURE with ERROR or CANCELLED | idle | FAILURE with its cause |
+    | FAILURE with another cause | ticked in the same tick | as the second, with the messages of both |
+    | halted | halted | INVALID with CANCELLED |
     """
 
     kind = "try"

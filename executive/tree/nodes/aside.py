@@ -1,10 +1,10 @@
-"""Moving an object aside that blocks every grasp of the wanted one, on the surface where it stands."""
+"""Moving aside an object that blocks every grasp of the wanted one, on the surface where it stands."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import ClassVar, Final
 
 from py_trees.common import Status
 
@@ -25,15 +25,25 @@ SETTLE_S: Final = 0.5
 
 
 class InTheWay(ExplainedLeaf):
-    """Says what stands in the way of an object, and notes where to put it. SUCCESS at once.
+    """Leaf that notes which object blocks a grasp, and where it must not be put.
 
-    Reads from the blackboard: the objects that are in the way (`blocking_key`), of which the first is meant, and the
-    wanted one (`wanted_key`). Writes: that first one (`obstacle_key`), the surface on which it stands (`surface_key`),
-    the robot's pose (`pose_key`), and the circles of `clear_m` about the wanted object and the way from the robot to it
-    (`clear_key`), where it would be in the way again. FAILURE with PRECONDITION: nobody knows what it stands on.
+    Reads the blocking objects (`blocking_key`), of which it takes the first, and the wanted object (`wanted_key`).
+    Writes that first object (`obstacle_key`), the surface on which it stands (`surface_key`), the robot's pose
+    (`pose_key`), and circles of `clear_m` around the path from the robot to the wanted object (`clear_key`).
+
+    | case | status |
+    |---|---|
+    | the surface is known | SUCCESS in its first tick |
+    | the surface is unknown | FAILURE with PRECONDITION |
     """
 
     kind = "in the way"
+    output_types: ClassVar = {
+        "obstacle_key": ObjectObservation,
+        "surface_key": Surface,
+        "clear_key": tuple[Circle, ...],
+        "pose_key": Pose2D,
+    }
     item: str
     blocking_key: str
     wanted_key: str
@@ -45,14 +55,8 @@ class InTheWay(ExplainedLeaf):
     context: RunContext
     clear_m: float = 0.25
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The keys of the object, its surface, the pose and the circles."""
-        types = {"obstacle_key": ObjectObservation, "surface_key": Surface, "pose_key": Pose2D}
-        return {options[name]: kind for name, kind in types.items()} | {options["clear_key"]: tuple[Circle, ...]}
-
     def update(self) -> Status:
-        """Writes where it is, and where it must not be put."""
+        """Writes the object, its surface, and the circles to keep clear."""
         board = self.context.board
         obstacle: ObjectObservation = board.get(self.blocking_key)[0]
         wanted: ObjectObservation = board.get(self.wanted_key)
@@ -64,18 +68,18 @@ class InTheWay(ExplainedLeaf):
         board.put(self.obstacle_key, obstacle)
         board.put(self.surface_key, surface)
         board.put(self.pose_key, self.context.pose())
-        board.put(self.clear_key, _way_circles(wanted, self.context.pose(), self.clear_m))
+        board.put(self.clear_key, _path_circles(wanted, self.context.pose(), self.clear_m))
         return self.say(f"the {obstacle.kind} is in the way of the {self.item}; it is moved aside")
 
 
 def floor_square(pose: Pose2D, ahead_m: float, half_m: float) -> Surface:
-    """A square of floor about a point before the body."""
+    """Square of floor around the point `ahead_m` before a pose, `half_m` to each side."""
     corners = (compose(pose, Pose2D(ahead_m + x * half_m, y * half_m, 0.0)) for x, y in _CORNERS)
     return Surface(FLOOR, tuple((corner.x_m, corner.y_m) for corner in corners), 0.0)
 
 
-def _way_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> tuple[Circle, ...]:
-    """Circles in a row from an object to the robot."""
+def _path_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> tuple[Circle, ...]:
+    """Circles in a row from an object to the robot, 0.2 m apart."""
     x, y, _ = wanted.position_W
     off_x, off_y = pose.x_m - x, pose.y_m - y
     steps = max(1, round(math.hypot(off_x, off_y) / _STEP_M))
@@ -83,9 +87,9 @@ def _way_circles(wanted: ObjectObservation, pose: Pose2D, radius_m: float) -> tu
 
 
 def can_move_aside(builder: PlanBuilder) -> bool:
-    """Whether the mission allows it, and the skills tell what is in the way and can be told where not to put it."""
-    told = builder.has_ports("grasp", (), ("in_the_way",)) and builder.has_ports("place", ("clear_of",))
-    return builder.move_aside > 0 and told
+    """Returns whether the mission allows it, and the skills have the ports `in_the_way` and `clear_of`."""
+    has_ports = builder.has_ports("grasp", (), ("in_the_way",)) and builder.has_ports("place", ("clear_of",))
+    return builder.move_aside > 0 and has_ports
 
 
 def move_aside_plan(
@@ -96,10 +100,10 @@ def move_aside_plan(
     surfaces: tuple[Surface, ...] | FromBoard,
     tuck: NodeSpec,
 ) -> NodeSpec:
-    """Takes the first object under the key `blocking`, and put it where it is not in the way of the one under `wanted`.
+    """Takes the first object under the key `blocking`, and puts it where it does not block the one under `wanted`.
 
-    `tuck` draws the arm in between. What finds no room there is set down again anywhere on its surface, so that the
-    gripper is free. In the end the robot goes back to where it stood, since from there a grasp was found without it.
+    `tuck` draws the arm in between. If there is no space, the object is set down anywhere on its surface, so that the
+    gripper is free. In the end the robot returns to its earlier pose, for which a grasp without the obstacle exists.
     """
     obstacle, surface, clear, pose = map(below.key, ("obstacle", "surface", "clear", "pose"))
     what = below.node(

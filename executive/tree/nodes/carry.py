@@ -1,11 +1,19 @@
-"""Carrying an object to a person, to the start or to a surface, under the guard that the gripper holds it."""
+"""Carrying an object to a person, to the start or to a surface, and picking it up again when it falls.
+
+| event | detection | recovery |
+|---|---|---|
+| it slips | the gripper closes on it, or its force falls | it is gripped again more firmly, and carried on |
+| it slips once more | the same | it is set down, grasped again, and carried on |
+| it falls | the gripper is empty and has not opened | the robot looks where it fell, picks it up, carries it on |
+| it is not where it was put or handed over | the camera, the gripper | the same |
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import field
-from typing import Any, Final
+from dataclasses import field, replace
+from typing import ClassVar, Final
 
 import numpy as np
 from py_trees.common import Status
@@ -17,9 +25,9 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.pick_up import LOOK_AGAIN_S, go_near_plan, held_plan, pick_up_plan
-from executive.tree.nodes.recovery import Recovery
+from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.nodes.search import detect_plan, where
-from executive.tree.plan import PlanBuilder, after, pose_2d
+from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import START
 from executive.words.outlines import Point, distance_m, inside
 from skills.api import FLOOR, Cause, Failed, ObjectKind, Surface
@@ -31,7 +39,7 @@ from skills.robot import Pose2D
 def carry_plan(builder: PlanBuilder) -> NodeSpec:
     """Carries the item to a person, to the start, or to a surface of a place."""
     command = builder.command
-    item = builder.known(command.item or command.object)
+    item = builder.required_object(command.item or command.object)
     goal = command.goal
     if goal is None:
         raise builder.error(f"it is not said where to take the {item}", "name a place or a person")
@@ -47,7 +55,7 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
-    """Carries it there and holds it out; the gripper opens when the person takes it."""
+    """Carries the item to a person and holds it out; the gripper opens when the person takes it."""
     to = "the start" if isinstance(pose, FromBoard) else person
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
@@ -58,9 +66,9 @@ def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromB
 
 
 def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
-    """Any surface of the place will do: the next one is tried when one does not work. With it, the guards of the ways.
+    """Carries the item to a surface of the place, or to the next one when that fails; returns also its guards.
 
-    Raises InputError: the place has no surfaces.
+    Raises InputError when the place has no surfaces.
     """
     surfaces = builder.knowledge.surfaces_in(place)
     if not surfaces:
@@ -68,13 +76,13 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
             f"'{place}' has no surface to put the {item} on", "add one under 'surfaces' in the knowledge"
         )
     to = f"to the {place}"
-    ways = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
-    put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *ways)
-    return put, tuple(guard for way in ways for guard in way.children)
+    each = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
+    put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *each)
+    return put, tuple(guard for plan in each for guard in plan.children)
 
 
 def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) -> NodeSpec:
-    """Carries it there and puts it down; both under guards."""
+    """Carries the item to a surface and puts it down, both under guards."""
     view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
     place = builder.skill("place", {"surface": builder.surface(surface)})
     return builder.sequence(
@@ -84,32 +92,32 @@ def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) 
     )
 
 
-def carried_along_plan(builder: PlanBuilder, way: NodeSpec, to: str) -> NodeSpec:
-    """A way on which what an earlier step has grasped stays in the gripper; it is picked up again where it falls.
+def carried_along_plan(builder: PlanBuilder, drive: NodeSpec, to: str) -> NodeSpec:
+    """Guards a drive with the object that an earlier step has grasped; it is picked up again where it falls.
 
-    An earlier step that failed and was passed over has grasped nothing: then there is nothing to watch.
+    After an earlier step that failed and was skipped, the gripper is empty and the guard passes.
     """
     if builder.carried is None:
-        return way
-    guard = _holding(builder.at("carried"), builder.carried, to, way, until_put_down=True)
+        return drive
+    guard = _holding(builder.at("carried"), builder.carried, to, drive, until_put_down=True)
     return unless_fallen(builder.at("carry-on"), builder.carried, to, guard, (guard,))
 
 
 def _holding(
     builder: PlanBuilder, item: ObjectKind, to: str, below: NodeSpec, *, until_put_down: bool = False
 ) -> NodeSpec:
-    """A guard: what is carried stays in the gripper, perhaps until it is put down."""
-    condition = Holds(str(item), to, until_put_down, builder.sought(item.name), item.attributes)
+    """Guards nodes below while the gripper holds the item, or until it puts the item down."""
+    condition = Holds(str(item), to, until_put_down, builder.search_classes(item.name), item.attributes)
     return builder.node("guard", f"holding {item}", below, condition=condition)
 
 
 def goal_in_words(builder: PlanBuilder, goal: str) -> str:
-    """A goal as it is called in a sentence."""
+    """Text of a goal in a sentence."""
     return goal if builder.knowledge.person(goal) else f"the {goal}"
 
 
 def goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
-    """Where to stand at a goal: a place, a person, or the start."""
+    """Pose of the robot at a goal: a place, a person, or the start."""
     if goal == START:
         return FromBoard(builder.start_key)
     person = builder.knowledge.person(goal)
@@ -119,7 +127,7 @@ def goal_pose(builder: PlanBuilder, goal: str) -> Pose2D | FromBoard:
 
 
 def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
-    """Where to stand to meet a person: the pose of the place where they are, turned to them when that is known."""
+    """Pose of the robot to meet a person: that of their place, turned towards them if their pose is known."""
     facts = builder.knowledge.people[person]
     place = builder.place(at or facts.at)
     stand = builder.knowledge.place_pose(place)
@@ -129,7 +137,7 @@ def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
 
 
 def _person_at_start(builder: PlanBuilder) -> str:
-    """The one person who is known to be in the room of the start; else whoever stands there."""
+    """Name of the only person in the room of the start, else "person" for anybody there."""
     knowledge = builder.knowledge
     start = (knowledge.start.x, knowledge.start.y)
     rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
@@ -137,28 +145,38 @@ def _person_at_start(builder: PlanBuilder) -> str:
     return there[0] if len(there) == 1 else "person"
 
 
+DROPPED: Final = Trigger(frozenset({Cause.EXECUTION}), own=True)
+MISSED: Final = Trigger(frozenset({Cause.POSTCONDITION}))
+"""Failures after which an object is picked up again: of a guard that it is held, and of a skill that puts it down."""
 _TURNS_RAD: Final = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
 LOST_WITHIN_M: Final = 2.0
 BACK_M: Final = 0.5
-"""What fell before the feet is then about as far ahead as it is grasped from; farther off it is hard to tell."""
+"""Distance to back off, so that an object before the feet is about as far ahead as in a grasp."""
 AHEAD_M: Final = 0.6
-"""So far before the middle of the body an object falls that is carried."""
+"""Distance before the middle of the body at which a carried object falls."""
 HALF_M: Final = 1.2
 ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
-"""Where else the floor is looked at from: forward and left of where the object was lost (m)."""
+"""Further viewpoints of the floor: forward and left of the pose at which the object was lost (m)."""
 
 
 class Fallen(ExplainedLeaf):
-    """Notes where the robot has lost what it carried, and says what happened. SUCCESS after `settle_s`.
+    """Leaf that notes where the robot has lost the carried object: RUNNING for `settle_s`, then SUCCESS.
 
-    Writes to the blackboard: the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where it
-    fell (`spot_key`); the square of floor about it, `half_m` to each side (`floor_key`); that square with those of
-    `surfaces` that lie within `within_m` of the robot, onto which it may have fallen as well (`around_key`). What the
-    gripper still holds by then has slipped, and is not yet lost: a smaller square of free floor says where to
-    set it down (`set_down_key`), and all else is written anew for there: it is picked up from where it is set down.
+    Writes the robot's pose (`pose_key`); the point of the floor `ahead_m` before the body, where the object fell
+    (`spot_key`); the square of floor around it, `half_m` to each side (`floor_key`); that square with those of
+    `surfaces` within `within_m` of the robot, onto which it may have fallen (`around_key`). An object that the gripper
+    still holds has slipped: a smaller square of free floor is written, on which to set it down (`set_down_key`), and
+    the other keys are written for that place, from which it is picked up again.
     """
 
     kind = "fallen"
+    output_types: ClassVar = {
+        "pose_key": Pose2D,
+        "spot_key": tuple[Coordinate, Coordinate, Height],
+        "floor_key": tuple[Surface, ...],
+        "around_key": tuple[Surface, ...],
+        "set_down_key": Surface,
+    }
     item: str
     to: str
     pose_key: str
@@ -175,15 +193,8 @@ class Fallen(ExplainedLeaf):
     set_down_half_m: float = 0.3
     settle_s: float = 0.3
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The keys of the pose, of the point and of the pieces of floor."""
-        surfaces = {options[key]: tuple[Surface, ...] for key in ("floor_key", "around_key")}
-        spot = tuple[Coordinate, Coordinate, Height]
-        return {options["pose_key"]: Pose2D, options["spot_key"]: spot, options["set_down_key"]: Surface, **surfaces}
-
     def initialise(self) -> None:
-        """Writes where it is looked for: where the robot stands just now."""
+        """Writes where to look for the object, by the robot's present pose."""
         self.clear_explanation()
         self._end_s = self.context.clock.now() + self.settle_s
         pose = self.context.pose()
@@ -192,7 +203,7 @@ class Fallen(ExplainedLeaf):
         self._write(pose, self.ahead_m)
 
     def update(self) -> Status:
-        """Feels for a moment whether the gripper still holds something."""
+        """Waits for the gripper to settle, and checks whether it still holds the object."""
         if self.context.clock.now() < self._end_s:
             return self.say(f"feels whether the {self.item} is still held", Status.RUNNING)
         towards = self._towards_free_floor()
@@ -201,11 +212,11 @@ class Fallen(ExplainedLeaf):
         if slipped:
             self._write(towards, self.set_down_ahead_m)
         happened = "slips in the gripper" if slipped else "fell"
-        then = "is set down and gripped anew" if slipped else "is picked up again"
+        then = "is set down and gripped again" if slipped else "is picked up again"
         return self.say(f"the {self.item} {happened} on the way {self.to}; it {then}")
 
     def _write(self, pose: Pose2D, ahead_m: float) -> None:
-        """Writes where the object lies: so far (m) before the body at a pose."""
+        """Writes where the object lies: `ahead_m` before the body at a pose."""
         board, spot = self.context.board, compose(pose, Pose2D(ahead_m, 0.0, 0.0))
         floor = floor_square(pose, ahead_m, self.half_m)
         board.put(self.pose_key, pose)
@@ -214,10 +225,7 @@ class Fallen(ExplainedLeaf):
         board.put(self.around_key, (floor, *self._near))
 
     def _towards_free_floor(self) -> Pose2D:
-        """The robot's pose, turned to floor on which nothing stands, as little as may be.
-
-        A robot at a table has the table ahead.
-        """
+        """Robot's pose, turned by the least angle to free floor; a robot at a table has the table ahead."""
         pose, costmap = self.context.pose(), self.context.costmap
         turned = [compose(pose, Pose2D(0.0, 0.0, turn)) for turn in _TURNS_RAD]
         middles = [compose(each, Pose2D(self.set_down_ahead_m, 0.0, 0.0)) for each in turned]
@@ -226,14 +234,15 @@ class Fallen(ExplainedLeaf):
 
 
 class SurfacesNear(ExplainedLeaf):
-    """Writes those of some surfaces to the blackboard that lie within `within_m` of the robot, the nearest first.
+    """Leaf that writes the surfaces within `within_m` of the robot, the nearest first.
 
-    `rooms` has the outline of each surface's room by the surface's name. Where surfaces of the robot's own room are
-    near, others do not count: a wall hides them.
-    SUCCESS when there are some. FAILURE with POSTCONDITION when there are none: `otherwise` says what that means.
+    `rooms` has the outline of each surface's room by the surface's name. If surfaces of the robot's own room are near,
+    the others do not count, since a wall hides them. SUCCESS if there are any; FAILURE with POSTCONDITION and the
+    message `otherwise` if there are none.
     """
 
     kind = "surfaces near"
+    output_types: ClassVar = {"key": tuple[Surface, ...]}
     surfaces: Sequence[Surface]
     within_m: float
     key: str
@@ -241,13 +250,8 @@ class SurfacesNear(ExplainedLeaf):
     context: RunContext
     rooms: Mapping[str, Sequence[Point]] = field(default_factory=dict)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key of the surfaces."""
-        return {options["key"]: tuple[Surface, ...]}
-
     def update(self) -> Status:
-        """Looks which surfaces are near."""
+        """Writes the near surfaces."""
         pose = self.context.pose()
         here = (pose.x_m, pose.y_m)
         near = sorted((distance_m(surface.polygon_W, here), k) for k, surface in enumerate(self.surfaces))
@@ -269,16 +273,16 @@ def unless_fallen(
     guards: tuple[NodeSpec, ...],
     hands_on: tuple[NodeSpec, ...] = (),
 ) -> NodeSpec:
-    """Carrying `to` somewhere; what is lost on the way (one of the guards breaks) is picked up again where it fell.
+    """Recovers carrying `to` a goal: an object that is lost (one of the guards breaks) is picked up where it fell.
 
-    The same is done when a skill in `hands_on` has let go of the object and finds that it is not where it is to be. It
-    is done as often as the builder's `pick_ups` says; then the carrying begins anew.
+    So is an object that a skill in `hands_on` has released and that is not at its goal. After each of the builder's
+    `pick_ups` at most, the carrying begins again.
     """
     if not builder.pick_ups:
         return carry
-    broken = (after(Cause.EXECUTION, of=guard, own=True) for guard in guards)
-    missed = (after(Cause.POSTCONDITION, of=skill) for skill in hands_on)
-    lost = Recovery((*broken, *missed), uses=builder.pick_ups)
+    dropped = (replace(DROPPED, node=guard.path_id) for guard in guards)
+    missed = (replace(MISSED, node=skill.path_id) for skill in hands_on)
+    lost = Recovery((*dropped, *missed), uses=builder.pick_ups)
     recovery = _pick_up_again_plan(builder.at("again"), item, to)
     return builder.recover(f"carry {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
 
@@ -316,7 +320,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
 
 
 def _free_gripper_plan(builder: PlanBuilder, item: ObjectKind, set_down_key: str) -> NodeSpec:
-    """Sets down what is still held; where that fails, draws it in. An empty arm is stowed."""
+    """Sets down an object that is still held; stows the arm if that fails, or if it is empty."""
     below = builder.at("set-down")
     set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
     held = below.node("only if holding", f"set the {item} down", set_down)
@@ -324,14 +328,14 @@ def _free_gripper_plan(builder: PlanBuilder, item: ObjectKind, set_down_key: str
 
 
 def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
-    """Back off, to see the floor before the feet; where there is no room, look from here."""
+    """Backs off to see the floor before the feet; stays if there is no space."""
     ports = {"distance_m": BACK_M} if builder.has_ports("back_off", ("distance_m",)) else {}
     stay = builder.pause("stay", "look from here", LOOK_AGAIN_S)
     return builder.node("selector", "stand back", builder.skill("back_off", ports), stay)
 
 
 def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> NodeSpec:
-    """Looks from here where it fell and about there, then at the surfaces near, then at the floor from either side."""
+    """Looks at the spot where the object fell, at the floor around, at near surfaces, then from either side."""
     floor, detection = FromBoard(keys["floor"]), keys["detection"]
     aside = [
         below.sequence(
@@ -357,7 +361,7 @@ def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> 
 
 
 def _near_plan(builder: PlanBuilder, item: ObjectKind, detection: str) -> NodeSpec:
-    """Looks at the surfaces near where it was lost."""
+    """Looks at the surfaces near the place where the object was lost."""
     facts, near = builder.knowledge, builder.key("surfaces")
     surfaces = builder.node(
         "surfaces near",

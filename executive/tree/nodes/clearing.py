@@ -1,12 +1,12 @@
-"""Clearing a place: the robot takes away one object after the other, until its look finds nothing any more."""
+"""Clearing a place: the robot takes away one object after the other, until a look finds none."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import field, replace
-from typing import Any, Final
+from typing import ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -28,26 +28,36 @@ from skills.perception.class_forms import THING
 from skills.robot import Robot
 
 SAME_PLACE_M: Final = 0.15
-"""What stands within this of where an object was missed is that object."""
+"""An object within this distance of a missed object is the same object."""
 Seen = tuple[ObjectObservation, ...]
 MOST_OBJECTS: Final = 12
 MOST_MISSES: Final = 3
 
 
 class ForEachFound(MemoryComposite):
-    """A look (the first child, which writes what it found under `key`), and what is done with each object it finds.
+    """Composite of a look (the first child, which writes the found object under `key`) and an action for each object.
 
-    Child RUNNING: RUNNING. Look SUCCESS: on to the second child in the same tick. Second child SUCCESS: the object is
-    `done`, and at the next tick the look starts anew. Second child FAILURE: the object is `missed`, and the look starts
-    anew too; but FAILURE with its cause when that is ERROR or CANCELLED, when the gripper holds something, or when as
-    many as `misses` failed. Look FAILURE with POSTCONDITION: nothing is left; SUCCESS with what was done, unless an
-    object is missed: then POSTCONDITION. Look FAILURE with another cause: FAILURE with it. Look SUCCESS after `limit`
-    objects: FAILURE with POSTCONDITION. What is done later where an object was missed is no longer missed.
-    `done` and `missed` are blackboard keys, empty when it starts anew unless they are not in `forgets`. `did` says what
-    was done ("moved", "to the bench"), `where` where nothing is left.
+    | look | action | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | SUCCESS | ticked in the same tick | as below |
+    | SUCCESS after `limit` objects | idle | FAILURE with POSTCONDITION |
+    | FAILURE with POSTCONDITION, none missed | idle | SUCCESS: no object is left |
+    | FAILURE with POSTCONDITION, some missed | idle | FAILURE with POSTCONDITION |
+    | FAILURE with another cause | idle | FAILURE with its cause |
+    | SUCCESS | RUNNING | RUNNING |
+    | SUCCESS | SUCCESS | RUNNING: the object is `done`; the next tick looks again |
+    | SUCCESS | FAILURE | RUNNING: the object is `missed`; the next tick looks again |
+    | SUCCESS | FAILURE with ERROR, CANCELLED or a held object, or the `misses`th FAILURE | FAILURE with its cause |
+    | halted | halted | INVALID with CANCELLED |
+
+    A success at the position of a missed object takes that object off the list. `done` and `missed` are blackboard
+    keys, cleared at a new start if they are in `forgets`. `did` names the action ("moved", "to the bench"), `where` the
+    place that is clear in the end.
     """
 
     kind = "for each found"
+    output_types: ClassVar = {"done": Seen, "missed": Seen}
     key: str
     done: str
     missed: str
@@ -61,13 +71,8 @@ class ForEachFound(MemoryComposite):
     _failures: int = field(default=0, init=False)
     _why: str = field(default="", init=False)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The keys of the objects that were done, and missed."""
-        return {options["done"]: Seen, options["missed"]: Seen}
-
     def tick(self) -> Iterator[Behaviour]:
-        """Looks anew in each round; until then the results of the round before are to be seen."""
+        """Looks again in each round; until then the results of the round before stay visible."""
         if self._index == 0 and self.children[0].status != Status.RUNNING:
             self._reset_children()
         yield from super().tick()
@@ -90,14 +95,14 @@ class ForEachFound(MemoryComposite):
         elif child is action:
             self._action_ended(action)
         elif look.status == Status.SUCCESS:
-            self._end(Cause.POSTCONDITION, f"{self._told()}, and something is left {self.where}")
+            self._end(Cause.POSTCONDITION, f"{self._report()}, and something is left {self.where}")
         elif cause_of(look) is Cause.POSTCONDITION:
             self._nothing_left()
         else:
-            self._end(cause_of(look), f"{self._told()}, then {message_of(look)}")
+            self._end(cause_of(look), f"{self._report()}, then {message_of(look)}")
 
     def _action_ended(self, action: Behaviour) -> None:
-        """Notes what became of the object, and looks anew."""
+        """Notes the object as done or missed, and begins the next look."""
         seen: ObjectObservation = self.board.get(self.key)
         x, y, _ = seen.position_W
         missed = self._noted(self.missed)
@@ -105,32 +110,30 @@ class ForEachFound(MemoryComposite):
         if action.status == Status.SUCCESS:
             self.board.put(self.missed, elsewhere)
             self.board.put(self.done, (*(each for each in self._noted(self.done) if each != seen), seen))
-            self._next_round(self._told())
+            self._index = 0
+            self._go_on(self._report())
             return
         cause, why = cause_of(action), message_of(action)
         self._failures += 1
         self._why = f"the {seen.kind}: {why}"
         self.board.put(self.missed, (*elsewhere, seen))
         if cause in FINAL_CAUSES or self._failures >= self.misses or self.robot.gripper().holding:
-            self._end(cause, f"{self._told()}, then {why}")
+            self._end(cause, f"{self._report()}, then {why}")
         else:
-            self._next_round(f"looks again, since {why}")
-
-    def _next_round(self, said: str) -> None:
-        self._index = 0
-        self._go_on(said)
+            self._index = 0
+            self._go_on(f"looks again, since {why}")
 
     def _nothing_left(self) -> None:
-        """The end: all that was found was done, unless an object is gone that was missed."""
+        """Ends with SUCCESS, unless a missed object has disappeared."""
         if missed := self._noted(self.missed):
-            told = listing(f"the {each.kind}" for each in missed)
-            self._end(Cause.POSTCONDITION, f"{self._told()}, but {told} is gone from there ({self._why})")
+            gone = listing(f"the {each.kind}" for each in missed)
+            self._end(Cause.POSTCONDITION, f"{self._report()}, but {gone} is gone from there ({self._why})")
             return
         done = self._noted(self.done)
-        self._end(None, f"{self._told()}; nothing is left {self.where}" if done else f"nothing is {self.where}")
+        self._end(None, f"{self._report()}; nothing is left {self.where}" if done else f"nothing is {self.where}")
 
-    def _told(self) -> str:
-        """ "moved one cube and two things to the bench"."""
+    def _report(self) -> str:
+        """Returns a report such as "moved one cube and two beers to the bench"."""
         verb, to = self.did
         kinds = Counter(str(each.kind) for each in self._noted(self.done))
         return f"{verb} {listing(count_of(count, kind) for kind, count in kinds.items())} {to}"
@@ -141,16 +144,16 @@ class ForEachFound(MemoryComposite):
 
 
 def is_clearing(get: Command, bring: Command | None) -> bool:
-    """True when two commands in a row ask to get everything and to bring everything somewhere."""
+    """Returns whether two commands in a row get everything and bring everything somewhere."""
     if bring is None or get.task is not Task.GRASP or get.object is None or get.object.name != EVERYTHING:
         return False
     return bring.task in (None, Task.PLACE) and get.object == (bring.item if bring.task is None else bring.object)
 
 
 def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
-    """Looks whether anything is left, and takes it away, until nothing is; `builder` is that of the command to get it.
+    """Looks for an object and takes it away, until none is left; `builder` belongs to the command to get everything.
 
-    Raises InputError: it is not said from where to where, it is to be brought to a person, or where it is taken from.
+    Raises InputError when a place is missing, the goal is a person, or the goal is among the sources.
     """
     get, goal = builder.command, bring.goal
     assert get.object is not None
@@ -190,7 +193,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 
 
 def refuse_everything(builder: PlanBuilder) -> None:
-    """Refuses to take everything in one go. Raises InputError: a command on its own that is about everything."""
+    """Raises InputError for a single command about everything."""
     command = builder.command
     if any(item is not None and item.name == EVERYTHING for item in (command.item, command.object)):
         hint = "say from where to where in one step: 'move everything from the desk to the shelf'"

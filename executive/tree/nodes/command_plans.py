@@ -1,4 +1,4 @@
-"""Commands: take hold of, look whether, carry, go, wait, charge; and two that are made of trips or rounds."""
+"""Plans of commands: grasp, find, carry, go, wait, charge; and of pairs of commands with trips or rounds."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.goal import GoalCondition, When
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
-from skills.api import ObjectKind
 from skills.files.errors import InputError, listing
 from skills.quantities import Quantity
 
@@ -38,13 +37,13 @@ LONGEST_WAIT_S: Final = 3600.0
 
 
 COUNTED: Final = Annotated[float, Quantity(ge=0.0, le=1_000.0)]
-"""How many objects a look counts."""
+"""Number of objects that a look counts."""
 _ANSWERS: Final[Mapping[str, tuple[str, type]]] = {"answer": ("key", bool), "count": ("count_key", float)}
-"""What a status check can give: the option of its answer node that names the key, and the type."""
+"""Results of a status check by their names: the option of its answer node that holds the key, and the type."""
 
 
 def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembled:
-    """The subtree of one command, or of two in a row that get and bring several objects, or all."""
+    """Plans one command, or two in a row that get and bring several objects, or all."""
     if not step.commands:
         raise InputError("a step has no commands", hint="give it 'say', a command, a skill or a file to use")
     builder = replace(
@@ -75,7 +74,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
 
 
 def _pair_plan(assembler: Assembler, builder: PlanBuilder, bring: Command) -> Assembled:
-    """The one subtree of two commands that get and bring several objects, or all."""
+    """Plans two commands that get and bring several objects, or all."""
     get, flow, knowledge = builder.command, assembler.flow, builder.knowledge
     goals: tuple[GoalCondition | None, ...]
     if is_clearing(get, bring):
@@ -93,7 +92,7 @@ def _pair_plan(assembler: Assembler, builder: PlanBuilder, bring: Command) -> As
 
 
 def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanBuilder) -> NodeSpec:
-    """The subtree of a status check whose answer later steps read. Raises InputError: it gives no such thing."""
+    """Lets later steps read the answer of a status check. Raises InputError when it gives no such value."""
     command, keys = builder.command, dict[str, str]()
     for port, name in (step.gives or {}).items():
         known = ("answer", "count") if command.object_count != 1 else ("answer",)
@@ -107,13 +106,13 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
 
 
 def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
-    """The surfaces to which a command brings what is fetched before."""
+    """Returns the surfaces to which a command brings the object of the command before."""
     place = None if command is None or command.goal is None else knowledge.place(command.goal)
     return frozenset() if place is None else frozenset(knowledge.surfaces_in(place))
 
 
 def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
-    """Where else the object of a command to get it may be found."""
+    """Returns the further surfaces on which a command may find its object."""
     command, knowledge = builder.command, builder.knowledge
     if command.task is not Task.GRASP or command.object is None or command.goal is None or not builder.anywhere:
         return ()
@@ -122,14 +121,14 @@ def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
 
 
 def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
-    """Finds it, stands before it, takes it, tuck the arm in.
+    """Finds the object, approaches it, grasps it, draws the arm in.
 
-    When standing or taking fails, what fits the failure is done and the robot looks again and tries anew; when nothing
-    is to be found that is final. With `anywhere`, it is looked for elsewhere, too, when it is not in its place. What an
-    earlier step grasped, be it that this step failed, is not looked for, unless the gripper is empty. While it holds
-    another object, nothing is looked for: PRECONDITION.
+    After a failed approach or grasp, the recovery for the failure runs and the robot tries again; a failed search is
+    final. With `anywhere`, an object that is not in its place is searched elsewhere too. An object that an earlier step
+    has grasped is searched only if the gripper is empty. While the gripper holds another object, it fails with
+    PRECONDITION.
     """
-    item = builder.known(builder.command.object)
+    item = builder.required_object(builder.command.object)
     if builder.command.item is not None:
         raise builder.error("the one gripper cannot take hold of a second object", "put the first one down before")
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
@@ -143,7 +142,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     get = pick_up_plan(builder, item, search, key, around)
     if not builder.in_gripper:
         held = known_held_plan(builder.at("have"), item)
-        alone = HoldsNothingElse(str(item), builder.sought(item.name), item.attributes)
+        alone = HoldsNothingElse(str(item), builder.search_classes(item.name), item.attributes)
         get = builder.node("guard", f"get {item} with an empty gripper", get, part="empty-handed", condition=alone)
         have = builder.node("selector", f"have {item}, or get it", held, get, part="have")
         return builder.sequence(f"get {item} {where(builder.knowledge, place)}", have)
@@ -151,21 +150,21 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
 
 
 def go_plan(builder: PlanBuilder) -> NodeSpec:
-    """Goes to a place, a person or the start; with an item in the gripper, carries it."""
+    """Goes to a place, a person or the start; carries the item if there is one."""
     command = builder.command
     if command.item is not None:
         return carry_plan(builder)
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     to = goal_in_words(builder, command.goal)
-    way = go_near_plan(builder, goal_pose(builder, command.goal), to)
-    return builder.sequence(f"go to {to}", carried_along_plan(builder, way, f"to {to}"))
+    drive = go_near_plan(builder, goal_pose(builder, command.goal), to)
+    return builder.sequence(f"go to {to}", carried_along_plan(builder, drive, f"to {to}"))
 
 
 def wait_plan(builder: PlanBuilder) -> NodeSpec:
-    """Goes to the place, where one is named, and waits there for a time.
+    """Goes to the place, if one is named, and waits there for a time.
 
-    Raises InputError: it is no time, or too long a one.
+    Raises InputError when the time is missing or too long.
     """
     command = builder.command
     if command.item is not None:
@@ -178,19 +177,12 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     if command.goal is None:
         return builder.sequence("wait here", pause)
     goal, to = goal_pose(builder, command.goal), goal_in_words(builder, command.goal)
-    way = carried_along_plan(builder, go_near_plan(builder, goal, to), f"to {to}")
-    return builder.sequence(f"wait at {to}", way, pause)
-
-
-def _required(builder: PlanBuilder, item: ObjectKind | None) -> ObjectKind:
-    if item is None:
-        raise builder.error("the command names no object", "say what it is about")
-    builder.classes(item.name)
-    return item
+    drive = carried_along_plan(builder, go_near_plan(builder, goal, to), f"to {to}")
+    return builder.sequence(f"wait at {to}", drive, pause)
 
 
 def are_trips(get: Command, bring: Command | None) -> bool:
-    """True when two commands in a row ask to get several objects and to bring as many of them somewhere."""
+    """Returns whether two commands in a row get several objects and bring the same number of them somewhere."""
     if bring is None or get.task is not Task.GRASP or get.object is None or get.object_count < 2:
         return False
     carried, count = (bring.item, bring.item_count) if bring.task is None else (bring.object, bring.object_count)
@@ -198,10 +190,10 @@ def are_trips(get: Command, bring: Command | None) -> bool:
 
 
 def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
-    """Gets one and brings it there, as often as was said; `builder` is that of the command to get them.
+    """Gets one object and brings it to the goal, as often as requested; `builder` belongs to the command to get them.
 
-    Raises InputError: too many; to a person, who takes one; no place to take them from, or
-    one where those that were brought would be found again.
+    Raises InputError for too many objects, a person as the goal, no source, or a source where the robot would find
+    the objects again that it has brought.
     """
     get, goal = builder.command, bring.goal
     count, item = get.object_count, get.object
@@ -224,7 +216,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
 
 
 def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:
-    """Gets one object and brings it."""
+    """Gets one object and brings it to the goal."""
     trip = builder.at(f"trip-{number}")
     get_one = replace(trip.at("get"), command=replace(builder.command, object_count=1))
     bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))

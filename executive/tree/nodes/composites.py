@@ -1,4 +1,4 @@
-"""Sequence, selector and round: children one after the other, with memory, whose results stay in sight."""
+"""Sequence, selector and round: composites with memory; the results of their children stay visible."""
 
 from __future__ import annotations
 
@@ -15,23 +15,34 @@ _MERELY_NOT_SO = frozenset({Cause.PRECONDITION, Cause.POSTCONDITION})
 
 
 class MemorySequence(MemoryComposite):
-    """One after the other.
+    """Sequence with memory.
 
-    Child RUNNING: RUNNING. Child FAILURE: FAILURE with its cause; later children stay untouched. Child SUCCESS: on to
-    the next in the same tick; after the last: SUCCESS.
+    | child | status |
+    |---|---|
+    | RUNNING | RUNNING |
+    | SUCCESS | ticks the next child in the same tick; SUCCESS after the last |
+    | FAILURE | FAILURE with its cause; later children stay idle |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "sequence"
 
 
 class MemorySelector(MemoryComposite):
-    """One child after the other until one works.
+    """Selector with memory.
 
-    Child that does not apply (`Conditional`): passed over, it stays idle. Child RUNNING: RUNNING. Child SUCCESS:
-    SUCCESS. Child FAILURE: on to the next in the same tick; after the last: FAILURE with the sentences of all that
-    could begin, the decisive ones first. Its cause is ERROR when one child had that, else the first that is neither
-    PRECONDITION nor POSTCONDITION, else `exhausted_cause` where given, else the last child's. With `one_goal` the
-    children lead to the same goal: after a failure that is final for one, the others are passed over.
+    | child | status |
+    |---|---|
+    | does not apply (`Conditional`) | passed over: the child stays idle, the next one is ticked |
+    | RUNNING | RUNNING |
+    | SUCCESS | SUCCESS |
+    | FAILURE | ticks the next child in the same tick; FAILURE after the last |
+    | halted | INVALID with CANCELLED |
+
+    The failure has the messages of all children that could begin, the decisive ones first. Its cause is ERROR if one
+    child had that, else the first that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause` if given, else
+    that of the last child. With `one_goal` all children lead to the same goal: after a final failure of one, the others
+    are passed over.
     """
 
     kind = "selector"
@@ -65,10 +76,16 @@ class MemorySelector(MemoryComposite):
 
 
 class MemoryRound(MemorySelector):
-    """All children, one after the other, whatever becomes of each.
+    """Composite that ticks all children, one after the other, whatever their results.
 
-    Child that does not apply: passed over. Child RUNNING: RUNNING. Child SUCCESS or FAILURE: on to the next in the same
-    tick. After the last: SUCCESS with the sentences of those that worked when any did, else FAILURE as a selector.
+    | child | status |
+    |---|---|
+    | does not apply (`Conditional`) | passed over |
+    | RUNNING | RUNNING |
+    | SUCCESS, FAILURE | ticks the next child in the same tick |
+    | after the last, with any SUCCESS | SUCCESS with the messages of all that succeeded |
+    | after the last, without | FAILURE like a selector |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "round"

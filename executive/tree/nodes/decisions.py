@@ -1,6 +1,6 @@
-"""What a mission decides by while it runs: a condition as data, the looks that it takes, and the nodes that decide.
+"""Decisions of a running mission: conditions as data, the looks that they take, and the nodes that decide.
 
-A decision is true, false, or not known yet (None): a look that it takes has not been taken.
+A decision is true, false, or not known yet (None) before a look that it needs.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Final
+from typing import ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -43,12 +43,12 @@ from skills.files.errors import InputError
 
 DAY_S: Final = 86_400.0
 Keys = Mapping[str, str]
-"""Blackboard keys by the names that expressions read."""
+"""Blackboard keys by the names in expressions."""
 
 
 @dataclass
 class View:
-    """What decisions look at: the run, when the tree was made (s), and how often each button was pressed by then."""
+    """Data of decisions: the context of the run, the time (s) at which the tree was built, and presses of buttons."""
 
     context: RunContext
     begun_s: float = field(init=False)
@@ -58,14 +58,14 @@ class View:
         self.begun_s, self.presses = self.context.clock.now(), self.context.presses()
 
     def values(self, keys: Keys) -> Mapping[str, Value]:
-        """The readings, and the values of names that are kept under blackboard keys; what has none is left out.
+        """Returns the readings, and the values of names under blackboard keys; each is read when it is used.
 
-        Each is read when it is asked for.
+        Names without a value are missing.
         """
         return _Values(self, keys)
 
     def reading(self, name: str) -> Value:
-        """A reading by its name."""
+        """Returns a reading by its name."""
         context = self.context
         match name:
             case "battery":
@@ -80,17 +80,17 @@ class View:
         return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
     def pressed(self, button: str) -> bool:
-        """Returns whether a button has been pressed since."""
+        """Returns whether a button has been pressed since the beginning."""
         return self.context.presses().get(button, 0) > self.presses.get(button, 0)
 
     def forget_presses(self) -> None:
-        """Count presses of buttons from now on."""
+        """Ignores all presses of buttons until now."""
         self.presses = self.context.presses()
 
 
 @dataclass(frozen=True)
 class _Values(Mapping[str, Value]):
-    """What expressions read."""
+    """Values of the names in expressions."""
 
     view: View
     named: Keys
@@ -113,14 +113,14 @@ class _Values(Mapping[str, Value]):
 
 @dataclass(frozen=True)
 class Decision:
-    """A condition, and where its values and the answers of its looks, in their order, stand on the blackboard."""
+    """Condition with the blackboard keys of its values and of the answers of its looks, in order."""
 
     condition: Condition
     keys: Keys = field(default_factory=dict)
     answers: tuple[str, ...] = ()
 
     def holds(self, view: View) -> bool | None:
-        """Whether it holds now; None before a look that it needs. Raises ExpressionError: something has no value."""
+        """Returns whether it holds now; None before a look that it needs. Raises ExpressionError for missing values."""
         return self._holds(self.condition, view, iter(self.answers))
 
     def _holds(self, condition: Condition, view: View, answers: Iterator[str]) -> bool | None:
@@ -144,13 +144,13 @@ class Decision:
 
     @property
     def looks(self) -> tuple[tuple[str, Look | DoorOpen], ...]:
-        """The looks that it takes, by the keys of their answers."""
+        """Looks that it takes, each with the key of its answer."""
         looks = (part for part in parts_of(self.condition) if isinstance(part, Look | DoorOpen))
         return tuple(zip(self.answers, looks, strict=True))
 
 
 def buttons_of(node: NodeSpec) -> Iterator[str]:
-    """The buttons that a node decides by."""
+    """Iterates over the buttons by which a node decides."""
     condition = node.options.get("condition")
     decision = condition.decision if isinstance(condition, MustHold) else node.options.get("decision")
     if isinstance(decision, Decision):
@@ -159,18 +159,18 @@ def buttons_of(node: NodeSpec) -> Iterator[str]:
 
 @dataclass
 class MustHold(guard.Condition):
-    """A decision that must be true while nodes run; PRECONDITION when it is not, ERROR where it has no value."""
+    """Condition that a decision is true; PRECONDITION when it is not, ERROR when it has no value."""
 
     decision: Decision
     words: str
     _view: View | None = field(default=None, init=False, repr=False, compare=False)
 
     def run_begins(self, context: RunContext) -> None:
-        """Count time and presses from now."""
+        """Counts time and presses from now on."""
         self._view = View(context)
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when it does not hold."""
+        """Returns a failure when the decision is false."""
         holds = self._holds(context)
         if isinstance(holds, Failed):
             return holds
@@ -188,23 +188,23 @@ class MustHold(guard.Condition):
 
 @dataclass
 class MustNotBegin(MustHold):
-    """Calls an interrupt when the decision becomes true; once it was called, not before it was false in between."""
+    """Condition that calls an interrupt when the decision becomes true, and again only after it was false."""
 
     _called: bool = field(default=False, init=False, repr=False, compare=False)
 
     def begin(self, context: RunContext) -> None:
-        """The steps begin: nothing was called yet."""
+        """Handles the start of the steps: no call yet."""
         super().begin(context)
         self._called = False
 
     def called(self) -> None:
-        """The interrupt has begun."""
+        """Notes that the interrupt has begun."""
         self._called = True
         if self._view is not None:
             self._view.forget_presses()
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure, which calls the interrupt, when it has become true."""
+        """Returns a failure, which calls the interrupt, when the decision has become true."""
         holds = self._holds(context)
         if isinstance(holds, Failed):
             return holds
@@ -213,15 +213,24 @@ class MustNotBegin(MustHold):
 
 
 class Decide(MemoryComposite):
-    """Decides, and takes the looks (its children) one after the other only as long as the decision needs them.
+    """Composite that decides, and takes its looks (the children) in order while the decision needs them.
 
-    A look that has begun is taken to its end. Decided: SUCCESS, the answer under `key`. A look RUNNING: RUNNING. A look
-    FAILURE: FAILURE with its cause. An expression without a value: FAILURE with PRECONDITION. Without a look left and
-    not decided: FAILURE with ERROR. Each time that it begins it forgets the answers, but those that are no older than
-    their `max_age_s`; the n-th child is the look for the n-th answer of the decision.
+    | case | status |
+    |---|---|
+    | decided, no look is running | SUCCESS; the answer stands under `key` |
+    | look RUNNING | RUNNING; a look that has begun is taken to its end |
+    | look SUCCESS | decides, or ticks the next look in the same tick |
+    | look FAILURE | FAILURE with its cause |
+    | expression without a value | FAILURE with PRECONDITION |
+    | no look left, not decided | FAILURE with ERROR |
+    | halted | INVALID with CANCELLED |
+
+    The n-th child is the look for the n-th answer of the decision. Each start clears the answers, except those not
+    older than their `max_age_s`.
     """
 
     kind = "decide"
+    output_types: ClassVar = {"key": bool}
     settled = True
     least = 0
     decision: Decision
@@ -234,13 +243,8 @@ class Decide(MemoryComposite):
         super().__post_init__()
         self.view = View(self.context)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key of the answer."""
-        return {options["key"]: bool}
-
     def tick(self) -> Iterator[Behaviour]:
-        """Decide, or take the next look."""
+        """Decides, or takes the next look."""
         looks = self.status == Status.RUNNING
         if not looks:
             self._restart()
@@ -267,12 +271,12 @@ class Decide(MemoryComposite):
         self.context.board.forget(key for key, look in self.decision.looks if not self._fresh(key, look.max_age_s))
 
     def _fresh(self, key: str, max_age_s: float) -> bool:
-        """Returns whether an answer of an earlier time need not be asked for again."""
+        """Returns whether an earlier answer is recent enough."""
         old_s = self.context.clock.now() - self._given_s.get(key, -math.inf)
         return max_age_s > 0.0 and old_s <= max_age_s
 
     def _decided(self) -> bool:
-        """Returns whether it has come to an end."""
+        """Decides if possible; returns whether the node has ended."""
         try:
             holds = self.decision.holds(self.view)
         except ExpressionError as error:
@@ -286,9 +290,9 @@ class Decide(MemoryComposite):
 
 
 def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple[NodeSpec, str, tuple[StepPart, ...]]:
-    """The node that decides, the key of its answer, and the checks that it makes.
+    """Plans a decision; returns its node, the key of its answer, and the parts with goals that it checks.
 
-    Raises InputError: an expression that is not true or false, an unknown name, or something that cannot be looked for.
+    Raises InputError for an expression that is not true or false, an unknown name, or an object that no look can find.
     """
     decision, key, words = decision_of(flow, condition, builder), builder.key("decided"), str(condition)
     looks = [look_plan(builder, number, look, answer) for number, (answer, look) in enumerate(decision.looks, start=1)]
@@ -298,7 +302,7 @@ def decide_plan(flow: Flow, condition: Condition, builder: PlanBuilder) -> tuple
 
 
 def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str) -> tuple[NodeSpec, StepPart]:
-    """A look of a decision, and what it is to find out."""
+    """Plans a look of a decision; returns its node, and its part with the goal."""
     below = builder.at(f"look-{number}")
     if isinstance(look, DoorOpen):
         part = StepPart(below.path_id, goal=door_goal(builder.knowledge, look.between))
@@ -310,7 +314,7 @@ def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str
 
 
 def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
-    """The decision of a condition, with the looks that `builder` has planned. Raises InputError like `decide_plan`."""
+    """Returns the decision of a condition with the looks of `builder`. Raises InputError like `decide_plan`."""
     source, parts = builder.source, list(parts_of(condition))
     expressions = [part.expression for part in parts if isinstance(part, ValueIs)]
     for expression in expressions:
@@ -327,7 +331,7 @@ def decision_of(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decis
 
 
 def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> Decision:
-    """The decision of a condition that is watched. Raises InputError: it takes a look, or as `decision_of`."""
+    """Returns the decision of a monitored condition. Raises InputError when it takes a look, or like `decision_of`."""
     look = next((part for part in parts_of(condition) if isinstance(part, Look | DoorOpen)), None)
     if look is not None:
         hint = "look once with 'if', or again and again with 'repeat: {until: ..}'"
@@ -336,9 +340,9 @@ def instant_decision(flow: Flow, condition: Condition, builder: PlanBuilder) -> 
 
 
 class Check(ExplainedDecorator):
-    """Makes the decision of its child an answer of the mission: it is published under `ANSWER_TOPIC`.
+    """Decorator that publishes the decision of its child under `ANSWER_TOPIC`, as an answer of the mission.
 
-    As the child; `key` is where the child leaves its answer.
+    Status as the child; `key` holds the child's answer.
     """
 
     kind = "check"
@@ -347,7 +351,7 @@ class Check(ExplainedDecorator):
     context: RunContext
 
     def update(self) -> Status:
-        """The child's status, and the answer when it is there."""
+        """Returns the child's status; publishes the answer when there is one."""
         status = self.pass_on()
         if status == Status.SUCCESS:
             answer = self.context.board.get(self.key)

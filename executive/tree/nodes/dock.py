@@ -1,4 +1,4 @@
-"""Charging at the dock: the plans of the command and of the block."""
+"""Charging at the dock: plans of the command and of the block."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skills.robot import Pose2D
 
 
 def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
-    """Stands on the dock and charge; where it does not charge, back off and docks again."""
+    """Docks and charges; where the robot does not charge, it backs off and docks again."""
     charge = builder.skill("charge", {"level": level})
     attempt = builder.at("attempt").sequence(
         "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
@@ -27,7 +27,7 @@ def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:
-    """Goes to the dock and charge there. Raises InputError: anything else is said with it."""
+    """Charges at the dock. Raises InputError when the command names more than that."""
     command, facts = builder.command, builder.knowledge
     if any(part is not None for part in (command.item, command.goal, command.object)):
         raise builder.error("the robot charges itself, at its dock", "say 'do: charge' alone")

@@ -1,6 +1,6 @@
-"""Looking whether a door is open: go where it can be seen through, and look; where that fails, from its other side.
+"""Check whether a door is open: the robot goes to a viewpoint before it and looks, or else on its other side.
 
-A closed door may bar the way to where it would be looked at. So the robot looks from where its way ended, too.
+A closed door may bar the path to its viewpoint, so the robot also looks from the pose where its drive ended.
 """
 
 from __future__ import annotations
@@ -20,56 +20,56 @@ from skills.robot import Pose2D
 
 CHECK_DOOR: Final = "check_door"
 _BEFORE_M: Final = ((1.5, 1.2, 1.8), (0.9, 0.7))
-"""How far before a door, the better ones first."""
+"""Distances before a door, the better ones first."""
 _ASIDE_RAD: Final = tuple(map(math.radians, (0.0, 20.0, -20.0, 40.0, -40.0)))
 _LOOK_S: Final = 0.5
 _TURNED_RAD: Final = (0.0, math.pi / 2)
 _BODY_M: Final = (1.3, 0.7)
-"""Length and width of the body, with a little room around it."""
+"""Length and width of the body, with a margin."""
 
 
 def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeSpec:
     """Goes before the door in the room on one side, or else on the other, and looks; the answer goes to `key`.
 
-    The side with more doors comes first: whoever must go through a door to look at it need not look.
+    The room with more doors comes first, since the robot can reach it more easily when this door is closed.
 
-    Raises InputError: the world has no such door.
+    Raises InputError when the world has no such door.
     """
     door = _door(builder, between)
     through_rad = _through_rad(builder.knowledge, door)
     sides = sorted(between, key=lambda room: -sum(room in other.between for other in builder.knowledge.doors))
     views = [(room, view) for room in sides if (view := view_of(builder.knowledge, door, room)) is not None]
     views = views or [(room, pose_2d(builder.knowledge.places[room].pose)) for room in sides]
-    told = f"door between {between[0]} and {between[1]}"
-    ports = {"middle_W": door.at, "width_m": door.width, "through_rad": through_rad, "door": told}
+    name = f"door between {between[0]} and {between[1]}"
+    ports = {"middle_W": door.at, "width_m": door.width, "through_rad": through_rad, "door": name}
 
-    def looked(room: str, view: Pose2D) -> NodeSpec:
+    def look_from(room: str, view: Pose2D) -> NodeSpec:
         below = builder.at(f"from-{room}")
         stay = below.pause("stay", "look from here", _LOOK_S)
         near = below.node(
-            "selector", "stand before it, or stay", below.navigate(view, f"the {told}"), stay, part="near"
+            "selector", "stand before it, or stay", below.navigate(view, f"the {name}"), stay, part="near"
         )
         return below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
 
-    looks = (looked(room, view) for room, view in views)
+    looks = (look_from(room, view) for room, view in views)
     look = builder.node("selector", "look from one side, or else from the other", *looks, part="look")
-    return builder.node("check", f"is the {told} open?", look, question=f"is the {told} open", key=key)
+    return builder.node("check", f"is the {name} open?", look, question=f"is the {name} open", key=key)
 
 
 def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:
-    """Where to stand in a room on a side of a door to see through it: before it, or a little aside; None: nowhere.
+    """Viewpoint in a room to see through a door: before it, or to the side; None if the room has no free pose.
 
-    The robot looks at the door, or stands along the wall where it has no room to; its LiDAR sees all around.
+    The robot faces the door, or stands along the wall in a narrow space; its LiDAR sees all around.
     """
     across = _through_rad(knowledge, door)
     outline = knowledge.places[room].polygon
-    into = min((across, across + math.pi), key=lambda way_rad: distance_m(outline, _from(door.at, way_rad, 0.5)))
+    into = min((across, across + math.pi), key=lambda each_rad: distance_m(outline, _from(door.at, each_rad, 0.5)))
     taken = [knowledge.surfaces[name].polygon for name in knowledge.surfaces_in(room)]
     return next((pose for pose in _before(door, into) if fits(_outline(pose), outline, taken)), None)
 
 
 def _before(door: Door, into_rad: float) -> Iterator[Pose2D]:
-    """Poses before a door, the best view first."""
+    """Iterates over poses before a door, the best viewpoint first."""
     for far_m in _BEFORE_M:
         for aside_rad, turned_rad, before_m in product(_ASIDE_RAD, _TURNED_RAD, far_m):
             bearing_rad = into_rad + aside_rad
@@ -79,24 +79,24 @@ def _before(door: Door, into_rad: float) -> Iterator[Pose2D]:
 
 
 def doorway(knowledge: Knowledge, door: Door) -> Doorway:
-    """A door of the knowledge file as the skills take it."""
+    """Converts a door of the knowledge file to the doorway of the skills."""
     return Doorway(door.at, door.width, _through_rad(knowledge, door), door.between)
 
 
 def _through_rad(knowledge: Knowledge, door: Door) -> float:
-    """The direction through a door: across the side of a room along which it lies."""
+    """Direction (rad) through a door: across the side of the room in which it lies."""
     sides = [nearest_side(knowledge.places[room].polygon, door.at, door.width) for room in door.between]
     (x0, y0), (x1, y1) = min(sides, key=lambda side: side.off_m).ends
     return math.remainder(math.atan2(y1 - y0, x1 - x0) + math.pi / 2, math.tau)
 
 
-def _from(point: Point, way_rad: float, by_m: float) -> Point:
-    """The point so far away in a direction."""
-    return point[0] + by_m * math.cos(way_rad), point[1] + by_m * math.sin(way_rad)
+def _from(point: Point, bearing_rad: float, by_m: float) -> Point:
+    """Point at a distance in a direction."""
+    return point[0] + by_m * math.cos(bearing_rad), point[1] + by_m * math.sin(bearing_rad)
 
 
 def _outline(pose: Pose2D) -> tuple[Point, ...]:
-    """The corners of the body at a pose."""
+    """Corners of the body at a pose."""
     half_x, half_y = 0.5 * _BODY_M[0], 0.5 * _BODY_M[1]
     corners = ((half_x, half_y), (-half_x, half_y), (-half_x, -half_y), (half_x, -half_y))
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)

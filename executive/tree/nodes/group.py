@@ -1,4 +1,4 @@
-"""Steps under what is watched meanwhile, and with what is always done in the end: the plan and its node."""
+"""Groups of steps with `when`, `while` and `always`: the plan and its node."""
 
 from __future__ import annotations
 
@@ -28,18 +28,22 @@ from skills.files.errors import InputError
 
 
 class Always(Afterwards):
-    """Something to be done (the first child), and what is done in the end (the second), however it ended.
+    """Composite of work (the first child), and of steps that run in the end (the second), whatever the result.
 
-    First child RUNNING: RUNNING. First child done: on to the second in the same tick. Second RUNNING: RUNNING. Second
-    FAILURE after the first's SUCCESS: FAILURE with its cause. Else the first's status, cause and sentence.
-    Stopped from outside once it has begun: the run still does the second, before anything else (`RunContext.endings`).
+    | work | steps in the end | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | SUCCESS, FAILURE | ticked in the same tick | RUNNING until they end |
+    | SUCCESS | FAILURE | FAILURE with the cause of the steps |
+    | SUCCESS, FAILURE | SUCCESS, or FAILURE after FAILURE | as the work |
+    | halted | handed to the run, which ticks them first (`RunContext.endings`) | INVALID with CANCELLED |
     """
 
     kind = "always"
     context: RunContext
 
     def stop(self, new_status: Status = Status.INVALID) -> None:
-        """Stop; what is to be done in the end is handed to the run when it is stopped from outside."""
+        """Stops the children; hands the second one to the run when the node is stopped from outside."""
         first, last = self.children
         endings = self.context.endings
         interrupted = new_status == Status.INVALID and self.status == Status.RUNNING
@@ -71,7 +75,7 @@ def _plan(assembler: Assembler, block: model.Group, builder: PlanBuilder) -> Ass
 def framed(
     assembler: Assembler, body: Assembled, group: model.Group | Mission, builder: PlanBuilder, before: Flow
 ) -> Assembled:
-    """Steps under what is watched meanwhile, and with what is always done in the end; `before` is their flow."""
+    """Adds `when`, `while` and `always` to steps; `before` is the flow before them."""
     node, parts = body.node, body.parts
     if group.when:
         after, calls = assembler.flow, []
@@ -109,7 +113,7 @@ def framed(
 
 
 def _is_holding(condition: Condition) -> bool:
-    """Returns whether a condition says that the gripper holds something, alone or together with others."""
+    """Returns whether a condition requires that the gripper holds something."""
     match condition:
         case ValueIs(text=text):
             return text.strip() == "holding"
@@ -119,7 +123,7 @@ def _is_holding(condition: Condition) -> bool:
 
 
 def mission_plan(assembler: Assembler, mission: Mission, base: str) -> Assembled:
-    """The subtrees of a mission's steps, under what is watched meanwhile, after its values are set."""
+    """Plans a mission's steps, with its values set before, and its `when`, `while` and `always` around them."""
     builder, flow = assembler.builder(base, mission.source), assembler.flow
     outer, known = (assembler.values_base, flow.declared), dict(flow.names)
     assembler.values_base = f"{base}/values"
@@ -135,7 +139,7 @@ def mission_plan(assembler: Assembler, mission: Mission, base: str) -> Assembled
 
 
 def _declare(assembler: Assembler, mission: Mission, builder: PlanBuilder) -> NodeSpec:
-    """The leaf that gives a mission's values as they are at the beginning."""
+    """Builds the leaf that sets a mission's values at the beginning."""
     values, kinds = dict[str, Expression | Template](), dict[str, type]()
     for name, value in (mission.variables or {}).items():
         kind = PYTHON_TYPES[kind_of(value)]
@@ -146,7 +150,7 @@ def _declare(assembler: Assembler, mission: Mission, builder: PlanBuilder) -> No
 
 
 def _use_plan(assembler: Assembler, step: UseMission, builder: PlanBuilder) -> Assembled:
-    """The subtree of a mission that a step uses."""
+    """Plans the mission that a step uses."""
     used: Mission = step.mission
     try:
         steps = mission_plan(assembler, used, builder.path_id)

@@ -1,7 +1,7 @@
-"""Conditions that must hold while nodes run, and what they make of readings that are too old.
+"""Conditions that must hold while nodes run, and the policies for readings that are too old.
 
-They stand in a compiled tree as plain data; each run looks at them by copies of its own. A condition answers with None
-when it holds, `Failed` when it does not, and `Waiting` when that cannot be said yet.
+They stand in a compiled tree as plain data; each run uses copies of its own. A condition returns None when it holds,
+`Failed` when it does not, and `Waiting` when that is not known yet.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CONTROL_TOPIC = "control"
 
 @dataclass(frozen=True)
 class Waiting:
-    """Nothing can be said yet; one plain sentence on what is waited for. The nodes below stand still meanwhile."""
+    """Verdict of a condition that cannot be judged yet, with one sentence; the nodes below are suspended meanwhile."""
 
     message: str
 
@@ -38,7 +38,7 @@ Verdict = Failed | Waiting | None
 
 @dataclass(frozen=True)
 class Freshness:
-    """How old (s) a reading may be, what happens when it is older, and how long WAIT waits at most (s)."""
+    """Greatest age (s) of a reading, the policy for an older one, and the greatest duration (s) of WAIT."""
 
     max_age_s: float = 1.0
     policy: StaleData = StaleData.WAIT
@@ -47,10 +47,14 @@ class Freshness:
 
 @dataclass
 class Condition(ABC):
-    """Something that must hold while a subtree runs; `stale` says what an old reading means (None: as usual).
+    """Condition that must hold while a subtree runs; `stale` is the policy for an old reading (None: the usual one).
 
-    Reading fresh, or policy ACCEPT: as `judged`. Too old: Waiting (WAIT) until the patience is over, then, or at once
-    (FAIL), Failed with PRECONDITION.
+    | reading | policy | verdict |
+    |---|---|---|
+    | fresh | any | as `judged` |
+    | too old | ACCEPT | as `judged` |
+    | too old | WAIT | Waiting until the patience is over, then Failed with PRECONDITION |
+    | too old | FAIL | Failed with PRECONDITION |
     """
 
     reading: ClassVar[str] = ""
@@ -61,34 +65,34 @@ class Condition(ABC):
 
     @abstractmethod
     def judged(self, context: RunContext) -> Verdict:
-        """What the readings say against going on, None when nothing does."""
+        """Judges the condition by the readings; None when it holds."""
 
     def stamp_s(self, context: RunContext) -> float:
-        """When the reading was taken; now where there is none."""
+        """Stamp (s) of the reading; the present time for a condition without one."""
         return context.clock.now()
 
     def for_run(self, context: RunContext) -> Self:
-        """A copy for a run that begins now."""
+        """Returns a copy for a run that begins now."""
         mine = copy.copy(self)
         mine.run_begins(context)
         return mine
 
     def run_begins(self, context: RunContext) -> None:  # noqa: B027 - most conditions need not know
-        """The run begins for which this is a copy."""
+        """Handles the beginning of the run for which this is a copy."""
 
     def begin(self, context: RunContext) -> None:
-        """The subtree starts anew: forget for how long something was so."""
+        """Handles a new start of the subtree: clears all durations."""
         self._since_s = self._stale_since_s = None
 
     def called(self) -> None:  # noqa: B027 - most conditions need not know
-        """What is done about it has begun."""
+        """Handles the beginning of the interrupt that the condition has called."""
 
     def violated_at_end(self, context: RunContext) -> Failed | None:
-        """What speaks against a success of the subtree, None when nothing does."""
+        """Returns the failure that contradicts a success of the subtree, or None."""
         return None
 
     def violated(self, context: RunContext) -> Verdict:
-        """What speaks against going on, None when nothing does. Called before each tick of the subtree."""
+        """Judges the condition before each tick of the subtree, with the policy for old readings; None if it holds."""
         fresh, policy = self.freshness, self.stale or self.freshness.policy
         if policy is StaleData.ACCEPT:
             return self.judged(context)
@@ -106,7 +110,7 @@ class Condition(ABC):
 
 
 def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
-    """Whether an object was taken for one of these classes, or any (`THING`), with at least these attributes."""
+    """Returns whether an object was recognised as one of these classes, or any (`THING`), with these attributes."""
     if item is None:
         return False
     return (THING in classes or item.name in classes) and set(attributes) <= set(item.attributes)
@@ -114,15 +118,20 @@ def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Seq
 
 @dataclass
 class Holds(Condition):
-    """The gripper holds `item`, which is brought `to` somewhere ("to the kitchen").
+    """Condition that the gripper holds `item`, which is brought `to` a goal ("to the kitchen").
 
-    PRECONDITION at the start when what it holds was taken for something else than one of the classes `known_as` with
-    all `attributes`; of what nobody knows, as after a restart, it is believed.
+    | gripper | verdict | verdict with `until_put_down` |
+    |---|---|---|
+    | at the start: holds an object recognised as another | PRECONDITION | PRECONDITION |
+    | at the start: empty | PRECONDITION | holds |
+    | the object is lost, within 0.3 s | EXECUTION | EXECUTION, but holds while the object is offered |
+    | the object begins to slip | holds; it is gripped once more firmly | the same |
+    | the object slips once more | EXECUTION | holds |
+    | the gripper has opened | EXECUTION | holds |
+    | at the end: empty | EXECUTION | holds |
 
-    PRECONDITION when nothing is held at the start, EXECUTION when it is lost on the way, within 0.3 s. What begins to
-    slip is gripped again more firmly, once; EXECUTION when it slips on. With `until_put_down` the gripper may open to
-    let go, what slips on is left to the skill that puts it down, and so is an empty gripper at the start; what is lost
-    while it is offered is left to the skill that offers it. Without it, the gripper holds it at the end, too.
+    The object must be recognised as one of the classes `known_as` with all `attributes`; an unrecognised object, as
+    after a restart, is accepted.
     """
 
     reading = "the gripper"
@@ -135,16 +144,16 @@ class Holds(Condition):
     _watch: HoldWatch = field(default_factory=HoldWatch, init=False, repr=False, compare=False)
 
     def stamp_s(self, context: RunContext) -> float:
-        """The gripper's stamp."""
+        """Stamp (s) of the gripper."""
         return context.robot.gripper().stamp_s
 
     def begin(self, context: RunContext) -> None:
-        """The subtree starts anew: nothing has been held yet."""
+        """Handles a new start of the subtree: watches the grip from now on."""
         super().begin(context)
         self._watch, self._begins = hold_watch(context.robot.capabilities()), True
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when it is lost or slips on, or is another object; grips again what slips."""
+        """Judges the grip; grips a slipping object again."""
         watch, held = self._watch, context.payload.kind
         begins, self._begins = self._begins, False
         another = held is not None and self.known_as and not is_known_as(held, self.known_as, self.attributes)
@@ -167,7 +176,7 @@ class Holds(Condition):
         return None
 
     def violated_at_end(self, context: RunContext) -> Failed | None:
-        """A failure when the gripper feels nothing any more."""
+        """Returns a failure when the gripper is empty at the end."""
         if self.until_put_down or context.robot.gripper().holding:
             return None
         return Failed(Cause.EXECUTION, f"the {self.item} was lost on the way{self._to}")
@@ -179,10 +188,10 @@ class Holds(Condition):
 
 @dataclass
 class HoldsNothingElse(Condition):
-    """The gripper holds no other object when `item` is to be taken, one of the classes `known_as` with `attributes`.
+    """Condition that the gripper holds no other object before `item` is grasped.
 
-    PRECONDITION at the start when what it holds was taken for something else; what nobody knows, as after a restart, is
-    left to the skill that grasps.
+    PRECONDITION at the start when it holds an object that was recognised as another than the classes `known_as` with
+    `attributes`; an unrecognised object, as after a restart, is left to the skill that grasps.
     """
 
     reading = "the gripper"
@@ -192,12 +201,12 @@ class HoldsNothingElse(Condition):
     _begins: bool = field(default=True, init=False, repr=False, compare=False)
 
     def begin(self, context: RunContext) -> None:
-        """The subtree starts anew: the gripper is felt once more."""
+        """Handles a new start of the subtree: the next judgement counts."""
         super().begin(context)
         self._begins = True
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when it begins with another object."""
+        """Returns a failure when the gripper holds another object at the start."""
         begins, self._begins = self._begins, False
         held = context.payload.kind
         if not begins or held is None or not context.robot.gripper().holding:
@@ -209,18 +218,18 @@ class HoldsNothingElse(Condition):
 
 @dataclass
 class KnowsPlace(Condition):
-    """The robot knows where it is. Not knowing for up to `patience_s` (robot's clock) is let pass; PRECONDITION."""
+    """Condition that the robot is localised; PRECONDITION after `patience_s` (robot's clock) without."""
 
     reading = "its place"
     freshness = Freshness(2.0)
     patience_s: float = 5.0
 
     def stamp_s(self, context: RunContext) -> float:
-        """The estimate's stamp."""
+        """Stamp (s) of the estimate."""
         return context.localiser.estimate().stamp_s
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when the place has been unknown for longer than the patience."""
+        """Returns a failure when the robot has not been localised for longer than the patience."""
         if context.localiser.estimate().localised:
             self._since_s = None
             return None
@@ -233,60 +242,60 @@ class KnowsPlace(Condition):
 
 @dataclass
 class BatteryAtLeast(Condition):
-    """The battery's charge (0 to 1) is at least `charge`; an old reading will do, since charge changes slowly."""
+    """Condition that the battery's charge (0 to 1) is at least `charge`; accepts old readings, which change slowly."""
 
     reading = "the battery"
     freshness = Freshness(10.0, StaleData.ACCEPT)
     charge: float
 
     def stamp_s(self, context: RunContext) -> float:
-        """The battery's stamp."""
+        """Stamp (s) of the battery."""
         return context.robot.battery().stamp_s
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure with PRECONDITION when the charge is below."""
+        """Returns a failure with PRECONDITION when the charge is below the least one."""
         charge, least = context.robot.battery().charge, self.least(context)
         if charge >= least:
             return None
         return Failed(Cause.PRECONDITION, f"the battery is at {charge:.0%}, less than {least:.0%}")
 
     def least(self, context: RunContext) -> float:
-        """The least charge that is enough here."""
+        """Least charge that suffices here."""
         return self.charge
 
 
 @dataclass
 class BatteryForWork(BatteryAtLeast):
-    """The charge is at least `charge`, and enough for the route to the dock.
+    """Condition that the charge is at least `charge`, and suffices for the route to the dock.
 
-    The route is taken as twice the distance as the crow flies, at `per_m` of charge for each metre.
+    The length of the route is estimated as twice the straight distance, at `per_m` of charge for each metre.
     """
 
     dock: Pose2D
     per_m: float = 0.0008
 
     def least(self, context: RunContext) -> float:
-        """More, the farther the dock is."""
+        """Least charge that suffices here; it grows with the distance to the dock."""
         here = context.pose()
         return max(self.charge, 2.0 * self.per_m * math.hypot(here.x_m - self.dock.x_m, here.y_m - self.dock.y_m))
 
 
 @dataclass
 class NoStopButton(Condition):
-    """No stop button is pressed. The mission stands still as long as one is."""
+    """Condition that no stop button is pressed; the mission stands still while one is."""
 
     def judged(self, context: RunContext) -> Verdict:
-        """Waiting while it is pressed."""
+        """Returns Waiting while a stop button is pressed."""
         pressed = context.stop_pressed()
         return None if pressed is None else Waiting(pressed)
 
 
 @dataclass
 class OwnLease(Condition):
-    """Nobody else may move the robot. The mission stands still as long as somebody does."""
+    """Condition that no other program holds the robot's lease; the mission stands still while one does."""
 
     def judged(self, context: RunContext) -> Verdict:
-        """Waiting while another holds the lease."""
+        """Returns Waiting while another program holds the lease."""
         held = context.robot.lease_holder()
         if held is None or held.holder == context.lease.holder:
             return None
@@ -295,27 +304,32 @@ class OwnLease(Condition):
 
 @dataclass
 class NotAfter(Condition):
-    """At most `limit_s` on the robot's clock have passed since the run began; TIMEOUT when not."""
+    """Condition that at most `limit_s` on the robot's clock have passed since the run began; TIMEOUT after that."""
 
     limit_s: float
     _begun_s: float = field(default=0.0, init=False, repr=False, compare=False)
 
     def run_begins(self, context: RunContext) -> None:
-        """Count from now."""
+        """Counts from now on."""
         self._begun_s = context.clock.now()
 
     def judged(self, context: RunContext) -> Verdict:
-        """A failure when the time is over."""
+        """Returns a failure when the time is over."""
         if context.clock.now() - self._begun_s <= self.limit_s:
             return None
         return Failed(Cause.TIMEOUT, f"more than {self.limit_s:g} s have passed since the mission began")
 
 
 class Guard(ExplainedDecorator):
-    """A condition above actions, looked at before every tick.
+    """Decorator that judges a condition before every tick of its child.
 
-    Condition violated: child halted, FAILURE with the condition's cause. Condition waiting: child suspended, RUNNING.
-    Child SUCCESS that the condition contradicts (`violated_at_end`): FAILURE with its cause. Else as the child.
+    | condition | child | status |
+    |---|---|---|
+    | violated | halted | FAILURE with the condition's cause |
+    | waiting | suspended | RUNNING |
+    | holds | RUNNING, FAILURE | as the child |
+    | holds | SUCCESS | SUCCESS, or FAILURE with the condition's cause if it contradicts (`violated_at_end`) |
+    | - | halted | INVALID with CANCELLED |
     """
 
     kind = "guard"
@@ -328,7 +342,7 @@ class Guard(ExplainedDecorator):
         self.condition = self.condition.for_run(self.context)
 
     def initialise(self) -> None:
-        """Forgets for how long something was so."""
+        """Starts the condition again."""
         self.condition.begin(self.context)
 
     def _held_back(self) -> Status | None:
@@ -340,7 +354,7 @@ class Guard(ExplainedDecorator):
         return None if verdict is None else self.fail(verdict)
 
     def update(self) -> Status:
-        """As the child, unless the condition contradicts its success."""
+        """Returns the child's status, unless the condition contradicts its success."""
         status = self.pass_on()
         done, self._looked = self._looked and status == Status.SUCCESS, False
         contradicts = self.condition.violated_at_end(self.context) if done else None

@@ -1,9 +1,9 @@
-"""The root of every mission's tree: monitors and interrupts by priority above the mission itself.
+"""Root of every mission's tree: monitors and interrupts by priority above the mission itself.
 
     stop button > lost lease > battery low > localisation lost > mission
 
-A monitor that is violated ends the mission. An interrupt that is called suspends all below it, does its work (to the
-dock and charge, find out where the robot is), and the mission goes on where it was.
+A monitor that is violated ends the mission. An interrupt that is called suspends all below it and does its work (it
+charges at the dock, or localises the robot); then the mission continues where it was.
 """
 
 from __future__ import annotations
@@ -28,16 +28,20 @@ from executive.words.knowledge import Pose
 from skills.api import Cause, Failed
 
 HANDLING: Final = frozenset({"grasp", "place", "hand_over", "stow"})
-"""Skills that an interrupt lets come to their end, since an object is half held meanwhile."""
+"""Skills that an interrupt does not suspend, since their object is not held safely meanwhile."""
 MOST_CHARGES: Final = 5
 MOST_RELOCALISATIONS: Final = 5
 LOST_PATIENCE_S: Final = 2.0
 
 
 class Monitor(ExplainedLeaf):
-    """Looks at a condition at every tick.
+    """Leaf that judges a condition at every tick.
 
-    Holds: SUCCESS. Waiting: RUNNING, the mission stands still. Violated: FAILURE with the condition's cause.
+    | condition | status |
+    |---|---|
+    | holds | SUCCESS |
+    | waiting | RUNNING; the mission is suspended |
+    | violated | FAILURE with the condition's cause; the mission ends |
     """
 
     kind = "monitor"
@@ -50,15 +54,15 @@ class Monitor(ExplainedLeaf):
         self.condition = self.condition.for_run(self.context)
 
     def begin(self) -> None:
-        """The mission starts."""
+        """Handles the start of the mission."""
         self.condition.begin(self.context)
 
     def wants_tick(self, mission: Behaviour) -> bool:
-        """Always."""
+        """Returns True: a monitor is ticked at every tick."""
         return True
 
     def update(self) -> Status:
-        """Look."""
+        """Judges the condition."""
         verdict = self.condition.violated(self.context)
         if isinstance(verdict, Failed):
             return self.fail(verdict)
@@ -66,11 +70,17 @@ class Monitor(ExplainedLeaf):
 
 
 class Interrupt(ExplainedDecorator):
-    """Work that is done between two ticks of the mission when it is called for, `uses` times at most.
+    """Decorator whose child interrupts the mission when `condition` is violated, at most `uses` times.
 
-    It is called when `condition` is violated. Never called: idle. Child RUNNING or SUCCESS: the same. Child FAILURE,
-    or called once too often: FAILURE.
-    While the mission runs a skill named in `spares` the call waits, unless `urgent` is violated, too.
+    | case | status |
+    |---|---|
+    | never called | INVALID |
+    | child RUNNING, SUCCESS | as the child |
+    | child FAILURE | FAILURE with its cause |
+    | called more than `uses` times | FAILURE with EXECUTION |
+    | halted | INVALID with CANCELLED |
+
+    While the mission runs a skill named in `spares`, the call waits, unless `urgent` is violated too.
     """
 
     kind = "interrupt"
@@ -90,13 +100,13 @@ class Interrupt(ExplainedDecorator):
         self.urgent = None if self.urgent is None else self.urgent.for_run(self.context)
 
     def begin(self) -> None:
-        """The mission starts: count from zero."""
+        """Handles the start of the mission: counts calls from zero."""
         self.count, self.waiting = 0, ""
         for condition in filter(None, (self.condition, self.urgent)):
             condition.begin(self.context)
 
     def wants_tick(self, mission: Behaviour) -> bool:
-        """Returns whether it is under way or called; `waiting` says what it waits for before it can tell."""
+        """Returns whether it is running or called; sets `waiting` while its condition cannot be judged."""
         self.waiting = ""
         if self.status == Status.RUNNING:
             return True
@@ -113,7 +123,7 @@ class Interrupt(ExplainedDecorator):
         return True
 
     def initialise(self) -> None:
-        """It begins."""
+        """Counts a call."""
         self.count += 1
         self.condition.called()
 
@@ -123,25 +133,31 @@ class Interrupt(ExplainedDecorator):
         return self.fail(Failed(Cause.EXECUTION, f"{self._why}, again after {self.uses} times {self.name}"))
 
     def update(self) -> Status:
-        """As the child, with the reason in front."""
+        """Returns the child's status, with the reason of the call before its message."""
         status = self.pass_on()
         self.message = f"{self._why}: {self.message}"
         return status
 
 
 class Interrupts(MemoryComposite):
-    """Monitors and interrupts, the most important first, above the mission, which is the last child.
+    """Composite of monitors and interrupts, the most important first, above the mission, which is the last child.
 
-    At every tick they are looked at in order. Monitor violated: FAILURE with its cause, all below is stopped. Monitor
-    or call waiting: all below is suspended, RUNNING. Interrupt called or under way: all below is suspended and it is
-    ticked: RUNNING, or FAILURE with its cause when it fails; when it succeeds, the next are looked at in the same tick.
-    With nothing to do, the mission is ticked, and its status, cause and sentence are taken over.
+    At every tick they are checked in order:
+
+    | monitor or interrupt | children after it | status |
+    |---|---|---|
+    | monitor holds, interrupt not called or SUCCESS | the next one is checked in the same tick | as that one |
+    | monitor or condition of an interrupt is waiting | suspended | RUNNING |
+    | interrupt RUNNING | suspended | RUNNING |
+    | monitor or interrupt FAILURE | halted | FAILURE with its cause |
+    | none of these | the mission is ticked | as the mission |
+    | halted | halted | INVALID with CANCELLED |
     """
 
     kind = "interrupts"
 
     def tick(self) -> Iterator[Behaviour]:
-        """Looks at the watches in order; tick the first that has to do, else the mission."""
+        """Ticks monitors and called interrupts in order, then the mission."""
         watches: list[Any] = self.children[:-1]
         mission = self.children[-1]
         if self.status != Status.RUNNING:
@@ -161,7 +177,7 @@ class Interrupts(MemoryComposite):
         yield self
 
     def _hold(self, watch: Monitor | Interrupt, below: Sequence[Behaviour]) -> None:
-        """Lets nothing below a watch move; give it up when the watch failed."""
+        """Suspends all children below a monitor or interrupt; halts them when it has failed."""
         self.current_child = watch
         if not watch.waiting and watch.status == Status.FAILURE:
             for child in below:
@@ -175,9 +191,9 @@ class Interrupts(MemoryComposite):
 
 
 def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
-    """The mission under its watches, the last node below; `builder` is the mission's own.
+    """Builds the root with monitors and interrupts above the mission; `builder` is the mission's own.
 
-    Raises InputError: a skill that the watches need is not registered.
+    Raises InputError when a skill that the interrupts need is not registered.
     """
     below = builder.at("watch")
     watches = (
@@ -190,7 +206,7 @@ def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
 
 
 def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
-    """To the dock, charge, and back to where it was; urgent when half of what it is called for is left."""
+    """Charges at the dock and returns to the earlier pose; urgent at half of the charge that calls it."""
     facts, dock = builder.knowledge.battery, pose_2d(place)
     key = builder.key("where")
     work = builder.at("charge").sequence(
@@ -212,7 +228,7 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
 
 
 def _relocalising(builder: PlanBuilder, work: NodeSpec) -> NodeSpec:
-    """Work after which the robot finds out where it is when it did not know, and works on."""
+    """Recovers work by a relocalisation after a failure with PRECONDITION or EXECUTION."""
     lost = Recovery((after(Cause.PRECONDITION, Cause.EXECUTION),))
     return builder.recover("know where it is", work, (builder.skill("relocalise"), lost), attempts=2)
 

@@ -1,7 +1,8 @@
-"""Taking hold of an object: stand before it, grasp it, draw the arm in, and what is done when one of these fails.
+"""Picking an object up: approach it, grasp it, draw the arm in, with recoveries for each failure.
 
-Going there has its own recoveries (`PlanBuilder.navigate`), so has looking for it (`executive.tree.nodes.search`), and
-what falls on the way is picked up again (`executive.tree.nodes.carry`).
+Other recoveries stand with their work: of drives in `executive.tree.plan`, of searches in
+`executive.tree.nodes.search`, of a dropped object in `executive.tree.nodes.carry`, of charging in
+`executive.tree.nodes.dock`.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from skills.robot import Pose2D
 ATTEMPTS: Final = 4
 LOOK_AGAIN_S: Final = 0.5
 NEARBY_M: Final = ((-0.5, 0.0), (0.0, 0.6), (0.0, -0.6))
-"""Poses near a goal that will do as well, forward and left of it (m)."""
+"""Alternative poses near a goal, forward and left of it (m)."""
 _ANY: Final = frozenset(Cause) - {Cause.ERROR}
 _PLANNING: Final = frozenset({Cause.PLANNING})
 _OTHERS: Final = frozenset({Cause.PRECONDITION, Cause.EXECUTION, Cause.POSTCONDITION})
@@ -39,14 +40,11 @@ RECOVERIES: Final[Mapping[str, Recovery]] = {
     "see what is around": Recovery((Trigger(_PLANNING, "approach"),)),
     "back off": Recovery((Trigger(_PLANNING, "grasp"), Trigger(_PLANNING, "approach"))),
 }
-"""What is done before the next attempt: the first that fits the failure of a step, the object in the gripper first.
-
-A lost object is searched where one was just seen, else looked for again, on the floor as well.
-"""
+"""Recoveries before the next attempt, in their order: the first that fits the failure of a step runs."""
 
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
-    """Drives to a pose, called `to`, or, when there is no path to it, to one nearby in the same room."""
+    """Drives to a pose, called `to`, or to one nearby in the same room if there is no path."""
     nearby = _nearby(builder, pose)
     direct = builder.navigate(pose, to, nearby_m=tuple(nearby))
     others = [
@@ -59,7 +57,7 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
 
 
 def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:
-    """Poses beside a goal, by how far they lie beside it; those of a known pose lie in the same room."""
+    """Returns poses beside a goal by their offsets (m); for a known goal only those in the same room."""
     if isinstance(pose, FromBoard):
         return {offset: BesideBoard(pose.key, *offset) for offset in NEARBY_M}
     rooms = [
@@ -80,10 +78,10 @@ def pick_up_plan(
     *,
     seen: bool = False,
 ) -> NodeSpec:
-    """Finds (`search`, which writes `key`), approaches, grasps and tuck the arm in, with recoveries.
+    """Finds an object (`search`, which writes `key`), approaches it, grasps it and draws the arm in, with recoveries.
 
-    A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`: only further attempts begin
-    with the search.
+    A failure ends with the arm stowed. With `seen`, an earlier node has just written `key`, and the search runs only
+    before further attempts.
     """
     near, tried, blocking = map(builder.key, ("near-detection", "tried-grasps", "in-the-way"))
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
@@ -106,7 +104,7 @@ def pick_up_plan(
         work["look again"] = builder.pause("look-again", "look again", LOOK_AGAIN_S)
         work["plan again"] = builder.pause("plan-again", "look and plan again", LOOK_AGAIN_S)
     paths = {"approach": approach.path_id, "grasp": grasp.path_id, "tuck": tuck.path_id}
-    rules = {name: rule.of(paths) for name, rule in RECOVERIES.items() if name in work}
+    rules = {name: rule.bind(paths) for name, rule in RECOVERIES.items() if name in work}
     if aside:
         rules["move aside"] = replace(rules["move aside"], uses=builder.move_aside, given=blocking)
     most = ATTEMPTS + builder.move_aside if aside else ATTEMPTS
@@ -122,7 +120,7 @@ def pick_up_plan(
 
 
 def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | None) -> NodeSpec:
-    """The grasp, told of those that were tried where the skill can be told; what is in the way goes to `blocking`."""
+    """Builds the grasp, which avoids grasps that were tried if the skill can; blocking objects go to `blocking`."""
     memory = builder.has_ports("grasp", ("avoid",), ("tried",))
     inputs = {"observation": FromBoard(near), **({"avoid": FromBoardOr(tried, ())} if memory else {})}
     outputs = {"tried": tried} if memory else {}
@@ -130,7 +128,7 @@ def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | Non
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:
-    """Draws the arm in, twice if need be; where that does not work but the object is held, goes on with it."""
+    """Draws the arm in, in two attempts; if both fail and the object is held, it is carried as it is."""
     causes = frozenset({Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
     twice = builder.node(
         "retry", "draw in the arm, twice if need be", builder.skill("stow"), part="tuck-in", attempts=2, causes=causes
@@ -142,7 +140,7 @@ def tuck_plan(builder: PlanBuilder) -> NodeSpec:
 
 
 def held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
-    """What an earlier step grasped: nothing to do while the gripper holds something."""
+    """Builds a branch that succeeds while the gripper holds the object of an earlier step."""
     below = builder.at("in-gripper")
     return below.node(
         "only if holding", f"the {item} is in the gripper", below.pause("settle", "hold it", LOOK_AGAIN_S)
@@ -150,8 +148,8 @@ def held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
 
 
 def known_held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
-    """Draws in what a grasp that failed or was broken off took hold of; only if that is the object."""
-    known = {"known_as": builder.sought(item.name), "attributes": item.attributes}
+    """Draws the arm in if a failed or interrupted grasp holds the object, and no other one."""
+    known = {"known_as": builder.search_classes(item.name), "attributes": item.attributes}
     tuck = _tucked(builder, item)
     return builder.node("only if holding", f"it took hold of the {item}", tuck, part="only-if", **known)
 

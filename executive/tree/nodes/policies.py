@@ -1,14 +1,14 @@
-"""The policy of a step or of a whole mission: nodes around its subtree, and what becomes of a step that failed.
+"""Policy of a step or of a whole mission: nodes around its subtree.
 
-From the inside: the subtree; its timeout; its retries; its guards; what to do when all that failed (skip it, ask about
-it, go back). So each attempt has its own time, and when a guard is violated there are no further attempts.
+From the inside: the subtree, its timeout, its retries, its guards, and the action after a failure (skip, ask, go back).
+So each attempt has its own time, and a violated guard ends all attempts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import field
-from typing import Any, Final
+from typing import ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -31,17 +31,21 @@ from skills.api import Asked, Cause, Failed, Question
 from skills.robot import Clock, Pose2D
 
 FINAL_CAUSES: Final = frozenset({Cause.ERROR, Cause.CANCELLED})
-"""A defect and somebody's request to stop are neither skipped, nor asked about, nor tried again."""
+"""Defects and cancellations are neither skipped, nor asked about, nor tried again."""
 RETRY: Final = "retry"
 SKIP: Final = "skip"
 STOP: Final = "stop"
 
 
 class Timeout(ExplainedDecorator):
-    """A limit on the robot's clock.
+    """Decorator with a time limit on the robot's clock; suspended time does not count.
 
-    Child FAILURE: FAILURE with its cause. Time over: child halted, FAILURE with TIMEOUT, even when it succeeded just
-    now. Else as the child. Time in which the tree is suspended does not count.
+    | child | in time | too late |
+    |---|---|---|
+    | RUNNING | RUNNING | FAILURE with TIMEOUT; the child is halted |
+    | SUCCESS | SUCCESS | FAILURE with TIMEOUT |
+    | FAILURE | FAILURE with its cause | FAILURE with its cause |
+    | halted | INVALID with CANCELLED | INVALID with CANCELLED |
     """
 
     kind = "timeout"
@@ -57,7 +61,7 @@ class Timeout(ExplainedDecorator):
         self._time.stop()
 
     def update(self) -> Status:
-        """The child's status, unless the time is over."""
+        """Returns the child's status, unless the time is over."""
         self._time.go_on()
         late = self._time.elapsed_s() > self.limit_s
         if late and self.decorated.status != Status.FAILURE:
@@ -66,10 +70,14 @@ class Timeout(ExplainedDecorator):
 
 
 class Retry(ExplainedDecorator):
-    """Tries again, but only after failures of given causes.
+    """Decorator that tries again after failures with given causes.
 
-    Child RUNNING or SUCCESS: the same. Child FAILURE of another cause, or no attempts left: FAILURE with its cause.
-    Else RUNNING, and at the next tick the child starts anew from its first step with nothing remembered.
+    | child | status |
+    |---|---|
+    | RUNNING, SUCCESS | as the child |
+    | FAILURE with one of `causes`, attempts left | RUNNING; the next tick starts the child again, without memory |
+    | FAILURE with another cause, or no attempts left | FAILURE with its cause |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "retry"
@@ -78,11 +86,11 @@ class Retry(ExplainedDecorator):
     attempt: int = field(default=1, init=False)
 
     def initialise(self) -> None:
-        """Count from the first attempt."""
+        """Begins with the first attempt."""
         self.attempt = 1
 
     def update(self) -> Status:
-        """The child's status, unless another attempt is due."""
+        """Returns the child's status, unless another attempt is due."""
         status = self.pass_on()
         if status != Status.FAILURE:
             return status
@@ -96,9 +104,14 @@ class Retry(ExplainedDecorator):
 
 
 class Skip(ExplainedDecorator):
-    """A step that may fail; `step` is the step in words.
+    """Decorator of a step that may fail; `step` is the step in words.
 
-    Child FAILURE: SUCCESS, and `skipped` says why; but FAILURE when its cause is ERROR or CANCELLED. Else as the child.
+    | child | status |
+    |---|---|
+    | RUNNING, SUCCESS | as the child |
+    | FAILURE with ERROR or CANCELLED | FAILURE with its cause |
+    | FAILURE with another cause | SUCCESS; `skipped` has the reason |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "skip"
@@ -106,29 +119,35 @@ class Skip(ExplainedDecorator):
     skipped: str | None = field(default=None, init=False)
 
     def initialise(self) -> None:
-        """Nothing is skipped yet."""
+        """Clears the reason of an earlier skip."""
         self.skipped = None
 
     def update(self) -> Status:
-        """The child's status, a failure turned into a success that is noted."""
+        """Returns the child's status, or skips a failure."""
         status = self.pass_on()
         if status != Status.FAILURE or self.cause in FINAL_CAUSES:
             return status
         return self.skip()
 
     def skip(self) -> Status:
-        """SUCCESS without the child's."""
+        """Returns SUCCESS, and notes the child's failure as the reason."""
         self.skipped, self.cause = self.message, None
         self.message = f"skipped: {self.skipped}"
         return Status.SUCCESS
 
 
 class AskOperator(Skip):
-    """A step about which the operator is asked when it fails.
+    """Decorator of a step about which the operator is asked when it fails.
 
-    Child FAILURE: RUNNING until the operator answers or the question's time is over. Answer retry: RUNNING, and the
-    child starts anew at the next tick. Answer skip: SUCCESS, and `skipped` says why. Answer stop: FAILURE as the child.
-    A failure with cause ERROR or CANCELLED is passed on without a question. Else as the child.
+    | child | answer | status |
+    |---|---|---|
+    | RUNNING, SUCCESS | - | as the child |
+    | FAILURE with ERROR or CANCELLED | - | FAILURE with its cause |
+    | FAILURE with another cause | none yet | RUNNING until the time is over, when `default` is the answer |
+    | FAILURE with another cause | retry | RUNNING; the next tick starts the child again |
+    | FAILURE with another cause | skip | SUCCESS; `skipped` has the reason |
+    | FAILURE with another cause | stop | FAILURE with its cause |
+    | halted | withdrawn | INVALID with CANCELLED |
     """
 
     kind = "ask"
@@ -140,7 +159,7 @@ class AskOperator(Skip):
     _asked: Asked | None = field(default=None, init=False)
 
     def update(self) -> Status:
-        """As the child, until it fails: then the question is put."""
+        """Returns the child's status; asks the question when it fails."""
         status = self.pass_on()
         if status != Status.FAILURE or self.cause is None or self.cause in FINAL_CAUSES:
             return status
@@ -154,14 +173,14 @@ class AskOperator(Skip):
         return self.say(f"asks the operator: {text}", Status.RUNNING)
 
     def stop(self, new_status: Status) -> None:
-        """Takes an open question back when the tree is stopped."""
+        """Withdraws an open question when the node is stopped from outside."""
         if new_status == Status.INVALID and self._asked is not None:
             self._asked.withdraw()
             self._asked = None
         super().stop(new_status)
 
     def _held_back(self) -> Status | None:
-        """Act on the answer once it is there."""
+        """Acts on the answer when there is one."""
         if self._asked is None or not self._asked.done():
             return None if self._asked is None else Status.RUNNING
         answer, self._asked, failure = self._asked.result(), None, self._failure
@@ -174,10 +193,16 @@ class AskOperator(Skip):
 
 
 class GoBack(MemoryComposite):
-    """A route back after a failure: two children, the first what is to be done, the second the route back.
+    """Composite that drives back (the second child) after a failure of the work (the first child).
 
-    First child RUNNING or SUCCESS: the same. First child FAILURE: the second is ticked, RUNNING while it runs; at its
-    end FAILURE with the first's cause and sentence, and whether the robot is back.
+    | work | drive back | status |
+    |---|---|---|
+    | RUNNING, SUCCESS | idle | as the work |
+    | FAILURE with ERROR or CANCELLED | idle | FAILURE with its cause |
+    | FAILURE with another cause | idle, ticked from the next tick on | RUNNING |
+    | FAILURE | RUNNING | RUNNING |
+    | FAILURE | SUCCESS, FAILURE | FAILURE with the cause of the work |
+    | halted | halted | INVALID with CANCELLED |
     """
 
     kind = "go back"
@@ -186,60 +211,61 @@ class GoBack(MemoryComposite):
         return None
 
     def _take_over(self, child: Behaviour) -> None:
-        action, way_back = self.children
+        action, drive_back = self.children
         if child is action and action.status == Status.FAILURE and cause_of(action) not in FINAL_CAUSES:
             self._index = 1
             self._go_on(f"goes back, since {message_of(action)}")
         elif child is action:
             super()._take_over(action)
-        elif way_back.status == Status.RUNNING:
-            self.message = f"goes back ({message_of(way_back)})"
+        elif drive_back.status == Status.RUNNING:
+            self.message = f"goes back ({message_of(drive_back)})"
         else:
-            back = way_back.status == Status.SUCCESS
-            told = "is back where it started" if back else f"could not go back: {message_of(way_back)}"
-            self._end(cause_of(action), f"{message_of(action)}; the robot {told}")
+            back = drive_back.status == Status.SUCCESS
+            end = "is back where it started" if back else f"could not go back: {message_of(drive_back)}"
+            self._end(cause_of(action), f"{message_of(action)}; the robot {end}")
 
 
 class Summary(ExplainedDecorator):
-    """The end of a mission in which steps may be skipped; `steps` are the path ids of its steps' outermost nodes.
+    """Decorator of a mission in which steps may be skipped; `steps` are the path ids of its steps' outermost nodes.
 
-    As the child, but a SUCCESS names what was skipped, and it is FAILURE when every one of the steps was skipped.
+    | child | status |
+    |---|---|
+    | RUNNING, FAILURE | as the child |
+    | SUCCESS, all `steps` were skipped | FAILURE with EXECUTION |
+    | SUCCESS | SUCCESS; the message names the skipped steps |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "summary"
     steps: Sequence[str]
 
     def update(self) -> Status:
-        """The child's status, and what was skipped."""
+        """Returns the child's status, with the skipped steps."""
         status = self.pass_on()
         nodes = [node for node in self.iterate() if isinstance(node, Skip) and node.status == Status.SUCCESS]
         skipped = {node.path_id: f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None}
         if status != Status.SUCCESS or not skipped:
             return status
-        told = "; ".join(skipped.values())
+        steps = "; ".join(skipped.values())
         if skipped.keys() >= set(self.steps):
-            return self.fail(Failed(Cause.EXECUTION, f"all steps were skipped: {told}"))
-        self.message = f"done, but skipped: {told}"
+            return self.fail(Failed(Cause.EXECUTION, f"all steps were skipped: {steps}"))
+        self.message = f"done, but skipped: {steps}"
         return status
 
 
 class RememberPose(ExplainedLeaf):
-    """Writes the robot's present pose in the world to the blackboard. Always SUCCESS once the robot is localised.
+    """Leaf that writes the robot's pose (world frame) to the blackboard.
 
-    FAILURE with PRECONDITION when the robot does not know where it is for longer than `patience_s`. With `keep`, a pose
-    that is there already stays: the mission was asked for where another one began.
+    RUNNING until the robot is localised, then SUCCESS; FAILURE with PRECONDITION after `patience_s` without. With
+    `keep`, SUCCESS at once if there is a pose already, such as that of the person who asked for the mission.
     """
 
     kind = "remember"
+    output_types: ClassVar = {"key": Pose2D}
     key: str
     context: RunContext
     patience_s: float = 5.0
     keep: bool = False
-
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key of the pose."""
-        return {options["key"]: Pose2D}
 
     def initialise(self) -> None:
         """Starts the patience."""
@@ -261,7 +287,7 @@ class RememberPose(ExplainedLeaf):
 def under_policy(
     body: NodeSpec, policy: Policy, builder: PlanBuilder, words: str, *, may_skip: bool = True
 ) -> NodeSpec:
-    """The subtree under its policy, where that asks for anything; `words` is what is done, in words."""
+    """Builds the nodes of a policy around a subtree; `words` describes the subtree."""
     below = body
     if policy.timeout_s is not None:
         name = f"within {policy.timeout_s:g} s"
@@ -288,7 +314,7 @@ def under_policy(
 
 
 def _conditions(guards: Guards) -> Iterator[tuple[str, str, Condition]]:
-    """Part of the path id, name and condition of each guard; the outermost last."""
+    """Iterates over the guards, the outermost last: part of the path id, name and condition."""
     if guards.localised:
         yield "guard-localised", "knows where it is", KnowsPlace(stale=guards.stale)
     if guards.time_s is not None:

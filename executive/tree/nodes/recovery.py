@@ -1,14 +1,14 @@
-"""Recovery by cause: an attempt, and recoveries of which each has its own failures that it is for.
+"""Recovery by cause: an attempt, and recoveries that each fit certain failures.
 
-One failure, one recovery, another attempt; all of it bounded, and nothing of one attempt is left for the next but what
-the attempts share on purpose.
+After a failure one recovery runs, then the next attempt. All counts are bounded, and attempts share only the data that
+they share on purpose.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import ClassVar
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -22,10 +22,10 @@ from skills.api import Cause, ObjectObservation
 
 @dataclass(frozen=True)
 class Trigger:
-    """A kind of failure: of the node `node` (None: of the attempt as a whole), with one of `causes`.
+    """Kind of failure: of the node `node` (None: of the whole attempt), with one of `causes`.
 
-    With `own`, only where the failure is the node's own and not one that a node below it handed up: a guard's. A
-    failure of a node that is final fits no trigger for that node.
+    With `own`, the failure must be the node's own, such as a guard's, and not that of a node below it. A final failure
+    fits no trigger.
     """
 
     causes: frozenset[Cause]
@@ -33,10 +33,10 @@ class Trigger:
     own: bool = False
 
     def fits(self, attempt: Behaviour) -> bool:
-        """Returns whether an attempt failed so."""
-        return any(self._is_it(node, attempt) for node in attempt.iterate())
+        """Returns whether an attempt has such a failure."""
+        return any(self._fits(node, attempt) for node in attempt.iterate())
 
-    def _is_it(self, node: Behaviour, attempt: Behaviour) -> bool:
+    def _fits(self, node: Behaviour, attempt: Behaviour) -> bool:
         if node.status != Status.FAILURE or cause_of(node) not in self.causes:
             return False
         if isinstance(node, Explained) and node.final:
@@ -48,10 +48,10 @@ class Trigger:
 
 @dataclass(frozen=True)
 class Recovery:
-    """When a recovery is due: after failures that fit one of the triggers, `uses` times at most.
+    """Rule of a recovery: it runs after failures that fit one of the triggers, at most `uses` times.
 
-    With `given`, only while the blackboard holds something under that key. After one that is `final` and failed there
-    is no other. One that `completes` brings about what the attempt was for: after its success all is done.
+    With `given`, only while the blackboard has a value under that key. After the failure of a `final` recovery no other
+    one runs. The success of a recovery that `completes` is the success of the whole.
     """
 
     triggers: tuple[Trigger, ...]
@@ -60,12 +60,12 @@ class Recovery:
     final: bool = False
     completes: bool = False
 
-    def of(self, paths: Mapping[str, str]) -> Recovery:
-        """The same for nodes with these path ids, by the names that stand in its triggers."""
+    def bind(self, paths: Mapping[str, str]) -> Recovery:
+        """Replaces the names of steps in its triggers by the path ids of their nodes."""
         return replace(self, triggers=tuple(replace(each, node=paths[each.node or ""]) for each in self.triggers))
 
     def fits(self, attempt: Behaviour, board: Board) -> bool:
-        """Returns whether it is for the failure of an attempt."""
+        """Returns whether it fits the failure of an attempt."""
         if self.given is not None and not (self.given in board and board.get(self.given)):
             return False
         return any(trigger.fits(attempt) for trigger in self.triggers)
@@ -73,29 +73,37 @@ class Recovery:
 
 @dataclass(frozen=True)
 class _AttemptFailure:
-    """How an attempt failed, and how many steps of it had succeeded by then."""
+    """Failure of an attempt, and the number of its steps that had succeeded."""
 
     cause: Cause
     message: str
     steps: int
 
     @staticmethod
-    def of(attempt: Behaviour) -> _AttemptFailure:
+    def from_attempt(attempt: Behaviour) -> _AttemptFailure:
         steps = sum(child.status == Status.SUCCESS for child in attempt.children)
         return _AttemptFailure(cause_of(attempt), message_of(attempt), steps)
 
 
 class Recover(MemoryComposite):
-    """An attempt (the first child), with recoveries (the others, each with its `Recovery`) before the next attempt.
+    """Composite of an attempt (the first child) and recoveries (the others, each with its `Recovery` rule).
 
-    Attempt RUNNING or SUCCESS: the same. Attempt FAILURE: the first recovery that fits and is not used up is run from
-    the next tick on; none: FAILURE. A recovery that does not apply (`Conditional`) does not fit. Recovery RUNNING:
-    RUNNING. Recovery SUCCESS: RUNNING, and at the next tick the attempt starts anew; SUCCESS after one that completes.
-    Recovery FAILURE: the next that fits; none: FAILURE. No attempts left: FAILURE, but one that completes is tried.
-    A failure has the cause and the sentence of the attempt that came farthest, the last of those: when a grasp slips
-    and the object is then not seen any more, the slip is decisive. An attempt comes as far as children of it succeeded.
-    After it stand the last attempt's sentence and a failed recovery's (its cause counts when it is ERROR).
-    When it starts anew, recoveries are counted from zero and the blackboard keys in `forgets` are empty.
+    | attempt | recovery | status |
+    |---|---|---|
+    | RUNNING, SUCCESS | idle | as the attempt |
+    | FAILURE | the first that fits and is not used up runs from the next tick on | RUNNING |
+    | FAILURE | none fits | FAILURE |
+    | FAILURE, no attempts left | only one that `completes` may still run | RUNNING, or FAILURE |
+    | FAILURE | RUNNING | RUNNING |
+    | FAILURE | SUCCESS | RUNNING; the next tick starts the attempt again |
+    | FAILURE | SUCCESS of one that `completes` | SUCCESS |
+    | FAILURE | FAILURE | RUNNING with the next that fits; FAILURE if there is none, or it was `final` |
+    | halted | halted | INVALID with CANCELLED |
+
+    A recovery that does not apply (`Conditional`) does not fit. The failure has the cause and the message of the
+    attempt with the most successful children, the last of several: if a grasp slips and the next search finds nothing,
+    the slip is decisive. The messages of the last attempt and of a failed recovery are appended; a recovery's ERROR is
+    the cause. A new start counts recoveries from zero and clears the blackboard keys in `forgets`.
     """
 
     kind = "recover"
@@ -119,7 +127,7 @@ class Recover(MemoryComposite):
         return None
 
     def _take_over(self, child: Behaviour) -> None:
-        """Sees what comes of the attempt or the recovery that is under way."""
+        """Handles the status of the attempt or of the recovery."""
         if child.status == Status.RUNNING:
             self._go_on(message_of(child))
         elif self._index == 0:
@@ -128,11 +136,11 @@ class Recover(MemoryComposite):
             self._recovery_ended(child)
 
     def _attempt_ended(self, attempt: Behaviour) -> None:
-        """Success ends it; after a failure the recoveries that fit are due."""
+        """Ends after a success; queues the recoveries that fit a failure."""
         if attempt.status == Status.SUCCESS:
             self._end(None, message_of(attempt))
             return
-        failure = _AttemptFailure.of(attempt)
+        failure = _AttemptFailure.from_attempt(attempt)
         if self._farthest is None or failure.steps >= self._farthest.steps:
             self._farthest = failure
         more = self.attempt < self.attempts
@@ -142,13 +150,13 @@ class Recover(MemoryComposite):
             self._fail(tried)
 
     def _fits(self, number: int) -> bool:
-        """Returns whether a recovery is for the failure of the attempt, applies and is not used up."""
+        """Returns whether a recovery fits the failure of the attempt, applies and is not used up."""
         recovery, node = self.recoveries[number], self.children[number + 1]
         applies = not isinstance(node, Conditional) or node.applies()
         return applies and self._uses[number] < recovery.uses and recovery.fits(self.children[0], self.board)
 
     def _next_recovery(self) -> bool:
-        """Turns to the next recovery that is due; False when there is none."""
+        """Begins the next queued recovery; returns False when there is none."""
         if not self._due:
             return False
         chosen = self._due.pop(0)
@@ -170,19 +178,23 @@ class Recover(MemoryComposite):
             self._fail(f"; {recovery.name}: {message_of(recovery)}", error)
 
     def _fail(self, addition: str, cause: Cause | None = None) -> None:
-        """Ends with what is decisive, and what came last."""
-        last = _AttemptFailure.of(self.children[0])
+        """Ends with the decisive failure, and the message of the last attempt."""
+        last = _AttemptFailure.from_attempt(self.children[0])
         decisive = self._farthest or last
         then = "" if decisive.message == last.message else f", then {last.message}"
         self._end(cause or decisive.cause, f"{decisive.message}{then}{addition}")
 
 
 class Afterwards(MemoryComposite):
-    """Something to be done (the first child), and what tidies up after it (the second), however it ended.
+    """Composite of work (the first child) and of a step that tidies up after it (the second), whatever the result.
 
-    First child RUNNING: RUNNING. First child done: on to the second in the same tick, unless it succeeded and the
-    second is there `only_after_failure`. Second RUNNING: RUNNING. Second done: the first's status, cause and sentence,
-    with the second's failure mentioned.
+    | work | tidying | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | SUCCESS, with `only_after_failure` | idle | SUCCESS |
+    | SUCCESS, FAILURE | ticked in the same tick, RUNNING | RUNNING |
+    | SUCCESS, FAILURE | SUCCESS, FAILURE | as the work; the message mentions a failure of the tidying |
+    | halted | halted | INVALID with CANCELLED |
     """
 
     kind = "afterwards"
@@ -205,26 +217,22 @@ class Afterwards(MemoryComposite):
 
 
 class OnlyIfKnown(MemoryComposite):
-    """As its only child, for selectors that pass it over while the blackboard does not hold `key`."""
+    """Composite that applies only while the blackboard has a value under `key`; status as its only child."""
 
     kind = "only if known"
+    output_types: ClassVar = {"key": ObjectObservation}
     key: str
     board: Board
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key, again."""
-        return {options["key"]: ObjectObservation}
-
     def applies(self) -> bool:
-        """Returns whether the key has been written."""
+        """Returns whether the key has a value."""
         return self.key in self.board
 
 
 class OnlyIfHolding(MemoryComposite):
-    """As its only child, for selectors that pass it over while the gripper holds nothing.
+    """Composite that applies only while the gripper holds an object; status as its only child.
 
-    With `known_as`, what is held must have been taken for an object of one of those classes, with all `attributes`.
+    With `known_as`, the object must have been recognised as one of these classes with all `attributes`.
     """
 
     kind = "only if holding"
@@ -233,7 +241,7 @@ class OnlyIfHolding(MemoryComposite):
     attributes: tuple[str, ...] = ()
 
     def applies(self) -> bool:
-        """Returns whether something is held, or that object."""
+        """Returns whether the gripper holds an object, or that object."""
         if not self.context.robot.gripper().holding:
             return False
         return self.known_as is None or is_known_as(self.context.payload.kind, self.known_as, self.attributes)

@@ -1,10 +1,10 @@
-"""Rounds of the same steps: the plan and its node."""
+"""Repetition of steps in rounds: the plan and its node."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import field, replace
-from typing import Any, Final, Literal
+from typing import ClassVar, Final, Literal
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -25,16 +25,28 @@ from skills.robot import Clock
 
 
 class Repeat(MemoryComposite):
-    """Rounds of its last child; before it, where there is one, stands the decision (`key` is where its answer is).
+    """Composite that repeats its last child, the body; a decision, whose answer stands under `key`, may come before it.
 
-    A round begins in the tick after the one before ended, and not before `every_s` have passed since that one began.
-    Body RUNNING: RUNNING. Body FAILURE: FAILURE with its cause. `mode` "until": SUCCESS when the decision is true after
-    a round. "while": SUCCESS when it is false before one. After `times` rounds: SUCCESS without a decision, else
-    FAILURE with POSTCONDITION. Decision FAILURE: FAILURE with its cause. `count` is the blackboard key of how many
-    rounds have begun.
+    | decision | body | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | FAILURE | idle | FAILURE with its cause |
+    | `while`: false before a round | idle | SUCCESS |
+    | `while`: true before a round | ticked in the same tick | as below |
+    | - | RUNNING | RUNNING |
+    | - | FAILURE | FAILURE with its cause |
+    | `until`: true after a round | SUCCESS | SUCCESS |
+    | `until`: false after a round, `while` | SUCCESS | RUNNING until the next round |
+    | `until`, `while`: after `times` rounds | SUCCESS | FAILURE with POSTCONDITION |
+    | none (mode `times`) | SUCCESS | RUNNING until the next round; SUCCESS after `times` rounds |
+    | halted | halted | INVALID with CANCELLED |
+
+    A round begins in the tick after the end of the one before, and not before `every_s` have passed since that one
+    began. `count` is the blackboard key of the number of begun rounds.
     """
 
     kind = "repeat"
+    output_types: ClassVar = {"count": int}
     mode: Literal["until", "while", "times"]
     words: str
     count: str
@@ -47,15 +59,17 @@ class Repeat(MemoryComposite):
     _due_s: float = field(default=0.0, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Begins a round, decides, or tick the body."""
+        """Begins a round, decides, or ticks the body."""
         if self.status != Status.RUNNING:
             self._restart()
         if self._phase == "start":
             if self.clock.now() < self._due_s - 1e-9:
-                self._go_on(f"{self._told()}; the next in {self._due_s - self.clock.now():.0f} s")
+                self._go_on(f"{self._report()}; the next in {self._due_s - self.clock.now():.0f} s")
                 yield self
                 return
-            self._begin_round()
+            self._reset_children()
+            self.board.put(self.count, self.rounds + 1)
+            self._enter_round()
         ended = False
         while not ended and self._phase != "start":
             child = self.current_child = self.children[-1 if self._phase == "body" else 0]
@@ -74,39 +88,29 @@ class Repeat(MemoryComposite):
         if len(self.children) == 2 and isinstance(self.children[0], Decide):
             self.children[0].view.forget_presses()
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key of how many rounds have begun."""
-        return {options["count"]: int}
-
     @property
     def rounds(self) -> int:
-        """How many rounds have begun."""
+        """Number of rounds that have begun."""
         return int(self.board.get(self.count))
-
-    def _begin_round(self) -> None:
-        self._reset_children()
-        self.board.put(self.count, self.rounds + 1)
-        self._enter_round()
 
     def _enter_round(self) -> None:
         self._phase = "before" if self.mode == "while" else "body"
         self._due_s = self.clock.now() + self.every_s
 
     def _judged(self, child: Behaviour) -> bool:
-        """What the child's status means; False when another child is ticked in the same tick."""
+        """Handles the child's status; returns False when another child is ticked in the same tick."""
         if child.status == Status.RUNNING:
             self._go_on(message_of(child))
         elif child.status != Status.SUCCESS:
-            told = f" (in round {self.rounds})" if self.rounds > 1 else ""
-            self._end(cause_of(child), f"{message_of(child)}{told}")
+            number = f" (in round {self.rounds})" if self.rounds > 1 else ""
+            self._end(cause_of(child), f"{message_of(child)}{number}")
         elif self._phase == "body":
             if self.mode == "until":
                 self._phase = "after"
                 return False
             self._round_done()
         elif bool(self.board.get(self.key)) is (self.mode == "until"):
-            self._end(None, self._told())
+            self._end(None, self._report())
         elif self._phase == "before" and (self.times is None or self.rounds <= self.times):
             self._phase = "body"
             return False
@@ -117,14 +121,14 @@ class Repeat(MemoryComposite):
     def _round_done(self) -> None:
         if self.times is None or self.rounds < self.times or (self.mode == "while" and self.rounds == self.times):
             self._phase = "start"
-            self._go_on(self._told())
+            self._go_on(self._report())
         elif self.mode == "times":
-            self._end(None, self._told())
+            self._end(None, self._report())
         else:
             still = "still" if self.mode == "while" else "not"
             self._end(Cause.POSTCONDITION, f"it is {still} so after {self.times} rounds that {self.words}")
 
-    def _told(self) -> str:
+    def _report(self) -> str:
         done = self.rounds - (1 if self._phase == "before" else 0)
         last = message_of(self.children[-1]) if self.children[-1].status == Status.SUCCESS else ""
         counted = count_text(done, "round")
@@ -176,7 +180,7 @@ def _plan(assembler: Assembler, block: model.Repeat, builder: PlanBuilder) -> As
 
 
 def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: PlanBuilder) -> None:
-    """Refuses rounds that go on for ever: nothing that the condition reads can change. Raises InputError."""
+    """Raises InputError for rounds that never end, since no step changes the values of their condition."""
     if condition is None or block.loop.times is not None or block.timeout_s is not None:
         return
     read: set[str] = set()
@@ -190,7 +194,7 @@ def _refuse_endless(block: model.Repeat, condition: Condition | None, builder: P
 
 
 def _given(steps: Iterable[Step]) -> set[str]:
-    """The names that steps may give a value."""
+    """Returns the names that steps may give a value."""
     found: set[str] = set()
     for step in (below for each in steps for below in each.walk()):
         match step:

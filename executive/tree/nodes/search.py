@@ -1,4 +1,4 @@
-"""Looking for objects and people: where, in which order; and the answer whether they are there."""
+"""Search for objects and people: viewpoints in order, and the answer whether they are there."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import ClassVar, Final
 
 from py_trees.common import Status
 
@@ -30,26 +30,32 @@ MOST_ELSEWHERE: Final = 3
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
-"""The output port of a look for all that it saw."""
+"""Output port of a look for all objects that it found."""
 
 
 class Answer(ExplainedDecorator):
-    """Turns a search into a yes or a no.
+    """Decorator that turns a search into the answer yes or no.
 
-    Child RUNNING: RUNNING. Child SUCCESS: SUCCESS, answer True. Child FAILURE with every surface looked at: SUCCESS,
-    answer False. Child FAILURE with a surface that could not be looked at: FAILURE with what kept the robot from it.
-    `looks` names for each surface the leaves that look at it, one for each viewpoint: all of them must have looked,
-    which means that they succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; one
-    that `tells` repeats what was seen where. `question` is what a yes says, `denied` what a no says; without
-    `yes_or_no` they stand alone, since "is it empty" and "is there anything on it" are one question.
+    | child | surfaces | status |
+    |---|---|---|
+    | RUNNING | any | RUNNING |
+    | SUCCESS | any | SUCCESS, answer True |
+    | FAILURE | all seen | SUCCESS, answer False |
+    | FAILURE | some not seen | FAILURE with the cause that prevented the look |
+    | with `tallies`: ended, `needed` objects counted | any | SUCCESS, answer True |
+    | with `tallies`: ended, fewer counted | all seen | SUCCESS, answer False |
+    | with `tallies`: ended, fewer counted | some not seen | FAILURE with the cause that prevented the look |
+    | halted | any | INVALID with CANCELLED |
 
-    With `tallies` the child looks at all surfaces, and what its leaves saw, each under a blackboard key, is counted,
-    each object once. As many as `needed` is SUCCESS, answer True. Too few is SUCCESS, answer False, with every surface
-    looked at, and else FAILURE as above. How many were counted goes to `count_key`, where
-    there is one.
+    `looks` names for each surface the leaves that look at it, one for each viewpoint; the surface is seen when all of
+    them succeeded, or failed with POSTCONDITION. The answer is published under `ANSWER_TOPIC`; with `tells` it
+    includes the found object. `question` is the text of a yes, `denied` of a no; without `yes_or_no` they stand alone,
+    since "is it empty" and "is there anything on it" are one question. `tallies` are the blackboard keys under which
+    the leaves write all found objects, of which each is counted once; the number goes to `count_key`, if given.
     """
 
     kind = "answer"
+    output_types: ClassVar = {"key": bool, "count_key": float}
     question: str
     denied: str
     looks: Mapping[str, Sequence[str]]
@@ -63,23 +69,17 @@ class Answer(ExplainedDecorator):
     count_key: str = ""
     answer: bool | None = field(default=None, init=False)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key of the answer, and that of the count."""
-        count = options.get("count_key")
-        return {options["key"]: bool, **({count: float} if count else {})}
-
     def restore(self, status: Status, cause: Cause | None, message: str) -> None:
-        """Gives the answer of before, too."""
+        """Restores the answer as well."""
         super().restore(status, cause, message)
         self.answer = self.board.get(self.key) if status == Status.SUCCESS else None
 
     def initialise(self) -> None:
-        """Forgets an earlier answer."""
+        """Clears an earlier answer."""
         self.answer = None
 
     def update(self) -> Status:
-        """The answer, as soon as the search is over."""
+        """Answers as soon as the search is over."""
         status = self.pass_on()
         if status == Status.RUNNING:
             return status
@@ -109,10 +109,10 @@ class Answer(ExplainedDecorator):
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
-        told = self.question if answer else self.denied
+        text = self.question if answer else self.denied
         if self.yes_or_no:
-            told = f"{'yes' if answer else 'no'}: {told}"
-        self.message = told + (f"; {found}" if found else "")
+            text = f"{'yes' if answer else 'no'}: {text}"
+        self.message = text + (f"; {found}" if found else "")
         self.board.put(self.key, answer)
         note = {"node": self.path_id, "question": self.question, "answer": answer, "message": self.message}
         self.publish(ANSWER_TOPIC, note)
@@ -120,13 +120,13 @@ class Answer(ExplainedDecorator):
 
 
 def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
-    """True when each of the leaves took a look, whether it saw something or nothing."""
+    """Returns whether each of the leaves took a look, with or without a found object."""
     looks = [nodes.get(leaf) for leaf in leaves]
     return all(look and (look.status == Status.SUCCESS or look.cause == Cause.POSTCONDITION) for look in looks)
 
 
 def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
-    """The first cause in the tree that is not merely "not seen"."""
+    """Returns the first cause in the tree other than POSTCONDITION (not found)."""
     causes = (node.cause for node in nodes.values())
     return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION
 
@@ -134,8 +134,8 @@ def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
 def surfaces_elsewhere(
     knowledge: Knowledge, item: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
-    """The surfaces to look at when the object is not in its place: where it usually is, then others of the same room,
-    then any others, the nearest first; `MOST_ELSEWHERE` at most, and none that are `avoided`."""
+    """Returns the surfaces to search when the object is not in its place: its usual places, then others of the same
+    room, then the rest, the nearest first; at most `MOST_ELSEWHERE`, and none in `avoided`."""
     if place is None:
         return ()
     usual = (name for spot in knowledge.usual_surfaces(item) for name in knowledge.surfaces_in(spot))
@@ -148,7 +148,7 @@ def surfaces_elsewhere(
 
 
 def _apart_m(one: Pose, other: Pose) -> float:
-    """As the crow flies (m)."""
+    """Straight distance (m) between two poses."""
     return math.hypot(one.x - other.x, one.y - other.y)
 
 
@@ -161,16 +161,17 @@ def look_plans(
     *,
     tallied: bool = False,
 ) -> tuple[tuple[str, NodeSpec], ...]:
-    """For each surface and viewpoint: drive there and look. The detection goes to `key`; `extra` are detect's.
+    """Builds a drive and a look for each surface and viewpoint; returns them with the names of the surfaces.
 
-    With `tallied`, all that a look saw goes to a key of its own (see `tally_of`).
+    The detected object goes to `key`; `extra` are further ports of `detect`. With `tallied`, all objects of a look go
+    to a key of its own (see `tally_of`).
     """
     views = [(name, n) for name in surfaces for n in range(1, len(builder.knowledge.surfaces[name].viewpoints) + 1)]
     return tuple((name, _look_plan(builder.at(f"{name}-{n}"), item, name, n, key, extra, tallied)) for name, n in views)
 
 
 def tally_of(leaf: NodeSpec) -> str:
-    """The blackboard key to which the leaf of a tallied look writes all that it saw."""
+    """Returns the blackboard key to which the leaf of a tallied look writes all found objects."""
     key: str = leaf.options["outputs"][_TALLY]
     return key
 
@@ -189,9 +190,9 @@ def _look_plan(
 def people_looks(
     builder: PlanBuilder, person: str, place: str | None, key: str, *, tallied: bool
 ) -> tuple[tuple[str, NodeSpec], ...]:
-    """For each room where a person is looked for: go there and look about; as `look_plans` otherwise.
+    """Builds a drive and a look around for each room in which a person is searched; see `look_plans`.
 
-    Raises InputError: the place is a surface, or one of several people is meant, whom nothing tells apart.
+    Raises InputError when the place is a surface, or for one of several people, whom the robot cannot tell apart.
     """
     knowledge = builder.knowledge
     if place in knowledge.surfaces:
@@ -220,15 +221,15 @@ def detect_plan(
     *,
     tallied: bool = False,
 ) -> NodeSpec:
-    """Looks for the object on some surfaces, by name or from the blackboard, from where the robot stands."""
+    """Looks for the object on surfaces, by name or from the blackboard, from the robot's present pose."""
     where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
-    ports = {"classes": builder.sought(item.name), "attributes": item.attributes, "surfaces": where_to_look}
+    ports = {"classes": builder.search_classes(item.name), "attributes": item.attributes, "surfaces": where_to_look}
     tally = {_TALLY: builder.key("all")} if tallied else {}
     return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
 
 
 def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str) -> NodeSpec:
-    """When it was seen before: look from here first, where it was seen, and at the floor beside. Else passed over."""
+    """Looks from the present pose at the place where the object was detected before, and at the floor beside."""
     seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
     floor = {"floor": True} if builder.has_ports("detect", ("floor",)) else NO_PORTS
     look = detect_plan(builder, item, seen_on, key, floor)
@@ -238,10 +239,10 @@ def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str,
 def search_plan(
     builder: PlanBuilder, item: ObjectKind, place: str | None, key: str, *, anywhere: bool = True
 ) -> NodeSpec:
-    """Looks from here when it was seen before, else at each surface in turn; the first detection ends the search.
+    """Looks for the object where it was detected before, then at each surface; the first detection ends the search.
 
-    When it is nowhere in its place, look at some of its surfaces from aside, then, with `anywhere`, at surfaces
-    elsewhere. Raises InputError: the place has no surfaces.
+    If it is not in its place, the robot looks at some surfaces from the side, then, with `anywhere`, at surfaces
+    elsewhere. Raises InputError when the place has no surfaces.
     """
     surfaces = required_surfaces(builder, item, place)
     name = builder.knowledge.object_name(item.name) or item.name
@@ -266,7 +267,7 @@ def search_plan(
 def _looks_from_aside(
     builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str
 ) -> Iterator[NodeSpec]:
-    """Looks again at surfaces that have only one viewpoint, from beside it."""
+    """Iterates over further looks at surfaces with only one viewpoint, from beside it."""
     facts = builder.knowledge.surfaces
     single = [name for name in surfaces if len(facts[name].viewpoints) == 1]
     for name in single[:MOST_ASIDE]:
@@ -281,7 +282,7 @@ def _looks_from_aside(
 
 
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
-    """The surfaces to look at. Raises InputError when there are none."""
+    """Returns the surfaces to search. Raises InputError when there are none."""
     surfaces = surfaces_to_search(builder.knowledge, builder.knowledge.object_name(item.name) or item.name, place)
     if not surfaces:
         raise builder.error(f"'{place}' has no surface to look at", "add one under 'surfaces' in the knowledge file")
@@ -289,19 +290,17 @@ def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None)
 
 
 def where(knowledge: Knowledge, place: str | None) -> str:
-    """The place as the end of a sentence: in a room, on a surface."""
+    """Text of a place at the end of a sentence: "in the kitchen", "on the desk"."""
     if place is None:
         return "anywhere"
     return f"{'on' if place in knowledge.surfaces else 'in'} the {place}"
 
 
 def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
-    """Looks at the surfaces of the place and answers yes or no; where it is asked where or how many, tell that, too.
+    """Looks at the surfaces of the place and answers yes or no, with the place or the number if the question asks it.
 
-    The answer goes to `answer_key`, which is a key of this subtree unless one is given.
-
-    The first object that is seen ends the search, unless they are to be counted: then all surfaces are looked at.
-    People are looked for in rooms.
+    The answer goes to `answer_key` (None: a key of this subtree). The first found object ends the search, unless
+    objects are counted: then all surfaces are searched. People are searched in rooms.
     """
     command, knowledge = builder.command, builder.knowledge
     place = None if command.goal is None else builder.place(command.goal)
@@ -312,7 +311,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         asked = what if command.object_count == 1 else _asked_for(person, command.object_count)
         looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
     else:
-        item = builder.known(command.object)
+        item = builder.required_object(command.object)
         what, asked = str(item), _asked_for(str(item), command.object_count)
         whole_room = place is None or place in knowledge.places
         extra = {"floor": whole_room, "count": 0 if counting else 1}
@@ -346,24 +345,21 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
 
 
 def _asked_for(item: str, count: int) -> str:
-    """What a question is about: "beer", "two beers", or "beers" for any number."""
+    """Text of the object of a question: "beer", "two beers", or "beers" for any number."""
     if count == 1:
         return item
     return count_of(count, item) if count else plural(item)
 
 
 def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
-    """A status check whose answer goes elsewhere: options of its answer node by name."""
+    """Sets options of the answer node of a status check, such as the key of its answer."""
     if node.kind == Answer.kind:
         return node.with_options(**keys)
     return replace(node, children=tuple(answering(child, keys) for child in node.children))
 
 
 def refuse_several(builder: PlanBuilder) -> None:
-    """Refuses a count that no trips are made of; in a question and of a time any count will do.
-
-    Raises InputError: more than one object, or an open number of objects.
-    """
+    """Raises InputError for a command about several objects, or an open number; questions and times may have any."""
     command = builder.command
     asked = 1 if command.task in (Task.FIND, Task.WAIT) else command.object_count
     for item, count in ((command.item, command.item_count), (command.object, asked)):

@@ -1,4 +1,4 @@
-"""The one leaf that wraps every skill: binds its ports, keeps its time, survives its defects, always ends it."""
+"""Leaf of every skill: it binds the ports, limits the time, turns defects into failures, and always ends the skill."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.context import RunContext
 from executive.tree.goals import POSE_NEAR_M, square_region, surface_region
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
-from executive.tree.port_values import FROM_KEY, PortValueError, gathered, port_value
+from executive.tree.port_values import FROM_KEY, PortValueError, assign_ports, port_value
 from executive.tree.registry import missing
 from executive.tree.types import conforms, describe_type, field_types
 from executive.words.goal import GoalCondition, GoalKind
@@ -33,20 +33,25 @@ _TOLERANCE_S = 1e-6
 
 
 class Remembered(Succeeded):
-    """A success from before a restart: its data was fresh then."""
+    """Success from before a restart, whose data was fresh then."""
 
 
 class SkillLeaf(ExplainedLeaf):
-    """Runs one skill.
+    """Leaf that runs one skill.
 
-    RUNNING while the skill says `Running` and its time is not over. SUCCESS when it says `Succeeded` in time and
-    its output ports are filled with the declared types. FAILURE with the skill's cause when it says `Failed`; with
-    TIMEOUT when the robot's clock ran past `limit_s`, a late success included; with ERROR when it raised anything
-    or returned no `Step`. INVALID with CANCELLED when stopped from outside. `end` is called on every way out.
-    Each attempt gets a new skill object, so that nothing leaks from one attempt to the next. A suspended leaf stays
-    RUNNING; its skill goes on at the next tick (`Skill.resume`), and the time between does not count.
-    `first` is the skill that brings the arm in. It runs before the skill where the arm may be anywhere; a robot whose
-    arm cannot be brought in does without.
+    | skill | status |
+    |---|---|
+    | `Running` in time | RUNNING |
+    | `Succeeded` in time, outputs of the declared types, data fresh | SUCCESS |
+    | `Succeeded` in time, on data older than it declares | FAILURE with POSTCONDITION |
+    | `Failed` | FAILURE with its cause |
+    | `Running` or `Succeeded` after `limit_s` of the robot's clock | FAILURE with TIMEOUT |
+    | an exception, no `Step`, or outputs that are missing or of a wrong type | FAILURE with ERROR |
+    | suspended | RUNNING; the next tick calls `Skill.resume`, and the time between does not count |
+    | halted | INVALID with CANCELLED |
+
+    `end` is called in every case. Each attempt gets a new skill object, so that attempts share nothing. `first` is the
+    skill that stows the arm: it runs before the skill if the arm may be anywhere, unless the robot has no arm.
     """
 
     kind = "skill"
@@ -61,9 +66,9 @@ class SkillLeaf(ExplainedLeaf):
     _values: Any = field(default=None, init=False)
     _false_start: Failed | None = field(default=None, init=False)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The keys bound to the skill's output ports."""
+    @classmethod
+    def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the keys of the skill's bound output ports, and their types."""
         return {key: options["skill"].outputs.get(port, Any) for port, key in options.get("outputs", {}).items()}
 
     def __post_init__(self) -> None:
@@ -74,32 +79,32 @@ class SkillLeaf(ExplainedLeaf):
 
     @property
     def active(self) -> bool:
-        """True between the skill's `begin` and its `end`."""
+        """Returns whether it is between the skill's `begin` and `end`."""
         return self._skill is not None
 
     @property
     def checkpoint(self) -> Mapping[str, Any]:
-        """What the active skill keeps for a restart; empty on an idle leaf."""
+        """Checkpoint of the active skill for a restart; empty for an idle leaf."""
         return {} if self._skill is None else self._skill.checkpoint
 
     @property
     def skill_name(self) -> str:
-        """The registered name of the skill."""
+        """Registered name of the skill."""
         return self.skill.name
 
     @property
     def suspended(self) -> bool:
-        """True between `suspend` and the next tick."""
+        """Returns whether it is between `suspend` and the next tick."""
         return self.active and self._time.stopped
 
     def initialise(self) -> None:
-        """Begins a new attempt; a defect is kept for `update`, since an exception here would leave the tree hanging."""
+        """Begins a new attempt; `update` reports a defect, since an exception here would leave the tree RUNNING."""
         self.clear_explanation()
         self.progress = None
         self._false_start = self._guarded(self._begin)
 
     def update(self) -> Status:
-        """One step of the skill, judged."""
+        """Runs one step of the skill, and judges it."""
         if self.suspended:
             self._go_on()
         step = self._false_start or self._judged(self._guarded(self._step))
@@ -114,7 +119,7 @@ class SkillLeaf(ExplainedLeaf):
         return Status.FAILURE if isinstance(step, Failed) else Status.SUCCESS
 
     def suspend(self) -> None:
-        """Lets the skill stop its motion and keeps its place; does nothing on an idle or suspended leaf."""
+        """Suspends the skill, which stops its motion; does nothing on an idle or suspended leaf."""
         if not self.active or self.suspended:
             return
         active = self._first or self._skill
@@ -124,7 +129,7 @@ class SkillLeaf(ExplainedLeaf):
         self._false_start = self._guarded(active.suspend) or self._false_start
 
     def terminate(self, new_status: Status) -> None:
-        """Stopped from outside: end the skill if it is still active, else merely forget an old result."""
+        """Ends an active skill when the node is stopped from outside; else clears an old result."""
         if new_status != Status.INVALID:
             return
         if self.active:
@@ -133,7 +138,7 @@ class SkillLeaf(ExplainedLeaf):
             self.clear_explanation()
 
     def abandon(self) -> None:
-        """Ends an active skill and says that it was cancelled; does nothing on an idle leaf."""
+        """Ends an active skill and explains that it was cancelled; does nothing on an idle leaf."""
         if not self.active:
             return
         defect = self._ended()
@@ -155,7 +160,7 @@ class SkillLeaf(ExplainedLeaf):
             self._skill.begin(self._values)
 
     def _go_on(self) -> None:
-        """The first tick after a suspension; a defect is kept, as in `initialise`."""
+        """Resumes the skill in the first tick after a suspension; `update` reports a defect."""
         assert self._skill is not None
         first, skill = self._first, self._skill
         self._time.go_on()
@@ -172,7 +177,7 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _bring_in(self, first: Skill[Any], skill: Skill[Any]) -> Running:
-        """One step of bringing the arm in; once that is over the skill begins, and its time."""
+        """Runs one step of the skill that stows the arm; begins the skill itself, and its time, at its end."""
         step = first.step()
         if isinstance(step, Running) and self._time.elapsed_s() <= first.default_timeout_s:
             return step
@@ -184,7 +189,7 @@ class SkillLeaf(ExplainedLeaf):
         return Running("the arm is brought in" if isinstance(step, Succeeded) else f"goes on: {step.message}")
 
     def _judged(self, step: Step) -> Step:
-        """Time over turns going on, and a success that comes too late, into a failure."""
+        """Turns a step after the time limit, and a success on old data, into a failure."""
         late = self._time.elapsed_s() > self.limit_s
         if late and not isinstance(step, Failed):
             return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self.limit_s:g} s ({step.message})")
@@ -194,14 +199,14 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _ended(self) -> Failed | None:
-        """Calls `end` once; a Failed when it raised."""
+        """Calls `end` once; returns Failed when it raises."""
         active, self._first, self._skill = self._first or self._skill, None, None
         return None if active is None else self._guarded(active.end)
 
     def _written(self, step: Succeeded | Failed) -> Succeeded | Failed:
-        """Puts the outputs on the blackboard; a missing or wrongly typed output is a defect of the skill.
+        """Writes the outputs to the blackboard; returns a defect for a missing or wrongly typed output.
 
-        A failure need not fill all ports: what it learnt is for the next attempt.
+        A failure may have outputs for the next attempt, and need not fill all ports.
         """
         given = step.outputs if isinstance(step, Failed) else self.skill.outputs
         for port, kind in self.skill.outputs.items():
@@ -216,7 +221,7 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _guarded(self, call: Callable[[], ResultT]) -> ResultT | Failed:
-        """The call's result, or Failed(ERROR) with the traceback in the log when it raised."""
+        """Returns the call's result, or Failed(ERROR) when it raises, with the traceback in the log."""
         try:
             return call()
         except BaseException as defect:
@@ -229,7 +234,7 @@ class SkillLeaf(ExplainedLeaf):
 
 
 def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContext) -> Succeeded | Failed:
-    """The success, or a failed postcondition when data that it rests on is older than the skill allows."""
+    """Returns the success, or a failed postcondition if its data is older than the skill allows."""
     if isinstance(success, Remembered):
         return success
     for source, most_s in skill.max_data_age_s.items():
@@ -244,7 +249,7 @@ def refuse_stale(skill: type[Skill[Any]], success: Succeeded, context: RunContex
 
 
 def _stamp_s(source: str, outputs: Mapping[str, Any], context: RunContext) -> float | None:
-    """When the data was taken: an output port's value, the place estimate, or a sense verb that does not block."""
+    """Stamp (s) of the data: of an output port, of the localisation, or of a reading of the robot."""
     if source in outputs:
         return float(outputs[source].stamp_s)
     if source == "localisation":
@@ -254,9 +259,9 @@ def _stamp_s(source: str, outputs: Mapping[str, Any], context: RunContext) -> fl
 
 
 def _plan(assembler: Assembler, call: CallSkill, builder: PlanBuilder) -> Assembled:
-    """The leaf of a skill on its own.
+    """Plans the leaf of a single skill.
 
-    Raises InputError: no such skill, a value that does not fit its port, an unknown port or name.
+    Raises InputError for an unknown skill, port or name, or a value that does not fit its port.
     """
     if call.skill not in builder.registry:
         raise call.error(("skill",), *missing(call.skill, builder.registry))
@@ -280,7 +285,7 @@ def _plan(assembler: Assembler, call: CallSkill, builder: PlanBuilder) -> Assemb
 
 
 def _goal(skill: str, bound: Mapping[str, Binding], knowledge: Knowledge) -> GoalCondition | None:
-    """What a skill on its own is to bring about; None: nothing that a referee can see, or not known before."""
+    """Goal condition of a single skill; None if a referee cannot judge it, or it is not known before the run."""
     inputs = {port: each.value for port, each in bound.items() if isinstance(each, Constant)}
     match skill:
         case "navigate" if isinstance(pose := inputs.get("goal"), Pose2D):
@@ -300,10 +305,10 @@ def _goal(skill: str, bound: Mapping[str, Binding], knowledge: Knowledge) -> Goa
 def _inputs(
     call: CallSkill, skill: type[Skill[Any]], knowledge: Knowledge, names: Mapping[str, Named]
 ) -> dict[str, Binding]:
-    """A binding for each input port that has a value."""
+    """Returns the bindings of the input ports that have values."""
     hints = field_types(skill.Inputs)
     try:
-        ports = gathered(call.values or {}, skill.Inputs)
+        ports = assign_ports(call.values or {}, skill.Inputs)
         return {
             port: _named_output(call, path, value[FROM_KEY], names)
             if isinstance(value, dict) and set(value) == {FROM_KEY}

@@ -1,4 +1,4 @@
-"""Saying a text, and asking a question whose answer the mission goes by: the plans and the node."""
+"""Speech: saying a text, and asking a question whose answer the mission uses; the plans and the node."""
 
 from __future__ import annotations
 
@@ -32,12 +32,19 @@ _FILLERS: Final = re.compile(
 
 
 class AskPeople(ExplainedLeaf):
-    """Puts a question, aloud and on the page, and leaves the answer under `key`.
+    """Leaf that asks a question, aloud and on the page, and writes the answer under `key`.
 
-    RUNNING until it is answered; an answer that means nothing is asked for again. SUCCESS with the answer, which is one
-    of `names` (what may be said, in lower case, and what it means), or a number or any text where it `gives` that.
-    Nobody answers within `limit_s`: SUCCESS with `default`, FAILURE with TIMEOUT where there is none. A text without a
-    value: FAILURE with PRECONDITION. The answer is published under `ANSWER_TOPIC`.
+    | case | status |
+    |---|---|
+    | not answered yet | RUNNING |
+    | an answer that is not understood | RUNNING; the question is asked again, without more time |
+    | an answer that is understood | SUCCESS |
+    | nobody answers within `limit_s` | SUCCESS with `default`; FAILURE with TIMEOUT without one |
+    | the text reads a missing value | FAILURE with PRECONDITION |
+    | halted | INVALID with CANCELLED; the question is withdrawn |
+
+    The answer is one of `names` (by spoken form in lower case), or a number or any text if it `gives` that type. It is
+    published under `ANSWER_TOPIC`.
     """
 
     kind = "question"
@@ -57,13 +64,13 @@ class AskPeople(ExplainedLeaf):
         super().__post_init__()
         self._view = View(self.context)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The key of the answer."""
+    @classmethod
+    def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the key of the answer, and its type."""
         return {options["key"]: options["gives"]}
 
     def initialise(self) -> None:
-        """Puts the question."""
+        """Asks the question."""
         self.clear_explanation()
         self._false_start = None
         self._until_s = self.context.clock.now() + self.limit_s
@@ -75,7 +82,7 @@ class AskPeople(ExplainedLeaf):
         self._put(self._text)
 
     def update(self) -> Status:
-        """Act on the answer once it is there."""
+        """Acts on the answer when there is one."""
         if self._false_start is not None or self._asked is None:
             return self.fail(self._false_start or Failed(Cause.ERROR, "the question was not put"))
         if not self._asked.done():
@@ -90,7 +97,7 @@ class AskPeople(ExplainedLeaf):
         return Status.RUNNING
 
     def terminate(self, new_status: Status) -> None:
-        """Takes an open question back when it is stopped from outside."""
+        """Withdraws an open question when the node is stopped from outside."""
         if new_status != Status.INVALID:
             return
         if self._asked is not None:
@@ -110,7 +117,7 @@ class AskPeople(ExplainedLeaf):
         self.message = f"asks: {text}"
 
     def _meant(self, said: str) -> Value | None:
-        """What an answer means; None when it means nothing."""
+        """Returns the value of an answer; None if it is not understood."""
         if self.default is not None and said == _as_text(self.default):
             return self.default
         plain = said.strip().lower()
@@ -134,7 +141,7 @@ class AskPeople(ExplainedLeaf):
 
 
 def _number(said: str) -> float | None:
-    """A number that expressions can hold."""
+    """Parses a number within the range of expressions; None if it is none."""
     try:
         number = float(said)
     except ValueError:
@@ -192,7 +199,7 @@ def _ask_plan(assembler: Assembler, block: model.Ask, builder: PlanBuilder) -> A
 
 
 def _spoken(match: str | None, builder: PlanBuilder) -> dict[str, str]:
-    """What people may say for the names of the world, in lower case, and what it means."""
+    """Returns the names of the world by their spoken forms in lower case."""
     knowledge = builder.knowledge
     groups: Mapping[str, tuple[Sequence[str], Callable[[str], str | None]]] = {
         "place": (knowledge.place_names(), knowledge.place),
@@ -207,7 +214,7 @@ def _spoken(match: str | None, builder: PlanBuilder) -> dict[str, str]:
 
 
 def _default(block: model.Ask, names: Mapping[str, str], builder: PlanBuilder) -> Value | None:
-    """The default as the answer's own type. Raises InputError: it is no answer."""
+    """Converts the default to the type of the answer. Raises InputError when it is no answer."""
     default = block.default
     if default is None or block.choices:
         return default

@@ -1,4 +1,4 @@
-"""Steps side by side: the plan and its node."""
+"""Parallel steps: the plan and its node."""
 
 from __future__ import annotations
 
@@ -20,10 +20,14 @@ from skills.files.errors import InputError
 
 
 class Together(MemoryComposite):
-    """All children side by side: each is ticked until it is done.
+    """Parallel composite: each child is ticked until it ends.
 
-    SUCCESS when `needed` of them succeeded, FAILURE with the first failure's cause when as many cannot succeed any
-    more; then the others are stopped. Else RUNNING.
+    | children | status |
+    |---|---|
+    | `needed` of them SUCCESS | SUCCESS; the others are halted |
+    | so many FAILURE that `needed` cannot succeed | FAILURE with the first cause; the others are halted |
+    | else | RUNNING |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "together"
@@ -32,7 +36,7 @@ class Together(MemoryComposite):
     _done: list[Behaviour] = field(default_factory=list, init=False)
 
     def tick(self) -> Iterator[Behaviour]:
-        """Ticks all that are not done."""
+        """Ticks the children that have not ended."""
         if self.status != Status.RUNNING:
             self._restart()
             self._failed, self._done = [], []
@@ -85,7 +89,7 @@ def _plan(assembler: Assembler, block: model.Together, builder: PlanBuilder) -> 
 
 
 def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> None:
-    """Refuses branches that use the same part of the robot. Raises InputError."""
+    """Raises InputError for branches that use the same part of the robot."""
     users: dict[Part, int] = {}
     for number, branch in enumerate(branches, start=1):
         skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")

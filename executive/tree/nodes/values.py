@@ -1,4 +1,4 @@
-"""Working values out: the plan and its node."""
+"""Computed values of a mission: the plan and its node."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from skills.api import Cause, Failed
 
 
 class SetValues(ExplainedLeaf):
-    """Works values out in order, each under its blackboard key; a text with braces is filled.
+    """Leaf that computes values in order, each under its blackboard key; a text with braces is filled.
 
-    SUCCESS when all have a value; FAILURE with PRECONDITION at the first that has none.
+    SUCCESS when all have a value; FAILURE with PRECONDITION at the first without one.
     """
 
     kind = "set"
@@ -35,15 +35,15 @@ class SetValues(ExplainedLeaf):
         super().__post_init__()
         self.view = View(self.context)
 
-    @staticmethod
-    def writes(options: Mapping[str, Any]) -> Mapping[str, Any]:
-        """The keys of the values."""
+    @classmethod
+    def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the keys of the values, and their types."""
         kinds: Mapping[str, Any] = options["kinds"]
         return kinds
 
     def update(self) -> Status:
-        """Works them out."""
-        told = []
+        """Computes the values."""
+        texts = []
         for key, each in self.values.items():
             try:
                 known = self.view.values(self.keys)
@@ -51,8 +51,8 @@ class SetValues(ExplainedLeaf):
             except ExpressionError as error:
                 return self.fail(Failed(Cause.PRECONDITION, f"{each.text}: {error.message}"))
             self.context.board.put(key, float(value) if self.kinds[key] is float else value)
-            told.append(f"{key.rsplit('/', 1)[-1]} = {value}")
-        return self.say(", ".join(told))
+            texts.append(f"{key.rsplit('/', 1)[-1]} = {value}")
+        return self.say(", ".join(texts))
 
 
 def set_plan(
@@ -63,7 +63,7 @@ def set_plan(
     part: str,
     name: str,
 ) -> NodeSpec:
-    """A leaf that works values out; `values` and their types are by the keys that they go to."""
+    """Builds a leaf that computes values; `values` and `kinds` are by the blackboard keys of the results."""
     keys = flow.keys_of(*values.values())
     options = {"values": MappingProxyType(dict(values)), "keys": MappingProxyType(dict(keys))}
     return builder.node("set", name, part=part, **options, kinds=MappingProxyType(kinds))

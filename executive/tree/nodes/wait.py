@@ -1,4 +1,4 @@
-"""Waiting for a time of day, for some time, or until a condition holds: the plan and its nodes."""
+"""Waiting for a duration, for a time of day, or until a condition holds: the plan and its nodes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skills.robot import Clock
 
 
 class Pause(ExplainedLeaf):
-    """RUNNING for `duration_s` on the robot's clock, then SUCCESS: objects may come to rest, readings may come in."""
+    """Leaf that is RUNNING for `duration_s` on the robot's clock, then SUCCESS."""
 
     kind = "pause"
     duration_s: float
@@ -35,9 +35,15 @@ class Pause(ExplainedLeaf):
 
 
 class WaitFor(ExplainedDecorator):
-    """Waits until its child, a decision, is true; it is asked anew `every_s` after it was false.
+    """Decorator that waits until its child, a decision, answers true.
 
-    Child RUNNING: RUNNING. Answer true: SUCCESS. Answer false: RUNNING. Child FAILURE: FAILURE with its cause.
+    | child | status |
+    |---|---|
+    | RUNNING | RUNNING |
+    | SUCCESS, answer true | SUCCESS |
+    | SUCCESS, answer false | RUNNING; the child is ticked again after `every_s` |
+    | FAILURE | FAILURE with its cause |
+    | halted | INVALID with CANCELLED |
     """
 
     kind = "wait for"
@@ -48,7 +54,7 @@ class WaitFor(ExplainedDecorator):
     clock: Clock
 
     def initialise(self) -> None:
-        """Asks at once; presses of buttons count from now on."""
+        """Asks for the first decision at once; presses of buttons count from now on."""
         self._due_s = self.clock.now()
         if isinstance(self.decorated, Decide):
             self.decorated.view.forget_presses()
@@ -57,7 +63,7 @@ class WaitFor(ExplainedDecorator):
         return Status.RUNNING if self.clock.now() < self._due_s - 1e-9 else None
 
     def update(self) -> Status:
-        """Returns whether it holds."""
+        """Returns SUCCESS once the answer is true."""
         status = self.pass_on()
         if status != Status.SUCCESS:
             return status
@@ -69,7 +75,10 @@ class WaitFor(ExplainedDecorator):
 
 
 class WaitUntilClock(ExplainedLeaf):
-    """RUNNING until a time of day (s after midnight), then SUCCESS; at once when it was up to twelve hours ago."""
+    """Leaf that is RUNNING until a time of day (s after midnight), then SUCCESS.
+
+    SUCCESS at once when that time was up to twelve hours ago.
+    """
 
     kind = "wait until"
     time_s: float
@@ -77,7 +86,7 @@ class WaitUntilClock(ExplainedLeaf):
     context: RunContext
 
     def initialise(self) -> None:
-        """Sees how far it is until then."""
+        """Computes the end of the wait."""
         self.clear_explanation()
         now_s = self.context.clock.now()
         ahead_s = (self.time_s - self.context.day_began_s - now_s) % DAY_S

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import pytest
 from pydantic import Field
 
-from executive.tree.port_values import PortValueError, gathered, port_value
+from executive.tree.port_values import PortValueError, assign_ports, port_value
 from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.quantities import Length, Speed
 from skills.robot import Pose2D
@@ -136,7 +136,7 @@ def test_a_wrong_value_is_refused_with_its_place_and_the_hint(knowledge, value, 
 
 
 def test_fields_of_the_one_port_that_has_them_go_there():
-    found = gathered({"x": 1, "y": 2, "max_speed": 0.4}, Drive)
+    found = assign_ports({"x": 1, "y": 2, "max_speed": 0.4}, Drive)
     assert found == {"goal": ((), {"x": 1, "y": 2}), "max_speed_m_s": (("max_speed",), 0.4)}
 
 
@@ -151,5 +151,5 @@ def test_fields_of_the_one_port_that_has_them_go_there():
 )
 def test_what_belongs_to_no_port_is_refused(values, inputs, says):
     with pytest.raises(PortValueError) as error:
-        gathered(values, inputs)
+        assign_ports(values, inputs)
     assert says in error.value.hint

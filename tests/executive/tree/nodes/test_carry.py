@@ -41,7 +41,7 @@ def test_it_says_what_happened(leaf, clock):
 def test_what_is_felt_after_all_has_slipped(leaf, clock, robot):
     leaf.tick_once()
     robot.holding = True
-    told = "the hammer slips in the gripper on the way to the kitchen; it is set down and gripped anew"
+    told = "the hammer slips in the gripper on the way to the kitchen; it is set down and gripped again"
     assert ended(leaf, clock).message == told
 
 

@@ -382,7 +382,7 @@ def test_what_slips_on_is_set_down_on_the_floor_and_gripped_anew(slipping, scrip
     assert script.begun == ["navigate", "place", "back_off", "detect", *TAKEN, "navigate", "place"]
     assert [inputs.surface.name for inputs in place.inputs] == ["floor", "bedside table"]
     told = [message["message"] for topic, message in published if topic == "transitions"]
-    assert "the coke slips in the gripper on the way to the bedroom; it is set down and gripped anew" in told
+    assert "the coke slips in the gripper on the way to the bedroom; it is set down and gripped again" in told
 
 
 def test_what_slips_on_and_cannot_be_set_down_is_carried_on_as_it_is(slipping, script, fails):

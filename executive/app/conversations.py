@@ -11,9 +11,9 @@ from executive.app.feasibility import refuse_impossible
 from executive.app.prepared import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
 from executive.conversation.parts import Waiting
-from executive.language.addressees import Whom, addressees
-from executive.language.cleaning import addressed_to
-from executive.language.followups import remark_of
+from executive.language.addressees import RobotChoice, addressees
+from executive.language.cleaning import find_address
+from executive.language.followups import parse_remark
 from executive.language.parser import load_parser
 from executive.language.questions import RefusalError
 from executive.language.understand import understand
@@ -72,15 +72,15 @@ class Conversations(RunVisitor):
         if len(names) == 1:
             return names, text
         try:
-            several = addressees(names).called_in_talk(text)
+            several = addressees(names).split_call(text)
         except RefusalError:
             return names, text
         if several is not None:
-            return names if isinstance(several[0], Whom) else several[0], several[1]
-        called = addressed_to(text, names)
+            return names if isinstance(several[0], RobotChoice) else several[0], several[1]
+        called = find_address(text, names)
         if called.name is not None:
             return (called.name,), text
-        return names if remark_of(text) is not None else names[:1], text
+        return names if parse_remark(text) is not None else names[:1], text
 
 
 def conversation_of(prepared: Prepared, control: Control) -> Conversation:

@@ -16,7 +16,7 @@ from executive.app.goal_conditions import Share
 from executive.app.prepare import Setting, prepare_alone
 from executive.app.prepared import Prepared
 from executive.app.report_file import EndedTree
-from executive.language.addressees import Whom
+from executive.language.addressees import RobotChoice
 from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
 from executive.store.assignments import GivenMission, GivenMissions
@@ -94,10 +94,10 @@ def _options(
     if request.sentence is not None:
         setting = Setting(request, world, _patient(knowledge), robots)
         meant = setting.understand()
-        meanings, named = [part.meaning for part in meant.parts], {part.robot for part in meant.parts} - {Whom.ANY}
-        if len(named) > 1 or (Whom.ALL in named and len(robots) > 1):
+        meanings, named = [part.meaning for part in meant.parts], {part.robot for part in meant.parts} - {RobotChoice.ANY}
+        if len(named) > 1 or (RobotChoice.ALL in named and len(robots) > 1):
             raise InputError("it is for several robots at once", hint="queue a mission for each of them")
-        able = [name for name in robots if not named or name in named or Whom.ALL in named]
+        able = [name for name in robots if not named or name in named or RobotChoice.ALL in named]
         return {name: setting.part(name, meanings) for name in able}
     alone = prepare_alone(request)
     if alone.world.seed_rules != world.seed_rules:

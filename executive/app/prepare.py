@@ -13,7 +13,7 @@ from executive.app.placed_robots import knowledge_for, only_robot, placed_robots
 from executive.app.prepared import Prepared, combine
 from executive.app.worlds import knowledge_of, open_world, with_map
 from executive.language.parser import load_parser
-from executive.language.questions import Answerer, ClarifyingQuestion, answer_by
+from executive.language.questions import Answerer, ClarifyingQuestion, make_answerer
 from executive.mission.load import (
     import_folders,
     knowledge_of_mission,
@@ -123,7 +123,7 @@ class Setting:
         Raises InputError if an answer of the request is too long or no plain text.
         """
         left = iter([plain_text(text, what="--answer", longest=LONGEST_ANSWER) for text in self.request.answers])
-        further = answer_by(policy or QuestionPolicy.ASK, self.ask)
+        further = make_answerer(policy or QuestionPolicy.ASK, self.ask)
 
         def answer(question: ClarifyingQuestion) -> str | None:
             return next(left, None) or further(question)
@@ -256,11 +256,11 @@ def _for_called_robots(setting: Setting) -> Prepared:
 
 def _part_for_each(part: Part, setting: Setting) -> Iterator[Part]:
     """Yields the part for each robot that it addresses. Raises InputError if any robot may do it and none can."""
-    from executive.language.addressees import Whom
+    from executive.language.addressees import RobotChoice
 
-    if part.robot is Whom.ALL:
+    if part.robot is RobotChoice.ALL:
         yield from (replace(part, robot=name) for name in setting.robots)
-    elif part.robot is Whom.ANY:
+    elif part.robot is RobotChoice.ANY:
         yield replace(part, robot=_fastest(setting.robots, lambda name: setting.part(name, [part.meaning]))[0])
     else:
         yield part

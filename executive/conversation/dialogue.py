@@ -23,18 +23,18 @@ from executive.conversation.parts import (
     refusal,
 )
 from executive.conversation.remarks import RemarkAnswers
-from executive.language.cleaning import heard_wake, strip_wake
+from executive.language.cleaning import find_heard_wake, strip_wake
 from executive.language.followups import (
     Amendment,
     FollowUp,
     FollowUpKind,
     Remark,
-    amended,
-    follow_up_of,
-    remark_of,
-    without_fetching,
+    amend,
+    parse_follow_up,
+    parse_remark,
+    skip_fetching,
 )
-from executive.language.questions import with_answer
+from executive.language.questions import insert_answer
 from executive.language.reference import Memory
 from executive.language.understand import Status, Understanding
 from executive.run.control import Control
@@ -137,7 +137,7 @@ class Conversation(RunVisitor):
             if wake.name in (None, name):
                 return wake.text, None
             return short, Reply(ReplyKind.IGNORED, f"it is said to {wake.name}, and I am {name}")
-        address = heard_wake(short, name, others=self._others)
+        address = find_heard_wake(short, name, others=self._others)
         if address.name is None and self._waiting(now_s) is None:
             return short, Reply(ReplyKind.IGNORED, f'my name was not said; begin with "Hey {name}"')
         return address.text, None
@@ -145,7 +145,7 @@ class Conversation(RunVisitor):
     def _reply(self, text: str, now_s: float) -> Reply:
         if not text.strip(" .,!?"):
             return answer("yes?")
-        remark = remark_of(text)
+        remark = parse_remark(text)
         if remark is Remark.CANCEL and self._waiting(now_s) is not None:
             self._open = None
             return confirmation(NEVER_MIND)
@@ -176,11 +176,11 @@ class Conversation(RunVisitor):
             return None
         if text.strip(" .,!?").lower() in _NONE_OF_THEM:
             return confirmation(NEVER_MIND)
-        whole = with_answer(waiting.sentence, waiting.question, text)
+        whole = insert_answer(waiting.sentence, waiting.question, text)
         reply = self._follow_up(whole, now_s) or self._request(whole, now_s)
         if reply.kind is not ReplyKind.REFUSED:
             return reply
-        if follow_up_of(text) is not None or self._understood(text, now_s).status is Status.OK:
+        if parse_follow_up(text) is not None or self._understood(text, now_s).status is Status.OK:
             return None
         self._open = waiting
         return Reply(ReplyKind.QUESTION, f"I did not understand. {waiting.question.text}", question=waiting.question)
@@ -200,9 +200,9 @@ class Conversation(RunVisitor):
 
     def _memory_of(self, commands: Sequence[Command]) -> Memory | None:
         """Memory of a file's commands, as if somebody had said them."""
-        thing = next((c.object or c.item for c in commands if c.object or c.item), None)
+        item = next((c.object or c.item for c in commands if c.object or c.item), None)
         goal = next((c.goal for c in reversed(commands) if c.goal not in (None, _START)), None)
-        said = f"find the {thing}" if thing is not None else f"go to {goal}" if goal is not None else ""
+        said = f"find the {item}" if item is not None else f"go to {goal}" if goal is not None else ""
         return self._speech.understand(said, None).memory if said else None
 
     def _request(self, text: str, now_s: float) -> Reply:
@@ -225,7 +225,7 @@ class Conversation(RunVisitor):
 
     def _follow_up(self, text: str, now_s: float) -> Reply | None:
         """Carries out a follow-up to the last request, while that is remembered."""
-        last, follow_up = self._remembered(now_s), follow_up_of(text)
+        last, follow_up = self._remembered(now_s), parse_follow_up(text)
         if follow_up is None or last is None or self._understood(text, now_s).steps:
             return None
         when = _When.AFTERWARDS
@@ -241,7 +241,7 @@ class Conversation(RunVisitor):
         named = self._named(follow_up, now_s)
         if isinstance(named, Understanding):
             return self._not_ok(named, text, now_s)
-        changed = amended(last.commands, named, self._speech.knowledge)
+        changed = amend(last.commands, named, self._speech.knowledge)
         if changed == last.commands:
             return refusal(f"I do not see what '{follow_up.whole}' changes")
         return self._begin(changed, when, now_s)
@@ -252,17 +252,17 @@ class Conversation(RunVisitor):
             return Amendment(count=_COUNTS[follow_up.said.lower()])
         said = follow_up.said if re.match(_DETERMINED, follow_up.said, re.IGNORECASE) else f"the {follow_up.said}"
         place = self._understood(f"go to {said}", now_s)
-        thing = self._understood(f"find {said}", now_s)
+        found = self._understood(f"find {said}", now_s)
         old = self._old_name(follow_up.instead_of, now_s)
-        if thing.status is Status.OK and not follow_up.preposition and thing.commands[0].object is not None:
-            first = thing.commands[0]
+        if found.status is Status.OK and not follow_up.preposition and found.commands[0].object is not None:
+            first = found.commands[0]
             count = first.object_count if re.match(_COUNTED, said, re.IGNORECASE) else None
-            return Amendment(thing=first.object, count=count, old=old)
+            return Amendment(kind=first.object, count=count, old=old)
         if place.status is Status.OK:
             goal = place.commands[0]
             source = follow_up.preposition in _SOURCES
             return Amendment(goal=goal.goal, goal_at=goal.goal_at, source=source, old=old)
-        both = (place, thing) if follow_up.preposition else (thing, place)
+        both = (place, found) if follow_up.preposition else (found, place)
         return next((each for each in both if each.status is Status.QUESTION), both[0])
 
     def _old_name(self, said: str, now_s: float) -> str | None:
@@ -294,7 +294,7 @@ class Conversation(RunVisitor):
             return refusal(OVER)
         todo = tuple(commands)
         if when is _When.INSTEAD and not steps:
-            todo = without_fetching(todo, self._held(), self._speech.knowledge)
+            todo = skip_fetching(todo, self._held(), self._speech.knowledge)
         whole = steps or steps_of_commands(todo)
         try:
             tree = self._speech.compile(whole, self._names)
@@ -305,8 +305,8 @@ class Conversation(RunVisitor):
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, instead)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
-        shown = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
-        text = "; ".join((*notes, f"{when.value}: {shown}{still}"))
+        listed = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
+        text = "; ".join((*notes, f"{when.value}: {listed}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:
             self._names |= {tree.mission_name}

@@ -1,4 +1,4 @@
-"""Actions: what each clause asks for, in the robot's own few kinds of work."""
+"""Actions: the robot's work that each clause asks for."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from executive.words.command import TIME_UNITS_S
 
 @dataclass(frozen=True)
 class Action:
-    """One verb's work: `objects` are what it is done to, `source` where those are, `goal` where they or the robot go.
+    """Work that one verb asks for: on `objects` at `source`, towards `goal`.
 
-    `kind` is None for a statement, which only tells where something is. `said` is all that was said of it, `unknown`
-    the words that do not fit, `choices` phrases of which only one can be meant, `teller` who told by what they did.
-    `departs` says that a place is only left, `ways` are where the way was said to lead past, `time` is how long it is
-    to be waited. `anew` says that "then" or "after that" stood before it, and `again`, once pronouns are resolved, that
-    the thing was spoken of before.
+    `kind` is None for a statement, which only gives the place of an object. `said` is the text of the clause, `unknown`
+    are words that do not fit, `choices` phrases joined by "or", `teller` the person who put the object there. `departs`
+    marks a place that is only left, `passes` are places on the route, `time` is the length of a wait. `follows` says
+    that "then" or "after that" stands before it, and `again`, once pronouns are resolved, that the object was named
+    before.
     """
 
     kind: VerbKind | None
@@ -48,14 +48,14 @@ class Action:
     choices: tuple[tuple[Phrase, ...], ...] = ()
     teller: Phrase | None = None
     departs: bool = False
-    ways: tuple[Location, ...] = ()
+    passes: tuple[Location, ...] = ()
     time: Phrase | None = None
-    anew: bool = False
+    follows: bool = False
     again: bool = False
 
     @property
     def target(self) -> Phrase | None:
-        """The one thing that it is done to, once pronouns are resolved."""
+        """The one object of the action, once pronouns are resolved."""
         return self.objects[0] if self.objects else None
 
 
@@ -67,15 +67,14 @@ _QUESTION_TAGS: Final = frozenset({"WDT", "WP", "WP$", "WRB"})
 
 
 def read_actions(
-    clauses: Sequence[Predicate], *, told: bool = False, recipient: Location | None = None
+    clauses: Sequence[Predicate], *, elliptic: bool = False, recipient: Location | None = None
 ) -> tuple[Action, ...]:
-    """The actions of all clauses, in order.
+    """Reads the actions of all clauses, in order.
 
-    `told` says that things were spoken of before, which may be left out; `recipient` is given things where a clause
-    does not say to whom.
+    `elliptic` says that earlier objects may be left out; `recipient` receives objects where a clause names nobody.
     """
     found: list[Action] = []
-    anew = False
+    follows = False
     for clause in requested_predicates(clauses):
         before = [each for each in (clause.subject, clause.verb) if each is not None]
         chunks = [item for item in clause.items if isinstance(item, Chunk)]
@@ -84,14 +83,14 @@ def read_actions(
         gives = recipient is not None and not (named or any(isinstance(item, Adverb) for item in clause.items))
         for action in _actions(clause):
             goal = recipient if gives and action.verb.partition(" ")[0] in _GIVING else action.goal
-            action = replace(action, said=spoken_words([*before, *clause.items]), anew=anew, goal=goal)
+            action = replace(action, said=spoken_words([*before, *clause.items]), follows=follows, goal=goal)
             lacks = action.unknown == (action.verb,) and not action.objects and action.kind in _ELIDING
-            if told and lacks and (goal is not None or action.kind is VerbKind.FIND):
+            if elliptic and lacks and (goal is not None or action.kind is VerbKind.FIND):
                 action = replace(action, unknown=(), objects=(_IT,))  # take the phone and carry to me
-            told = told or any(not phrase.speaker for phrase in action.objects)
+            elliptic = elliptic or any(not phrase.speaker for phrase in action.objects)
             found.append(action)
         end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
-        anew = any(isinstance(item, Separator) and item.word in _THEN for item in end)
+        follows = any(isinstance(item, Separator) and item.word in _THEN for item in end)
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
     # The "go" of "go and find" is left out.
     bare = [one for one in found[:-1] if one.kind is VerbKind.GO and one.goal is None and one.unknown == (one.verb,)]
@@ -109,7 +108,7 @@ def _actions(clause: Predicate) -> Iterator[Action]:
 
 
 def _being(clause: Predicate, being: Being) -> Action:
-    """A status check ("is there a hammer in the workshop"), or a statement ("there is a hammer in the workshop")."""
+    """Reads a status check ("is there a hammer on the desk") or a statement ("there is a hammer on the desk")."""
     subject = None if clause.subject is None else clause.subject.phrase
     if being.narrated:
         return _narrated(clause, being)
@@ -137,23 +136,23 @@ def _being(clause: Predicate, being: Being) -> Action:
 
 
 def _narrated(clause: Predicate, being: Being) -> Action:
-    """What happened or goes on, with the thing that it happens to; nothing to do by itself."""
+    """Reads an event with its object; it asks for nothing by itself."""
     roles = read_roles(clause.items, describes=False)
     lacked = [place.phrase for place in roles.sources if place.preposition == "out of"]
-    things = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
-    things = things or [phrase for phrase in (being.topic,) if phrase is not None]
-    named = tuple(phrase for phrase in things if not (phrase.pronoun or phrase.speaker or phrase.person))
+    topics = [phrase for phrase in (*roles.objects, roles.searched, *lacked) if phrase is not None]
+    topics = topics or [phrase for phrase in (being.topic,) if phrase is not None]
+    named = tuple(phrase for phrase in topics if not (phrase.pronoun or phrase.speaker or phrase.person))
     place = next(iter([*roles.ats, *roles.goals]), None)
     return Action(None, being.text, named[:1], place, teller=being.teller)
 
 
 def _is_state(clause: Predicate, being: Being) -> bool:
-    """Whether it only tells how things are ("I'm thirsty", "the baby is crying"): a reason, and nothing to do."""
+    """Returns whether a clause only describes a state ("I'm thirsty", "the baby is crying"): a reason, no request."""
     if clause.subject is None or clause.whether or (being.asked and _asks(clause.subject.phrase)):
         return False
-    told = any(isinstance(item, Unknown | Adverb) for item in clause.items) or clause.subject.phrase.speaker
+    states = any(isinstance(item, Unknown | Adverb) for item in clause.items) or clause.subject.phrase.speaker
     rest = (item for item in clause.content if not (isinstance(item, Adverb) and item.here))
-    return told and all(isinstance(item, Unknown) for item in rest)
+    return states and all(isinstance(item, Unknown) for item in rest)
 
 
 def _asks(phrase: Phrase) -> bool:
@@ -187,7 +186,7 @@ def _acting(clause: Predicate, verb: Verb) -> Iterator[Action]:
 
 
 def _departs(verb: Verb, roles: Roles) -> bool:
-    """Whether a place is only left ("leave the kitchen and go to the hall"), which is part of going elsewhere."""
+    """Returns whether a place is only left ("leave the kitchen and go to the hall"), as a part of going elsewhere."""
     left = roles.objects if verb.text in lexicon().leaves else []
     if verb.text not in lexicon().leaves and VerbKind.GO in verb.kinds and not roles.objects:
         left = [place.phrase for place in roles.sources if place.phrase is not None]
@@ -196,17 +195,17 @@ def _departs(verb: Verb, roles: Roles) -> bool:
 
 
 def _going(blank: Action, roles: Roles) -> Iterator[Action]:
-    """One action for each place to go to."""
+    """Yields one action for each place to go to."""
     bare = [HERE if phrase.speaker else Location(phrase) for phrase in roles.objects]
     passed = [place for place in roles.ats if roles.goals and place.preposition in ("around", "by")]
     ats = [place for place in roles.ats if place not in passed]
     if len(bare) == 1 and bare[0] is not HERE and len(ats) == 1 and not roles.goals:
         bare = [replace(bare[0], within=ats.pop())]
-    things = any(phrase.kind is NounKind.THING and not phrase.known for phrase in roles.objects)
+    objects = any(phrase.kind is NounKind.THING and not phrase.known for phrase in roles.objects)
     if bare and blank.verb.endswith((" down", " up", " along")):
         passed += [replace(place, preposition=blank.verb.split()[-1]) for place in bare if roles.goals]
         bare = [] if roles.goals else bare
-    elif bare and (blank.verb not in lexicon().bare_goal or (blank.verb in lexicon().enters and things)):
+    elif bare and (blank.verb not in lexicon().bare_goal or (blank.verb in lexicon().enters and objects)):
         blank = replace(blank, unknown=(*blank.unknown, *(phrase.spoken for phrase in roles.objects)))
     sought = roles.searched
     fetched = sought is not None and sought.kind is NounKind.THING and not sought.pronoun
@@ -223,12 +222,12 @@ def _going(blank: Action, roles: Roles) -> Iterator[Action]:
     recipient = None if roles.recipient is HERE and roles.favour else roles.recipient
     extra = [part.text for part in (recipient, None if headed is not None else sought) if part is not None]
     extra += [place.text for place in roles.sources] + ([] if places else [blank.verb])
-    blank = replace(blank, unknown=(*blank.unknown, *extra), ways=tuple(passed))
+    blank = replace(blank, unknown=(*blank.unknown, *extra), passes=tuple(passed))
     yield from (replace(blank, goal=place) for place in places) if places else (blank,)
 
 
 def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
-    """One action for each place to look at: "in the kitchen and the hall"."""
+    """Yields one action for each place to search: "in the kitchen and the hall"."""
     objects, places = list(roles.objects), [*roles.ats, *roles.sources]
     if roles.searched is not None:
         within, places = (places[0], places[1:]) if objects and places else (None, places)
@@ -246,7 +245,7 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
 
 
 def _waiting(blank: Action, roles: Roles) -> Action:
-    """Waiting for a time, here or in a place."""
+    """Waits for a time, here or in a place."""
     times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
     fits = len(times) == 1 and times[0].head.word in TIME_UNITS_S and times[0].count > 0
@@ -257,24 +256,24 @@ def _waiting(blank: Action, roles: Roles) -> Action:
 
 
 def _charging(blank: Action, roles: Roles) -> Action:
-    """Charging the robot's own battery at its dock; it charges nothing else and nowhere else."""
-    things = [phrase.spoken for phrase in roles.objects if not phrase.addressed]
+    """Charges the robot's own battery at its dock; the robot charges nothing else and nowhere else."""
+    objects = [phrase.spoken for phrase in roles.objects if not phrase.addressed]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
     docks = [place.text for place in places if place.phrase is None or place.phrase.head.lemma not in lexicon().docks]
     searched = [] if roles.searched is None else [roles.searched.spoken]
-    return replace(blank, unknown=(*blank.unknown, *things, *docks, *searched, *(p.text for p in _beyond(roles))))
+    return replace(blank, unknown=(*blank.unknown, *objects, *docks, *searched, *(p.text for p in _beyond(roles))))
 
 
 def _beyond(roles: Roles) -> Iterator[Location]:
-    """Where a verb that moves nothing cannot go: sources, paths, somebody, more places."""
+    """Yields the locations that a verb without motion cannot have: sources, paths, recipients, more places."""
     recipient = () if roles.recipient in (None, HERE) else (roles.recipient,)
     yield from (place for place in (*roles.sources, *roles.paths, *recipient, *roles.joined_goals) if place)
 
 
 def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
-    """Taking, bringing and putting: sort out from where, to where and for whom.
+    """Takes, brings and puts: assigns source, goal and recipient.
 
-    One thing of a kind for each of several places: "a beer to Robin and Charlie".
+    An indefinite object goes to each of several places: "a beer to Robin and Charlie".
     """
     goals, sources, ats = list(roles.goals), list(roles.sources), list(roles.ats)
     if roles.recipient is not None and not (roles.favour and ats and blank.kind is VerbKind.PLACE):
@@ -301,6 +300,6 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
 
 
 def _with_object(action: Action, extra: Sequence[str]) -> Action:
-    """The action with the words that are too many, its verb among them when it says not what."""
+    """Adds the words that do not fit to the action, its verb among them when the object is missing."""
     missing = () if action.objects else (action.verb,)
     return replace(action, unknown=(*action.unknown, *extra, *missing))

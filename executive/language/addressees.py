@@ -1,4 +1,4 @@
-"""Who of several robots is meant, and what is said to each: "Alice, go to the hall and let Bob bring a coke"."""
+"""Addressees: the robots that a sentence names, and the text for each: "Alice, go home and let Bob bring a coke"."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from typing import Final
 
-from executive.language.cleaning import addressed_to
+from executive.language.cleaning import find_address
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
 from executive.language.questions import RefusalError
 from executive.words.robot_config import display_name, find_robot
@@ -25,38 +25,38 @@ _REFUSED: Final[Mapping[str, str]] = {
 }
 
 
-class Whom(enum.Enum):
-    """Who does a part of a sentence, where it is no one robot by its name."""
+class RobotChoice(enum.Enum):
+    """Addressee that is no robot by name."""
 
     ALL = "all"  # each of the robots
     ANY = "any"  # whichever of them does it best: none was named
 
 
-Who = tuple[str, ...] | Whom
+Addressee = tuple[str, ...] | RobotChoice
 """Robots by their names, or all of them, or any."""
 
 
 @dataclass(frozen=True)
-class Saying:
-    """What is said to one addressee: `who` is None where nobody was named; `joint` stood before it.
+class AddressedText:
+    """Text for one addressee: `who` is None where nobody is named; `joint` are the words before it.
 
-    `then` says that it comes after the one before it; `behind` names the robots whose parts before it have to be done
-    first. `otherwise` says that it hangs on the condition of the one before it. `past` says that it tells what the
-    robot has done by then, which is what it is to do.
+    `then` says that it follows the text before it; `behind` names the robots whose earlier parts must be done first.
+    `otherwise` says that it depends on the condition of the text before it. `past` says that it describes what the
+    robot has done by then, which is its task.
     """
 
-    who: Who | None
+    who: Addressee | None
     text: str
     joint: str = ""
     then: bool = False
-    behind: Who | None = None
+    behind: Addressee | None = None
     otherwise: bool = False
     past: bool = False
 
 
 @cache
 def _verbs() -> Mapping[str, str]:
-    """The verbs by their forms: "bring" and "brings" are bring."""
+    """Verbs by their forms: "bring" and "brings" are bring."""
     table = read_table("robots.yaml")
     bases = {verb[0] for verb in lexicon().verbs} | set(table["verbs_too"].split("|"))
     forms = {f"{base}{'es' if re.search('(?:s|x|z|ch|sh)$', base) else 's'}": base for base in bases}
@@ -65,31 +65,31 @@ def _verbs() -> Mapping[str, str]:
 
 @cache
 def addressees(names: tuple[str, ...]) -> Addressees:
-    """Finds the robots of these names where they are called."""
+    """Finder of the robots of these names."""
     return Addressees(names)
 
 
 @dataclass(frozen=True)
 class Addressees:
-    """Finds the robots `names` where they are called, and parts what is said to each."""
+    """Finder of the robots `names` in a sentence, which splits the text by robot."""
 
     names: tuple[str, ...]
 
     @cached_property
     def begins(self) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """What begins another robot's part, in the order of trying."""
+        """Patterns that begin another robot's part, in the order of trying."""
         return self.forms.mapping("begins")
 
     @cached_property
     def forms(self) -> Patterns:
-        """How they are called and told what to do."""
+        """Patterns of calls and instructions."""
         words = {"one": rf"(?:{any_of(self.names)})(?![\w'-])", "verbs": rf"(?:{any_of(_verbs())})(?![\w'])"}
         return Patterns("robots.yaml", words=words)
 
-    def meant(self, said: str, but: Sequence[str] = ()) -> Who:
-        """Which robots `said` names; "the other robot" is the one that is none of `but`.
+    def find_robots(self, said: str, but: Sequence[str] = ()) -> Addressee:
+        """Finds the robots that `said` names; "the other robot" is the one that is none of `but`.
 
-        Raises RefusalError: as many robots as it says are not there.
+        Raises RefusalError when it names another number of robots than there are.
         """
         words = " ".join(said.lower().split())
         if self.forms.other.fullmatch(words):
@@ -102,26 +102,26 @@ class Addressees:
             if number is not None and number != len(self.names):
                 known = listing(map(display_name, self.names))
                 raise RefusalError(f"there are {len(self.names)} robots, {known}: which are '{said}'?", [said])
-            return Whom.ALL
+            return RobotChoice.ALL
         found = self.forms.one.findall(said)
         return tuple(dict.fromkeys(filter(None, (find_robot(name, self.names) for name in found))))
 
-    def called_in_talk(self, text: str) -> tuple[Who, str] | None:
-        """Several robots that a text calls first, and the rest of it. Raises RefusalError: see `meant`."""
+    def split_call(self, text: str) -> tuple[Addressee, str] | None:
+        """Splits off the robots that a text calls first. Raises RefusalError: see `find_robots`."""
         match = self.forms.talk.match(text)
-        return None if match is None else (self.meant(match["who"]), text[match.end() :])
+        return None if match is None else (self.find_robots(match["who"]), text[match.end() :])
 
     def narrates(self, text: str) -> bool:
-        """Returns whether all that a text says of robots is how they are: "Bob can't reach the shelf"."""
+        """Returns whether a text only describes the state of robots: "Bob can't reach the shelf"."""
         return re.search(rf"\b{self.forms.one.pattern}", self.forms.narrated.sub("", text), re.IGNORECASE) is None
 
-    def parts(self, text: str) -> tuple[Who | None, tuple[Saying, ...]]:
-        """Whom a sentence is said to first, and its parts by who is to do them, those in a row for the same as one.
+    def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
+        """Returns the addressee of a sentence, and its parts, those in a row for the same addressee as one.
 
-        Raises RefusalError: it is not clear which robots are meant, or it says what one is not to do.
+        Raises RefusalError when it is not clear which robots it names, or when it forbids an action.
         """
         parting = _Parting(self, *self.listener(text))
-        found: list[Saying] = []
+        found: list[AddressedText] = []
         for part in parting.parts():
             last = found[-1] if found else None
             waits = part.behind is not None and part.behind != part.who
@@ -132,33 +132,33 @@ class Addressees:
                 found.append(part)
         return parting.listener, tuple(found)
 
-    def listener(self, text: str) -> tuple[Who | None, str]:
-        """Who a sentence is said to, and the rest of it. Raises RefusalError: see `meant`."""
+    def listener(self, text: str) -> tuple[Addressee | None, str]:
+        """Splits off the addressee of a sentence. Raises RefusalError: see `find_robots`."""
         if (match := self.forms.first.match(text)) is not None:
-            return self.meant(_who(match)), text[match.end() :]
+            return self.find_robots(_who(match)), text[match.end() :]
         if (match := self.forms.last.search(text)) is not None:
             before = text[: match.start()]
             if not (before[:1].islower() and re.search(r"\b[A-Z]\w*$", before)):  # a beer for Robin, Alice and Bob
-                return self.meant(_who(match)), before
-        address = addressed_to(text, self.names)
+                return self.find_robots(_who(match)), before
+        address = find_address(text, self.names)
         if address.name is not None:
             return (address.name,), address.text
         if (match := self.forms.called_back.search(text)) is not None:
-            return self.meant(_who(match)), f"{text[: match.start()]}{match['mark']}{text[match.end() :]}"
+            return self.find_robots(_who(match)), f"{text[: match.start()]}{match['mark']}{text[match.end() :]}"
         return None, text
 
     def imperative(self, text: str) -> str:
-        """What somebody does as what is to be done: "goes to the hall and brings" -> "go to the hall and bring"."""
+        """Turns statements into commands: "goes to the hall and brings" -> "go to the hall and bring"."""
         return self.forms.third_person.sub(lambda match: f"{match[1]}{_verbs()[match[2].lower()]}", text)
 
     def tidy(self, text: str) -> str:
-        """The text without signs at its ends and without joints at its beginning."""
+        """Strips signs from both ends, and joints from the beginning."""
         return self.forms.begins_with_joints.sub("", text.strip(" ,;:-")).strip(" ,;:-")
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A place where another robot's part begins, with its text behind `end`; `lead` is the verb that it stands for."""
+    """Position where another robot's part begins; its text begins at `end`, and `lead` is an implied verb."""
 
     who: str
     end: int
@@ -168,29 +168,29 @@ class _Found:
 
 @dataclass
 class _Parting:
-    """Parts one sentence by who is to do what."""
+    """Splitter of one sentence by robot."""
 
     calls: Addressees
-    listener: Who | None
+    listener: Addressee | None
     text: str
-    address: Who | None = None
-    found: list[Saying] = field(default_factory=list)
+    address: Addressee | None = None
+    found: list[AddressedText] = field(default_factory=list)
 
-    def parts(self) -> tuple[Saying, ...]:
-        """The parts of the sentence, in order."""
+    def parts(self) -> tuple[AddressedText, ...]:
+        """Parts of the sentence, in order."""
         text, self.address, at = self.text, self.listener, 0
-        self.found = [Saying(self.listener, "")]
+        self.found = [AddressedText(self.listener, "")]
         for start in (0, *(match.end() for match in self.calls.forms.boundary.finditer(text))):
             if start < at:
                 continue
             if (found := self._begins(start, at)) is not None:
-                called = self.calls.meant(found.who) if self.listener is None and found.kind == "call" else None
+                called = self.calls.find_robots(found.who) if self.listener is None and found.kind == "call" else None
                 self.listener = self.listener or called
                 self._take(found, text[at:start])
                 at = found.end
             elif self.found[-1].past and text[:start].rstrip().endswith(","):
                 self._add(text[at:start])
-                self.found.append(Saying(self.address, "", then=True))
+                self.found.append(AddressedText(self.address, "", then=True))
                 at = start
         self._add(text[at:])
         if len(self.found) > 1 and not _says(self.found[-1]) and self.found[-1].behind is not None:
@@ -199,7 +199,7 @@ class _Parting:
         return tuple(self._sentences())
 
     def _begins(self, start: int, at: int) -> _Found | None:
-        """The part of another robot that begins here. Raises RefusalError: it is said what a robot is not to do."""
+        """Part of another robot that begins here. Raises RefusalError when it forbids an action."""
         current = self.found[-1]
         for kind, form in self.calls.begins:
             match = form.match(self.text, start)
@@ -216,7 +216,7 @@ class _Parting:
         return None if verb is None else _Found(match["who"], match.end(), "gap", f"{verb[1]} ")
 
     def _take(self, found: _Found, before: str) -> None:
-        """Ends the part that `before` belongs to, and begins the one that was found."""
+        """Ends the part with the text `before`, and begins the found one."""
         joint_at = self.calls.forms.joint.search(before)
         at = len(before) if joint_at is None else joint_at.start()
         said, joint = before[:at], before[at:]
@@ -224,11 +224,11 @@ class _Parting:
             self._add(said)
             now = self.found[-1].who
             who = now if found.kind == "wait" or self.address is None else self.address
-            behind = None if found.who.lower() in _SOMEBODY else self.calls.meant(found.who)
+            behind = None if found.who.lower() in _SOMEBODY else self.calls.find_robots(found.who)
             behind = behind or next((one.who for one in reversed(self.found) if one.who is not None), None)
             if behind is None:
                 raise RefusalError(f"who is '{found.who}'? say the robot's name", [found.who])
-            self.found.append(Saying(who, "", joint, behind=behind))
+            self.found.append(AddressedText(who, "", joint, behind=behind))
             return
         who = self._who(found)
         bare, opener = said.strip(" ,"), ""  # a condition at its end is for what follows: "if there is a coke,"
@@ -237,7 +237,7 @@ class _Parting:
             said, opener = bare[: match.start()], match[1]
         self._add(said)
         last = self.found[-1]
-        begun = Saying(
+        begun = AddressedText(
             who,
             f"{opener}, {found.lead}" if opener else found.lead,
             joint,
@@ -254,15 +254,15 @@ class _Parting:
         last = self.found[-1]
         self.found[-1] = replace(last, text=self.calls.tidy(f"{last.text}{more}"))
 
-    def _who(self, found: _Found) -> Who:
-        """Who is meant by a name, "you" or "the other robot"."""
+    def _who(self, found: _Found) -> Addressee:
+        """Robots of a name, of "you" or of "the other robot"."""
         named = [name for one in self.found if isinstance(one.who, tuple) for name in one.who]
         if found.who.lower() in _YOU:
-            return self.calls.meant("the other robot", named) if self.address is None else self.address
-        return self.calls.meant(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
+            return self.calls.find_robots("the other robot", named) if self.address is None else self.address
+        return self.calls.find_robots(found.who, self.address if isinstance(self.address, tuple) else named[-1:])
 
-    def _sentences(self) -> Iterator[Saying]:
-        """The parts that say something; a sentence behind a robot's part is again for the one that is spoken to."""
+    def _sentences(self) -> Iterator[AddressedText]:
+        """Yields the parts with text; a further sentence within another robot's part is again for the addressee."""
         tidy, imperative = self.calls.tidy, self.calls.imperative
         for one in self.found:
             split = self.address is not None and self.address != one.who
@@ -270,13 +270,13 @@ class _Parting:
             if _says(replace(one, text=first)):
                 yield replace(one, text=tidy(first) if one.past else imperative(tidy(first)))
             if rest:
-                yield Saying(self.address, imperative(tidy(" ".join(rest))))
+                yield AddressedText(self.address, imperative(tidy(" ".join(rest))))
 
 
 def _who(match: re.Match[str]) -> str:
-    """The words of who is meant."""
+    """Words that name the robots."""
     return next(words for key, words in match.groupdict().items() if key.startswith("who") and words)
 
 
-def _says(saying: Saying) -> bool:
+def _says(saying: AddressedText) -> bool:
     return re.search(r"\w", saying.text) is not None

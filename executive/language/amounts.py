@@ -1,4 +1,4 @@
-"""Numbers, spans of time, times of day and shares as they are spoken."""
+"""Spoken numbers, spans of time, times of day and shares."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _WORDS: Final = any_of(word for word in lexicon().numbers if word not in ("coupl
 _NUMBER: Final = rf"(?:\d+(?:\.\d+)?|(?:{_WORDS})(?:[ -](?:{_WORDS}))?)"
 _FORMS: Final = Patterns("amounts.yaml", words={"number": _NUMBER})
 AMOUNTS: Final = {name: _FORMS.text(name) for name in ("span", "times", "share")}
-"""What stands for them in other tables."""
+"""Patterns of amounts for other tables."""
 _NAMED: Final = {"noon": 12, "midday": 12, "midnight": 0}
 _UNITS_S: Final = {"s": 1.0, "m": 60.0, "h": 3600.0}
 _SPANS_S: Final = {
@@ -23,23 +23,23 @@ _SPANS_S: Final = {
 
 @dataclass(frozen=True)
 class TimeOfDay:
-    """A time of day (s after midnight); `taken` says that it could be one of two half days."""
+    """Time of day (s after midnight); `taken` says that the speaker left the half of the day open."""
 
     seconds: float
     taken: bool = False
 
     @property
     def text(self) -> str:
-        """As "14:30"."""
+        """Text such as "14:30"."""
         return f"{int(self.seconds // 3600):02d}:{int(self.seconds % 3600 // 60):02d}"
 
     def notes(self, said: str) -> tuple[str, ...]:
-        """What it was taken for, where it could be another."""
+        """Note on the chosen half of the day, if it was left open."""
         return (f"I take '{said}' as {self.text}",) if self.taken else ()
 
 
-def count_of(text: str) -> float | None:
-    """The number that digits or words make."""
+def parse_number(text: str) -> float | None:
+    """Parses a number in digits or words."""
     words = text.lower().replace("-", " ").split()
     if len(words) == 1 and re.fullmatch(r"\d+(?:\.\d+)?", words[0]):
         return float(words[0])
@@ -52,39 +52,41 @@ def count_of(text: str) -> float | None:
     return float(first + sum(rest))
 
 
-def times_of(text: str) -> int | None:
-    """How often "three times" or "twice" is; None for what is no whole number from 1 to 100."""
+def parse_times(text: str) -> int | None:
+    """Parses "three times" or "twice"; None for other texts than whole numbers from 1 to 100."""
     words = re.sub(r" in a row$", "", text.lower())
     if words == "twice" or words == "a couple of times":
         return 2
-    number = count_of(re.sub(r" times$", "", words))
+    number = parse_number(re.sub(r" times$", "", words))
     return int(number) if number is not None and number == int(number) and 1 <= number <= 100 else None
 
 
-def seconds_of(text: str) -> float | None:
-    """How long a span is (s)."""
+def parse_seconds(text: str) -> float | None:
+    """Parses a span of time (s)."""
     words = re.sub(r"^(?:a )?quarter(?: of an)? hour$", "quarter", text.lower().strip())
     if words in _SPANS_S:
         return _SPANS_S[words]
     match = re.fullmatch(r"(half an?|a couple of|.+?) ?(and a half )?([smh])[a-z]*( and a half)?", words)
     if match is None:
         return None
-    count = {"a": 1.0, "an": 1.0, "half a": 0.5, "half an": 0.5, "a couple of": 2.0}.get(match[1], count_of(match[1]))
+    count = {"a": 1.0, "an": 1.0, "half a": 0.5, "half an": 0.5, "a couple of": 2.0}.get(
+        match[1], parse_number(match[1])
+    )
     half = 0.5 if match[2] or match[4] else 0.0
     return None if count is None or count + half <= 0 else (count + half) * _UNITS_S[match[3]]
 
 
-def share_of(text: str) -> float | None:
-    """The share from 0 to 1 of "thirty percent" or "half"."""
+def parse_share(text: str) -> float | None:
+    """Parses a share from 0 to 1: "thirty percent" or "half"."""
     words = text.lower().strip()
     if words.startswith("half"):
         return 0.5
-    number = count_of(re.sub(r" ?percent$", "", words))
+    number = parse_number(re.sub(r" ?percent$", "", words))
     return number / 100 if number is not None and 0 < number <= 100 else None
 
 
-def time_of(text: str) -> TimeOfDay | None:
-    """The time of day that is spoken of; one to six without more are in the afternoon."""
+def parse_time(text: str) -> TimeOfDay | None:
+    """Parses a time of day; one to six without more are in the afternoon."""
     words = " ".join(text.lower().replace("o' clock", "o'clock").split())
     if words in _NAMED:
         return TimeOfDay(3600.0 * _NAMED[words])
@@ -97,10 +99,10 @@ def time_of(text: str) -> TimeOfDay | None:
 
 def _time(match: re.Match[str], words: str) -> TimeOfDay | None:
     groups = match.groupdict()
-    hour, minute = count_of(groups["hour"]), count_of(groups.get("minute") or "0")
+    hour, minute = parse_number(groups["hour"]), parse_number(groups.get("minute") or "0")
     if groups.get("part"):
         part = groups["part"]
-        minute = 30.0 if part == "half" else 15.0 if part.endswith("quarter") else count_of(part)
+        minute = 30.0 if part == "half" else 15.0 if part.endswith("quarter") else parse_number(part)
         if minute is not None and groups["side"] in ("to", "before"):
             minute = -minute
             if part == "half":

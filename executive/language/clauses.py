@@ -1,4 +1,4 @@
-"""The one splitter: a sentence in clauses, each with its addressee, the cue by which it goes on, and its words."""
+"""Splitter of a sentence into clauses, each with its addressee, its cue and its words."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Final
 
-from executive.language.addressees import Saying, Who, addressees
+from executive.language.addressees import AddressedText, Addressee, addressees
 from executive.language.amounts import AMOUNTS
 from executive.language.items import Item
 from executive.language.lexicon import Patterns, any_of, lexicon, read_table
@@ -20,7 +20,7 @@ ACTS: Final = Patterns("structures.yaml", "acts", AMOUNTS)
 
 
 class Cue(enum.Enum):
-    """How a clause goes on from the one before."""
+    """Relation of a clause to the one before it."""
 
     FAILED = "failed"  # "if that fails"
     SO = "so"  # "if so"
@@ -37,10 +37,10 @@ class Cue(enum.Enum):
 
 @dataclass(frozen=True)
 class Clause:
-    """A clause: what joins it to the one before, its cue (`kind`, and `cue` in words), and the other words.
+    """Clause: the words that join it to the one before, its cue (`kind`, and `cue` in words), and its other words.
 
-    `part` is the part of the sentence for one addressee that it belongs to. `lead` are items that were left out before
-    it, its verb among them. `before` is what is to be done where it stands behind that, as in "go home if ...".
+    `part` is the text of its addressee. `lead` are implied items before it, its verb among them. `before` is the action
+    before a trailing cue, as in "go home if ...".
     """
 
     joint: str
@@ -48,27 +48,27 @@ class Clause:
     kind: Cue | None = None
     cue: str = ""
     lead: tuple[Item, ...] = ()
-    part: Saying | None = field(default=None, compare=False, repr=False)
+    part: AddressedText | None = field(default=None, compare=False, repr=False)
     before: str = ""
 
     @property
     def begins(self) -> bool:
-        """Returns whether a sentence begins with it."""
+        """Returns whether it begins a sentence."""
         return re.search(r"[.!?;]", self.joint) is not None
 
     @property
     def outer(self) -> bool:
-        """Returns whether it is done after all of the clauses before."""
+        """Returns whether it follows all clauses before it."""
         return CLAUSES.outer.search(self.joint) is not None
 
     @property
     def anyway(self) -> bool:
-        """Returns whether it is done at the end whatever happens."""
+        """Returns whether it runs at the end in any case."""
         return CLAUSES.whatever.search(self.joint) is not None
 
     @property
     def ends_anyway(self) -> bool:
-        """Returns whether it says at its end that it is done whatever happens."""
+        """Returns whether its last words say that it runs in any case."""
         return self.kind is None and CLAUSES.ends_anyway.search(self.text) is not None
 
     @property
@@ -79,18 +79,18 @@ class Clause:
 
 @dataclass(frozen=True)
 class Split:
-    """The clauses of a sentence, and the robot or robots that it is said to first."""
+    """Clauses of a sentence, and its addressee."""
 
     clauses: tuple[Clause, ...]
-    listener: Who | None = None
+    listener: Addressee | None = None
 
 
 def split(text: str, robots: tuple[str, ...] = ()) -> Split:
-    """Cuts a sentence, or several, into clauses, each with the part for one of the `robots` that it is of.
+    """Splits one or several sentences into clauses, each with the part of its addressee among `robots`.
 
-    Raises RefusalError: it is not clear which of the robots are meant, or it says what one is not to do.
+    Raises RefusalError when it is not clear which robots it names, or when it forbids an action.
     """
-    listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (Saying(None, text),))
+    listener, parts = addressees(robots).parts(text) if len(robots) > 1 else (None, (AddressedText(None, text),))
     found: list[Clause] = []
     for part in parts:
         said = smooth(part.text)
@@ -101,7 +101,7 @@ def split(text: str, robots: tuple[str, ...] = ()) -> Split:
 
 
 def cut(text: str) -> tuple[Clause, ...]:
-    """The clauses of a text for one addressee as it stands, by the words that join them and their cues."""
+    """Splits the text for one addressee at joining words and cues."""
     cuts, found = list(_cuts(text)), []
     for (start, begin), end in zip(cuts, (*(start for start, _ in cuts[1:]), len(text)), strict=True):
         clause = Clause(text[start:begin], text[begin:end].strip(" ,;.!?:"))
@@ -114,7 +114,7 @@ def cut(text: str) -> tuple[Clause, ...]:
 
 
 def _cuts(text: str) -> Iterator[tuple[int, int]]:
-    """Where what joins two clauses begins and ends."""
+    """Begin and end of the words that join two clauses."""
     first = _joint().match(text)
     begin = 0 if first is None else first.end()
     yield 0, begin
@@ -129,7 +129,7 @@ def _cuts(text: str) -> Iterator[tuple[int, int]]:
 
 
 def _kind(text: str) -> tuple[Cue, str] | None:
-    """The cue that a clause begins with; a whole one ("if not") ends where a clause can begin."""
+    """Cue at the beginning of a clause; a complete one ("if not") ends where a clause can begin."""
     for kind, form in _kinds():
         match = form.match(text)
         behind_it = None if match is None or kind not in _WHOLE else _NEXT.match(text, match.end())
@@ -138,8 +138,8 @@ def _kind(text: str) -> tuple[Cue, str] | None:
     return None
 
 
-def cue_behind(text: str) -> Clause | None:
-    """The first thing that stands behind what is to be done in a clause, so that it decides or repeats that."""
+def trailing_cue(text: str) -> Clause | None:
+    """First cue behind an action in a clause, which decides or repeats that action."""
     forms = CLAUSES.mapping("behind")
     found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
@@ -150,14 +150,14 @@ def cue_behind(text: str) -> Clause | None:
 
 
 def verb_positions(text: str) -> Iterator[int]:
-    """Where, behind its first words, a clause may begin without a comma before it."""
+    """Positions behind the first word where a clause may begin without a comma before it."""
     for match in re.finditer(r"[\w']+", text):
         if match.start() and match[0].lower() in _verbs():
             yield match.start()
 
 
-def text_of(clauses: Iterable[Clause]) -> str:
-    """The clauses as one text."""
+def join_clauses(clauses: Iterable[Clause]) -> str:
+    """Joins clauses to one text."""
     return " ".join(f"{clause.joint}{clause.cue} {clause.text}".strip() for clause in clauses).strip(" ,;.")
 
 
@@ -182,6 +182,6 @@ _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
 _NEXT: Final = re.compile(r"\s*([^\s,;:]\w*)")
 _SMALL: Final = frozenset({"then", "please", "just"})
 _ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
-"""Behind these "and" and "please" join no other clause: "go and charge"."""
+"""Verbs behind which "and" and "please" join no other clause: "go and charge"."""
 _ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)
 _SOME: Final = re.compile(r"(?:some|any|every|no|body|thing|one|where|what|who)$", re.IGNORECASE)

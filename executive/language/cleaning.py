@@ -1,8 +1,8 @@
-"""What is taken off a sentence before it is read: odd characters, and the wake phrase.
+"""Cleaning of a sentence: odd characters, and the wake phrase.
 
 The wake phrase is "Hey Alice", or the bare name set off by a comma. A greeting right before the name calls at the
-beginning and at the end of a sentence, and after a pause; the bare name calls at the beginning or the end, set off by a
-comma. A name in a story ("Hey, Alice told me ...", "my sister, Alice") does not.
+beginning and at the end of a sentence, and after a pause; the bare name calls at the beginning or the end. A name in a
+story ("Hey, Alice told me ...", "my sister, Alice") does not call.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _PLACEHOLDER: Final = re.compile(
 
 
 def clean(text: str) -> str:
-    """The sentence in plain characters: no control characters, brackets or pictures, and single blanks.
+    """Removes control characters, brackets and pictures, and joins blanks.
 
     Quotes become plain, and short forms stand in one piece ("i 'm" becomes "i'm").
     """
@@ -40,8 +40,7 @@ def clean(text: str) -> str:
 
 
 def placeholder(text: str) -> str | None:
-    """The first piece that stands for a word which is not filled in ("${room}", "[object]", "ROOM_NAME"), or another
-    piece with a sign that is no part of a sentence; None when there is none."""
+    """Finds a placeholder ("${room}", "[object]", "ROOM_NAME") or another odd piece; None without any."""
     found = _PLACEHOLDER.search(_PERCENT.sub(" percent", _AND.sub("and", text)))
     return None if found is None else found[0]
 
@@ -52,7 +51,7 @@ _MOST_LETTERS: Final = 2000
 
 
 def foreign_reason(text: str) -> str | None:
-    """One line when the letters are of another script, or the small words of another language; None else."""
+    """Refusal of a text in another script or language; None for English."""
     letters = [c for c in text[:_MOST_LETTERS] if c.isalpha()]
     if letters and 2 * sum("LATIN" in unicodedata.name(c, "") for c in letters) < len(letters):
         return "I understand English only, in Latin letters"
@@ -66,21 +65,21 @@ def foreign_reason(text: str) -> str | None:
 
 _FORMS: Final = Patterns("wake.yaml")
 SAME_NAME: Final = 0.13
-"""How far a misheard name may sound from the name, behind a greeting (see `sound_distance`)."""
+"""Largest distance in sound (see `sound_distance`) of a misheard name behind a greeting."""
 SAME_NAME_ALONE: Final = 0.05
-"""The same for a bare name."""
+"""Largest distance in sound of a misheard name without a greeting."""
 
 
 @dataclass(frozen=True)
 class Address:
-    """Who of the robots is called (None: nobody), and the sentence without the wake phrase."""
+    """Robot that a sentence calls (None: nobody), and the text without the wake phrase."""
 
     name: str | None
     text: str
 
 
-def addressed_to(text: str, names: Collection[str]) -> Address:
-    """Which of the robots called `names` a sentence is said to; the wake phrase that comes first counts."""
+def find_address(text: str, names: Collection[str]) -> Address:
+    """Finds the robot among `names` that a sentence calls; the first wake phrase counts."""
     calls = [(start, -end, name) for name in names for start, end in _calls(text, name)]
     if not calls:
         return Address(None, text)
@@ -89,25 +88,25 @@ def addressed_to(text: str, names: Collection[str]) -> Address:
     return Address(name, " ".join(f"{text[:start].rstrip()} {behind}".split()).strip(" ,"))
 
 
-def heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> Address:
-    """The same for what was heard, where the name may be misspelled ("Hey Ellis"): whether the robot `name` is called.
+def find_heard_wake(transcript: str, name: str, *, others: Collection[str] = ()) -> Address:
+    """Finds the wake phrase for the robot `name` in a transcript, where the name may be misspelled ("Hey Ellis").
 
-    `others` are the names of other robots: what sounds more like one of those is not for this one.
+    `others` are names of other robots: a word that sounds more like one of them does not call this robot.
     """
-    exact = addressed_to(transcript, (name, *others))
+    exact = find_address(transcript, (name, *others))
     if exact.name is not None:
         return exact if exact.name == name else Address(None, transcript)
-    heard = (addressed_to(corrected, (name, *others)) for corrected in _corrected(transcript, name, others))
+    heard = (find_address(corrected, (name, *others)) for corrected in _corrected(transcript, name, others))
     return next((address for address in heard if address.name == name), Address(None, transcript))
 
 
 def strip_wake(text: str, name: str, others: Collection[str] = ()) -> Address:
-    """Takes the wake phrase for the robot called `name` out of `text`, where it stands; `others` are other robots.
+    """Removes the wake phrase for the robot called `name`; `others` are other robots.
 
-    A bare name at the beginning without a comma is taken out, too, but calls nobody. Where somebody else is called,
-    theirs is the name.
+    A bare name at the beginning without a comma is removed, too, but calls nobody. When the sentence calls another
+    robot, its name is returned.
     """
-    address = addressed_to(text, (name, *others))
+    address = find_address(text, (name, *others))
     if address.name is not None:
         return address if address.name == name else replace(address, text=text)
     other = _FORMS.other.match(text)
@@ -116,18 +115,18 @@ def strip_wake(text: str, name: str, others: Collection[str] = ()) -> Address:
 
 @lru_cache(maxsize=64)
 def _forms(name: str) -> Patterns:
-    """The ways of calling a robot of that name."""
-    return _FORMS.filled(own=rf"{re.escape(name)}\b")
+    """Patterns of calls to a robot of that name."""
+    return _FORMS.with_words(own=rf"{re.escape(name)}\b")
 
 
 def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
-    """Where a robot is called, from the first character to behind the last: by a greeting, the name first, or last."""
+    """Spans of text that call a robot: by a greeting, by the name first, or by the name last."""
     forms = _forms(name)
     for match in forms.greets.finditer(text):
         before, after = text[: match.start()], text[match.end() :]
-        told = forms.says_before.fullmatch(before) or forms.told_behind_greeting.fullmatch(after)
+        narrated = forms.says_before.fullmatch(before) or forms.told_behind_greeting.fullmatch(after)
         ended = not before.strip(" ,.!?;:-'\"") or before.rstrip().endswith((",", ".", "!", "?", ";", ":"))
-        if not told and (ended or forms.politely.fullmatch(before) or not after.strip(" .!?,")):
+        if not narrated and (ended or forms.politely.fullmatch(before) or not after.strip(" .!?,")):
             yield match.span()
     first = forms.begins.match(text)
     if first and not forms.told_behind_name.fullmatch(text[first.end() :]):
@@ -140,7 +139,7 @@ def _calls(text: str, name: str) -> Iterator[tuple[int, int]]:
 
 
 def _corrected(transcript: str, name: str, others: Collection[str]) -> Iterator[str]:
-    """The transcript with what sounds like the wake phrase, or the name, at its beginning written as that."""
+    """Corrections of the transcript, where its beginning sounds like the wake phrase or the name."""
 
     def alike(heard: str, limit: float) -> bool:
         distance = sound_distance(heard, name)

@@ -1,4 +1,4 @@
-"""Resolved actions become command frames: going for a thing and carrying it are two."""
+"""Command frames: resolved actions as commands with spoken names, one to take an object and one to carry it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _ALONE: Final[Mapping[VerbKind | None, Task | None]] = {
 
 @dataclass(frozen=True)
 class CommandFrame:
-    """A command whose names are still as they were spoken."""
+    """Command whose names are still as spoken."""
 
     verb: str
     item: Phrase | None = None
@@ -35,13 +35,13 @@ class CommandFrame:
 
 
 def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
-    """The commands of all actions, in order.
+    """Converts actions to command frames, in order.
 
-    A place that the robot is sent to first is where the next action's thing is looked for; a thing in the hand is not
-    gone for again.
+    The robot looks for the next action's object at the place where it was sent first; it does not fetch an object that
+    it holds.
 
     Raises:
-        RefusalError: it is not said where something is to go.
+        RefusalError: the destination of an object is missing.
     """
     frames: list[CommandFrame] = []
     held: Phrase | None = None
@@ -79,14 +79,14 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
 
 
 def _puts_down(action: Action, before: Action) -> bool:
-    """Whether what was carried to a place, not to somebody, is then put down: "take it to the desk and set it down"."""
+    """Returns whether an action puts down an object where it was carried: "take it to the desk and set it down"."""
     goal = before.goal if before.kind in _GOES_FOR else None
     carried = goal is not None and goal is not HERE and not goal.person
     return carried and action.kind is VerbKind.PLACE and action.again and action.target == before.target
 
 
 def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
-    """Brings what is in the hand before something else is taken, and then that, too: "grab a coke and a water"."""
+    """Delivers the held object before the next one is taken: "grab a coke and a water"."""
     held: CommandFrame | None = None
     several = False
     for frame in frames:
@@ -100,7 +100,7 @@ def _one_in_hand(frames: Sequence[CommandFrame]) -> Iterator[CommandFrame]:
 
 
 def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Puts a thing where it was carried: "take it to the desk and set it down"."""
+    """Merges carrying an object and putting it down: "take it to the desk and set it down"."""
     found: list[Action] = []
     for action in actions:
         if found and action.goal is None and _puts_down(action, found[-1]):
@@ -111,11 +111,11 @@ def _set_down(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Gives the place of a bare "go" to the next action, where that lacks one; "then fetch" is an errand of its own."""
+    """Merges a bare "go" with the next action, where that has no place of its own; "then fetch" stays apart."""
     joined: list[Action] = []
     for action in actions:
         before = joined[-1] if joined and joined[-1].kind is VerbKind.GO else None
-        own = action.anew and action.kind is VerbKind.ROUND_TRIP
+        own = action.follows and action.kind is VerbKind.ROUND_TRIP
         takes_source = before and action.kind in _GOES_FOR and action.source is None and not (action.again or own)
         takes_goal = before and action.kind is VerbKind.PLACE and action.goal is None
         there = before and action.kind in _GOES_FOR and action.source is not None and action.source.within is None
@@ -135,7 +135,7 @@ def _join_going(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def _meets(action: Action, wish: Action) -> bool:
-    """Returns whether an action goes once more for what a wish asks to be brought."""
+    """Returns whether an action fetches the object of a wish."""
     same = action.target is not None and wish.target is not None and action.target.tokens == wish.target.tokens
     somebody = wish.goal is not None and (wish.goal is HERE or wish.goal.living)
     wished = wish.kind is VerbKind.ROUND_TRIP and somebody and wish.source is None and not wish.again
@@ -144,7 +144,7 @@ def _meets(action: Action, wish: Action) -> bool:
 
 
 def _one_by_one(actions: Sequence[Action]) -> tuple[Action, ...]:
-    """Carries each thing before the next is taken: "take the milk and the cup and put them on the table"."""
+    """Carries each object before the next is taken: "take the milk and the cup and put them on the table"."""
     ordered: list[Action] = []
     for action in actions:
         last = next((n for n in range(len(ordered) - 1, -1, -1) if ordered[n].target == action.target), None)
@@ -155,15 +155,15 @@ def _one_by_one(actions: Sequence[Action]) -> tuple[Action, ...]:
 
 
 def spoken_command(frame: CommandFrame) -> Command:
-    """The frame as a command with its names as they were spoken."""
+    """Command with its names as spoken."""
     goal, within = frame.goal, None if frame.goal is None else frame.goal.within
     person = goal is not None and goal.person
     return Command(
-        item=None if frame.item is None else frame.item.thing,
+        item=None if frame.item is None else frame.item.object_kind,
         goal=None if goal is None else goal.name if person else goal.text,
         goal_at=within.text if person and within is not None else None,
         task=frame.task,
-        object=None if frame.object is None else frame.object.thing,
+        object=None if frame.object is None else frame.object.object_kind,
         item_count=1 if frame.item is None else frame.item.count,
         object_count=1 if frame.object is None else frame.object.count,
         verb=frame.verb,

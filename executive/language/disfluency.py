@@ -1,4 +1,4 @@
-"""What a speaker takes back: corrections ("the wrench, no, the hammer") and negations ("not the coke")."""
+"""Repair of disfluencies: corrections ("the wrench, no, the hammer") and negations ("not the coke")."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _WHERE_TO: Final = frozenset({PrepositionRole.GOAL, PrepositionRole.AT, Preposit
 
 
 def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
-    """The items as if the speaker had said at once what they mean.
+    """Applies the speaker's corrections and negations to the items.
 
     A correction or negation that fits nothing becomes an unknown word.
 
     Raises:
-        RefusalError: something is forbidden.
+        RefusalError: the speaker forbids an action.
     """
     rest, done = list(items), list[Item]()
     while rest:
@@ -48,16 +48,16 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
     return tuple(done)
 
 
-def unwanted_things(items: Sequence[Item]) -> tuple[Phrase, ...]:
-    """What stands right behind "not"."""
+def unwanted_phrases(items: Sequence[Item]) -> tuple[Phrase, ...]:
+    """Noun phrases right behind "not"."""
     pairs = pairwise(item for item in items if not isinstance(item, Separator))
     return tuple(b.phrase for a, b in pairs if isinstance(a, Negation) and isinstance(b, Chunk))
 
 
 def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[Item], list[Item]]:
-    """Leaves out the clause or the chunks behind "not", where that only tells them apart from what is asked for.
+    """Removes a negated clause or noun phrase that only distinguishes the requested one.
 
-    Raises RefusalError: it forbids something by itself ("but don't go to the kitchen").
+    Raises RefusalError when the negation forbids an action ("but don't go to the kitchen").
     """
     ahead = _without_separators(rest)
     first = ahead[0] if ahead else None
@@ -68,12 +68,12 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
         clause, rest = ahead[1:end], ahead[end:]
         turns = (n for n, item in enumerate(clause) if isinstance(item, Separator) and item.word == "but")
         turn = next(turns, len(clause))
-        kept = [first, *clause[turn + 1 :]] if clause[turn + 1 :] else []  # not to the hall but to the kitchen
-        rest = [Separator(","), *kept, *rest]
+        instead = [first, *clause[turn + 1 :]] if clause[turn + 1 :] else []  # not to the hall but to the kitchen
+        rest = [Separator(","), *instead, *rest]
         if not _done_instead(first, done, rest):
             raise _forbidden(mark, ahead[:end])
-        thing = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
-        return done, rest if thing is None or thing.pronoun or thing.speaker else _one_of_them(rest, thing)
+        phrase = next((item.phrase for item in ahead if isinstance(item, Chunk) and item.role is None), None)
+        return done, rest if phrase is None or phrase.pronoun or phrase.speaker else _one_of_them(rest, phrase)
     if isinstance(first, Chunk):
         rest = ahead[1:]  # behind all that "or" joins
         while len(rest) > 1 and isinstance(rest[0], Separator) and rest[0].word == "or" and isinstance(rest[1], Chunk):
@@ -81,7 +81,7 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
         at = next((n for n, item in enumerate(rest) if not isinstance(item, Separator)), len(rest))
         new = rest[at] if at < len(rest) else None
         if isinstance(new, Chunk) and new.phrase.stands_for_one:  # not the red cup but the blue one
-            rest = [*rest[:at], replace(new, phrase=new.phrase.instead_of_one(first.phrase)), *rest[at + 1 :]]
+            rest = [*rest[:at], replace(new, phrase=new.phrase.replace_one(first.phrase)), *rest[at + 1 :]]
         if not _meant_instead(first, mark, done, rest):
             raise _forbidden(mark, ahead[:1])
         return done, rest
@@ -89,15 +89,15 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
 
 
 def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
-    """The refusal of what the speaker does not want, and which is no part of a command."""
+    """Refusal of a prohibition."""
     said = spoken_words([mark, *ahead]).replace(" n't", "n't")
     return RefusalError(f"I cannot keep to {said!r}; say only what I am to do", [said])
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Returns whether what follows is to be done in place of what was negated: going for going, handling for handling.
+    """Returns whether the next verb replaces the negated one: going for going, handling for handling.
 
-    Where nothing was asked for before, what is not to be handled is simply left alone.
+    When no action stands before it, a negated handling is dropped.
     """
     after = next((item for item in rest if isinstance(item, Verb)), None)
     goes = negated.kinds == {VerbKind.GO}
@@ -106,28 +106,28 @@ def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> 
 
 
 def _meant_instead(negated: Chunk, mark: Negation, done: Sequence[Item], rest: Sequence[Item]) -> bool:
-    """Returns whether something else is said in the place of what was negated: "the milk, not the juice"."""
+    """Returns whether another phrase replaces the negated one: "the milk, not the juice"."""
     if negated.role is not None and mark.word.startswith("but"):
         return False
     before = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), 0)
     meant = [item for item in (*done[before:], *rest) if _corrects(negated, item)]
-    told = (item.phrase.content for item in meant if isinstance(item, Chunk))
-    return bool(meant) and (not negated.phrase.stands_for_one or any(len(words) > 1 for words in told))
+    contents = (item.phrase.content for item in meant if isinstance(item, Chunk))
+    return bool(meant) and (not negated.phrase.stands_for_one or any(len(words) > 1 for words in contents))
 
 
 def _one_of_them(rest: list[Item], negated: Phrase) -> list[Item]:
-    """What follows, with "one" or "it" for what was negated ("don't take the red cup, take the blue one")."""
+    """Replaces "one" or "it" by the negated phrase ("don't take the red cup, take the blue one")."""
     at = next((n for n, item in enumerate(rest) if isinstance(item, Chunk) and item.role is None), None)
     new = None if at is None else rest[at]
     one = isinstance(new, Chunk) and new.phrase.stands_for_one
     if at is None or not isinstance(new, Chunk) or not (one or new.phrase.head.word in ("it", "them")):
         return rest
-    phrase = new.phrase.instead_of_one(negated) if one else negated
+    phrase = new.phrase.replace_one(negated) if one else negated
     return [*rest[:at], replace(new, phrase=phrase), *rest[at + 1 :]]
 
 
 def _corrected(done: list[Item], rest: list[Item], mark: Correction) -> tuple[list[Item], list[Item]]:
-    """Puts what follows in the place of what it corrects."""
+    """Replaces the corrected item by the next one."""
     ahead = _without_separators(rest)
     verb = next((n for n in range(len(done) - 1, -1, -1) if isinstance(done[n], Verb)), None)
     if all(isinstance(item, Separator) for item in done):
@@ -153,7 +153,7 @@ def _without_separators(items: list[Item]) -> list[Item]:
 
 
 def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
-    """The clause with the chunk that `new` corrects replaced, or with `new` added when there is none."""
+    """Replaces the noun phrase that `new` corrects, or appends `new` when there is none."""
     at = _corrected_index(clause, new)
     if at is None:
         return [*clause, new]
@@ -161,7 +161,7 @@ def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
     if isinstance(new, Chunk) and new.role is None and isinstance(old, Chunk):
         phrase = new.phrase  # "two" and "the red one" take their noun from the old one
         if phrase.stands_for_one:
-            phrase = phrase.instead_of_one(old.phrase)
+            phrase = phrase.replace_one(old.phrase)
         elif phrase.counts:
             phrase = old.phrase.with_count(phrase.count)
         new = replace(old, phrase=phrase)
@@ -169,7 +169,7 @@ def _replaced(clause: Sequence[Item], new: Item) -> list[Item]:
 
 
 def _corrected_index(clause: Sequence[Item], new: Item) -> int | None:
-    """Where the last item stands that `new` can take the place of."""
+    """Index of the last item that `new` can replace."""
     return next((n for n in range(len(clause) - 1, -1, -1) if _corrects(new, clause[n])), None)
 
 

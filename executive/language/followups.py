@@ -1,6 +1,7 @@
-"""What is said after something else: remarks about the run, corrections, more of the same, the same again.
+"""Follow-ups to an earlier request: remarks about the run, corrections, additions, repetitions.
 
-The commands of the request before are amended by what was said; names are grounded before this step."""
+They amend the commands of the earlier request; names are grounded before.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from skills.api import ObjectKind
 
 
 class FollowUpKind(enum.Enum):
-    """How a sentence goes on from the one before."""
+    """Relation of a sentence to the request before it."""
 
     CORRECTION = "correction"  # in place of it
     ADDITION = "addition"  # after it
@@ -27,7 +28,7 @@ class FollowUpKind(enum.Enum):
 
 @dataclass(frozen=True)
 class FollowUp:
-    """A sentence that goes on from the one before: what it says, with its preposition, and in place of what."""
+    """Follow-up to a request: its words, their preposition, and the words that they replace."""
 
     kind: FollowUpKind
     said: str = ""
@@ -36,18 +37,18 @@ class FollowUp:
 
     @property
     def whole(self) -> str:
-        """What was said, as it was said."""
+        """Words with their preposition."""
         return f"{self.preposition} {self.said}".strip()
 
 
 @dataclass(frozen=True)
 class Amendment:
-    """A grounded name that was said: a thing, with its number where one was said, or else a place or a person.
+    """Grounded change of a request: an object, with its number where one was said, or else a place or a person.
 
-    `source` says that the place is where the thing is; `old` is the name that it takes the place of, where said.
+    `source` says that the place is where the object is; `old` is the replaced name, where it was said.
     """
 
-    thing: ObjectKind | None = None
+    kind: ObjectKind | None = None
     count: int | None = None
     goal: str | None = None
     goal_at: str | None = None
@@ -55,8 +56,8 @@ class Amendment:
     old: str | None = None
 
 
-def follow_up_of(text: str) -> FollowUp | None:
-    """How a sentence goes on from the one before; None when it stands for itself."""
+def parse_follow_up(text: str) -> FollowUp | None:
+    """Parses a follow-up; None for a sentence that stands for itself."""
     plain = " ".join(text.replace("’", "'").split()).strip(" .!,")
     if _FORMS.again.fullmatch(plain):
         return FollowUp(FollowUpKind.AGAIN)
@@ -69,13 +70,14 @@ def follow_up_of(text: str) -> FollowUp | None:
     return None
 
 
-def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
-    """The commands with a thing, a place or a person changed.
+def amend(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) -> tuple[Command, ...]:
+    """Changes an object, a place or a person in commands.
 
-    A new thing is looked for where the old one was only if that was said and not the old one's usual place. A place
-    without a preposition is where things go to when that was said before, else where they are looked for.
+    The robot looks for a new object where the old one was only if the speaker named that place and it is not the old
+    one's usual place. A place without a preposition becomes the destination if the request has one, otherwise the
+    source.
     """
-    if by.thing is not None:
+    if by.kind is not None:
         return tuple(_with_thing(command, by, knowledge) for command in commands)
     if by.goal is None:
         return tuple(_counted(command, by.count) for command in commands)
@@ -86,10 +88,10 @@ def amended(commands: Sequence[Command], by: Amendment, knowledge: Knowledge) ->
     )
 
 
-def without_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
-    """What is left to do when the robot holds something already.
+def skip_fetching(commands: Sequence[Command], held: ObjectKind | None, knowledge: Knowledge) -> tuple[Command, ...]:
+    """Removes the commands that a held object makes needless.
 
-    The same thing is not gone for again; another one is put down first, in the place where such things usually are.
+    The robot does not fetch the same object again; it first puts another one back at its usual place.
     """
     if held is None or not commands:
         return tuple(commands)
@@ -104,22 +106,22 @@ def without_fetching(commands: Sequence[Command], held: ObjectKind | None, knowl
 
 
 def _with_thing(command: Command, by: Amendment, knowledge: Knowledge) -> Command:
-    assert by.thing is not None
+    assert by.kind is not None
     old = command.object or command.item
     if old is None or (by.old is not None and old.name != by.old and by.old not in knowledge.classes(old.name)):
         return command
     usual = command.task in (Task.GRASP, Task.FIND) and command.goal == knowledge.default_place(command.task, old.name)
     named = replace(
         command,
-        item=None if command.item is None else by.thing,
-        object=None if command.object is None else by.thing,
-        goal=knowledge.default_place(command.task, by.thing.name) if usual else command.goal,
+        item=None if command.item is None else by.kind,
+        object=None if command.object is None else by.kind,
+        goal=knowledge.default_place(command.task, by.kind.name) if usual else command.goal,
     )
     return _counted(named, by.count)
 
 
 def _counted(command: Command, count: int | None) -> Command:
-    """The command with so many of its thing, where that was said."""
+    """Sets the number of objects in a command, where one was said."""
     item_count, object_count = (command.item_count, command.object_count) if count is None else (count, count)
     return replace(
         command,
@@ -129,7 +131,7 @@ def _counted(command: Command, count: int | None) -> Command:
 
 
 def _place_of(commands: Sequence[Command], by: Amendment) -> int:
-    """Which command's goal a place changes."""
+    """Index of the command whose goal a place changes."""
     named = [n for n, command in enumerate(commands) if by.old is not None and command.goal == by.old]
     sources = [n for n, command in enumerate(commands) if command.item is None and command.task is not None]
     goals = [n for n, command in enumerate(commands) if n not in sources]
@@ -140,7 +142,7 @@ def _place_of(commands: Sequence[Command], by: Amendment) -> int:
 
 
 def _split(said: str) -> tuple[str, str]:
-    """A preposition at the beginning, and the rest."""
+    """Splits off a preposition at the beginning."""
     match = _FORMS.placed.fullmatch(said)
     return (match.group(1).lower(), match.group(2)) if match else ("", said)
 
@@ -150,7 +152,7 @@ _FORMS: Final = Patterns("followups.yaml")
 
 
 class Remark(enum.Enum):
-    """What such a remark asks for."""
+    """Meaning of a remark about the run."""
 
     STOP = "stop"  # stand still at once
     WAIT = "wait"  # pause
@@ -162,8 +164,8 @@ class Remark(enum.Enum):
     THANKS = "thanks"  # nothing
 
 
-def remark_of(text: str) -> Remark | None:
-    """The remark that a whole sentence is; None when it is something else, such as a request."""
+def parse_remark(text: str) -> Remark | None:
+    """Parses a whole sentence as a remark; None for any other sentence, such as a request."""
     words = " ".join(re.sub(r"[^\w\s']", " ", text[:_MOST_LETTERS].lower().replace("’", "'")).split())
     return _remarks().get(words) or _remarks().get(_FORMS.polite.sub("", words).strip())
 

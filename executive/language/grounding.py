@@ -1,7 +1,7 @@
-"""Names as spoken become names of the world, and what was left open is filled in.
+"""Grounding: spoken names become names of the world, and open places get their defaults.
 
-A name is looked up as it stands, then by what it is otherwise called, then by its noun alone; what could be several,
-or only looks or sounds like something known, makes a question.
+A name is looked up as it stands, then by its synonyms, then by its noun alone; an ambiguous or similar name makes a
+question.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase
 from executive.language.questions import ABLE, ClarifyingQuestion, RefusalError, Slot, perhaps_question, which_question
 from executive.language.roles import HERE, Location
-from executive.language.spelling import look_alikes, synonyms_of, words_for
+from executive.language.spelling import look_alikes, synonyms_for, synonyms_of
 from executive.language.tokens import Token
 from executive.words.command import Command, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, EVERYTHING, Knowledge
@@ -27,24 +27,24 @@ from skills.files.errors import known_names, listing
 
 
 def known_line(knowledge: Knowledge | None) -> str:
-    """What can be asked for and where one can be sent, in one line."""
+    """Abilities of the robot and known names, in one line."""
     if knowledge is None:
         return ABLE
     return (
-        f"{ABLE}; known things: {listing(knowledge.object_names())}; known places: {listing(knowledge.place_names())}"
+        f"{ABLE}; known objects: {listing(knowledge.object_names())}; known places: {listing(knowledge.place_names())}"
     )
 
 
 def ground(
     frames: Sequence[CommandFrame], knowledge: Knowledge, parser: DependencyParser
 ) -> tuple[tuple[Command, ...], tuple[str, ...]]:
-    """The frames as commands in the world's own names, with default places where none was said.
+    """Converts frames to commands in the world's own names, with default places where none was said.
 
-    Behind them is a word on each name that was taken for another. What the parser knows of English words widens what an
-    unknown name may stand for.
+    Also returns a note on each name that was taken for another one. Similarity of English words, which the parser
+    knows, widens the meaning of unknown names.
 
     Raises:
-        RefusalError: a thing, place or person is unknown, or could be several; with a question where that helps.
+        RefusalError: an object, place or person is unknown or ambiguous; with a question where that helps.
     """
     grounder = _Grounder(knowledge, parser)
     commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
@@ -52,28 +52,28 @@ def ground(
 
 
 def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], knowledge: Knowledge) -> None:
-    """Refuses to leave out one kind among several that a command takes: "a drink, but not a beer".
+    """Refuses to exclude one kind among several that a command takes: "a drink, but not a beer".
 
     Raises RefusalError.
     """
     for phrase in unwanted:
         names = filter(None, (knowledge.object_name(form) for _, form in _readings(phrase)))
         kinds = {kind for name in names for kind in knowledge.classes(name)}
-        things = (thing for command in commands for thing in (command.object, command.item) if thing is not None)
-        if any(not thing.attributes and kinds & {*knowledge.classes(thing.name)} for thing in things):
+        taken = (one for command in commands for one in (command.object, command.item) if one is not None)
+        if any(not one.attributes and kinds & {*knowledge.classes(one.name)} for one in taken):
             raise RefusalError(f"I cannot keep to 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
 
 
 @dataclass
 class _Grounder:
-    """Looks names up in one world, and notes what it took for what."""
+    """Grounder of names in one world, which notes the names that it took for others."""
 
     knowledge: Knowledge
     parser: DependencyParser
     notes: list[str] = field(default_factory=list)
 
     def needed_there(self, frames: Sequence[CommandFrame]) -> tuple[CommandFrame, ...]:
-        """The frames; a thing asked for in a room without a surface to take it from is brought into that room."""
+        """Moves the destination into a room without surfaces when an object is asked for there."""
         found = list(frames)
         for k, (takes, brings) in enumerate(pairwise(frames)):
             place, fetched = takes.goal, takes.task is Task.GRASP and brings.item == takes.object
@@ -87,7 +87,7 @@ class _Grounder:
         return tuple(found)
 
     def commands(self, frame: CommandFrame) -> Iterator[Command]:
-        """One frame as a command; going to every room is one for each."""
+        """Converts one frame to a command, or to one for each room."""
         if frame.goal is not None and frame.goal.every_room and frame.item is None and frame.task is None:
             yield from (Command(goal=room, verb=frame.verb) for room in self.knowledge.places)
             return
@@ -113,22 +113,22 @@ class _Grounder:
         )
 
     def target(self, phrase: Phrase, task: Task | None) -> ObjectKind:
-        """What a task is done to: a known thing, or a time."""
+        """Object of a task: a known object, or a time."""
         if task is Task.WAIT:
             return ObjectKind(phrase.head.lemma)
         if task is not Task.FIND:
             return self.taken(phrase)
-        return self.thing(phrase) if (person := self._sought(phrase)) is None else ObjectKind(person)
+        return self.object_kind(phrase) if (person := self._sought(phrase)) is None else ObjectKind(person)
 
     def taken(self, phrase: Phrase) -> ObjectKind:
-        """The known thing or category; "all the things", whatever they are, is everything."""
-        thing = self.thing(phrase)
-        return replace(thing, name=EVERYTHING) if thing.name == ANYTHING and phrase.count == 0 else thing
+        """Known class or category of a phrase; "all the objects" is everything."""
+        kind = self.object_kind(phrase)
+        return replace(kind, name=EVERYTHING) if kind.name == ANYTHING and phrase.count == 0 else kind
 
     def _sought(self, phrase: Phrase) -> str | None:
-        """Who is looked for, a known person or anybody; None where it is a thing.
+        """Person to look for, a known one or anybody; None for an object.
 
-        Raises RefusalError: somebody whom the robot cannot tell from others.
+        Raises RefusalError for a person whom the robot cannot distinguish from others.
         """
         person = self.knowledge.person(phrase.text)
         if person is not None and len(self.knowledge.people) > 1:
@@ -147,10 +147,10 @@ class _Grounder:
         return None
 
     def _kept_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
-        """The frame's goal, whose relation the command keeps, and where it is to be found when it is a person."""
+        """Goal of a frame, whose relation the command keeps, and for a person the place."""
         looks = frame.task in (Task.GRASP, Task.FIND)
         if looks and location == HERE:
-            raise RefusalError("I take and find things on surfaces, and people in rooms: name a place", [HERE.name])
+            raise RefusalError("I take and find objects on surfaces, and people in rooms: name a place", [HERE.name])
         act = "look" if looks else "go" if frame.item is None else "bring"
         check_relation(act, _KINDS, location)
         person = None if location == HERE or location.phrase is None else self._person(location.phrase)
@@ -166,8 +166,8 @@ class _Grounder:
         check_relation(act, [kind for kind, fits in zip(_KINDS, own, strict=True) if fits][:1], location)
         return goal, goal_at
 
-    def thing(self, phrase: Phrase) -> ObjectKind:
-        """The known thing or category, with the adjectives before it."""
+    def object_kind(self, phrase: Phrase) -> ObjectKind:
+        """Known class or category of a phrase, with the adjectives before it."""
         known = self._known(self.knowledge.object_names())
         for attributes, form in _readings(phrase):
             if (name := self.knowledge.object_name(form)) is not None:
@@ -181,9 +181,9 @@ class _Grounder:
         raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
 
     def place(self, location: Location) -> str:
-        """The known place that the words mean.
+        """Known place of a location.
 
-        Several surfaces may share a noun ("table"): the larger place around it, where said, tells which one is meant.
+        The room around it decides among several surfaces with the same noun ("table").
         """
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
@@ -200,7 +200,7 @@ class _Grounder:
         return self._only(inside, Slot.PLACE, Phrase(location.phrase.tokens).text)
 
     def _room(self, location: Location) -> str | None:
-        """The larger place around it, where one was said ("in the kitchen", "of the kitchen", "bedroom table")."""
+        """Room around a location, where one was said ("in the kitchen", "of the kitchen", "bedroom table")."""
         extra = () if location.phrase is None else location.phrase.extra
         around = " ".join(extra[1:]) if extra[:1] == ("of",) else None
         around = around if location.within is None else location.within.text
@@ -214,7 +214,7 @@ class _Grounder:
         return next(filter(None, map(self.knowledge.place, words)), None)
 
     def _places(self, phrase: Phrase, room: str | None, known: Mapping[str, str]) -> Sequence[str]:
-        """The places of that very name, or else of that noun; with a room said, also by their other names."""
+        """Places with that very name, or else with that noun; with a room, also those with such a synonym."""
         groups = {"room": tuple(self.knowledge.places), "surface": tuple(self.knowledge.surfaces)}
         named = len(phrase.content) > 1 or self.knowledge.place(phrase.text) is not None
         if not named and groups.get(phrase.head.lemma):  # any place: "the room", "a surface"
@@ -231,19 +231,21 @@ class _Grounder:
         nouns = _forms(phrase.head)
         own = [name for name in self.knowledge.place_names() if _last(name) in nouns]
         other = [name for spelling, name in known.items() if _last(spelling) in nouns]
-        called = [name for spelling, name in known.items() if any(_last(word) in nouns for word in words_for(spelling))]
+        called = [
+            name for spelling, name in known.items() if any(_last(word) in nouns for word in synonyms_for(spelling))
+        ]
         return list(dict.fromkeys([*own, *other, *called] if room is not None else own or other))
 
     def _left_over(self, phrase: Phrase, name: str) -> bool:
-        """Whether something was said of a place that neither its names nor its room's account for ("kitchen 3")."""
+        """Returns whether words are left that no name of the place or its room has ("kitchen 3")."""
         extra = () if phrase.extra[:1] == ("of",) else phrase.extra
         said = {word for part in (*(t.word for t in phrase.content[:-1]), *extra) for word in part.lower().split()}
         spellings = self.knowledge.spellings([name, self.knowledge.room(name)])
-        known = (other for spelling in spellings for other in (spelling, *words_for(spelling)))
+        known = (other for spelling in spellings for other in (spelling, *synonyms_for(spelling)))
         return not said <= {word.lower() for other in known for word in other.split()}
 
     def _person(self, phrase: Phrase) -> str | None:
-        """The known person; None when the words mean nobody."""
+        """Known person; None when the words name nobody."""
         name = self.knowledge.person(phrase.text)
         if name is not None or not phrase.person or self.knowledge.place(phrase.text) is not None:
             return name
@@ -264,23 +266,23 @@ class _Grounder:
         self.notes += [f"I take '{heard}' to be {name}" for name in names if heard.lower() != name.lower()]
 
     def _known(self, names: Iterable[str]) -> Mapping[str, str]:
-        """The names by each of their spellings in lower case."""
+        """Names by each of their spellings in lower case."""
         return {word.lower(): name for name in names for word in self.knowledge.spellings([name])}
 
     def _unknown(self, slot: Slot, forms: Sequence[str], known: Mapping[str, str]) -> RefusalError:
-        """A question where something known looks, sounds or means alike; else a refusal."""
+        """Question about names of similar spelling, sound or meaning; without any, a refusal."""
         heard = forms[0]
         ends = (name for form in forms for spelling, name in known.items() if spelling == _last(form))
         near = (name for form in forms for name in look_alikes(form, known, self.parser))
         candidates = tuple(dict.fromkeys([*ends, *near]))
         if candidates:
             return _asking(perhaps_question(slot, heard, candidates))
-        return RefusalError(f"I know no {slot.value} {heard!r}; {known_names(heard, known.values())}", [heard])
+        return RefusalError(f"I know no {slot.noun} {heard!r}; {known_names(heard, known.values())}", [heard])
 
 
-def _count(phrase: Phrase | None, thing: ObjectKind | None) -> int:
-    """How many are meant; everything is one thing to take."""
-    return 1 if phrase is None or thing is None or thing.name == EVERYTHING else phrase.count
+def _count(phrase: Phrase | None, kind: ObjectKind | None) -> int:
+    """Number of objects; everything counts as one."""
+    return 1 if phrase is None or kind is None or kind.name == EVERYTHING else phrase.count
 
 
 def _asking(question: ClarifyingQuestion) -> RefusalError:
@@ -288,7 +290,7 @@ def _asking(question: ClarifyingQuestion) -> RefusalError:
 
 
 def _readings(phrase: Phrase) -> Iterator[tuple[tuple[str, ...], str]]:
-    """The ways to read a phrase as adjectives and a name: the longest name first, as spoken and in singular."""
+    """Splits of a phrase into adjectives and a name: the longest name first, as spoken and in singular."""
     *left, head = phrase.tokens
     words = [t for t in left if t.text in phrase.text.split()]
     for first in range(len(words) + 1):

@@ -1,4 +1,4 @@
-"""Questions and statements that stand for requests: where something is, what somebody needs, what happened."""
+"""Indirect requests: questions and statements that ask for an action."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
-from executive.language.items import Being, Chunk, Item, Row, Separator, Unknown, Verb, command_position, verb
+from executive.language.items import Being, Chunk, Item, Row, Separator, Unknown, Verb, may_begin_command, verb
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
@@ -20,15 +20,15 @@ OBJECTS: Final = Phrase((Token(0, 0, "objects", "object", "NOUN", "NNS", 0, "obj
 
 
 def _asks(items: Sequence[Item]) -> bool:
-    """Returns whether it was asked to look for what comes next."""
+    """Returns whether the last item is a verb that asks to look for an object."""
     last = items[-1] if items else None
     return isinstance(last, Verb) and bool(last.kinds & {VerbKind.FIND, VerbKind.CHECK})
 
 
 def where_is(row: Row, items: list[Item]) -> Item | None:
-    """ "Where is the hammer", "check where the hammer is" ask to find it: something or somebody in the house."""
+    """ "Where is the hammer", "check where the hammer is" ask to find it: an object or a person in the house."""
     asks = _asks(items)
-    if row.tokens[row.at].word != "where" or not (asks or command_position(items)):
+    if row.tokens[row.at].word != "where" or not (asks or may_begin_command(items)):
         return None
     inverted = _is_be(row, row.at + 1)
     start = row.at + 1 + inverted
@@ -48,14 +48,14 @@ def where_is(row: Row, items: list[Item]) -> Item | None:
 
 
 def _is_be(row: Row, at: int) -> bool:
-    """Returns whether a form of "to be" stands there."""
+    """Returns whether a form of "to be" stands at a position."""
     return at < len(row.tokens) and (row.tokens[at].lemma == "be" or row.tokens[at].word == "'s")
 
 
 def how_many(row: Row, items: list[Item]) -> Item | None:
     """ "How many chairs are in the hall" asks to look for chairs there."""
     phrase = row.phrases.get(row.at)
-    if row.tokens[row.at].word != "how" or phrase is None or len(phrase.tokens) < 3 or not command_position(items):
+    if row.tokens[row.at].word != "how" or phrase is None or len(phrase.tokens) < 3 or not may_begin_command(items):
         return None
     end = row.at + len(phrase.tokens)
     be = row.tokens[end : end + 1]
@@ -77,16 +77,16 @@ def do_we_have(row: Row, items: list[Item]) -> Item | None:
     words = [token.word for token in row.tokens[row.at : row.at + 3]]
     has = len(words) == 3 and words[0] in ("do", "have") and words[2] in ("have", "got")
     phrase = row.phrase_at(row.at + 3) if has and words[1] in ("we", "you", "i", "they") else None
-    if phrase is None or not command_position(items) or not (phrase.known or phrase.kind is NounKind.THING):
+    if phrase is None or not may_begin_command(items) or not (phrase.known or phrase.kind is NounKind.THING):
         return None
     row.at += 3
     return Being(" ".join(words), existential=True, asked=True)
 
 
 def what_is(row: Row, items: list[Item]) -> Item | None:
-    """ "What is on the bench", "is there anything on it", "is the bench empty" ask to look for whatever lies there."""
+    """ "What is on the bench", "is there anything on it", "is the bench empty" ask to look for all objects there."""
     asks = _asks(items)
-    found = _whatever(row) or _fullness(row) if asks or command_position(items) else None
+    found = _whatever(row) or _fullness(row) if asks or may_begin_command(items) else None
     if found is None:
         return None
     if asks:
@@ -96,7 +96,7 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
 
 
 def _whatever(row: Row) -> Chunk | None:
-    """The place in the house behind "what is" or "is there anything", with its preposition."""
+    """Place behind "what is" or "is there anything", with its preposition."""
     at, asked = row.at, False
     for word in (token.word for token in row.tokens[row.at :]):
         whatever = word in ("what", "anything", "something")
@@ -114,7 +114,7 @@ def _whatever(row: Row) -> Chunk | None:
 
 
 def _fullness(row: Row) -> Chunk | None:
-    """The place in "is the bench empty"."""
+    """Place in "is the bench empty"."""
     phrase = row.phrase_at(row.at + 1) if _is_be(row, row.at) else None
     end = row.at + 1 + (0 if phrase is None else len(phrase.tokens))
     if phrase is None or end >= len(row.tokens) or row.tokens[end].word not in lexicon().fullness:
@@ -126,9 +126,9 @@ def _fullness(row: Row) -> Chunk | None:
 
 
 def reported_speech(row: Row, items: list[Item]) -> Item | None:
-    """ "I left it in the hall" tells where a thing is; behind a noun it tells only which one is meant."""
+    """ "I left it in the hall" gives the place of an object; behind a noun it only identifies that object."""
     subject = items[-1] if items else None
-    if not isinstance(subject, Chunk) or row.tokens[row.at].word not in lexicon().told or subject.role is not None:
+    if not isinstance(subject, Chunk) or row.tokens[row.at].word not in lexicon().placing or subject.role is not None:
         return None
     phrase = subject.phrase
     if phrase.head.word not in lexicon().subjects and not phrase.person:
@@ -143,11 +143,11 @@ def reported_speech(row: Row, items: list[Item]) -> Item | None:
 
 
 def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
-    """The bare phrase at the end with the places behind it, and where it stands: "the patient in room four"."""
+    """Bare phrase at the end, with the places behind it, and its index: "the patient in room four"."""
     at = len(items) - 1
     while at > 0 and isinstance(item := items[at], Chunk) and item.role is not None:
         at -= 1
-    subject = items[at] if at >= 0 and command_position(items[:at]) else None
+    subject = items[at] if at >= 0 and may_begin_command(items[:at]) else None
     return at, subject if isinstance(subject, Chunk) and subject.role is None else None
 
 
@@ -168,10 +168,10 @@ def stated_need(row: Row, items: list[Item]) -> Item | None:
 
 def belonging(row: Row, items: list[Item]) -> Item | None:
     """ "The plates go in the cupboard" asks to put them there."""
-    (at, thing), behind = _subject(items), row.ahead()
-    if row.tokens[row.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE or thing is None:
+    (at, item), behind = _subject(items), row.ahead()
+    if row.tokens[row.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE or item is None:
         return None
-    if thing.phrase.speaker or thing.phrase.person or thing.phrase.kind is NounKind.PERSON:
+    if item.phrase.speaker or item.phrase.person or item.phrase.kind is NounKind.PERSON:
         return None
     row.at += 1
     items[at + 1 :] = [
@@ -182,11 +182,11 @@ def belonging(row: Row, items: list[Item]) -> Item | None:
 
 
 def ongoing_event(row: Row, items: list[Item]) -> Item | None:
-    """ "My back hurts", which is no request by itself."""
+    """ "My back hurts" is no request by itself."""
     token, subject = row.tokens[row.at], items[-1] if items else None
     if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in _WANTS or token.lemma in lexicon().asks:
         return None
-    if not isinstance(subject, Chunk) or subject.role is not None or not command_position(items[:-1]):
+    if not isinstance(subject, Chunk) or subject.role is not None or not may_begin_command(items[:-1]):
         return None
     if any(word.tag.startswith("W") for word in subject.phrase.tokens):
         return None
@@ -195,11 +195,11 @@ def ongoing_event(row: Row, items: list[Item]) -> Item | None:
 
 
 def narration(row: Row, items: list[Item]) -> Item | None:
-    """ "Somebody spilled milk", "I can't reach the jar", "Kim is waiting for the books": a reason for what is asked."""
+    """ "Somebody spilled milk", "I can't reach the jar", "Kim is waiting for the books" give a reason for a request."""
     last = items[-1] if len(items) > 1 else None
     at = len(items) - 1 - (isinstance(last, Separator) and last.word.isalpha() and last.word != "and")
     subject = items[at] if at >= 0 else None
-    if not isinstance(subject, Chunk) or subject.role is not None or not command_position(items[:at]):
+    if not isinstance(subject, Chunk) or subject.role is not None or not may_begin_command(items[:at]):
         return None
     length, phrase = _told_verb(row), subject.phrase
     asked = any(token.tag.startswith("W") for token in phrase.tokens)
@@ -212,7 +212,7 @@ def narration(row: Row, items: list[Item]) -> Item | None:
 
 
 def _told_verb(row: Row) -> int:
-    """How many words the verb of a narration has that begins here; 0 when none does."""
+    """Number of words of a narrating verb that begins here; 0 for none."""
     tags = [t.tag for t in row.tokens[row.at : row.at + 4]]
     first, words = row.tokens[row.at], [t.word for t in row.tokens[row.at : row.at + 3]]
     if first.tag == "VBD" and first.pos == "VERB":
@@ -237,4 +237,4 @@ INDIRECT: Final = (
     belonging,
     ongoing_event,
 )
-"""The ways of reading, in the order of trying."""
+"""Readers of indirect requests, in the order of trying."""

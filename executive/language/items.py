@@ -1,7 +1,8 @@
-"""The sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
+"""Sentence as a row of items: verbs, noun phrases with their prepositions, and small words.
 
-Attachment of prepositions is where parsers err most; the row keeps the order of the words, and the verbs decide later
-which place plays which role."""
+Parsers err most in the attachment of prepositions; the row keeps the order of the words, and the verbs decide later
+which place has which role.
+"""
 
 from __future__ import annotations
 
@@ -18,20 +19,20 @@ from executive.language.tokens import Token
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb that the robot understands, with its particles."""
+    """Verb that the robot understands, with its particles."""
 
     text: str
     kinds: frozenset[VerbKind]
 
 
 def verb(text: str) -> Verb:
-    """A verb of the dictionary as an item."""
+    """Makes an item of a verb in the dictionary."""
     return Verb(text, lexicon().verbs[tuple(text.split())])
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """A noun phrase with the preposition before it; `role` is None for a bare one."""
+    """Noun phrase with the preposition before it; `role` is None without one."""
 
     phrase: Phrase
     preposition: str = ""
@@ -51,17 +52,16 @@ class Adverb:
 
     @property
     def word(self) -> str:
-        """The word as spoken."""
+        """Word as spoken."""
         return "here" if self.here else "there"
 
 
 @dataclass(frozen=True)
 class Being:
-    """A form of "to be" as spoken; `existential` with "there", `asked` when it stands before its subject.
+    """Form of "to be"; `existential` with "there", `asked` when it stands before its subject.
 
-    `teller` is somebody who did something with a thing, so that it is where it is ("Anna left her umbrella");
-    `narrated` says that it is any verb by which something is told ("somebody spilled milk on the floor"), and
-    `topic` is the thing that it is told of ("the ball rolled under the sofa").
+    `teller` is a person who put an object where it is ("Anna left her umbrella"); `narrated` marks any verb of a
+    narration ("somebody spilled milk on the floor"), and `topic` is its object ("the ball rolled under the sofa").
     """
 
     text: str
@@ -83,24 +83,24 @@ class _Word:
 
 
 class Separator(_Word):
-    """A comma, "and", "or", "then"."""
+    """Comma, "and", "or", "then"."""
 
 
 class Unknown(_Word):
-    """A word that nothing accounts for."""
+    """Word that fits nowhere."""
 
 
 class Outside(_Word):
-    """A verb that the robot does not know; what follows belongs to it."""
+    """Verb that the robot does not know; the items behind it belong to it."""
 
 
 class Negation(_Word):
-    """ "Not" and its kin: the speaker leaves out what follows."""
+    """ "Not" and the like: the speaker excludes the next item."""
 
 
 @dataclass(frozen=True)
 class Correction(_Word):
-    """ "No", "I mean": what follows takes the place of what was said; a `soft` one may also mean nothing."""
+    """ "No", "I mean": the next item replaces an earlier one; a `soft` one may also mean nothing."""
 
     soft: bool
 
@@ -109,7 +109,7 @@ Item = Verb | Chunk | Adverb | Being | Whether | Separator | Unknown | Outside |
 
 
 def spoken_words(items: Iterable[Item]) -> str:
-    """The words of the items as spoken, small words left out."""
+    """Words of the items as spoken, without small words."""
     words = (
         item.spoken if isinstance(item, Chunk) else getattr(item, "word", getattr(item, "text", ""))
         for item in items
@@ -119,14 +119,14 @@ def spoken_words(items: Iterable[Item]) -> str:
 
 
 LONGEST: Final = 6
-"""So many words has the longest phrase of the dictionaries."""
+"""Number of words of the longest phrase in the dictionaries."""
 
 
 @dataclass
 class Row:
-    """The words of a sentence, its noun phrases by their first word, and the next word to be read.
+    """Words of a sentence, its noun phrases by their first word, and the position of the reader.
 
-    Words in `silent` are passed over.
+    The reader skips words in `silent`.
     """
 
     tokens: Sequence[Token]
@@ -135,7 +135,7 @@ class Row:
     silent: set[int] = field(default_factory=set)
 
     def match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
-        """The longest of the phrases that stands here."""
+        """Longest of the phrases that stands here."""
         for length in range(LONGEST, 0, -1):
             piece = self.tokens[self.at : self.at + length]
             spoken = tuple(t.word for t in piece)
@@ -144,7 +144,7 @@ class Row:
         return None
 
     def phrase_at(self, start: int) -> Phrase | None:
-        """The noun phrase that begins at `start`, also when what came before took its first words."""
+        """Noun phrase that begins at `start`, also when its first words were taken."""
         whole = self.phrases.get(start)
         if whole is not None:
             return whole
@@ -152,12 +152,12 @@ class Row:
         return None if cut is None else Phrase(tuple(t for t in cut.tokens if t.index >= start))
 
     def take(self, count: int) -> str:
-        """The next words, which are then read."""
+        """Takes the next words."""
         self.at += count
         return " ".join(t.text for t in self.tokens[self.at - count : self.at])
 
     def take_words(self, phrase: Sequence[str]) -> str:
-        """A phrase of the dictionaries, whose words are then read."""
+        """Takes the words of a phrase of the dictionaries."""
         self.at += len(phrase)
         return " ".join(phrase)
 
@@ -166,17 +166,17 @@ class Row:
         return self.tokens[self.at + 1 : self.at + 1 + count]
 
 
-def command_position(items: Sequence[Item]) -> bool:
+def may_begin_command(items: Sequence[Item]) -> bool:
     """Returns whether a command may begin behind these items."""
     return not items or isinstance(items[-1], Separator)
 
 
 @dataclass(frozen=True)
 class Predicate:
-    """A verb, or a form of "to be", with the items behind it; a verb may be one that the robot does not know.
+    """Verb, or a form of "to be", with the items behind it; the robot may not know the verb.
 
-    `verb` is None for what stands before the first verb; `subject` stood before a form of "to be"; `whether` says that
-    "if" or "whether" did.
+    `verb` is None for items before the first verb; `subject` stands before a form of "to be"; `whether` says that "if"
+    or "whether" stands before it.
     """
 
     verb: Verb | Being | Outside | None
@@ -186,12 +186,12 @@ class Predicate:
 
     @property
     def content(self) -> tuple[Item, ...]:
-        """The items but the separators."""
+        """Items without separators."""
         return tuple(item for item in self.items if not isinstance(item, Separator))
 
 
 def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
-    """Cuts the row of items at its verbs."""
+    """Splits the row of items at its verbs."""
     found: list[Predicate] = [Predicate(None)]
     for item in items:
         if isinstance(item, Being):
@@ -205,7 +205,7 @@ def predicates(items: Iterable[Item]) -> tuple[Predicate, ...]:
 
 
 def _ungapped(clause: Predicate) -> Iterator[Predicate]:
-    """Says the verb again where it was left out: "a beer to Robin and a coke to Charlie"."""
+    """Repeats an omitted verb: "a beer to Robin and a coke to Charlie"."""
     items, between = clause.items, range(1, len(clause.items) - 1)
     cut = next((n for n in between if _gives_another(items, n)), None)
     recipient: tuple[Item, ...] = ()
@@ -221,7 +221,7 @@ def _ungapped(clause: Predicate) -> Iterator[Predicate]:
 
 
 def _gives_another(items: Sequence[Item], at: int) -> bool:
-    """Whether somebody else and what they are given stand behind a separator: "me the book and Anna the pen"."""
+    """Returns whether another recipient and object stand behind a separator: "me the book and Anna the pen"."""
     joint, who, what = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
     if not (isinstance(joint, Separator) and isinstance(who, Chunk) and isinstance(what, Chunk)):
         return False
@@ -230,13 +230,13 @@ def _gives_another(items: Sequence[Item], at: int) -> bool:
 
 
 def _gap(items: Sequence[Item], at: int) -> bool:
-    """Returns whether a separator stands between two things that each have a place of the same role."""
-    joint, thing, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
-    if not (isinstance(joint, Separator) and isinstance(thing, Chunk) and isinstance(place, Chunk)):
+    """Returns whether a separator stands between two objects that each have a place of the same role."""
+    joint, what, place = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
+    if not (isinstance(joint, Separator) and isinstance(what, Chunk) and isinstance(place, Chunk)):
         return False
     before = [item for item in items[:at] if isinstance(item, Chunk)]
     bare = any(item.role is None and not item.phrase.speaker for item in before)
-    return thing.role is None and bare and place.role is not None and place.role in [item.role for item in before]
+    return what.role is None and bare and place.role is not None and place.role in [item.role for item in before]
 
 
 def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
@@ -251,8 +251,8 @@ def _begin_being(last: Predicate, being: Being) -> list[Predicate]:
     return [replace(last, items=rest[: len(rest) - whether]), Predicate(asked, (), subject, whether)]
 
 
-def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
-    """Leaves out a bare name before the first verb: it calls somebody ("Michael go to the kitchen")."""
+def drop_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
+    """Removes a bare name before the first verb, which only calls somebody ("Michael go to the kitchen")."""
     first, *rest = clauses or [Predicate(None)]
     name = first.content[0] if len(first.content) == 1 else None
     if first.verb is not None or not rest or not isinstance(name, Chunk) or name.role is not None:
@@ -263,12 +263,12 @@ def without_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
 
 
 def requested_predicates(predicates: Sequence[Predicate]) -> list[Predicate]:
-    """The predicates as they are meant: a place before the first verb behind it, reasons and "check if" left out."""
+    """Normalises predicates: moves a fronted place behind its verb, removes reasons and "check if"."""
     return list(_without_checks(_without_reasons(_with_fronted(_with_verb(predicates)))))
 
 
 def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Says "take" where there is no verb at all: "hammer to the kitchen, please"."""
+    """Adds "take" to a sentence without a verb: "hammer to the kitchen, please"."""
     items = [item for clause in clauses for item in clause.content]
     chunks = [item for item in items if isinstance(item, Chunk)]
     carried = [chunk.role for chunk in chunks] == [None, PrepositionRole.GOAL] and len(chunks) == len(items)
@@ -278,7 +278,7 @@ def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Puts a place that stands before the first verb behind it: "from the kitchen bring me a spoon"."""
+    """Moves a place before the first verb behind it: "from the kitchen bring me a spoon"."""
     if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
         return clauses
     fronted = clauses[0].content
@@ -287,9 +287,9 @@ def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
         return clauses
     if chunks and chunks[0].role is None:  # that vase on the shelf, bring it here
         named = chunks[0].phrase
-        told = all(chunk.role in PLACES for chunk in chunks[1:]) and not (named.pronoun or named.speaker)
+        placed = all(chunk.role in PLACES for chunk in chunks[1:]) and not (named.pronoun or named.speaker)
         meant = [item.phrase for item in clauses[1].items if isinstance(item, Chunk)]
-        if told and any(phrase.pronoun or phrase.text == named.text for phrase in meant):
+        if placed and any(phrase.pronoun or phrase.text == named.text for phrase in meant):
             return (replace(clauses[0], verb=Being("", existential=True, asked=False)), *clauses[1:])
     if not all(chunk.role in PLACES for chunk in chunks):
         return clauses
@@ -297,10 +297,10 @@ def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Leaves out what the speakers say that they are about to do themselves, before or after what is to be done."""
+    """Removes the speakers' own plans before or after the request."""
 
     def own_affair(verb: Verb | Being | Outside | None, before: Sequence[Item]) -> bool:
-        """Whether it is nothing that a robot does, and nothing that it is asked for, either: "I am about to sing"."""
+        """Returns whether the verb is a plan of the speaker and no request: "I am about to sing"."""
         wants = [item.word for item in before if isinstance(item, Unknown)]
         return isinstance(verb, Outside) and verb.word.lower() not in lexicon().asks and wants[-1:] == ["to"]
 
@@ -319,7 +319,7 @@ def _without_reasons(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
-    """Leaves out "see" and "check" before "if there is": the question stands alone."""
+    """Removes "see" and "check" before "if there is": the question stands alone."""
     asks = False
     for clause, after in zip_longest(clauses, clauses[1:]):
         checks = isinstance(clause.verb, Verb) and VerbKind.CHECK in clause.verb.kinds
@@ -332,4 +332,4 @@ def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
 
 
 PLACES: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
-"""The roles of places behind a preposition."""
+"""Roles of places behind a preposition."""

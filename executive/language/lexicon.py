@@ -1,4 +1,4 @@
-"""The dictionaries of verbs and small words, read from their files once."""
+"""Dictionaries of verbs and small words, read from their files once."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Phrase = tuple[str, ...]
 
 
 class VerbKind(enum.Enum):
-    """What a verb asks for."""
+    """Kind of work that a verb asks for."""
 
-    ROUND_TRIP = "round_trip"  # go for a thing and bring it back
-    SINGLE_TRIP = "single_trip"  # carry a thing somewhere
-    PICK = "pick"  # take hold of a thing
-    PLACE = "place"  # set a thing down
-    FIND = "find"  # look for a thing
+    ROUND_TRIP = "round_trip"  # go for an object and bring it back
+    SINGLE_TRIP = "single_trip"  # carry an object somewhere
+    PICK = "pick"  # take hold of an object
+    PLACE = "place"  # set an object down
+    FIND = "find"  # look for an object
     GO = "go"  # go somewhere
     CHECK = "check"  # see whether something is so
     WAIT = "wait"  # stay for a time
@@ -29,28 +29,28 @@ class VerbKind(enum.Enum):
 
 
 class PrepositionRole(enum.Enum):
-    """What a preposition says of the place behind it."""
+    """Role of the place behind a preposition."""
 
     SOURCE = "source"  # from there
     GOAL = "goal"  # to there
-    AT = "at"  # there: where a thing is or belongs, as the verb has it
-    BESIDE = "beside"  # where a thing is, told by what is around it
-    PATH = "path"  # the way there
+    AT = "at"  # there: where an object is or belongs, as the verb has it
+    BESIDE = "beside"  # where an object is, by the objects around it
+    PATH = "path"  # the route there
     FOR = "for"  # for somebody, or what is searched for
 
 
 @cache
 def read_table(name: str) -> Any:
-    """A table of this package: all that is no list or mapping is text, "on" and "no" among it."""
+    """Reads a table of this package; all scalars are text, "on" and "no" among them."""
     text = resources.files(__package__).joinpath("tables", name).read_text(encoding="utf-8")
     return yaml.load(text, Loader=getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
 class Lexicon:
-    """The lists of words in verbs.yaml and words.yaml by their names; phrases are tuples of lower-case words.
+    """Word lists of verbs.yaml and words.yaml by their names; phrases are tuples of lower-case words.
 
-    `corrections` says of each phrase whether it may also be a mere filler; `light_nouns` gives for a verb the nouns
-    that make one act with it ("take a picture").
+    `corrections` says of each phrase whether it may also be a filler; `light_nouns` maps a verb to the nouns that make
+    one act with it ("take a picture").
     """
 
     def __init__(self) -> None:
@@ -84,19 +84,19 @@ class Lexicon:
 
 @cache
 def lexicon() -> Lexicon:
-    """The dictionaries that come with the package."""
+    """Dictionaries that come with the package."""
     return Lexicon()
 
 
 def any_of(phrases: Iterable[str]) -> str:
-    """The regular expression of any one of them, the longest first."""
+    """Regular expression of any of the phrases, the longest first."""
     return "|".join(map(re.escape, sorted(phrases, key=len, reverse=True)))
 
 
 class Patterns:
-    """The regular expressions of a table, or of its section, without regard to case; each is compiled when it is used.
+    """Regular expressions of a table, or of its section, without regard to case; each is compiled when it is used.
 
-    {name} in one stands for another one of the section, of the table, or of `words`.
+    {name} in an expression stands for another one of the section, of the table, or of `words`.
     """
 
     def __init__(self, table: str, section: str | None = None, words: Mapping[str, str] | None = None) -> None:
@@ -111,15 +111,15 @@ class Patterns:
         return found
 
     def compiled(self, text: str) -> re.Pattern[str]:
-        """An expression that stands in no table."""
+        """Compiles an expression that stands in no table."""
         return re.compile(self._filled(text), re.IGNORECASE)
 
     def each(self, name: str) -> tuple[re.Pattern[str], ...]:
-        """The expressions of a list."""
+        """Expressions of a list."""
         return tuple(form for _, form in self.mapping(name))
 
     def mapping(self, name: str) -> tuple[tuple[str, re.Pattern[str]], ...]:
-        """The expressions of a mapping, each with its name; those of a list have numbers."""
+        """Expressions of a mapping, each with its name; those of a list have numbers."""
         if name not in self._mappings:
             entry = self._entry(name)
             rows = entry.items() if isinstance(entry, dict) else enumerate(entry)
@@ -127,11 +127,11 @@ class Patterns:
         return self._mappings[name]
 
     def text(self, name: str) -> str:
-        """An expression as it is written, those that it names filled in."""
+        """Expression as text, with the named ones inserted."""
         return self._words[name] if name in self._words else self._filled(self._entry(name))
 
-    def filled(self, **words: str) -> Patterns:
-        """The same with more words to fill in."""
+    def with_words(self, **words: str) -> Patterns:
+        """Copies it, with more words to insert."""
         return Patterns(self._table, self._section, {**self._words, **words})
 
     def _entry(self, name: str) -> Any:

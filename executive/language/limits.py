@@ -1,4 +1,4 @@
-"""What the robot does not do: harm, ways that it cannot keep to, and what lies out of its reach."""
+"""Limits of the robot: harm, unsupported routes and relations, and objects and places out of reach."""
 
 from __future__ import annotations
 
@@ -21,20 +21,21 @@ _BY_HAND: Final = frozenset({"bring", "carry", "take", "deliver", "take over", "
 
 
 def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> None:
-    """Refuses odd numbers, to carry people, to serve all of a kind, what no hand can hold, and places out of reach.
+    """Refuses invalid numbers, people as objects, all of a kind as recipients, abstract objects, and places out of
+    reach.
 
     Raises:
-        RefusalError: any action is out of reach; it names all that is.
+        RefusalError: an action is out of reach; the error names all such actions.
     """
     counted = (phrase for one in actions for phrase in (one.target, one.time) if phrase is not None)
     odd = [number for phrase in counted if (number := phrase.odd_number)]
     if odd:
-        raise RefusalError(f"{listing(map(repr, odd))} is no number of things; say how many in one whole number", odd)
+        raise RefusalError(f"{listing(map(repr, odd))} is no number of objects; say how many in one whole number", odd)
     carrying = [(one, one.target) for one in actions if one.kind not in _STAYS and one.target is not None]
     goals = [one.goal.phrase for one, _ in carrying if one.goal is not None]
     shared = [goal.spoken for goal in goals if goal is not None and goal.universal]
     if shared:
-        raise RefusalError(f"I bring things to one person at a time, not to {', '.join(shared)}; name one", shared)
+        raise RefusalError(f"I bring objects to one person at a time, not to {', '.join(shared)}; name one", shared)
     people = [f"{one.verb} {target.text}" for one, target in carrying if target.person]
     if people:
         raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
@@ -48,7 +49,7 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
 
 
 def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None) -> RefusalError:
-    """The refusal that names the parts which lie outside the mission, each with the whole clause that it stands in."""
+    """Refusal that names the words which the robot does not understand, each with its whole clause."""
     named = []
     for clause in dict.fromkeys(clause for _, clause in parts):
         words = dict.fromkeys(part for part, other in parts if other == clause)
@@ -59,16 +60,16 @@ def not_understood(parts: Sequence[tuple[str, str]], knowledge: Knowledge | None
 
 
 def _asks_for_people(action: Action) -> bool:
-    """Returns whether it asks where somebody is, or whether there is any person at all ("is anybody in the hall")."""
+    """Returns whether an action looks for a person, or for anybody ("is anybody in the hall")."""
     phrase = action.target if action.kind is VerbKind.FIND else None
     anyone = phrase is not None and phrase.head.word in lexicon().anyone
     return phrase is not None and (anyone or phrase.person or phrase.stands_for_somebody)
 
 
 def _moved(action: Action, target: Phrase) -> bool:
-    """Returns whether a definite thing is taken from or put into a place in the house, so that it is no idea.
+    """Returns whether an action moves a definite object from or to a place in the house, so that it is no idea.
 
-    So is "the mail from the desk", and what is written ("take the report to the boss").
+    Examples are "the mail from the desk", and documents ("take the report to the boss").
     """
     if target.indefinite or action.kind in _STAYS:
         return False
@@ -86,7 +87,7 @@ def _moved(action: Action, target: Phrase) -> bool:
 
 
 def _outside(action: Action, moved: bool) -> Iterator[str]:
-    """The parts of an action that are out of reach; `moved` says that its thing lies in a place of the house."""
+    """Parts of an action that are out of reach; `moved` says that its object lies in a place of the house."""
     target = action.target
     if target is not None:
         odd = target.universal or target.addressed or target.counts
@@ -106,7 +107,7 @@ def _outside(action: Action, moved: bool) -> Iterator[str]:
 
 
 def _holdable(phrase: Phrase, action: Action) -> bool:
-    """Returns whether it is something to be found, and taken where the action takes it."""
+    """Returns whether the robot can find the object, and take it where the action does."""
     find = action.kind is VerbKind.FIND
     if find and action.source is None:
         trade = phrase.kind is NounKind.PERSON and phrase.indefinite and not phrase.named_person  # a good dentist
@@ -127,7 +128,7 @@ def _holdable(phrase: Phrase, action: Action) -> bool:
 
 
 def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
-    """Returns whether going there is something else than a way: "go to bed", "reach my wife"."""
+    """Returns whether going there is an idiom or an act, not a route: "go to bed", "reach my wife"."""
     out = place.preposition.startswith("out")
     if phrase.person and (out or not phrase.named_person) and place.within is None and verb in lexicon().calls:
         return True
@@ -136,7 +137,7 @@ def _idle(phrase: Phrase, place: Location, verb: str) -> bool:
 
 
 def _reachable(phrase: Phrase, place: Location) -> bool:
-    """Whether one can go there, or to somebody; a name in front of a place is somebody's ("Paris at the desk")."""
+    """Returns whether the robot can go there; a name before a place is a person's ("Paris at the desk")."""
     if phrase.known or phrase.person or (place.within is not None and phrase.head.pos == "PROPN"):
         return True
     nominal = phrase.head.pos not in ("ADJ", "ADV") or len(phrase.tokens) > 1
@@ -146,7 +147,7 @@ def _reachable(phrase: Phrase, place: Location) -> bool:
 
 
 def refuse_harm(clauses: Sequence[Predicate]) -> None:
-    """Refuses what does harm. Raises RefusalError, which names the clauses that do."""
+    """Refuses harmful clauses. Raises RefusalError, which names them."""
     harmful = [spoken_words((clause.verb, *clause.items)) for clause in clauses if clause.verb and _does_harm(clause)]
     if harmful:
         raise RefusalError(f"{', '.join(map(repr, harmful))} could hurt somebody or break something", harmful)
@@ -169,16 +170,16 @@ def _does_harm(clause: Predicate) -> bool:
 
 
 def _somebody(phrase: Phrase) -> bool:
-    """Returns whether it is somebody, or a part of them."""
+    """Returns whether the phrase is a person, or a part of one."""
     bare = len(phrase.content) == 1
     living = phrase.person or phrase.speaker or phrase.stands_for_somebody or (bare and phrase.kind is NounKind.PERSON)
     owned = not bare or any(token.tag in ("PRP$", "POS") for token in phrase.tokens)
     return living or (owned and phrase.head.lemma in read_table("harm.yaml")["body"])
 
 
-def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
-    """Refuses a way that is to be taken, and relations to the speaker but "to me". Raises RefusalError."""
-    for place in (place for action in actions for place in action.ways):
+def check_routes_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Action]) -> None:
+    """Refuses a prescribed route, and relations to the speaker other than "to me". Raises RefusalError."""
+    for place in (place for action in actions for place in action.passes):
         if place.phrase is None or place.phrase.head.lemma not in read_table("relations.yaml")["doors"]:
             raise _refused("go", place.preposition, place.name)
     for clause in clauses:
@@ -189,16 +190,16 @@ def check_ways_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Actio
 
 
 def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
-    """Refuses a relation that a command which goes, brings or looks ("go", "bring", "look") does not keep.
+    """Refuses a relation to a place that a command ("go", "bring", "look") does not keep.
 
-    `kinds` is what the place may turn out to be: "room", "surface" or "person". Raises RefusalError.
+    `kinds` are the possible kinds of the place: "room", "surface" or "person". Raises RefusalError.
     """
     name, around = location.phrase, location.within
     if name is None:
         return
     open_top = "surface" in kinds and name.head.lemma.split()[-1] in read_table("relations.yaml")["open_tops"]
-    kept = any(_keeps(act, kind, location.preposition) for kind in kinds)
-    if not kept and not (open_top and _keeps("lie", "open_top", location.preposition)):
+    supported = any(_keeps(act, kind, location.preposition) for kind in kinds)
+    if not supported and not (open_top and _keeps("lie", "open_top", location.preposition)):
         raise _refused(act, location.preposition, name.spoken)
     if around is not None and not _keeps("around", "place", around.preposition):
         raise _refused("around", around.preposition, around.name)
@@ -211,4 +212,4 @@ def _refused(act: str, preposition: str, name: str) -> RefusalError:
 
 def _keeps(act: str, kind: str, preposition: str) -> bool:
     table = read_table("relations.yaml")
-    return any(preposition in table["groups"][group] for group in table["kept"][act][kind])
+    return any(preposition in table["groups"][group] for group in table["supported"][act][kind])

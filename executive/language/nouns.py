@@ -1,7 +1,7 @@
-"""What kind of thing a noun stands for, judged by the nearness of its meaning to examples of each kind.
+"""Kinds of nouns, judged by the nearness of their meaning to examples of each kind.
 
-The examples stand in nouns.yaml by kind. A noun that is no example is judged by linear discriminant analysis on word
-vectors; `errand_train.nouns` learns its weights.
+The examples are in nouns.yaml by kind. Linear discriminant analysis on word vectors judges a noun that is no example;
+`errand_train.nouns` learns its weights.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ _MARGIN: Final = 2.0
 
 
 class NounKind(enum.Enum):
-    """What a noun stands for."""
+    """Kind of a noun's meaning."""
 
-    THING = "thing"  # something that lies about and can be found, and mostly taken
-    PLACE = "place"  # where one can go, or where things are kept
+    THING = "thing"  # an object that can be found, and mostly taken
+    PLACE = "place"  # where one can go, or where objects are stored
     PERSON = "person"  # somebody, animals included
-    VEHICLE = "vehicle"  # where things can be brought to, and which is not carried
+    VEHICLE = "vehicle"  # where objects can be brought to, and which is not carried
     ELSEWHERE = "elsewhere"  # a place out of reach
     ABSTRACT = "abstract"  # nothing that a hand can hold
 
     @property
     def within_reach(self) -> bool:
-        """Returns whether a robot in a house can have to do with it."""
+        """Returns whether a robot in a house can handle or reach it."""
         return self not in (NounKind.ELSEWHERE, NounKind.ABSTRACT)
 
 
 @cache
 def noun_examples() -> Mapping[str, NounKind]:
-    """The examples that come with the package: each noun, or pair of nouns, and its kind."""
+    """Shipped examples: each noun, or pair of nouns, and its kind."""
     table = read_table("nouns.yaml").items()
     kinds = [(NounKind(kind), noun) for kind, fields in table for nouns in fields.values() for noun in nouns]
     return {noun: kind for kind, noun in reversed(kinds)}
@@ -52,7 +52,7 @@ def noun_examples() -> Mapping[str, NounKind]:
 
 @dataclass(frozen=True)
 class NounKinds:
-    """Judges nouns; `weights`, of shape (dimensions + 1, kinds), gives the scores, its last row being constant."""
+    """Classifier of nouns; `weights`, of shape (dimensions + 1, kinds), gives the scores, its last row constant."""
 
     examples: Mapping[str, NounKind]
     vector_of: VectorOf
@@ -60,14 +60,14 @@ class NounKinds:
 
     @classmethod
     def load(cls, vector_of: VectorOf) -> NounKinds:
-        """Judges by the weights in noun_weights.npz, which `python -m errand_train.nouns` writes."""
+        """Loads the weights of noun_weights.npz, which `python -m errand_train.nouns` writes."""
         with resources.files(__package__).joinpath(WEIGHTS_FILE).open("rb") as file, np.load(file) as stored:
             return cls(noun_examples(), vector_of, stored["weights"])
 
     def kind(self, words: Sequence[str], *, lemma: str) -> NounKind | None:
-        """The kind of a noun, the last of `words`, with what stands before it; None when unknown.
+        """Kind of a noun, the last of `words`, with the words before it; None when it is unknown.
 
-        `lemma` is its dictionary form. In doubt it is something within reach.
+        `lemma` is its dictionary form. In doubt the kind is one within reach.
         """
         *before, noun = words
         pairs = [f"{before[-1]} {form}" for form in (noun, lemma)] if before else []
@@ -78,7 +78,7 @@ class NounKinds:
         return None if scores is None else list(NounKind)[int(np.argmax(scores))]
 
     def scores(self, words: Sequence[str]) -> FloatArray | None:
-        """The score of each kind for a noun; the words before it count less."""
+        """Score of each kind for a noun; the words before it count less."""
         vector = self.vector_of(words[-1])
         if vector is None:
             return None

@@ -1,6 +1,7 @@
-"""The dependency parser: spaCy's English model, loaded in little time.
+"""Dependency parser: spaCy's English model, loaded in little time.
 
-spaCy is loaded without the parts that a command never uses, which is most of what loading it takes."""
+spaCy is loaded without the parts that a command never uses, which take most of its loading time.
+"""
 
 from __future__ import annotations
 
@@ -37,7 +38,7 @@ _RELATIONS: Final = {"dobj": "obj", "dative": "iobj", "pobj": "obl", "ROOT": "ro
 
 
 class DependencyParser:
-    """Turns a sentence into words with dependency relations, by spaCy with the English model that comes as a package.
+    """Dependency parser of sentences, by spaCy with the English model that comes as a package.
 
     Its word vectors also judge the kinds of nouns.
     """
@@ -62,14 +63,14 @@ class DependencyParser:
         return NounKinds.load(self.vector)
 
     def release(self) -> None:
-        """Gives the model's memory back; it is loaded anew when it is next needed."""
+        """Frees the model's memory; the parser loads it again when it is next needed."""
         for loaded in ("_model", "_nouns"):
             self.__dict__.pop(loaded, None)
         self._parsed.clear()
 
     def parse(self, text: str) -> tuple[Token, ...]:
-        """The words of `text`, in order; never raises on text. Texts that were parsed last are not parsed again."""
-        from executive.language.tokens import Token, corrected_parse
+        """Parses `text` into words, in order; never raises on text. The latest texts are cached."""
+        from executive.language.tokens import Token, repair_parse
 
         if text not in self._parsed:
             if len(self._parsed) > _KEPT_TEXTS:
@@ -89,11 +90,11 @@ class DependencyParser:
                 for token in self._pipeline(text)
                 if not token.is_space
             )
-            self._parsed[text] = corrected_parse(words)
+            self._parsed[text] = repair_parse(words)
         return self._parsed[text]
 
     def _kind(self, token: SpacyToken) -> NounKind | None:
-        """The kind of a word as a noun, with what stands before it; each is judged once."""
+        """Kind of a word as a noun, with the words before it; cached."""
         if token.pos_ not in _OPEN_CLASS:
             return None
         before = (t.lower_ for t in token.lefts if t.dep_ in _MODIFIERS)
@@ -105,7 +106,7 @@ class DependencyParser:
         return self._kinds[words]
 
     def vector(self, word: str) -> FloatArray | None:
-        """The unit vector of a word's meaning; None when it has none."""
+        """Unit vector of a word's meaning; None when it has none."""
         vocab = self._pipeline.vocab
         row = vocab.vectors.find(key=vocab.strings[word])
         if row < 0:
@@ -120,14 +121,14 @@ class DependencyParser:
         return any(pipeline.vocab.strings[form] in rows.frequent for form in (word.lower(), word.title()))
 
     def similarity(self, word: str, other: str) -> float:
-        """How near two words are in meaning, from -1 to 1; 0 when one has no vector."""
+        """Similarity of two words in meaning, from -1 to 1; 0 when one has no vector."""
         first, second = self._pipeline.vocab[word], self._pipeline.vocab[other]
         return float(first.similarity(second)) if first.has_vector and second.has_vector else 0.0
 
 
 @cache
 def load_parser() -> DependencyParser:
-    """The parser of this process; its model is loaded when it is first needed.
+    """Loads the parser of this process; its model is loaded when it is first needed.
 
     Raises:
         InputError: the model's package is not installed.
@@ -145,9 +146,9 @@ _YAML_OF_SPACY: Final = ("read_yaml", "write_yaml", "yaml_dumps", "yaml_loads", 
 
 
 def load_english(folder: Path) -> tuple[Language, WordRows]:
-    """The pipeline in a folder, and the rows of its word vectors.
+    """Loads the pipeline in a folder, and the rows of its word vectors.
 
-    The store of strings is left out: it holds every word of the vectors, and only the labels are ever looked up. The
+    The store of strings is omitted: it holds every word of the vectors, and only the labels are ever looked up. The
     vectors stay in their file until they are used. The tokenizer's rules come from the folder alone.
     """
     with _small_spacy():
@@ -174,13 +175,13 @@ def load_english(folder: Path) -> tuple[Language, WordRows]:
 
 
 def _affix(find: Callable[[re.Pattern[str], str], Any], pattern: str, nothing: Any = None) -> Callable[[str], Any]:
-    """Finds a pattern, which is compiled once a word needs it: in letters, or a blank, there is nothing to find."""
+    """Finds a pattern, compiled when a word first needs it: words of letters, and blanks, never match."""
     compiled = cache(lambda: re.compile(pattern))
     return lambda word: nothing if word.isascii() and (word.isalpha() or word == " ") else find(compiled(), word)
 
 
 class RuleTokenizer:
-    """spaCy's tokenizer; a rule for a word ("don't", "o'clock") is added once a text holds that word."""
+    """Tokenizer of spaCy, with the rule for a word ("don't", "o'clock") added once a text holds that word."""
 
     def __init__(self, tokenizer: Callable[[str], Doc], rules: Mapping[str, Sequence[Mapping[Any, str]]]) -> None:
         self._tokenizer: Any = tokenizer
@@ -188,7 +189,7 @@ class RuleTokenizer:
 
     @classmethod
     def read(cls, pipeline: Language, file: Path) -> RuleTokenizer:
-        """The tokenizer that a file holds, for a pipeline."""
+        """Reads the tokenizer of a pipeline from a file."""
         import srsly
         from spacy.tokenizer import Tokenizer
 
@@ -204,7 +205,7 @@ class RuleTokenizer:
         return cls(tokenizer, stored["exceptions"])
 
     def __call__(self, text: str) -> Doc:
-        """The words of a text."""
+        """Splits a text into words."""
         for word in [word for word in self._rules if word in text]:
             self._tokenizer.add_special_case(word, self._rules.pop(word))
         doc: Doc = self._tokenizer(text)
@@ -213,9 +214,10 @@ class RuleTokenizer:
 
 @contextmanager
 def _small_spacy() -> Iterator[None]:
-    """While spaCy is imported, stand-ins replace what its pipelines never use and what takes long to import.
+    """Replaces modules that spaCy's pipelines never use, and that take long to import, while spaCy is imported.
 
-    Those are its command line, its YAML, and bridges to other frameworks. Nor does it look for plug-ins of its own.
+    These are its command line, its YAML, and bridges to other frameworks. It also skips the search for plug-ins of its
+    own.
     """
     if "spacy" in sys.modules:
         yield
@@ -237,7 +239,7 @@ def _small_spacy() -> Iterator[None]:
 
 
 FREQUENT_WORDS: Final = 50_000
-"""So many of the words of the model, which are in the order of their frequency, count as English words."""
+"""Number of words of the model, by decreasing frequency, that count as English words."""
 _SEARCHES: Final = 40  # rare words that are searched for in the file before all of it is read
 _MOST_BYTES_OF_ENTRY: Final = 14
 _LARGEST_IN_A_BYTE: Final = 0x7F  # msgpack writes these as they are; else a byte gives the length: 0xcc, 0xcd, 0xce
@@ -250,7 +252,7 @@ class WordRows(Mapping[int, int]):
     """Rows of vectors by the hash of a word, read from a msgpack file when they are needed.
 
     The frequent words are a dictionary. A rarer word is searched for in the bytes of the file, which takes 2 to 3 ms;
-    after 40 of those the whole file becomes the dictionary, as for a file of sentences that takes less time.
+    after 40 searches the whole file becomes the dictionary, which takes less time for many sentences.
     """
 
     def __init__(self, file: Path) -> None:
@@ -259,7 +261,7 @@ class WordRows(Mapping[int, int]):
 
     @cached_property
     def frequent(self) -> Mapping[int, int]:
-        """Rows of the most frequent words, in the order of their frequency."""
+        """Rows of the most frequent words, by decreasing frequency."""
         entries = min(FREQUENT_WORDS, len(self))
         return self._unpacked(entries, _HEADER_BYTES + entries * _MOST_BYTES_OF_ENTRY)
 
@@ -268,7 +270,7 @@ class WordRows(Mapping[int, int]):
         return self._unpacked(len(self), len(self._data))
 
     def _unpacked(self, entries: int, end: int) -> Mapping[int, int]:
-        """The first entries of the file, none of which stands behind the byte `end`."""
+        """First entries of the file, all of them before the byte `end`."""
         from srsly.msgpack import Unpacker
 
         unpacker = Unpacker(max_buffer_size=len(self._data), strict_map_key=False)
@@ -287,7 +289,7 @@ class WordRows(Mapping[int, int]):
         return row
 
     def _rare(self, key: int) -> int | None:
-        """The row of a word that is not frequent; None when it has none."""
+        """Row of a word that is not frequent; None when it has none."""
         if key not in self._searched:
             if len(self._searched) >= _SEARCHES or key.bit_length() <= 32:  # short keys could be part of a longer one
                 return self._all.get(key)

@@ -1,4 +1,4 @@
-"""Noun phrases: which words belong together around a noun, and what they say."""
+"""Noun phrases: the words around a noun, and their meaning."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "ro
 
 @dataclass(frozen=True)
 class Phrase:
-    """A noun with what stands around it.
+    """Noun with the words around it.
 
-    `extra` are the words joined behind it ("of wine"), `of_kind` the kind of what stands behind "of", and `numbered`
-    a count that was said apart from it ("make that two").
+    `extra` are the words joined behind it ("of wine"), `of_kind` is the kind of the noun behind "of", and `numbered` a
+    count that was said apart from it ("make that two").
     """
 
     tokens: tuple[Token, ...]
@@ -38,23 +38,23 @@ class Phrase:
 
     @property
     def head(self) -> Token:
-        """The noun."""
+        """Noun of the phrase."""
         return self.tokens[-1]
 
     @property
     def text(self) -> str:
-        """The words as spoken, without article, possessive and number."""
+        """Words as spoken, without article, possessive and number."""
         return _joined_text((*self.content, *self.extra))
 
     @property
     def singular(self) -> str:
-        """The same with the noun in its dictionary form."""
+        """Text with the noun in its dictionary form."""
         *left, head = self.content
         return _joined_text((*left, head.lemma, *self.extra))
 
     @property
-    def thing(self) -> ObjectKind:
-        """The phrase as a thing: leading adjectives are attributes."""
+    def object_kind(self) -> ObjectKind:
+        """Kind of object that the phrase names: leading adjectives are attributes."""
         words = self.content
         leads = (n for n, t in enumerate(words[:-1]) if not t.adjective)
         first = next(leads, len(words) - 1)
@@ -63,18 +63,18 @@ class Phrase:
 
     @property
     def plural(self) -> bool:
-        """Returns whether the noun stands in the plural."""
+        """Returns whether the noun is in the plural."""
         return self.head.tag in ("NNS", "NNPS")
 
     @property
     def count(self) -> int:
-        """The number said; 1 for a singular, 0 for a plural without a number."""
+        """Number said; 1 for a singular, 0 for a plural without a number."""
         said = self.said_count
         return said if said is not None else 0 if self.plural else 1
 
     @property
     def said_count(self) -> int | None:
-        """The number said, if any; that of "one" and "two" standing alone, too."""
+        """Number said, if any; also that of "one" and "two" alone."""
         said = next((_value(numeral) for numeral in self._numerals()), None)
         if said is None and self.plural and self.tokens[0].word == "both":
             said = 2
@@ -82,7 +82,7 @@ class Phrase:
 
     @property
     def odd_number(self) -> str | None:
-        """The words of a number that is none of things: "one two three", "zero", "infinity", "2.5", "at least two"."""
+        """Words of a number that counts no objects: "one two three", "zero", "infinity", "2.5", "at least two"."""
         odd = next((numeral for numeral in self._numerals() if not _value(numeral)), None)
         left = self.tokens[:-1]
         words = [t.text for t in odd or (t for t in left if t.word in lexicon().no_numbers)]
@@ -91,13 +91,13 @@ class Phrase:
 
     @property
     def pronoun(self) -> bool:
-        """Returns whether it stands for something said before ("it", "one", "two of them")."""
+        """Returns whether it stands for an earlier phrase ("it", "one", "two of them")."""
         word = self.head.word in lexicon().pronouns and not self.stands_for_one
         return word and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
     def stands_for_one(self) -> bool:
-        """Returns whether its noun is "one", told apart by what stands before it ("the red one")."""
+        """Returns whether its noun is "one" with words before it ("the red one")."""
         return self.head.word in _ONE and len(self.tokens) > 1
 
     @property
@@ -107,12 +107,12 @@ class Phrase:
 
     @property
     def speaker(self) -> bool:
-        """Returns whether it is who speaks."""
+        """Returns whether it means the speaker."""
         return len(self.tokens) == 1 and self.head.word in lexicon().speaker
 
     @property
     def person(self) -> bool:
-        """Returns whether it is somebody: a noun for people, or a person's name."""
+        """Returns whether it is a person: a noun for people, or a person's name."""
         return self.head.lemma in lexicon().people or self.head.word in lexicon().people or self.named_person
 
     @property
@@ -129,7 +129,7 @@ class Phrase:
 
     @property
     def proper(self) -> bool:
-        """Returns whether it is written as a name, of whatever kind."""
+        """Returns whether it is written as a name, of any kind."""
         return not self._determined() and all(token.pos == "PROPN" for token in self.tokens)
 
     @property
@@ -140,7 +140,7 @@ class Phrase:
 
     @property
     def addressed(self) -> bool:
-        """Returns whether it is who is spoken to, or a thing of theirs ("your phone"): a robot has none."""
+        """Returns whether it is the addressee, or an object of theirs ("your phone"): a robot has none."""
         if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
             return True
         held = self.kind is NounKind.THING or self.head.lemma in lexicon().fixtures
@@ -158,7 +158,7 @@ class Phrase:
 
     @property
     def kind(self) -> NounKind | None:
-        """What kind of thing it is: of "a piece of advice", what the advice is."""
+        """Kind of the noun: of "a piece of advice", the kind of the advice."""
         meant = self.head.lemma in lexicon().quantities or self.head.lemma in _ENDS
         return self.of_kind if meant and self.of_kind else self.head.kind
 
@@ -173,20 +173,20 @@ class Phrase:
         return _number(self.head) is not None
 
     def with_extra(self, *words: str) -> Phrase:
-        """The phrase with more words behind the noun."""
+        """Adds words behind the noun."""
         return replace(self, extra=(*self.extra, *words))
 
-    def consisting_of(self, inner: Phrase) -> Phrase:
-        """The phrase with "of" and what it consists of behind the noun; of a mere number nothing is held."""
+    def with_contents(self, inner: Phrase) -> Phrase:
+        """Adds "of" and the contents behind the noun; of a mere number nothing can be held."""
         head = replace(self.head, kind=NounKind.ABSTRACT) if inner.counts else self.head
         return replace(self.with_extra("of", inner.text), tokens=(*self.tokens[:-1], head), of_kind=inner.kind)
 
     def with_count(self, count: int) -> Phrase:
-        """So many of the same."""
+        """Sets the number."""
         return replace(self, numbered=count)
 
-    def instead_of_one(self, meant: Phrase) -> Phrase:
-        """The phrase with the noun of `meant` in the place of "one"; its own adjectives hold."""
+    def replace_one(self, meant: Phrase) -> Phrase:
+        """Replaces "one" by the noun of `meant`; its own adjectives stay."""
         noun = [t for t in meant.tokens if not t.adjective and not _is_determiner(t)] or [meant.head]
         single = self.head.word == "one" and meant.plural
         last = replace(noun[-1], text=noun[-1].lemma, tag="NN") if single else noun[-1]
@@ -197,14 +197,14 @@ class Phrase:
 
     @property
     def content(self) -> tuple[Token, ...]:
-        """The words without article, possessive and number."""
+        """Words without article, possessive and number."""
         *left, head = self.tokens
         units = {n for n in range(len(left)) if self._measures(n)}
         mine = {n for n, t in enumerate(left) if t.tag == "POS" and left[n - 1].tag not in ("PRP$", "PRP")}
         return (*(t for n, t in enumerate(left) if n in units | mine or not _is_determiner(t)), head)
 
     def _numerals(self) -> Iterator[tuple[Token, ...]]:
-        """The numbers that count, each in its words side by side; that of a measure does not ("ten inch nails")."""
+        """Yields the numbers that count, each in its successive words, without those of measures ("ten inch nails")."""
         left = tuple(t for n, t in enumerate(self.tokens[:-1]) if not self._measures(n))
         for numeral, run in groupby(
             self.tokens if self.counts else left,
@@ -229,7 +229,7 @@ _TENS: Final = frozenset(range(20, 100, 10))
 
 
 def _joined_text(words: Sequence[Token | str]) -> str:
-    """The words with blanks between them, but none before the "'s" of an owner."""
+    """Joins words by blanks, without one before the "'s" of an owner."""
     text = ""
     for word in words:
         owner = isinstance(word, Token) and word.tag == "POS"
@@ -244,7 +244,7 @@ def _is_determiner(token: Token) -> bool:
 
 
 def _value(numeral: Sequence[Token]) -> int | None:
-    """The number that words side by side make: "twenty one", "two dozen"; None for any others."""
+    """Number that successive words make: "twenty one", "two dozen"; None for other words."""
     first, *rest = map(_number, numeral)
     if first is None or not rest:
         return first
@@ -262,7 +262,7 @@ def _number(token: Token) -> int | None:
 
 
 def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
-    """All noun phrases by the index of their first word; they do not overlap."""
+    """Finds all noun phrases, by the index of their first word; they do not overlap."""
     phrases: dict[int, Phrase] = {}
     end = len(tokens)
     for head in reversed(tokens):
@@ -283,7 +283,7 @@ def noun_phrases(tokens: Sequence[Token]) -> dict[int, Phrase]:
 
 
 def _compound(before: Phrase, phrase: Phrase) -> bool:
-    """Returns whether nouns side by side without an article are one: "the kitchen" and "counter"."""
+    """Returns whether adjacent nouns without an article are one phrase: "the kitchen" and "counter"."""
     if before.head.lemma in lexicon().people and phrase.named_person and phrase.proper:
         return before.head.pos in ("NOUN", "PROPN") and not before.plural
     nouns = before.head.pos == "NOUN" and all(t.pos == "NOUN" for t in phrase.tokens)
@@ -302,7 +302,7 @@ def _is_head(token: Token, tokens: Sequence[Token]) -> bool:
 
 
 def _belongs(token: Token, head: Token, tokens: Sequence[Token]) -> bool:
-    """Returns whether a word before `head` depends on it through words of its own phrase only."""
+    """Returns whether a word before `head` depends on it only through words of its own phrase."""
     for _ in range(_DEEPEST):
         if token.relation not in _LEFT or token.word == "," or token.word in _LOOSE:
             return False

@@ -1,4 +1,4 @@
-"""The steps from a cleaned sentence to its commands, and the trace that they leave."""
+"""Pipeline from a cleaned sentence to its commands, with the trace of its steps."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Final
 
 from executive.language.actions import Action, read_actions
 from executive.language.command_frames import CommandFrame, command_frames, spoken_command
-from executive.language.disfluency import repair_disfluencies, unwanted_things
+from executive.language.disfluency import repair_disfluencies, unwanted_phrases
 from executive.language.grounding import check_unwanted, ground
-from executive.language.items import Being, Item, Predicate, predicates, without_name
+from executive.language.items import Being, Item, Predicate, drop_name, predicates
 from executive.language.lexicon import VerbKind
-from executive.language.limits import check_feasible, check_ways_and_speaker, not_understood, refuse_harm
+from executive.language.limits import check_feasible, check_routes_and_speaker, not_understood, refuse_harm
 from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.phrases import Phrase, noun_phrases
@@ -32,15 +32,15 @@ _MOST_CHARACTERS: Final = 800
 
 @dataclass(frozen=True)
 class Trace:
-    """What each step made of a sentence, in the order of the fields; steps behind a refusal are empty.
+    """Results of each step on a sentence, in the order of the fields; steps behind a refusal are empty.
 
-    The first fields are given. `memory` is what was spoken of before, and afterwards what was spoken of last. `lead`
-    are items that stand before the words, `asked` says that it is a statement to be checked, `elliptic` that it may
-    leave out "it", `recipient` who is given things where it does not say to whom.
+    The first fields are given. `memory` is the memory of earlier sentences, and afterwards of this one. `lead` are
+    items before the words, `asked` marks a statement to check, `elliptic` allows that "it" is left out, `recipient`
+    receives objects where the sentence names nobody.
 
-    `affirmed` is a statement that is checked, without its negation, `unwanted` what stands behind "not", `meanings` are
-    pronouns with what each stood for, `notes` say which name was taken for which. `refused_at` names the step that
-    refused. `steps` is the mission of a sentence that decides, repeats, waits or the like, and `parts` are its clauses.
+    `affirmed` is a checked statement without its negation, `unwanted` are phrases behind "not", `meanings` are pronouns
+    with their meanings, `notes` say which name was taken for which. `refused_at` names the step that refused. `steps`
+    is the mission of a sentence that decides, repeats, waits or the like, and `parts` are its clauses.
     """
 
     text: str
@@ -70,15 +70,15 @@ class Trace:
 
 @dataclass(frozen=True)
 class Pipeline:
-    """The steps from words to commands in one world; with `knowledge` None all names stay as they were spoken."""
+    """Steps from words to commands in one world; with `knowledge` None all names stay as spoken."""
 
     parser: DependencyParser
     knowledge: Knowledge | None
 
     def run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        """The trace after all steps, or those behind one and up to another by their names.
+        """Runs all steps, or those behind one and up to another by their names.
 
-        Never raises on text, which is without wake phrase.
+        Never raises on text, which has no wake phrase.
         """
         names = tuple(_STEPS)
         last = len(names) if upto is None else names.index(upto) + 1
@@ -106,18 +106,18 @@ class Pipeline:
         said = affirmation(trace.tokens, there=there) if trace.asked else Affirmed(trace.tokens)
         items = Reader(said.tokens, noun_phrases(said.tokens), silent=set(said.silent)).read(trace.lead)
         read = replace(trace, tokens=said.tokens, affirmed=said)
-        return replace(read, items=repair_disfluencies(items), unwanted=unwanted_things(items))
+        return replace(read, items=repair_disfluencies(items), unwanted=unwanted_phrases(items))
 
     def _split(self, trace: Trace) -> Trace:
         clauses = predicates(trace.items)
         if not clauses:
             raise RefusalError(f"nothing was said; {ABLE}")
         refuse_harm(clauses)
-        return replace(trace, clauses=clauses if self.knowledge else without_name(clauses))
+        return replace(trace, clauses=clauses if self.knowledge else drop_name(clauses))
 
     def _act(self, trace: Trace) -> Trace:
-        told = trace.elliptic and bool(trace.memory.things)
-        return replace(trace, actions=read_actions(trace.clauses, told=told, recipient=trace.recipient))
+        elliptic = trace.elliptic and bool(trace.memory.objects)
+        return replace(trace, actions=read_actions(trace.clauses, elliptic=elliptic, recipient=trace.recipient))
 
     def _check(self, trace: Trace) -> Trace:
         """Refuses the whole sentence when any part of it was not understood."""
@@ -131,11 +131,11 @@ class Pipeline:
                 raise _choosing(choice, trace.tokens)
             notes.append(f"of {listing((one.spoken for one in choice), last='or')} I take the first")
         if self.knowledge is not None:
-            check_ways_and_speaker(trace.clauses, trace.actions)
+            check_routes_and_speaker(trace.clauses, trace.actions)
         if not any(action.kind for action in trace.actions):
-            told = [phrase.text for action in trace.actions for phrase in action.objects]
-            of = f" of {listing(told)}" if told else ""
-            raise RefusalError(f"nothing to do was said{of}; {ABLE}", told, kind=RefusalKind.NOTHING_TO_DO)
+            phrases = [phrase.text for action in trace.actions for phrase in action.objects]
+            of = f" of {listing(phrases)}" if phrases else ""
+            raise RefusalError(f"nothing to do was said{of}; {ABLE}", phrases, kind=RefusalKind.NOTHING_TO_DO)
         return replace(trace, notes=(*trace.notes, *notes))
 
     def _refer(self, trace: Trace) -> Trace:
@@ -155,13 +155,13 @@ class Pipeline:
 
 
 def _choosing(choice: Sequence[Phrase], tokens: Sequence[Token]) -> RefusalError:
-    """The question which of several is meant, where only one can be."""
+    """Question about phrases joined by "or", where only one can be meant."""
     heard = " ".join(t.text for t in tokens[choice[0].content[0].index : choice[-1].head.index + 1]).replace(" ,", ",")
     place = all(phrase.kind is NounKind.PLACE for phrase in choice)
     slot = Slot.PLACE if place else Slot.PERSON if all(phrase.person for phrase in choice) else Slot.THING
     noun = choice[-1].head.text
     names = (f"{p.text} {noun}" if is_attribute(p.head.text) else p.text for p in choice)
-    question = which_question(slot, slot.value, tuple(dict.fromkeys(names)))
+    question = which_question(slot, slot.noun, tuple(dict.fromkeys(names)))
     return RefusalError(question.text, (heard,), question=replace(question, heard=heard))
 
 

@@ -1,6 +1,6 @@
-"""One question back to the speaker, what a sentence becomes by the answer, and refusals.
+"""Questions to the speaker, their answers, and refusals.
 
-The answer is put into the sentence, which is then understood anew: so it goes through the same steps as all else.
+The answer is inserted into the sentence, which is then understood again by the same steps.
 """
 
 from __future__ import annotations
@@ -14,26 +14,31 @@ from typing import Any, Final
 from executive.words.mission import QuestionPolicy
 from skills.files.errors import listing
 
-ABLE: Final = "I can fetch, take, put and find things, go to places, wait and charge"
+ABLE: Final = "I can fetch, take, put and find objects, go to places, wait and charge"
 ALIKE_SOUND: Final = 0.2
 _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 
 
 class Slot(Enum):
-    """What a question asks for."""
+    """Role of the name that a question asks for."""
 
-    THING = "thing"  # which thing
+    THING = "thing"  # which object
     PLACE = "place"  # which place
     PERSON = "person"  # which person
     GOAL = "goal"  # where to; nothing was said of it
 
+    @property
+    def noun(self) -> str:
+        """Noun for the role in a sentence."""
+        return "object" if self is Slot.THING else self.value
+
 
 @dataclass(frozen=True)
 class ClarifyingQuestion:
-    """What the robot asks before it acts.
+    """Question that the robot asks before it acts.
 
-    `candidates` are the answers to choose from, empty when any name will do; `default` is the likeliest of them;
-    `heard` is what was said in the answer's place, None when nothing was.
+    `candidates` are the possible answers, empty when any name will do; `default` is the likeliest of them; `heard` are
+    the words that the answer replaces, None when it is added.
     """
 
     text: str
@@ -43,16 +48,16 @@ class ClarifyingQuestion:
     heard: str | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """The question as JSON values."""
+        """Returns the question as JSON values."""
         return {**asdict(self), "slot": self.slot.value, "candidates": list(self.candidates)}
 
 
 Answerer = Callable[[ClarifyingQuestion], str | None]
-"""Answers a question, or leaves it open (None)."""
+"""Function that answers a question, or leaves it open (None)."""
 
 
-def answer_by(policy: QuestionPolicy, person: Answerer | None = None) -> Answerer:
-    """Who answers under a policy; `person` asks somebody, and is None where nobody is there."""
+def make_answerer(policy: QuestionPolicy, person: Answerer | None = None) -> Answerer:
+    """Makes the answerer of a policy; `person` asks somebody, and is None where nobody is there."""
     if policy is QuestionPolicy.FIRST:
         return lambda question: question.default or next(iter(question.candidates), None)
     if policy is QuestionPolicy.ASK and person is not None:
@@ -61,26 +66,26 @@ def answer_by(policy: QuestionPolicy, person: Answerer | None = None) -> Answere
 
 
 def which_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
-    """Which of several that one name could mean."""
+    """Question which of several candidates a name means."""
     text = f"Which {heard}: {listing(candidates, last='or')}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 
 def perhaps_question(slot: Slot, heard: str, candidates: tuple[str, ...]) -> ClarifyingQuestion:
-    """Returns whether an unknown name stands for a known one."""
+    """Question whether an unknown name stands for a known one."""
     quoted = listing((f"'{name}'" for name in candidates), last="or")
-    text = f"I know no {slot.value} '{heard}'; did you mean {quoted}?"
+    text = f"I know no {slot.noun} '{heard}'; did you mean {quoted}?"
     return ClarifyingQuestion(text, slot, candidates, candidates[0], heard)
 
 
 def open_question(reason: str, heard: str | None) -> ClarifyingQuestion:
-    """What the sentence does not say at all: where to, or what "it" and "there" stand for."""
+    """Question about missing words: the destination, or the meaning of "it" and "there"."""
     slot = Slot.GOAL if heard is None else Slot.PLACE if heard in _PLACE_WORDS else Slot.THING
     return ClarifyingQuestion(f"{reason[:1].upper()}{reason[1:]}", slot, heard=heard)
 
 
 def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
-    """The candidate that an answer means: by its number, its name, a word of it, or nearly so; None when unclear."""
+    """Candidate of an answer: by its number, its name, a word of it, or a similar one; None when unclear."""
     words = _FILLERS.sub("", answer.lower()).strip(" ,.!?")
     said = re.sub(r"\s+(?:one|please)$", "", _LEADING.sub("", words)).strip(" ,.!?")
     for number, candidate in enumerate(question.candidates, 1):
@@ -98,8 +103,8 @@ def chosen_candidate(question: ClarifyingQuestion, answer: str) -> str | None:
     return None
 
 
-def with_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
-    """The sentence with the answer in its place: the candidate that it means, else the answer's own words."""
+def insert_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str:
+    """Inserts the answer into the sentence: the candidate that it means, otherwise its own words."""
     value = chosen_candidate(question, answer) or _FILLERS.sub("", answer).strip(" ,.!?")
     if question.heard is None:
         return f"{sentence.rstrip(' .,!?')} {_whereto(value)}"
@@ -115,7 +120,7 @@ def with_answer(sentence: str, question: ClarifyingQuestion, answer: str) -> str
 
 
 def _nearly(question: ClarifyingQuestion, said: str) -> list[str]:
-    """Candidates that the answer is a slip for, or sounds like."""
+    """Candidates of which the answer is a misspelling, or that sound like it."""
     from rapidfuzz.distance import OSA
 
     from executive.language.spelling import nearest_by_sound
@@ -147,16 +152,16 @@ _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth")
 
 
 class RefusalKind(Enum):
-    """Why a sentence cannot become commands, for those who decide by it; the reason tells people."""
+    """Machine-readable kind of a refusal; its reason is for people."""
 
     NOT_UNDERSTOOD = "not_understood"  # words that lie outside of what the robot does
-    NOTHING_TO_DO = "nothing_to_do"  # it only tells something
+    NOTHING_TO_DO = "nothing_to_do"  # it asks for no action
     NO_SUCH_DOOR = "no_such_door"
     OTHER = "other"
 
 
 class RefusalError(Exception):
-    """The sentence cannot become commands: the reason in one line, and the words that were not understood.
+    """Refusal of a sentence: the reason in one line, and the words that were not understood.
 
     `question` says that an answer from the speaker would help, or is the question itself.
     """

@@ -1,4 +1,4 @@
-"""Reading of the words, from left to right, as a row of items."""
+"""Reader of the words of a sentence, from left to right, as a row of items."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from executive.language.items import (
     Unknown,
     Verb,
     Whether,
-    command_position,
+    may_begin_command,
     verb,
 )
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
@@ -35,14 +35,14 @@ _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)")
-"""Behind these "but" means "except"."""
+"""Words behind which "but" means "except"."""
 
 
 class Reader(Row):
-    """Reads the words of a sentence from left to right."""
+    """Reader of the words of a sentence from left to right."""
 
     def read(self, lead: Sequence[Item] = ()) -> tuple[Item, ...]:
-        """Reads the words as items behind `lead`: every word but the silent ones is in one of them."""
+        """Reads the words as items behind `lead`: each word becomes an item, except the silent ones."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
             *(partial(step, self) for step in INDIRECT),
@@ -62,7 +62,7 @@ class Reader(Row):
         return tuple(items)
 
     def _mark(self, items: list[Item]) -> Item | None:
-        """What takes something back: "not", "no, the hammer"; "no milk" does not."""
+        """Reads a negation or correction: "not", "no, the hammer"; "no milk" is none."""
         correction, negation = (self.match(lexicon().corrections), self.match(lexicon().negations))
         if correction is not None and len(correction) >= len(negation or ()):
             behind = self.tokens[self.at + len(correction) : self.at + len(correction) + 1]
@@ -81,7 +81,7 @@ class Reader(Row):
         return verb(" ".join(found))
 
     def _takes_preposition(self, verb: tuple[str, ...]) -> bool:
-        """Returns whether the last word of a verb rather begins a longer preposition ("go | in front of")."""
+        """Returns whether the last word of a verb begins a longer preposition instead ("go | in front of")."""
         if verb[:-1] not in lexicon().verbs:
             return False
         start = self.at + len(verb) - 1
@@ -92,10 +92,10 @@ class Reader(Row):
         return any(ahead[:n] in lexicon().prepositions for n in range(2, len(ahead) + 1))
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
-        """A verb that stands as "bringing" or "brought" where a command begins, as behind "would you mind"."""
+        """Verb in the form "bringing" or "brought" where a command begins, as behind "would you mind"."""
         first = self.tokens[self.at]
         past = first.tag in ("VBD", "VBN") and not items
-        if not (past or (first.tag == "VBG" and command_position(items))):
+        if not (past or (first.tag == "VBG" and may_begin_command(items))):
             return None
         spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + LONGEST]))
         return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in lexicon().verbs), None)
@@ -106,7 +106,7 @@ class Reader(Row):
         if token.pos == "VERB" and token.tag in _VERB_TAGS and not inside:
             return True
         following = self.tokens[self.at + length : self.at + length + 1]
-        return command_position(items) and bool(following) and following[0].word not in _SEPARATORS
+        return may_begin_command(items) and bool(following) and following[0].word not in _SEPARATORS
 
     def _being(self, items: list[Item]) -> Item | None:
         token, after = self.tokens[self.at], self.ahead()
@@ -136,7 +136,7 @@ class Reader(Row):
         return Chunk(phrase, " ".join(preposition), lexicon().prepositions[preposition] if preposition else None)
 
     def _level(self, items: list[Item]) -> Item | None:
-        """ "Upstairs": where to, or where to look; before a place it says nothing more."""
+        """ "Upstairs": a destination, or a place to search; before a place it adds nothing."""
         token, ahead = self.tokens[self.at], self.ahead()
         if token.word not in lexicon().levels:
             return None
@@ -150,9 +150,9 @@ class Reader(Row):
         return _place(token, PrepositionRole.AT if looks else PrepositionRole.GOAL)
 
     def _shown_at(self, start: int) -> Phrase | None:
-        """The noun phrase behind a "that" which was not read as its article ("hand me that cup")."""
-        shown = start < len(self.tokens) and self.tokens[start].word in _SHOWN
-        phrase = self.phrase_at(start + 1) if shown else None
+        """Noun phrase behind a "that" which was not parsed as its article ("hand me that cup")."""
+        points = start < len(self.tokens) and self.tokens[start].word in _SHOWN
+        phrase = self.phrase_at(start + 1) if points else None
         if phrase is None or phrase.named_person or phrase.head.word in lexicon().subjects:
             return None
         return Phrase((replace(self.tokens[start], tag="DT", pos="DET"), *phrase.tokens))
@@ -166,7 +166,7 @@ class Reader(Row):
             self.at += 1 + len(inner.tokens)
             whole = phrase.counts or phrase.head.word in ("all", "both")
             counted = replace(inner, tokens=(*phrase.tokens, *inner.tokens))
-            phrase = counted if whole else phrase.consisting_of(inner)
+            phrase = counted if whole else phrase.with_contents(inner)
         return phrase
 
     def _numbered(self, phrase: Phrase) -> Phrase:
@@ -179,7 +179,7 @@ class Reader(Row):
         return phrase.with_extra(self.take(1))
 
     def _description_end(self, phrase: Phrase) -> int:
-        """Where what tells somebody or something apart ends: what they do, what they wear, what it has."""
+        """End of a description behind a noun: of a person's action or clothes, or of an object's contents."""
         if self.at >= len(self.tokens):
             return self.at
         here = [t.word for t in (self.tokens[self.at], *self.ahead())]
@@ -201,7 +201,7 @@ class Reader(Row):
         return end
 
     def _doing_end(self) -> int:
-        """The end of "raising their left arm" or "wearing a blue shirt": what is done, and in which direction."""
+        """End of "raising their left arm" or "wearing a blue shirt"."""
         end = self.at + 1
         inner = self.phrase_at(end)
         if inner is not None and not inner.person:
@@ -211,7 +211,7 @@ class Reader(Row):
         return end
 
     def _directional(self, start: int) -> int:
-        """How many words from `start` on tell a direction or a posture."""
+        """Number of words from `start` that give a direction or a posture."""
         if self.tokens[start].relation == "prt":
             return 1
         preposition = int(self.tokens[start].pos in ("ADP", "PART"))
@@ -248,7 +248,7 @@ class Reader(Row):
         return None if filler is None else Separator(self.take_words(filler))
 
     def _idle(self, items: Sequence[Item]) -> bool:
-        """Whether the next word says nothing where it stands: in "that clamp over there", "I need like a towel"."""
+        """Returns whether the next word adds nothing: in "that clamp over there", "I need like a towel"."""
         token, behind = self.tokens[self.at], self.ahead()
         if token.word in lexicon().there and self._points(items):
             return True
@@ -263,12 +263,12 @@ class Reader(Row):
 
     def _points(self, items: Sequence[Item]) -> bool:
         """Returns whether "over there" only goes with a "that", as in "that clamp over there"."""
-        thing = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
+        named = next((item for item in reversed(items) if not isinstance(item, Separator)), None)
         behind = self.ahead()
         beyond = self.tokens[self.at - 1].word == "over" or (bool(behind) and behind[0].tag == "IN")
-        if not isinstance(thing, Chunk) or thing.role is not None or not beyond:
+        if not isinstance(named, Chunk) or named.role is not None or not beyond:
             return False
-        return thing.phrase.tokens[0].word in _SHOWN and not thing.phrase.pronoun
+        return named.phrase.tokens[0].word in _SHOWN and not named.phrase.pronoun
 
     def _particle(self, items: list[Item]) -> tuple[str, ...] | None:
         """Joins a particle to its verb: "put the cup down"."""
@@ -283,13 +283,13 @@ class Reader(Row):
         return (particle,)
 
     def _outside(self, items: list[Item]) -> Item | None:
-        """A verb that the robot does not know, where a clause may begin."""
+        """Verb that the robot does not know, where a clause may begin."""
         token = self.tokens[self.at]
-        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (command_position(items) or token.tag == "VB"):
+        if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (may_begin_command(items) or token.tag == "VB"):
             return None
         return Outside(self.take(1))
 
 
 def _place(token: Token, role: PrepositionRole) -> Chunk:
-    """A word as a place."""
+    """Makes a place of a word."""
     return Chunk(Phrase((replace(token, pos="NOUN", tag="NN", kind=NounKind.PLACE),)), "", role)

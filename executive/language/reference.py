@@ -1,4 +1,4 @@
-"""What "it", "one" and "there" stand for, and where a thing is that the sentence only tells of."""
+"""Reference resolution: the meanings of "it", "one" and "there", and the places of objects in statements."""
 
 from __future__ import annotations
 
@@ -15,103 +15,103 @@ from executive.language.roles import THERE, Location
 
 @dataclass(frozen=True)
 class Memory:
-    """What was last spoken of: things, where they are, a place, a person.
+    """Latest referents of the conversation: objects, their location, a place, a person.
 
-    `gathered` are all things that were spoken of since one was last carried somewhere, `told` where things were said
-    to be.
+    `gathered` are all objects named since one was last carried somewhere, `locations` are those of objects in
+    statements.
     """
 
-    things: tuple[Phrase, ...] = ()
+    objects: tuple[Phrase, ...] = ()
     gathered: tuple[Phrase, ...] = ()
     where: Location | None = None
     place: Location | None = None
     person: Location | None = None
-    told: tuple[tuple[Phrase, Location], ...] = ()
+    locations: tuple[tuple[Phrase, Location], ...] = ()
 
-    def where_is(self, thing: Phrase) -> Location | None:
-        """Where a thing of that name was said to be."""
-        return next((place for told, place in reversed(self.told) if told.head.lemma == thing.head.lemma), None)
+    def where_is(self, item: Phrase) -> Location | None:
+        """Location that a statement gave for an object of that name."""
+        return next((place for phrase, place in reversed(self.locations) if phrase.head.lemma == item.head.lemma), None)
 
 
 @dataclass(frozen=True)
-class Resolved:
-    """The actions of a sentence without pronouns, what was spoken of last, and each pronoun with what it stood for."""
+class Resolution:
+    """Actions of a sentence without pronouns, the memory after it, and each pronoun with its meaning."""
 
     actions: tuple[Action, ...] = ()
     memory: Memory = field(default_factory=Memory)
     meanings: tuple[tuple[str, str], ...] = ()
 
 
-def resolve(actions: Sequence[Action], memory: Memory) -> Resolved:
-    """The actions, each on one thing at most and without pronouns; `memory` is what was spoken of before.
+def resolve(actions: Sequence[Action], memory: Memory) -> Resolution:
+    """Replaces pronouns in actions, each then with one object at most; `memory` is that of earlier sentences.
 
     Raises:
-        RefusalError: a pronoun stands for nothing that was said.
+        RefusalError: a pronoun stands for no earlier phrase.
     """
-    resolved = Resolved(memory=memory)
+    resolved = Resolution(memory=memory)
     for action in actions:
         resolved = _stated(action, resolved) if action.kind is None else _done(action, resolved)
     return resolved
 
 
-def _done(action: Action, before: Resolved) -> Resolved:
+def _done(action: Action, before: Resolution) -> Resolution:
     memory = before.memory
     again = any(phrase.pronoun for phrase in action.objects)
     meant = _all_meant(action.objects, memory)
-    things = tuple(_named_before(thing, action, before.actions) or thing for thing in meant)
+    objects = tuple(_named_before(item, action, before.actions) or item for item in meant)
     goal, source = (_place(place, memory) for place in (action.goal, action.source))
     to = None if action.goal is None else action.goal.phrase
     taken = before.actions[-1].source if before.actions else None
     if again and to is not None and to.pronoun and goal is not None and goal == taken:  # put it next to it
         raise RefusalError(f"which place is {to.text!r}?", [to.text], question=True)
-    told = again or any(phrase.stands_for_one for phrase in action.objects)
-    source = source or (memory.where if told else None)
+    refers = again or any(phrase.stands_for_one for phrase in action.objects)
+    source = source or (memory.where if refers else None)
     person = next((place for place in (goal, source) if place is not None and place.living), memory.person)
     after = Memory(
-        things=things or memory.things,
-        gathered=() if goal is not None else tuple(dict.fromkeys((*memory.gathered, *things))),
-        where=source if again or not things else None,
+        objects=objects or memory.objects,
+        gathered=() if goal is not None else tuple(dict.fromkeys((*memory.gathered, *objects))),
+        where=source if again or not objects else None,
         place=goal or source or memory.place,
         person=person,
-        told=memory.told,
+        locations=memory.locations,
     )
     bare = replace(action, objects=(), source=source, goal=goal, again=again)
     each = tuple(
         replace(
             bare,
-            objects=(thing,),
-            source=source or (memory.where_is(thing) if action.kind is not VerbKind.GO else None),
-            again=again or thing not in meant,
+            objects=(item,),
+            source=source or (memory.where_is(item) if action.kind is not VerbKind.GO else None),
+            again=again or item not in meant,
         )
-        for thing in things
+        for item in objects
     )
-    return Resolved(
-        (*before.actions, *(each if things else (bare,))), after, (*before.meanings, *_meanings(action, memory))
+    return Resolution(
+        (*before.actions, *(each if objects else (bare,))), after, (*before.meanings, *_meanings(action, memory))
     )
 
 
-def _named_before(thing: Phrase, action: Action, actions: Sequence[Action]) -> Phrase | None:
-    """The thing that was taken before under the same name: "get the bread, go to the hall and put the bread there"."""
-    if thing.indefinite or action.source is not None or action.kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
+def _named_before(item: Phrase, action: Action, actions: Sequence[Action]) -> Phrase | None:
+    """Object of an earlier action under the same name: "get the bread, go to the hall and put the bread there"."""
+    if item.indefinite or action.source is not None or action.kind not in (VerbKind.PLACE, VerbKind.SINGLE_TRIP):
         return None
     taken = (one.target for one in reversed(actions) if one.target is not None and one.kind is not VerbKind.PLACE)
-    return next((target for target in taken if target.text.lower() == thing.text.lower()), None)
+    return next((target for target in taken if target.text.lower() == item.text.lower()), None)
 
 
 def _meanings(action: Action, memory: Memory) -> Iterator[tuple[str, str]]:
-    """Each pronoun of an action with what it stands for."""
+    """Yields each pronoun of an action with its meaning."""
     for n, phrase in enumerate(action.objects):
         meant = _all_meant(action.objects[: n + 1], memory)[n:]
         if meant != (phrase,):
-            yield phrase.text, " and ".join(thing.text for thing in meant)
+            yield phrase.text, " and ".join(item.text for item in meant)
     for place in (action.source, action.goal):
         found = _place(place, memory)
         if place is not None and found is not None and found != place:
             yield (THERE.preposition if place.phrase is None else place.phrase.text), found.text
 
 
-def _stated(action: Action, before: Resolved) -> Resolved:
-    """Remember a statement; "it is in the drawer" tells where the thing of an earlier action is."""
+def _stated(action: Action, before: Resolution) -> Resolution:
+    """Remembers a statement; "it is in the drawer" gives the place of an earlier action's object."""
     memory = before.memory
     where = _place(action.source, memory)
     somebody = any(phrase.stands_for_somebody for phrase in action.objects)
@@ -121,57 +121,59 @@ def _stated(action: Action, before: Resolved) -> Resolved:
         return replace(before, actions=actions, memory=replace(memory, person=met, place=where))
     teller = None if action.teller is None else Location(action.teller, within=None if action.objects else where)
     memory = replace(memory, where=where, place=where or memory.place, person=teller or memory.person)
-    animal = somebody and any(thing.kind is NounKind.PERSON for thing in memory.things)
+    animal = somebody and any(item.kind is NounKind.PERSON for item in memory.objects)
     if not animal and not any(phrase.pronoun for phrase in action.objects):
-        return replace(before, memory=_told(action, where, memory))
-    told = tuple(
-        replace(one, source=where) if one.target in memory.things and one.source is None else one
+        return replace(before, memory=_remember(action, where, memory))
+    placed = tuple(
+        replace(one, source=where) if one.target in memory.objects and one.source is None else one
         for one in before.actions
     )
-    return replace(before, actions=told, memory=memory)
+    return replace(before, actions=placed, memory=memory)
 
 
-def _told(action: Action, where: Location | None, memory: Memory) -> Memory:
-    """The memory after a statement of where somebody or something is."""
+def _remember(action: Action, where: Location | None, memory: Memory) -> Memory:
+    """Memory after a statement on the place of a person or an object."""
     people = [phrase for phrase in action.objects if phrase.person]
     if people:
         return replace(memory, person=Location(people[-1], within=where))
-    told = () if where is None else tuple((phrase, where) for phrase in action.objects)
+    locations = () if where is None else tuple((phrase, where) for phrase in action.objects)
     called = [phrase for phrase in action.objects if phrase.proper]
     person = memory.person
     if called:
         *left, head = called[-1].tokens
         named = replace(called[-1], tokens=(*left, replace(head, kind=NounKind.PERSON)))
         person = Location(named, within=where)
-    return replace(memory, person=person, things=action.objects or memory.things, told=(*memory.told, *told))
+    return replace(
+        memory, person=person, objects=action.objects or memory.objects, locations=(*memory.locations, *locations)
+    )
 
 
 def _all_meant(phrases: Sequence[Phrase], memory: Memory) -> tuple[Phrase, ...]:
-    """What the objects of an action stand for; each may stand for one before it ("the big box and the small one")."""
-    things: list[Phrase] = []
+    """Meanings of all objects of an action; each may refer to an earlier one ("the big box and the small one")."""
+    objects: list[Phrase] = []
     for phrase in phrases:
-        meant = _meant(phrase, replace(memory, things=tuple(things) or memory.things))
-        again = phrase.stands_for_one and bool(things) and meant[0].text == things[-1].text
-        things += [] if again else meant
-    return tuple(things)
+        meant = _meant(phrase, replace(memory, objects=tuple(objects) or memory.objects))
+        again = phrase.stands_for_one and bool(objects) and meant[0].text == objects[-1].text
+        objects += [] if again else meant
+    return tuple(objects)
 
 
 def _meant(phrase: Phrase, memory: Memory) -> Sequence[Phrase]:
-    """What a phrase stands for: itself, unless it is "it", "two of them" or "the red one"."""
+    """Meaning of a phrase: itself, unless it is "it", "two of them" or "the red one"."""
     if not (phrase.pronoun or phrase.stands_for_one):
         return [phrase]
-    if not memory.things:
+    if not memory.objects:
         raise RefusalError(f"what does {phrase.text!r} stand for?", [phrase.text], question=True)
     if phrase.stands_for_one:
-        return [phrase.instead_of_one(memory.things[-1])]
-    if phrase.head.word in ("them", "they", "these", "those") and len(memory.gathered) > len(memory.things):
+        return [phrase.replace_one(memory.objects[-1])]
+    if phrase.head.word in ("them", "they", "these", "those") and len(memory.gathered) > len(memory.objects):
         return memory.gathered
     said = phrase.said_count
-    return memory.things if said is None else [thing.with_count(said) for thing in memory.things]
+    return memory.objects if said is None else [item.with_count(said) for item in memory.objects]
 
 
 def _place(place: Location | None, memory: Memory) -> Location | None:
-    """The place that was meant: "there" is the last one, "her" the last person."""
+    """Meaning of a place: "there" is the last place, "her" the last person."""
     phrase = None if place is None else place.phrase
     pronoun = phrase is not None and (phrase.pronoun or phrase.stands_for_one or phrase.stands_for_somebody)
     if place is None or not (place == THERE or pronoun):

@@ -1,4 +1,4 @@
-"""The roles in a clause: what its verb is done to, from where, to where and for whom."""
+"""Roles in a clause: the object of its verb, source, goal and recipient."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from executive.language.phrases import Phrase
 
 @dataclass(frozen=True)
 class Location:
-    """A place or a person as spoken.
+    """Place or person as spoken.
 
-    `preposition` stood before it; `within` tells it more closely ("the table in the kitchen"), and for a person where
-    they are to be found. `phrase` is None for HERE and THERE.
+    `preposition` stands before it; `within` is a larger place around it ("the table in the kitchen"), and for a person
+    the place where to find them. `phrase` is None for HERE and THERE.
     """
 
     phrase: Phrase | None
@@ -26,37 +26,37 @@ class Location:
 
     @property
     def person(self) -> bool:
-        """Returns whether it is somebody."""
+        """Returns whether it is a person."""
         return self.phrase is not None and self.phrase.person
 
     @property
     def living(self) -> bool:
-        """Returns whether it is somebody, of whatever trade, or an animal: "him" and "her" can mean them."""
+        """Returns whether it is a person of any profession, or an animal: "him" and "her" can mean it."""
         return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
 
     @property
     def kind(self) -> NounKind | None:
-        """What kind of place, or somebody, it is."""
+        """Kind of place, or person."""
         return None if self.phrase is None else self.phrase.kind
 
     @property
     def role(self) -> PrepositionRole | None:
-        """What its preposition says of it."""
+        """Role of its preposition."""
         return lexicon().prepositions.get(tuple(self.preposition.split()))
 
     @property
     def every_room(self) -> bool:
-        """Returns whether all rooms are meant."""
+        """Returns whether it means all rooms."""
         return self.phrase is not None and self.phrase.universal and self.phrase.singular.split()[-1] == "room"
 
     @property
     def name(self) -> str:
-        """The words of the place itself, without articles; "start" for HERE."""
+        """Words of the place itself, without articles; "start" for HERE."""
         return "start" if self.phrase is None else self.phrase.text
 
     @property
     def text(self) -> str:
-        """The words with what tells it more closely."""
+        """Words of the place with the larger place around it."""
         if self.within is None:
             return self.name
         return f"{self.name} {self.within.preposition} {self.within.text}"
@@ -72,11 +72,10 @@ THERE: Final = Location(None, preposition="there")
 
 @dataclass
 class Roles:
-    """What stands behind a verb, sorted: bare noun phrases, places by their prepositions, and what is left over.
+    """Items behind a verb, sorted into noun phrases, places by their prepositions, and unknown words.
 
-    `first_at` is where the first of the bare phrases is to be found when that is somebody, `listed` says that "and"
-    stands between them. `choices` are phrases with "or" between them. `favour` says that the recipient stood
-    behind "for".
+    `first_at` is the place of the first bare phrase when that is a person, `listed` says that "and" stands between the
+    phrases. `choices` are phrases joined by "or". `favour` says that the recipient stood behind "for".
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -94,7 +93,7 @@ class Roles:
     favour: bool = False
 
     def add(self, one: _Placed) -> None:
-        """Sorts in a phrase with the place around it, by its preposition."""
+        """Adds a phrase with the place around it, by its preposition."""
         phrase, role, location = one.chunk.phrase, one.chunk.role, one.location
         joined = bool(one.joint and self.goals)
         if role is None:
@@ -118,7 +117,7 @@ class Roles:
         last = self.objects[-1] if self.objects else None
         distinct_objects = last is not None and not (last.speaker or last.person) and phrase.stands_for_one
         if last is not None and distinct_objects and one.joint in _LISTING and one.within is None:
-            self.objects[-1] = phrase.instead_of_one(last)
+            self.objects[-1] = phrase.replace_one(last)
             return
         places = self.goals or self.ats
         another = phrase.kind is NounKind.THING and bool(places and self.objects)  # the salt to the hall and the pepper
@@ -135,7 +134,7 @@ class Roles:
 
 @dataclass(frozen=True)
 class _Placed:
-    """A chunk, the "and" or "or" right before it, and the place around it."""
+    """Chunk, the "and" or "or" right before it, and the place around it."""
 
     chunk: Chunk
     joint: str
@@ -143,17 +142,17 @@ class _Placed:
 
     @property
     def location(self) -> Location:
-        """The chunk as a location."""
+        """Chunk as a location."""
         if self.chunk.phrase.speaker:
             return HERE
         return Location(self.chunk.phrase, self.chunk.preposition, self.within)
 
 
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
-    """Sorts the items behind a verb.
+    """Sorts the items behind a verb into roles.
 
-    `describes` says that a first "near", "on top of" with more places behind it tells which object is meant, `puts`
-    that "on" behind "from" says where to, as in "put the cup from the desk on the bed".
+    `describes` says that a first "near" or "on top of" with more places behind it identifies the object, `puts` that
+    "on" behind "from" is the destination, as in "put the cup from the desk on the bed".
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
@@ -179,7 +178,7 @@ def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) ->
 
 
 def _spoken(items: Sequence[Item], roles: Roles) -> Iterator[_Placed]:
-    """The chunks; what is neither chunk nor small word is left over."""
+    """Yields the chunks, and collects unknown words."""
     joint, relative = "", False
     before: Chunk | None = None
     for item in items:
@@ -210,7 +209,7 @@ def _described(spoken: list[_Placed]) -> list[_Placed]:
 
 
 def _nested(spoken: Sequence[_Placed], puts: bool) -> Iterator[_Placed]:
-    """Joins to each place the one behind it that tells it more closely: no "and" between, and another preposition."""
+    """Joins a place to the one before it that it contains: no "and" between, and another preposition."""
     rest = list(spoken)
     while rest:
         first = rest.pop(0)
@@ -235,7 +234,7 @@ def _somebody(phrase: Phrase) -> bool:
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
-    """The phrases that an "or" behind the row gives a choice of: the last, and what commas join to it."""
+    """Phrases that an "or" behind the row joins: the last one, and those joined to it by commas."""
     first = len(row) - 1
     while first > 0 and row[first].joint in _LISTING:
         before, chunk = row[first - 1].chunk, row[first].chunk

@@ -1,4 +1,4 @@
-"""What a sentence means for several robots: a part for each, which parts wait for which, and what changes hands."""
+"""Understanding for several robots: a part for each, the order of the parts, and objects that change hands."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Final
 
-from executive.language.addressees import Saying, Who, Whom, addressees
+from executive.language.addressees import AddressedText, Addressee, RobotChoice, addressees
 from executive.language.clauses import Clause, Split, split
 from executive.language.cleaning import clean
 from executive.language.parser import DependencyParser
@@ -16,7 +16,7 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.spelling import Corrected, correct_spelling
+from executive.language.spelling import CorrectedText, correct_spelling
 from executive.language.understand import Part, Status, Understanding, meaning, understand
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
@@ -37,10 +37,10 @@ def understand_for_robots(
     memory: Memory | None = None,
     correct: bool = True,
 ) -> Understanding:
-    """What `sentence` asks of the robots called `robots`, in parts; with one robot just what `understand` makes of it.
+    """Understands `sentence` for the robots called `robots`, in parts; for one robot as `understand` does.
 
-    A part that nobody is named for is for any of them. For several robots the names must be known. `require_wake` says
-    that one of the names, or a word that calls all, must be said. The other arguments are those of `understand`. Never
+    Any robot may do a part that names none. With several robots the world's names must be known. `require_wake` says
+    that the sentence must call a robot by name, or all of them. The other arguments are those of `understand`. Never
     raises on text.
     """
     text = clean(sentence)
@@ -58,7 +58,7 @@ def understand_for_robots(
         part = Part(robots[0], alone, speaker_by=robots[0])
         return replace(alone, parts=(part,)) if alone.status is Status.OK else alone
     assert knowledge is not None
-    said = correct_spelling(text, knowledge, parser) if correct else Corrected(text)
+    said = correct_spelling(text, knowledge, parser) if correct else CorrectedText(text)
     forms = addressees(names).forms
     stranger = forms.stranger.match(text)
     addressed = True
@@ -81,9 +81,9 @@ def understand_for_robots(
 
 @dataclass(frozen=True)
 class _Read:
-    """A part with its meaning, and the numbers of the parts that it waits for."""
+    """Part with its meaning, and the numbers of the parts that it waits for."""
 
-    part: Saying
+    part: AddressedText
     meaning: Understanding
     after: frozenset[int] = frozenset()
 
@@ -95,36 +95,38 @@ class _Reader:
     knowledge: Knowledge
 
     def addressed(self, sentence: str, cut: Split, memory: Memory | None) -> Understanding:
-        """The parts of a sentence that was cut."""
+        """Understands the parts of a split sentence."""
         read: list[_Read] = []
-        told: tuple[Clause, ...] = ()
+        pending: tuple[Clause, ...] = ()
         parts = [tuple(clauses) for _, clauses in groupby(cut.clauses, key=lambda clause: id(clause.part))]
         for number, clauses in enumerate(parts):
             part = clauses[0].part
             assert part is not None
-            if told and told[0].part is not None:
-                part = replace(part, text=f"{told[0].part.text.rstrip(' .')}. {part.text}")
-                clauses = (*told, replace(clauses[0], joint=". "), *clauses[1:])
+            if pending and pending[0].part is not None:
+                part = replace(part, text=f"{pending[0].part.text.rstrip(' .')}. {part.text}")
+                clauses = (*pending, replace(clauses[0], joint=". "), *clauses[1:])
             one = self._read(part, clauses, read, memory)
             if one.meaning.refused_as is RefusalKind.NOTHING_TO_DO and number < len(parts) - 1:
-                told = (replace(clauses[0], part=part), *clauses[1:])
+                pending = (replace(clauses[0], part=part), *clauses[1:])
                 continue
             self._refuse_as_person(one.part.text)
             if one.meaning.status is not Status.OK:
                 return replace(one.meaning, text=sentence)
-            told, memory = (), one.meaning.memory
+            pending, memory = (), one.meaning.memory
             read.append(one)
         if not read:
             raise RefusalError(f"nothing was said that {self._named(self.robots)} could do")
         notes = tuple(dict.fromkeys(note for one in read for note in one.meaning.notes))
         return Understanding(sentence, Status.OK, notes=notes, memory=memory, parts=tuple(self._parts(read, cut)))
 
-    def _read(self, part: Saying, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None) -> _Read:
-        """The meaning of a part, and what it waits for. Raises RefusalError."""
+    def _read(
+        self, part: AddressedText, clauses: Sequence[Clause], before: Sequence[_Read], memory: Memory | None
+    ) -> _Read:
+        """Understands a part, and finds the parts that it waits for. Raises RefusalError."""
         changes_hands = bool(before) and before[-1].part.who != part.who
         if part.otherwise and changes_hands:
             raise RefusalError("what one robot finds cannot decide what another does; say it as two requests")
-        if changes_hands:  # things are where they were put, or looked for
+        if changes_hands:  # objects are where they were put, or looked for
             memory, place = before[-1].meaning.memory, _where(before[-1].meaning)
             memory = memory if memory is None or place is None else replace(memory, where=place, place=place)
         if changes_hands and re.search(_IT, part.text):
@@ -136,7 +138,7 @@ class _Reader:
             if other.part.who == part.who:
                 continue
             if (place := _moved(other.meaning, meant)) is not None and memory is not None:
-                known = replace(memory, told=(*memory.told, *((thing, place) for thing in memory.things)))
+                known = replace(memory, locations=(*memory.locations, *((item, place) for item in memory.objects)))
                 meant = meaning(Trace(part.text, known), self.pipeline, clauses)
             put = {(str(command.item), command.goal) for command in other.meaning.commands if command.item is not None}
             if any((str(one.object), one.goal) in put for one in meant.commands if one.task is Task.GRASP):
@@ -146,8 +148,8 @@ class _Reader:
         self._check_one_thing(part, meant)
         return _Read(part, meant, frozenset(after))
 
-    def _said_before(self, part: Saying, before: Sequence[_Read]) -> Iterator[int]:
-        """The pieces that are said to come before one."""
+    def _said_before(self, part: AddressedText, before: Sequence[_Read]) -> Iterator[int]:
+        """Yields the parts that the sentence puts before this one."""
         for number in range(len(before) - 1, -1, -1) if part.then else ():
             if before[number].part.who != part.who:
                 yield number
@@ -163,8 +165,8 @@ class _Reader:
             raise RefusalError(f"nothing was said that {who} is to do before", [who])
         yield found[-1]
 
-    def _check_in_hand(self, before: Understanding, meant: Understanding, who: Who | None) -> None:
-        """Refuses to take what another robot holds, or has given away."""
+    def _check_in_hand(self, before: Understanding, meant: Understanding, who: Addressee | None) -> None:
+        """Refuses to take an object that another robot holds, or has handed over."""
         again = meant.trace is not None and any(one.again for one in meant.trace.resolved)
         again = again or re.search(_IT, meant.text, re.IGNORECASE) is not None
         carried = [command for command in before.commands if command.item is not None or command.object is not None]
@@ -174,13 +176,13 @@ class _Reader:
         if last.task not in (None, Task.GRASP) and last.item is None:
             return
         if last.item is None or last.goal is None or self.knowledge.place(last.goal) is None:
-            thing = last.item or last.object
-            what = f"the {thing} is then not where {self._named(who)} can take it; say on which table it is put before"
-            raise RefusalError(what, [str(thing)])
+            item = last.item or last.object
+            what = f"the {item} is then not where {self._named(who)} can take it; say on which table it is put before"
+            raise RefusalError(what, [str(item)])
 
-    def _check_one_thing(self, part: Saying, meant: Understanding) -> None:
-        """Refuses to send several robots for the one thing."""
-        several = part.who is Whom.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
+    def _check_one_thing(self, part: AddressedText, meant: Understanding) -> None:
+        """Refuses to send several robots for one object."""
+        several = part.who is RobotChoice.ALL or (isinstance(part.who, tuple) and len(part.who) > 1)
         if not several or meant.trace is None or all(command.task is not Task.GRASP for command in meant.commands):
             return
         targets = (one.target for one in meant.trace.resolved)
@@ -190,25 +192,27 @@ class _Reader:
             raise RefusalError(what, [definite[0].text])
 
     def _refuse_as_person(self, text: str) -> None:
-        """Raise RefusalError where a piece speaks of a robot as of a person, and does not only quote or tell of it."""
+        """Raises RefusalError when a part treats a robot as a person, except in quotes and descriptions."""
         named = [name for name in self.robots if re.search(rf"\b{re.escape(name)}\b", text, re.IGNORECASE)]
         named = [name for name in named if self.knowledge.person(name) is None]
         quotes = re.match(r"(?:say|announce|shout)\b(?!.* to \w+\W*$)", text, re.IGNORECASE)
         if named and not quotes and not addressees(self.robots).narrates(text):
             name = display_name(named[0])
             reason = (
-                f"{name} is a robot, and not somebody to go to or to hand things to; "
-                f"say what {name} is to do, or put things on a table and let {name} bring them from there"
+                f"{name} is a robot, and not somebody to go to or to hand objects to; "
+                f"say what {name} is to do, or put objects on a table and let {name} bring them from there"
             )
             raise RefusalError(reason, [name])
 
     def _parts(self, read: Sequence[_Read], cut: Split) -> Iterator[Part]:
-        """A part for each robot of each part."""
+        """Yields a part for each robot of each part."""
         by = find_robot(cut.listener[0], self.robots) if isinstance(cut.listener, tuple) else None
         numbers: list[tuple[int, ...]] = []
         count = 0
         for one in read:
-            who: tuple[str | Whom, ...] = (one.part.who or Whom.ANY,) if not isinstance(one.part.who, tuple) else ()
+            who: tuple[str | RobotChoice, ...] = (
+                (one.part.who or RobotChoice.ANY,) if not isinstance(one.part.who, tuple) else ()
+            )
             if isinstance(one.part.who, tuple):
                 who = tuple(find_robot(name, self.robots) or name for name in one.part.who)
             after = tuple(sorted({at for number in one.after for at in numbers[number]}))
@@ -216,28 +220,28 @@ class _Reader:
             count += len(who)
             yield from (Part(robot, one.meaning, after, by) for robot in who)
 
-    def _named(self, who: Who | None) -> str:
+    def _named(self, who: Addressee | None) -> str:
         names = who if isinstance(who, tuple) else self.robots
         return listing(map(display_name, names), last="and" if who is not None else "or")
 
 
 def _moved(before: Understanding, meant: Understanding) -> Location | None:
-    """Where a thing was put that `meant` names once more, without saying where it is ("the beer")."""
+    """Place where an object was put that `meant` names again without its place ("the beer")."""
     if meant.trace is None or before.trace is None or meant.status is not Status.OK or before.memory is None:
         return None
     named = (one.target for one in meant.trace.resolved if one.source is None and not one.again)
     texts = {target.text for target in named if target is not None and not target.indefinite}
-    same = any(thing.text in texts for thing in before.memory.things)
+    same = any(item.text in texts for item in before.memory.objects)
     puts = any(command.item is not None for command in before.commands)
     return _where(before) if same and puts else None
 
 
 def _where(meant: Understanding) -> Location | None:
-    """The place where the things that were spoken of are at last; None with somebody, or where nothing is known."""
+    """Last known place of the objects; None with a person, or where it is unknown."""
     memory = meant.memory
     if memory is None or meant.trace is None:
         return None
     actions = meant.trace.resolved
-    found = next((one for one in reversed(actions) if one.target in memory.things), None)
+    found = next((one for one in reversed(actions) if one.target in memory.objects), None)
     place = found.goal or found.source if found is not None else memory.place if not actions else None
     return None if place is None or place.phrase is None or place.living else place

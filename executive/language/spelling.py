@@ -1,15 +1,15 @@
-"""How words are spelled and how they sound: which known name a word stands for, is a slip for, or is misheard for.
+"""Spelling and sound of words: the known names that a word means, misspells, or was misheard for.
 
-Text and speech use the same tables and the same distance. A word becomes a row of sounds by rules from letters to
-sounds (`letter_sounds.yaml`; Elovitz, Johnson, McHugh and Shore, "Letter-to-sound rules for automatic translation of
-English text to phonetics", 1976, have the form of the rules, and far more of them). Two rows are compared by an edit
-distance whose substitutions cost the less the more alike two sounds are.
+Text and speech share tables and distance. Rules from letters to sounds turn a word into a row of sounds
+(`letter_sounds.yaml`; Elovitz, Johnson, McHugh and Shore, "Letter-to-sound rules for automatic translation of English
+text to phonetics", 1976, have the form of the rules, and far more of them). An edit distance compares two rows; its
+substitutions cost less for similar sounds.
 
-The sounds: p b t d k g f v s z h m n l r w y as in print, T (thin), S (ship), C (chip), J (jam), N (sing); the vowels
-i (bit, beat), e (bet, bait), a (bat), V (but), o (pot, boat), u (boot), @ (the), and A (buy), W (now), Y (boy).
+The sounds: p b t d k g f v s z h m n l r w y as in print, T (thin), S (ship), C (chip), J (jam), N (sing); the vowels i
+(bit, beat), e (bet, bait), a (bat), V (but), o (pot, boat), u (boot), @ (the), and A (buy), W (now), Y (boy).
 
-Of spelling only what is certain is taken: a general synonym (`synonyms.yaml`) of one known name, and a word that is no
-English at all and is spelled nearly like one known name. All else becomes a question or a refusal.
+Only certain corrections are made: a general synonym (`synonyms.yaml`) of one known name, and a word that is no English
+and misspells one known name. All others become a question or a refusal.
 """
 
 from __future__ import annotations
@@ -46,8 +46,11 @@ _MOST_CANDIDATES: Final = 4
 
 @dataclass(frozen=True)
 class Alike:
-    """A known phrase that sounds like some words: `cost` is about 1 for each changed sound, `distance` from 0 (the
-    same) to 1 (nothing in common). `name` tells names of things and places from other words."""
+    """Known phrase with its similarity to the sound of some words.
+
+    `cost` is about 1 for each changed sound, `distance` from 0 (the same) to 1 (nothing in common). `name`
+    distinguishes names of objects and places from other words.
+    """
 
     phrase: str
     cost: float
@@ -56,7 +59,7 @@ class Alike:
 
 
 class SoundAlikes:
-    """Finds the known phrases that sound like some words: `names` of things and places, and other words."""
+    """Index of known phrases by sound: `names` of objects and places, and other words."""
 
     def __init__(self, names: Iterable[str], others: Iterable[str] = ()) -> None:
         kinds = {**dict.fromkeys(others, False), **dict.fromkeys(names, True)}
@@ -70,14 +73,14 @@ class SoundAlikes:
         for row, its in enumerate(sounds):
             self._sounds[row, : len(its)] = [code[letter] for letter in its]
         self._drops = np.array([_drop_cost(letter) for letter in self._letters])
-        self.of = lru_cache(maxsize=4096)(self._of)
+        self.nearest = lru_cache(maxsize=4096)(self._nearest)
 
     def knows(self, word: str) -> bool:
-        """Returns whether the word is one of the phrases or stands in one."""
+        """Returns whether the word is one of the phrases, or in one."""
         return word.lower() in self._words
 
-    def all(self, words: str) -> tuple[Alike, ...]:
-        """All phrases that make a sound, in their order, as they sound beside `words`."""
+    def similarities(self, words: str) -> tuple[Alike, ...]:
+        """All phrases that make a sound, in their order, with their similarity to `words`."""
         heard = sounds_of(words)
         if not self._phrases:
             return ()
@@ -87,15 +90,15 @@ class SoundAlikes:
         rows = zip(self._phrases, costs.tolist(), distances.tolist(), strict=True)
         return tuple(Alike(phrase, cost, distance, name) for (phrase, name), cost, distance in rows)
 
-    def _of(self, words: str) -> tuple[Alike, ...]:
-        """The phrases that sound like `words`, the nearest first; not the very same words."""
+    def _nearest(self, words: str) -> tuple[Alike, ...]:
+        """Phrases that sound like `words`, the nearest first, without these words themselves."""
         heard, same = sounds_of(words), words.lower()
         most = min(_PART_CHANGED * len(heard) + _ALWAYS_CHANGED, _MOST_COST)
-        found = [one for one in self.all(words) if heard and one.cost <= most and one.phrase.lower() != same]
+        found = [one for one in self.similarities(words) if heard and one.cost <= most and one.phrase.lower() != same]
         return tuple(sorted(found, key=lambda one: one.cost)[:_MOST_ALIKES])
 
     def _costs(self, heard: str) -> Costs:
-        """The least cost of changing some sounds into those of every phrase, column by column of the table for all."""
+        """Least cost of changing some sounds into those of every phrase, column by column of the table for all."""
         count, longest = self._sounds.shape
         above = np.zeros((longest + 1, count))
         above[1:] = np.cumsum(self._drops[self._sounds], axis=1).T
@@ -106,8 +109,8 @@ class SoundAlikes:
             row[0] = above[0] + dropped
             for at in range(longest):
                 other = self._sounds[:, at]
-                kept = np.minimum(above[at] + change[other], above[at + 1] + dropped)
-                row[at + 1] = np.minimum(kept, row[at] + self._drops[other])
+                least = np.minimum(above[at] + change[other], above[at + 1] + dropped)
+                row[at + 1] = np.minimum(least, row[at] + self._drops[other])
             above = row
         costs: Costs = above[self._lengths, np.arange(count)]
         return costs
@@ -125,26 +128,26 @@ def _alikes(names: tuple[str, ...]) -> SoundAlikes:
 
 
 def nearest_by_sound(words: str, vocabulary: Iterable[str]) -> Alike | None:
-    """The name in `vocabulary` that `words` (one or several) sound most like; the first of equals.
+    """Name in `vocabulary` with the sound nearest to `words` (one or several); the first of equals.
 
-    A distance of up to about 0.2 is a likely mishearing. None when there is nothing to compare.
+    A distance of up to about 0.2 is a likely mishearing. None for an empty vocabulary.
     """
     heard, names = words.lower().split(), tuple(vocabulary)
     exact = next((name for name in names if name.lower().split() == heard), None)
     if exact is not None:
         return Alike(exact, 0.0, 0.0)
-    return min(_alikes(names).all(words), key=lambda one: one.distance, default=None)
+    return min(_alikes(names).similarities(words), key=lambda one: one.distance, default=None)
 
 
 @lru_cache(maxsize=4096)
 def sound_distance(first: str, second: str) -> float:
-    """How different two words or groups of words sound, from 0 to 1; spaces between words make no sound."""
-    return next((one.distance for one in SoundAlikes((second,)).all(first)), 1.0)
+    """Distance in sound between two words or groups of words, from 0 to 1; blanks make no sound."""
+    return next((one.distance for one in SoundAlikes((second,)).similarities(first)), 1.0)
 
 
 @lru_cache(maxsize=4096)
 def sounds_of(words: str) -> str:
-    """The sounds of one or several words, a character each; what is no Latin letter makes none."""
+    """Sounds of one or several words, a character each; other than Latin letters make none."""
     letters = unicodedata.normalize("NFKD", words[:_MAX_LETTERS].lower())  # accents are taken off
     plain = re.sub(r"[^a-z ]", "", re.sub(r"[-_\s]", " ", letters))
     return "".join(map(_word_sounds, plain.split()))
@@ -162,7 +165,7 @@ def _word_sounds(word: str) -> str:
 
 @cache
 def _rules(letter: str) -> Sequence[tuple[re.Pattern[str], re.Pattern[str], str]]:
-    """The rules that begin with a letter: what stands before, the letters, and their sounds."""
+    """Rules for a letter: the letters before it, its letters, and their sounds."""
     return tuple(
         (re.compile(rf"(?:{left})$"), re.compile(rf"(?:{letters})(?={right})"), sounds)
         for left, letters, right, sounds in read_table("letter_sounds.yaml")[letter]
@@ -171,14 +174,14 @@ def _rules(letter: str) -> Sequence[tuple[re.Pattern[str], re.Pattern[str], str]
 
 @cache
 def _drop_cost(sound: str) -> float:
-    """What it costs to leave a sound out, from 0 to 1; some are lost easily."""
+    """Cost of leaving a sound out, from 0 to 1; some are lost easily."""
     usual = _VOWEL_DROP if sound in _vowels() else _CONSONANT_DROP
     return float(read_table("sounds.yaml")["weak"].get(sound, usual))
 
 
 @cache
 def _change_cost(a: str, b: str) -> float:
-    """What it costs to say one sound for another, from 0 to 1."""
+    """Cost of saying one sound for another, from 0 to 1."""
     if a == b:
         return 0.0
     vowels, alike = _vowels(), read_table("sounds.yaml")["alike"].items()
@@ -195,20 +198,20 @@ _CONSONANT_DROP: Final = 0.8
 
 @cache
 def _vowels() -> Mapping[str, tuple[float, float]]:
-    """How far back and how high each vowel is spoken, from 0 to 1."""
+    """Backness and height of each vowel, from 0 to 1."""
     return {sound: (float(back), float(high)) for sound, (back, high) in read_table("sounds.yaml")["vowels"].items()}
 
 
 @dataclass(frozen=True)
-class Corrected:
-    """A sentence with known names in place of misspelled ones, and a word on each ("I take ...")."""
+class CorrectedText:
+    """Sentence with misspelled names corrected, and a note on each."""
 
     text: str
     notes: tuple[str, ...] = ()
 
 
-def words_for(name: str) -> tuple[str, ...]:
-    """Other words for the same as `name`, and words for its kind."""
+def synonyms_for(name: str) -> tuple[str, ...]:
+    """Synonyms of `name`, and words for its kind."""
     rings, kinds = _synonyms()
     wanted = name.lower()
     same = [word for ring in rings if wanted in ring for word in ring if word != wanted]
@@ -216,7 +219,7 @@ def words_for(name: str) -> tuple[str, ...]:
 
 
 def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
-    """The known names that a word which is none of them stands for; `known` gives the name for each spelling."""
+    """Known names that an unknown word stands for; `known` maps each spelling to its name."""
     wanted = word.lower()
     rings, kinds = _synonyms()
     ring = (known[other] for ring in rings if wanted in ring for other in ring if other in known)
@@ -227,11 +230,11 @@ def synonyms_of(word: str, known: Mapping[str, str]) -> tuple[str, ...]:
 
 
 def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) -> tuple[str, ...]:
-    """The known names that an unknown word may be a slip for, or is near in meaning, the likeliest first."""
+    """Known names that an unknown word may misspell, or is similar to in meaning, the likeliest first."""
     wanted = word.lower()
     if len(wanted) > _MOST_LETTERS:
         return ()
-    sounds = {one.phrase: one.distance for one in _alikes(tuple(known)).all(wanted)}
+    sounds = {one.phrase: one.distance for one in _alikes(tuple(known)).similarities(wanted)}
     slips = ((_slip(wanted, spelling, sounds.get(spelling, 1.0)), name) for spelling, name in known.items())
     near = [name for slip, name in sorted(slips) if slip < 1.0]
     if not near:
@@ -241,11 +244,11 @@ def look_alikes(word: str, known: Mapping[str, str], facts: DependencyParser) ->
     return tuple(dict.fromkeys(near))[:_MOST_CANDIDATES]
 
 
-def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -> Corrected:
-    """Writes known names in place of what is misspelled so that only one of them can be meant.
+def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -> CorrectedText:
+    """Replaces misspelled words that can only mean one known name.
 
-    A word is misspelled when it is no English word; the name must be within one slip, or two for long names. Names
-    that are written together or apart ("night stand", "nightstand") are the same.
+    A word is misspelled when it is no English word; the name must be within one typing error, or two for long names.
+    Names that are written together or apart ("night stand", "nightstand") are the same.
     """
     own = [*knowledge.object_names(), *knowledge.place_names(), *knowledge.people]
     known = _known(knowledge.spellings(own))
@@ -260,14 +263,12 @@ def correct_spelling(text: str, knowledge: Knowledge, facts: DependencyParser) -
             notes += [] if same else [f"I take '{spoken}' to be {name}"]
             end = words[at + count - 1].end()
         at += count
-    return Corrected("".join([*pieces, text[end:]]), tuple(notes))
+    return CorrectedText("".join([*pieces, text[end:]]), tuple(notes))
 
 
 @dataclass(frozen=True)
 class _Known:
-    """The spellings that count as known, in lower case: the names, their words, the names by their letters without
-    blanks, and how each name is written.
-    """
+    """Known spellings in lower case: names, their words, names without blanks, and the original form of each name."""
 
     names: frozenset[str]
     words: frozenset[str]
@@ -278,7 +279,7 @@ class _Known:
 def _corrected_at(
     words: Sequence[re.Match[str]], at: int, known: _Known, facts: DependencyParser
 ) -> tuple[int, str | None]:
-    """How many words from here on are one name, and that name where it must be written anew."""
+    """Number of words from here that are one name, and that name if it needs another spelling."""
     rows = [[word.group().lower() for word in words[at : at + count]] for count in range(_LONGEST_NAME, 0, -1)]
     fitting = [row for row in rows if at + len(row) <= len(words)]
     for row in fitting:
@@ -295,7 +296,7 @@ def _corrected_at(
 
 
 def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> str | None:
-    """The one known name that misspelled words can mean; None where they are English or could be several."""
+    """The one known name that misspelled words can mean; None where they are English or ambiguous."""
     strange = [word for word in row if word not in known.words]
     if not strange or any(not _FEWEST_LETTERS <= len(word) <= _MOST_LETTERS for word in strange):
         return None
@@ -310,7 +311,7 @@ def _only_near(row: Sequence[str], known: _Known, facts: DependencyParser) -> st
 
 
 def _slips(word: str, name: str) -> int:
-    """How many slips lie between two words: letters too few, too many, wrong, or two swapped; above 2 it says 3."""
+    """Number of typing errors between two words: missing, extra, wrong or swapped letters; 3 for more than 2."""
     return OSA.distance(word, name, score_cutoff=2)
 
 
@@ -319,7 +320,7 @@ def _slips_allowed(name: str) -> int:
 
 
 def _slip(word: str, name: str, sound: float) -> float:
-    """How likely a word is a slip for a name: below 1 when it looks or sounds alike, the less the likelier."""
+    """Score of a word as a misspelling of a name: below 1 when they look or sound alike, lower for more likely ones."""
     slips = _slips(word, name)
     if len(word) >= _FEWEST_LETTERS - 1 and slips <= _slips_allowed(name) // 2 + (len(name) > 3):
         return slips / len(name)
@@ -328,9 +329,9 @@ def _slip(word: str, name: str, sound: float) -> float:
 
 @lru_cache(maxsize=16)
 def _known(spelled: tuple[str, ...]) -> _Known:
-    """The names of a world with their aliases, and the general synonyms of those."""
+    """Names of a world with their aliases, and the general synonyms of those."""
     written = {name.lower(): name for name in spelled}
-    names = tuple(dict.fromkeys([*written, *(word for name in written for word in words_for(name))]))
+    names = tuple(dict.fromkeys([*written, *(word for name in written for word in synonyms_for(name))]))
     words = frozenset(word for name in names for word in name.split())
     return _Known(frozenset(names), words, {_despaced(name): name for name in reversed(names)}, written)
 

@@ -1,8 +1,9 @@
-"""Words with their place in the sentence and in the tree of dependencies, known names among them.
+"""Words with their place in the sentence and in the dependency tree, known names among them.
 
-The tagger has seen few commands: it reads "sink" in "the bathroom sink" and a name in lower case behind "to" as verbs,
+The tagger has seen few commands: it tags "sink" in "the bathroom sink" and a name in lower case behind "to" as verbs,
 and "look" in "go to the counter look for the bowl" as a noun. `repairs.yaml` has rules for a word and its neighbours,
-as in Brill, "A simple rule-based part of speech tagger" (1992)."""
+as in Brill, "A simple rule-based part of speech tagger" (1992).
+"""
 
 from __future__ import annotations
 
@@ -21,12 +22,12 @@ from skills.detect.descriptions import plural
 
 @dataclass(frozen=True)
 class Token:
-    """A word with its place in the sentence and in the tree.
+    """Word with its place in the sentence and in the tree.
 
-    `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the
-    index of the word that it depends on (its own for the root), `relation` how (nsubj, obj, iobj, prep, obl, ...),
-    `entity` what a known name is part of (PERSON), `kind` what kind of thing it would stand for as a noun,
-    and `known` whether the world knows the name.
+    `start` is its first character in the text, `pos` the universal part of speech, `tag` the Penn tag, `head` the index
+    of the word on which it depends (its own for the root), `relation` the dependency (nsubj, obj, iobj, prep, obl,
+    ...), `entity` the entity of a known name (PERSON), `kind` its kind as a noun, and `known` whether the world knows
+    the name.
     """
 
     index: int
@@ -43,17 +44,17 @@ class Token:
 
     @property
     def word(self) -> str:
-        """The text in lower case."""
+        """Text in lower case."""
         return self.text.lower()
 
     @property
     def adjective(self) -> bool:
-        """Returns whether it can be an attribute of a thing ("red", "heaviest")."""
+        """Returns whether it can be an attribute of an object ("red", "heaviest")."""
         return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 
-def corrected_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
-    """The words with their repairs, from left to right."""
+def repair_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
+    """Applies the repairs to the words, from left to right."""
     found = list(tokens)
     for at in range(1, len(found)):
         rule = next((rule for rule in _repairs() if rule.fits(found, at)), None)
@@ -64,7 +65,7 @@ def corrected_parse(tokens: Iterable[Token]) -> tuple[Token, ...]:
 
 @dataclass(frozen=True)
 class _Repair:
-    """What the words around one must be, by their places from it on, and what they become."""
+    """Conditions on the words around one, by their places from it on, and their new values."""
 
     where: Mapping[int, Mapping[str, re.Pattern[str]]]
     then: Mapping[int, Mapping[str, str]]
@@ -103,7 +104,7 @@ def _repairs() -> tuple[_Repair, ...]:
 
 
 def _fact(tokens: Sequence[Token], at: int, name: str) -> str:
-    """A field of a word, or the name of what it is when it is that; empty when it is not, and behind the ends."""
+    """Field of a word, or the name of a test that it passes; empty when it fails, and outside the sentence."""
     if not 0 <= at < len(tokens):
         return ""
     if name in _IS:
@@ -135,15 +136,18 @@ PERSON: Final = "John"
 
 
 NameTable = tuple[re.Pattern[str], Mapping[str, str]]
-"""The pattern that finds any known name, and for each name in lower case the word that stands in for it."""
+"""Pattern of all known names, and for each name in lower case the word that replaces it in the parser."""
 
 
 def name_table(knowledge: Knowledge) -> NameTable:
-    """The names of a world."""
-    things = [*(n for name, facts in knowledge.things.items() for n in (name, *facts.aliases)), *knowledge.categories()]
+    """Table of the names of a world."""
+    objects = [
+        *(n for name, facts in knowledge.things.items() for n in (name, *facts.aliases)),
+        *knowledge.categories(),
+    ]
     places = [n for g in (knowledge.places, knowledge.surfaces) for name, f in g.items() for n in (name, *f.aliases)]
     people = [n for name, facts in knowledge.people.items() for n in (name, *facts.aliases)]
-    stand_ins = {name.lower(): THING for name in things}
+    stand_ins = {name.lower(): THING for name in objects}
     stand_ins |= {name.lower(): PLACE for name in places}
     stand_ins |= {name.lower(): PERSON for name in people}
     return re.compile(rf"\b({any_of(stand_ins) or '(?!)'})(e?s)?\b", re.IGNORECASE), stand_ins
@@ -175,10 +179,10 @@ def parse_with_names(
 
 @dataclass(frozen=True)
 class Affirmed:
-    """A statement without its negation: its words, those to pass over, and whether it was denied.
+    """Statement without its negation: its words, those to skip, and whether it was denied.
 
-    "There is no beer in the hall" is affirmed by "any beer", "nobody is there" by "anybody", "it is not there" by
-    leaving out the "not".
+    "There is no beer in the hall" becomes "any beer", "nobody is there" becomes "anybody", "it is not there" loses its
+    "not".
     """
 
     tokens: tuple[Token, ...]
@@ -187,7 +191,7 @@ class Affirmed:
 
 
 def affirmation(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
-    """What a statement says, or denies, to be somewhere; one that is denied in another way stays as it is.
+    """Removes the negation from a statement on a place; any other negation stays.
 
     `there` says that "there is" stands before it.
     """
@@ -218,7 +222,7 @@ def affirmation(tokens: Sequence[Token], *, there: bool = False) -> Affirmed:
 
 
 def _instead(tokens: Sequence[Token], at: int, word: str) -> tuple[Token, ...]:
-    """The words with another one in the place of one of them."""
+    """Replaces one of the words."""
     tag, pos = ("DT", "DET") if word == "any" else ("IN", "ADP") if word == "in" else ("NN", "PRON")
     new = replace(tokens[at], text=word, lemma=word, tag=tag, pos=pos)
     return (*tokens[:at], new, *tokens[at + 1 :])
@@ -244,10 +248,10 @@ _TABLES: Final = tuple("short_forms asides hesitations praises refusals searches
 
 
 def rephrase(text: str) -> str:
-    """The sentence as a plain command, in single blanks: "could you please get it" becomes "get it".
+    """Simplifies the sentence to a plain command, in single blanks: "could you please get it" becomes "get it".
 
-    Hesitations and words said twice are left out. Where a polite form stands inside the sentence, a comma takes its
-    place. "I would like something to drink" becomes "bring me a drink".
+    Hesitations and repeated words are removed. A polite form inside the sentence becomes a comma. "I would like
+    something to drink" becomes "bring me a drink".
     """
     for pattern, instead in _rules():
         text = pattern.sub(instead, text)
@@ -255,7 +259,7 @@ def rephrase(text: str) -> str:
 
 
 def smooth(text: str) -> str:
-    """The sentence in full forms, without hesitations, asides and words said twice; else as it was spoken."""
+    """Writes short forms in full, and removes hesitations, asides and repeated words."""
     for pattern, instead in _rules(_SMOOTHED):
         text = pattern.sub(instead, text)
     text = re.sub(r"\b([ap])\.\s?m\.?(?![\w'])", r"\1m", text, flags=re.IGNORECASE)
@@ -280,13 +284,13 @@ def _rules(family: str | None = None) -> tuple[_Rule, ...]:
 
 
 def _all(match: re.Match[str]) -> str:
-    """Each of a kind, one after the other, is all of that kind."""
+    """Replaces each of a kind by all of that kind."""
     what = match["what"].strip()
     return f"{match['act']} all the {what if what.endswith('s') and not what.endswith('ss') else plural(what)} "
 
 
 def _break(match: re.Match[str]) -> str:
-    """What stands in an opener's place: a comma, unless there is one or the sentence ends."""
+    """Replaces an opener by a comma, unless there is one or the sentence ends."""
     return ", " if match.string[: match.start()].strip() and match.string[match.end() :].strip(" .!?") else " "
 
 

@@ -1,4 +1,4 @@
-"""From a sentence to commands, or to one line that says why not."""
+"""Understanding of a sentence: its commands, or the reason in one line why there are none."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final
 from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
 from executive.language.parser import DependencyParser
 from executive.language.pipeline import Pipeline, Trace
-from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, with_answer
+from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, insert_answer
 from executive.language.reference import Memory
-from executive.language.spelling import Corrected, correct_spelling
+from executive.language.spelling import CorrectedText, correct_spelling
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
@@ -21,12 +21,12 @@ from executive.words.step import Step
 from executive.words.yaml_steps import steps_to_data
 
 if TYPE_CHECKING:
-    from executive.language.addressees import Whom
+    from executive.language.addressees import RobotChoice
     from executive.language.clauses import Clause
 
 
 class Status(enum.Enum):
-    """How understanding a sentence ended."""
+    """Result of understanding a sentence."""
 
     OK = "ok"  # it became commands
     REFUSED = "refused"  # it, or a part of it, is nothing that the robot does
@@ -36,12 +36,12 @@ class Status(enum.Enum):
 
 @dataclass(frozen=True)
 class Understanding:
-    """What a sentence means: commands when `status` is OK, else the reason in one line.
+    """Meaning of a sentence: commands when `status` is OK, otherwise the reason in one line.
 
-    `steps` is the whole mission where it decides, repeats, waits or the like, and empty otherwise. `parts` say which of
-    the robots does what, where it was understood for robots by name; several have no `commands` and `steps` but these.
-    `question` is what the robot asks back, `notes` say which name was taken for which, `memory` is what was spoken of,
-    `trace` how the answer came about. `addressed` says that a robot was called by its name.
+    `steps` is the whole mission where the sentence decides, repeats, waits or the like, and empty otherwise. `parts`
+    assign it to robots by name; with several robots `commands` and `steps` are empty. `question` is the robot's
+    question, `notes` say which name was taken for which, `memory` has the referents for the next sentence, `trace` the
+    results of each step. `addressed` says that the sentence calls a robot by its name.
     """
 
     text: str
@@ -59,16 +59,16 @@ class Understanding:
 
     @property
     def all_steps(self) -> tuple[Step, ...]:
-        """The steps of the sentence; its commands as steps where it has no blocks."""
+        """Steps of the sentence; its commands as steps where it has no blocks."""
         return self.steps or steps_of_commands(self.commands)
 
     @property
     def refused_as(self) -> RefusalKind | None:
-        """Why it became no commands; None where it did, or where it was not for this robot."""
+        """Kind of the refusal; None for commands, or for a sentence to another robot."""
         return None if self.trace is None or self.trace.refusal is None else self.trace.refusal.kind
 
     def to_json(self) -> dict[str, Any]:
-        """The answer as JSON values."""
+        """Returns the answer as JSON values."""
         return {
             "text": self.text,
             "status": self.status.value,
@@ -83,18 +83,19 @@ class Understanding:
 
 @dataclass(frozen=True)
 class Part:
-    """What one robot is to do, or each (`Whom.ALL`), or any (`Whom.ANY`), once the parts `after` (from 0) are done.
+    """Part for one robot, for each (`RobotChoice.ALL`), or for any (`RobotChoice.ANY`).
 
-    `speaker_by` is the robot by whose start the speaker stands: "me" and "here" are there. None: by the world's start.
+    It begins once the parts `after` (from 0) are done. "Me" and "here" mean the start of the robot `speaker_by`. None:
+    the world's start.
     """
 
-    robot: str | Whom
+    robot: str | RobotChoice
     meaning: Understanding
     after: tuple[int, ...] = ()
     speaker_by: str | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """The part as JSON values."""
+        """Returns the part as JSON values."""
         return {
             "robot": self.robot if isinstance(self.robot, str) else self.robot.value,
             "after": list(self.after),
@@ -113,16 +114,16 @@ def understand(
     memory: Memory | None = None,
     correct: bool = True,
 ) -> Understanding:
-    """The commands that `sentence` asks for.
+    """Understands the commands in `sentence`.
 
     Args:
-        sentence: what was said or typed.
+        sentence: the words, spoken or typed.
         parser: the dependency parser.
-        knowledge: the world's names and defaults; None keeps all names as they were spoken.
-        require_wake: whether a sentence without the wake phrase is not for this robot.
-        robot_name: the name to listen to; by default the one in `knowledge`.
-        memory: what was spoken of before, for "it" and "there".
-        correct: whether misspelled names are taken for known ones where that is safe.
+        knowledge: the world's names and defaults; None keeps all names as spoken.
+        require_wake: whether the sentence must begin with the wake phrase.
+        robot_name: the robot's name; by default the one in `knowledge`.
+        memory: referents of earlier sentences, for "it" and "there".
+        correct: whether misspelled names are corrected where that is safe.
     """
     name = robot_name or (knowledge.robot.name if knowledge else "robot")
     called = strip_wake(clean(sentence), name, knowledge.robot.others if knowledge else ())
@@ -137,7 +138,7 @@ def understand(
         odd = RefusalError(f"{blank!r} is no word; say it in words", [blank])
         trace = Trace(sentence, refusal=odd, refused_at="cleaning")
         return Understanding(sentence, Status.REFUSED, (), odd.reason, odd.unknown, trace=trace, addressed=addressed)
-    said = Corrected(called.text)
+    said = CorrectedText(called.text)
     if correct and knowledge is not None:
         said = correct_spelling(called.text, knowledge, parser)
     found = meaning(Trace(said.text, memory or Memory()), Pipeline(parser, knowledge))
@@ -145,7 +146,7 @@ def understand(
 
 
 def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:
-    """What a text for one robot means, which is that of an empty trace; its clauses where they are known."""
+    """Understands a text for one robot, given as an empty trace, and perhaps its clauses."""
     trace = pipeline.run(said)
     if pipeline.knowledge is not None and _MENTIONED.search(said.text) is not None:
         from executive.language.structure.sentence import structured
@@ -161,16 +162,16 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
 
 
 def ask_until_clear(sentence: str, meant: Callable[[str], Understanding], answer: Answerer) -> Understanding:
-    """What a sentence means with the answers to its questions in their places, at most three; `text` has them, too.
+    """Understands a sentence, and inserts the answers to its questions, at most three; `text` has them, too.
 
-    A question that is left open, or whose answer is not understood, is what comes back.
+    The result is a question when it is left open, or when its answer is not understood.
     """
     found = meant(sentence)
     for _ in range(_MOST_QUESTIONS):
         said = None if found.question is None else answer(found.question)
         if found.question is None or said is None:
             break
-        sentence = with_answer(sentence, found.question, said)
+        sentence = insert_answer(sentence, found.question, said)
         found = meant(sentence)
     return found
 
@@ -183,4 +184,4 @@ _MENTIONED: Final = re.compile(
     r"|fails|door|battery|charge|percent|repeat|holding|report|provided)\b",
     re.IGNORECASE,
 )
-"""Where none of this is said, it is a sentence of plain commands, and the rest of the language is not loaded."""
+"""Words without which a sentence has only plain commands, so that the rest of the language is not loaded."""

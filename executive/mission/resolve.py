@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import BaseModel
 
-from executive.language.questions import Answerer, answer_by
+from executive.language.questions import Answerer, make_answerer
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.load import load_mission, locate
 from executive.mission.parameters import round_source
@@ -62,7 +62,7 @@ def mission_from_file(
     """
     loaded = file if isinstance(file, Mission) else load_mission(file)
     chain = () if loaded.document is None else (loaded.document.path.resolve(),)
-    answers = answer or answer_by(loaded.questions or QuestionPolicy.REFUSE)
+    answers = answer or make_answerer(loaded.questions or QuestionPolicy.REFUSE)
     robot = loaded.robot or knowledge.robot.name
     return _Resolver(parser, knowledge, robot, loaded.world, answers).mission(loaded, chain)
 

@@ -29,14 +29,14 @@ class PauseRules:
     """Thresholds for the begin and the end of an utterance; all times in seconds.
 
     An utterance begins with a frame whose probability of speech is at least `begin_at`, and ends once all frames for
-    `pause_s` stay below `end_at`. Pauses inside are cut down to `kept_pause_s`, `margin_s` stays at both ends, sounds
+    `pause_s` stay below `end_at`. Pauses inside are cut down to `inner_pause_s`, `margin_s` stays at both ends, sounds
     shorter than `least_s` are no speech, and an utterance is cut off at `most_s`.
     """
 
     begin_at: float = 0.5
     end_at: float = 0.35
     pause_s: float = 0.8
-    kept_pause_s: float = 0.6
+    inner_pause_s: float = 0.6
     margin_s: float = 0.3
     least_s: float = 0.15
     most_s: float = 26.0
@@ -63,17 +63,17 @@ class Endpointer:
         self._detector, self._rules = detector, rules or PauseRules()
         self._rest: Samples = np.zeros(0, np.float32)
         self._before: deque[Samples] = deque(maxlen=self._frames(self._rules.margin_s))
-        self._kept: list[Samples] = []
+        self._stored: list[Samples] = []
         self._spoken = self._quiet = self._frames_seen = self._began_at = 0
 
     @property
     def speaking(self) -> bool:
         """Returns whether an utterance has begun and not ended."""
-        return bool(self._kept)
+        return bool(self._stored)
 
     def current_sound(self) -> Samples:
         """Samples of the utterance that has begun."""
-        return concatenate(self._kept)
+        return concatenate(self._stored)
 
     def push(self, block: Samples) -> Iterator[Utterance]:
         """Adds the next block; yields the utterances that end in it."""
@@ -95,35 +95,35 @@ class Endpointer:
     def _hear(self, frame: Samples) -> Iterator[Utterance]:
         probability = self._detector.probability(frame)
         self._frames_seen += 1
-        if not self._kept:
+        if not self._stored:
             self._wait(frame, probability)
             return
         spoken = probability >= self._rules.end_at
         self._spoken += spoken
         self._quiet = 0 if spoken else self._quiet + 1
-        if self._quiet <= self._frames(self._rules.kept_pause_s):
-            self._kept.append(frame)
-        if self._quiet >= self._frames(self._rules.pause_s) or len(self._kept) >= self._frames(self._rules.most_s):
+        if self._quiet <= self._frames(self._rules.inner_pause_s):
+            self._stored.append(frame)
+        if self._quiet >= self._frames(self._rules.pause_s) or len(self._stored) >= self._frames(self._rules.most_s):
             yield from self._end()
 
     def _wait(self, frame: Samples, probability: float) -> None:
         """Stores frames before speech, which may hold the soft beginning of a word."""
         self._before.append(frame)
         if probability >= self._rules.begin_at:
-            self._kept = list(self._before)
+            self._stored = list(self._before)
             self._before.clear()
             self._spoken, self._quiet = 1, 0
-            self._began_at = self._frames_seen - len(self._kept)
+            self._began_at = self._frames_seen - len(self._stored)
 
     def _end(self) -> Iterator[Utterance]:
-        kept, spoken, quiet = self._kept, self._spoken, self._quiet
-        self._kept, self._spoken, self._quiet = [], 0, 0
+        stored, spoken, quiet = self._stored, self._spoken, self._quiet
+        self._stored, self._spoken, self._quiet = [], 0, 0
         if spoken < self._frames(self._rules.least_s):
             return
-        held = min(quiet, self._frames(self._rules.kept_pause_s))
+        held = min(quiet, self._frames(self._rules.inner_pause_s))
         tail = max(held - self._frames(self._rules.margin_s), 0)
         end = self._frames_seen - quiet + held - tail
-        yield Utterance(concatenate(kept[: len(kept) - tail]), self._began_at * _FRAME_S, end * _FRAME_S)
+        yield Utterance(concatenate(stored[: len(stored) - tail]), self._began_at * _FRAME_S, end * _FRAME_S)
 
     @staticmethod
     def _frames(seconds: float) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from executive.language.cleaning import SAME_NAME, Address, heard_wake
+from executive.language.cleaning import SAME_NAME, Address, find_heard_wake
 from executive.language.lexicon import lexicon
 from executive.language.parser import DependencyParser
 from executive.language.roles import HERE
@@ -80,7 +80,7 @@ class Reader:
         for name in self.robots:
             text = _with_pause(text, name)
         others = {name: {*self.robots, *self.other_robots} - {name} for name in self.robots}
-        heard = (heard_wake(text, name, others=others[name]) for name in self.robots)
+        heard = (find_heard_wake(text, name, others=others[name]) for name in self.robots)
         return next((one for one in heard if one.name is not None), Address(None, text))
 
 
@@ -129,9 +129,9 @@ def _with_pause(text: str, name: str) -> str:
 
 def _names(command: Command) -> Iterator[str]:
     """Names in a command, with their adjectives."""
-    things = (" ".join((*thing.attributes, thing.name)) for thing in (command.item, command.object) if thing)
+    objects = (" ".join((*one.attributes, one.name)) for one in (command.item, command.object) if one)
     goals = (goal for goal in (command.goal, command.goal_at) if goal is not None and goal != HERE.name)
-    yield from (*things, *goals)
+    yield from (*objects, *goals)
 
 
 def _knows(known: Collection[str], name: str) -> bool:

@@ -188,7 +188,7 @@ def _replaced(
 ) -> Iterator[tuple[Alike, tuple[str, ...]]]:
     """Sentences with a known phrase of similar sound in place of some words."""
     tail = re.sub(r".*[\w']", "", words[end - 1])
-    for alike in alikes.of(" ".join(map(_bare, words[start:end]))):
+    for alike in alikes.nearest(" ".join(map(_bare, words[start:end]))):
         before = words[:start]
         last = before[-1].lower() if before else ""
         if alike.name or not (last in _BEFORE_NAMES or is_attribute(last)):  # only a name stands behind these

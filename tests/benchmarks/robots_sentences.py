@@ -17,7 +17,7 @@ from typing import Final
 
 import yaml
 
-from executive.language.addressees import Whom
+from executive.language.addressees import RobotChoice
 from executive.language.parser import load_parser
 from executive.language.several_robots import understand_for_robots
 from executive.language.understand import Part, Status, Understanding
@@ -65,7 +65,7 @@ def _wanted(text: str) -> tuple[str, tuple[int, ...], str]:
 
 
 def _said(part: Part) -> tuple[str, tuple[int, ...], str]:
-    who = part.robot.value if isinstance(part.robot, Whom) else part.robot
+    who = part.robot.value if isinstance(part.robot, RobotChoice) else part.robot
     return who, part.after, noted(part.meaning.all_steps)
 
 

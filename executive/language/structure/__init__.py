@@ -1,1 +1,1 @@
-"""Sentences that decide, repeat, wait and go on: what they mean as the steps of a mission."""
+"""Structured sentences, which decide, repeat, wait and go on, as steps of a mission."""

@@ -1,4 +1,4 @@
-"""What a mission decides by and waits for, as it is spoken: "there is a beer in the kitchen", "the battery is low"."""
+"""Spoken conditions: "there is a beer in the kitchen", "the battery is low"."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Final
 
-from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
+from executive.language.amounts import AMOUNTS, parse_seconds, parse_share, parse_time
 from executive.language.clauses import CLAUSES
 from executive.language.indirect import OBJECTS
 from executive.language.items import Adverb, Chunk, Whether, verb
@@ -15,7 +15,7 @@ from executive.language.lexicon import Patterns, any_of
 from executive.language.questions import RefusalError, RefusalKind, Slot, which_question
 from executive.language.roles import HERE
 from executive.language.spelling import synonyms_of
-from executive.language.structure.plain import IS, IT, PlainReader, State, Supposed, behind_preposition
+from executive.language.structure.plain import IS, IT, PlainReader, SpokenCondition, State, with_preposition
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
 from skills.files.errors import listing
@@ -28,11 +28,11 @@ _SIGNS: Final = {
 }
 _P: Final = Patterns("structures.yaml", "conditions", {**AMOUNTS, "compared": any_of(filter(None, _SIGNS))})
 FULL: Final = 0.99
-"""The share at which a battery is called full."""
+"""Share at which a battery is full."""
 
 
-def suppose(text: str, state: State, reader: PlainReader) -> Supposed:
-    """The condition that `text` tells. Raises RefusalError: it tells none that can be looked at or read."""
+def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondition:
+    """Parses a condition. Raises RefusalError when the robot can neither see nor read it."""
     words = _P.tail.sub("", " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,."))
     if (found := usual_condition(words, state, reader)) is not None:
         return found
@@ -47,18 +47,18 @@ def suppose(text: str, state: State, reader: PlainReader) -> Supposed:
         raise refusal if refusal.question is not None or left_open is None else left_open from None
 
 
-def usual_condition(words: str, state: State, reader: PlainReader) -> Supposed | None:
-    """The condition of a usual form: of battery, hand, place, clock, button, door, or somebody who comes or reader."""
+def usual_condition(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
+    """Parses a condition of a usual form: battery, gripper, place, clock, button, door, or people who come or go."""
     return next((found for read in _READERS if (found := read(words, state, reader)) is not None), None)
 
 
-def _value(expression: str, said: str, state: State, *notes: str) -> Supposed:
-    return Supposed(ValueIs(text=expression), said, state, state, notes)
+def _value(expression: str, said: str, state: State, *notes: str) -> SpokenCondition:
+    return SpokenCondition(ValueIs(text=expression), said, state, state, notes)
 
 
-def _battery(words: str, state: State, reader: PlainReader) -> Supposed | None:
+def _battery(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     if (match := _P.battery.fullmatch(words)) is not None:
-        if (share := share_of(match["share"])) is None:
+        if (share := parse_share(match["share"])) is None:
             raise RefusalError(f"'{match['share']}' is no charge; say it in percent", [match["share"]])
         return _value(f"battery {_SIGNS[(match['how'] or '').lower()]} {share:g}", words, state)
     if (match := _P.charged.fullmatch(re.sub(r"^you are", "you is", words))) is None:
@@ -66,10 +66,10 @@ def _battery(words: str, state: State, reader: PlainReader) -> Supposed | None:
     facts, how = reader.knowledge.battery, (match["how"] or match["low"] or "").lower()
     level = {"charged": f">= {facts.charged:g}", "full": f">= {FULL}", "fully charged": f">= {FULL}"}
     found = _value(f"battery {level.get(how, f'< {facts.low:g}')}", words, state)
-    return found.denied(words) if match["not"] else found
+    return found.negate(words) if match["not"] else found
 
 
-def _holding(words: str, state: State, reader: PlainReader) -> Supposed | None:
+def _holding(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     words = re.sub(r"n't\b", " not", words)
     match = _P.holds.fullmatch(words) or _P.in_hand.fullmatch(words)
     if match is None:
@@ -78,51 +78,51 @@ def _holding(words: str, state: State, reader: PlainReader) -> Supposed | None:
     return _value("not holding" if empty != bool(match["not"]) else "holding", words, state)
 
 
-def _place(words: str, state: State, reader: PlainReader) -> Supposed | None:
+def _place(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     if _P.knows.fullmatch(words):
         return _value("localised", words, state)
     return _value("not localised", words, state) if _P.lost.fullmatch(words) else None
 
 
-def _clock(words: str, state: State, reader: PlainReader) -> Supposed | None:
+def _clock(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     if (match := _P.passed.fullmatch(words)) is not None:
-        seconds = seconds_of(match["span"] or match["since"])
+        seconds = parse_seconds(match["span"] or match["since"])
         return None if seconds is None else _value(f"elapsed >= {seconds:g}", words, state)
     match = _P.clock.fullmatch(words)
-    time = None if match is None else time_of(match["time"])
+    time = None if match is None else parse_time(match["time"])
     if match is None or time is None:
         return None
     early = (match["how"] or "").lower() in ("before", "earlier than", "not yet") or "not yet" in words.lower()
     return _value(f'clock {"<" if early else ">="} "{time.text}"', words, state, *time.notes(match["time"]))
 
 
-def _button(words: str, state: State, reader: PlainReader) -> Supposed | None:
+def _button(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
     match = _P.pressed.fullmatch(words)
     return None if match is None else button_condition(match["one"] or match["other"], words, state)
 
 
-def button_condition(button: str, words: str, state: State) -> Supposed:
-    """Returns whether a button is pressed, which is spoken of with its article; `words` say it."""
+def button_condition(button: str, words: str, state: State) -> SpokenCondition:
+    """Condition that a button is pressed, named with its article; `words` are its text."""
     name = re.sub(r"^(?:the|a|any)\b\s*|\s*\bbutton$", "", button.strip(), flags=re.IGNORECASE).strip()
-    return Supposed(ButtonPressed(button=name.lower() or "button"), words, state, state)
+    return SpokenCondition(ButtonPressed(button=name.lower() or "button"), words, state, state)
 
 
-def _door(words: str, state: State, reader: PlainReader) -> Supposed | None:
-    """That a door is open or not; "it" is the door that was spoken of last. Raises RefusalError: see `_between`."""
+def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
+    """Condition that a door is open or closed; "it" is the last door. Raises RefusalError: see `_between`."""
     match = _P.stands.fullmatch(words) or _P.turns.fullmatch(words)
     if match is None or (match["it"] and state.door is None):
         return None
     door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
     opens = match["how"].lower() in ("open", "opened", "opens", "to open", "is opening", "has opened")
     known = replace(state, door=door, goal=None, at=None)
-    found = Supposed(door, words, known, known)
-    return found if opens != bool(match.groupdict().get("not")) else found.denied(words)
+    found = SpokenCondition(door, words, known, known)
+    return found if opens != bool(match.groupdict().get("not")) else found.negate(words)
 
 
 def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
-    """The rooms on the two sides of the door that is meant.
+    """Rooms on the two sides of a door.
 
-    Raises RefusalError: there is no such door, or several, with a question then.
+    Raises RefusalError when there is no such door, or several, then with a question.
     """
     bare = re.sub(r"^(?:the|that|this|a) ", "", match["door"], flags=re.IGNORECASE)
     if not knowledge.doors:
@@ -151,8 +151,8 @@ def _room(name: str, knowledge: Knowledge) -> str:
     return knowledge.room(found)
 
 
-def _meeting(words: str, state: State, reader: PlainReader) -> Supposed | None:
-    """Somebody comes to where the robot is, or leaves it."""
+def _meeting(words: str, state: State, reader: PlainReader) -> SpokenCondition | None:
+    """Condition that somebody arrives at the robot's place, or leaves it."""
     gone = _P.goes.fullmatch(words)
     match = gone or _P.comes.fullmatch(words)
     if match is None or CLAUSES.unreal.search(words):
@@ -162,15 +162,16 @@ def _meeting(words: str, state: State, reader: PlainReader) -> Supposed | None:
     where = "there" if where is None and re.search(r"\bthere(?: any more)?$", words, re.IGNORECASE) else where
     if not (_P.nobody.fullmatch(who) or reader.is_somebody(who, state)) or re.search(r"\b(?:or|and)\b", where or ""):
         return None
-    return meeting(who, where, words, state, reader, gone=gone is not None)
+    return presence_condition(who, where, words, state, reader, gone=gone is not None)
 
 
-def meeting(
+def presence_condition(
     who: str, where: str | None, words: str, state: State, reader: PlainReader, *, gone: bool = False
-) -> Supposed:
-    """Returns whether somebody, or nobody, is where the robot is, or in a room; `words` say it. Raises RefusalError.
+) -> SpokenCondition:
+    """Condition that somebody, or nobody, is at the robot's place or in a room; `words` are its text. Raises
+    RefusalError.
 
-    "There" may be a room that was spoken of.
+    "There" may be an earlier room.
     """
     place = (where or "here").lower()
     room = state.at
@@ -183,21 +184,21 @@ def meeting(
     return replace(look, condition=Not(part=look.condition) if gone != nobody else look.condition)
 
 
-def _look(words: str, state: State, reader: PlainReader) -> Supposed:
-    """Something to be seen, or not to be seen. Raises RefusalError."""
+def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
+    """Condition that something is visible, or not. Raises RefusalError."""
     if (match := _P.sees.fullmatch(words)) is not None:
         return _seen(match, words, state, reader)
     match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
     if match is None:
         return reader.check(words, state)
-    place = behind_preposition(reader.items_of(match["on"] or match["what"]), "on")
+    place = with_preposition(reader.items_of(match["on"] or match["what"]), "on")
     found = reader.look_by_items((verb("find"), Chunk(OBJECTS), *place), words, state)
     empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
-    return found.denied(words) if empty != bool(match["not"]) else found
+    return found.negate(words) if empty != bool(match["not"]) else found
 
 
-def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -> Supposed:
-    """That the robot sees, or does not see, something or somebody."""
+def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -> SpokenCondition:
+    """Condition that the robot sees, or does not see, something or somebody."""
     what = re.sub(r"^(?:him|them)(?= )", "it", match["what"], flags=re.IGNORECASE)
     looks = re.match(r"you (?:can |do |could |\w+n't |not )*(?:see|spot|notice)\b", words, re.IGNORECASE)
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
@@ -208,11 +209,11 @@ def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -
         found = reader.look_by_items((verb("check"), Whether(), IT, IS, Adverb(here=False)), words, state)
     else:
         found = reader.exists(what, words, state)
-    return found.denied(words) if match["not"] else found
+    return found.negate(words) if match["not"] else found
 
 
-def _joined(words: str, state: State, reader: PlainReader) -> tuple[Supposed | None, RefusalError | None]:
-    """Several conditions with "and" or "or" between them, or else a question about one of them."""
+def _joined(words: str, state: State, reader: PlainReader) -> tuple[SpokenCondition | None, RefusalError | None]:
+    """Conditions joined by "and" or "or", otherwise a question about one of them."""
     left_open: RefusalError | None = None
     for word, kind in ((" and ", AllOf), (" or ", AnyOf)):
         for before, after in _halves(words, word):
@@ -229,7 +230,7 @@ def _joined(words: str, state: State, reader: PlainReader) -> tuple[Supposed | N
                 known = replace(state, goal=None, at=None, memory=replace(state.memory, person=person))
             both = (first.condition, second.condition)
             parts = tuple(each for one in both for each in (one.parts if isinstance(one, kind) else (one,)))
-            return Supposed(kind(parts=parts), words, known, state, (*first.notes, *second.notes)), None
+            return SpokenCondition(kind(parts=parts), words, known, state, (*first.notes, *second.notes)), None
     return None, left_open
 
 
@@ -241,24 +242,24 @@ def _halves(words: str, word: str) -> Iterator[tuple[str, str]]:
         start = words.lower().find(word, start + 1)
 
 
-def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[Supposed, Supposed]:
-    """Two conditions, where the second may leave out what the first has said, or the first the place of both."""
-    first = suppose(before, state, reader)
+def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[SpokenCondition, SpokenCondition]:
+    """Parses two conditions; the second may omit words of the first, or the first the place of both."""
+    first = parse_condition(before, state, reader)
     denied = isinstance(first.condition, Not)
     if _P.there.match(before) and _P.bare.match(after):
         items = reader.items_of(after)
         place = next((item for item in items if isinstance(item, Chunk) and item.role is not None), None)
         if place is not None and not _P.placed.search(before):
             first = reader.look_by_items((*first.items, place), before, state)
-            first = first.denied(before) if denied else first
+            first = first.negate(before) if denied else first
         return first, reader.exists(after, after, first.holds)
     if _P.at.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
         old = next((item for item in first.items if isinstance(item, Chunk) and item.role is not None), None)
-        moved = behind_preposition(reader.items_of(after), "in" if old is None else old.preposition)
+        moved = with_preposition(reader.items_of(after), "in" if old is None else old.preposition)
         second = reader.look_by_items((*(one for one in first.items if one is not old), *moved), after, first.holds)
-        return first, second.denied(after) if denied else second
-    return first, suppose(after, first.holds, reader)
+        return first, second.negate(after) if denied else second
+    return first, parse_condition(after, first.holds, reader)
 
 
-_Reader = Callable[[str, State, PlainReader], Supposed | None]
+_Reader = Callable[[str, State, PlainReader], SpokenCondition | None]
 _READERS: Final[tuple[_Reader, ...]] = (_battery, _holding, _place, _clock, _button, _door, _meeting)

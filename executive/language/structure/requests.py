@@ -1,4 +1,4 @@
-"""What is waited for, charged to, said and asked, and what is done for everyone and in every room."""
+"""Special requests: waiting, charging, speech, questions, deliveries to everyone, and searches of all rooms."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Final
 
-from executive.language.amounts import AMOUNTS, seconds_of, share_of, time_of
+from executive.language.amounts import AMOUNTS, parse_seconds, parse_share, parse_time
 from executive.language.clauses import ACTS, CLAUSES
 from executive.language.items import verb
 from executive.language.lexicon import Patterns, any_of
@@ -15,7 +15,13 @@ from executive.language.nouns import NounKind
 from executive.language.parser import DependencyParser
 from executive.language.questions import RefusalError
 from executive.language.roles import Location
-from executive.language.structure.conditions import FULL, button_condition, meeting, suppose, usual_condition
+from executive.language.structure.conditions import (
+    FULL,
+    button_condition,
+    parse_condition,
+    presence_condition,
+    usual_condition,
+)
 from executive.language.structure.plain import PlainReader, PlainReading, State, phrase_of_name
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
@@ -27,31 +33,33 @@ from skills.files.errors import listing
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
 Done = tuple[Steps, State, tuple[str, ...]]
-"""Steps, what is known behind them, and notes."""
+"""Steps, the state behind them, and notes."""
 
 
-def wait_in(text: str, state: State, reader: PlainReader) -> Done | None:
-    """A wait for something to be so; None where it is none, or only for some time. Raises RefusalError."""
+def parse_wait(text: str, state: State, reader: PlainReader) -> Done | None:
+    """Parses a wait for a condition; None for other texts, and for a wait of some time. Raises RefusalError."""
     match = _WAITING.wait.fullmatch(text)
     if match is None or ACTS.only_span.fullmatch(match["what"]):
         return None
-    return wait(match["where"].strip(), match["how"].lower(), match["what"], state, reader)
+    return wait_steps(match["where"].strip(), match["how"].lower(), match["what"], state, reader)
 
 
-def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> Done:
-    """A wait in a place: until something is so, for somebody ("for"), or as long as something is so.
+def wait_steps(where: str, how: str, what: str, state: State, reader: PlainReader) -> Done:
+    """Builds a wait in a place: until a condition holds, for somebody ("for"), or as long as a condition holds.
 
     Raises RefusalError.
     """
     steps, there = _gone(where, state, reader)
     if how in ("until", "till"):
-        if (passed := _WAITING.passed.fullmatch(what)) is not None and (span := seconds_of(passed["span"])) is not None:
+        if (passed := _WAITING.passed.fullmatch(what)) is not None and (
+            span := parse_seconds(passed["span"])
+        ) is not None:
             return (*steps, Wait(awaited=Awaited(seconds=span))), there, ()
-        if (time := time_of(_WAITING.time.sub(r"\g<time>", what))) is not None:
+        if (time := parse_time(_WAITING.time.sub(r"\g<time>", what))) is not None:
             return (*steps, Wait(awaited=Awaited(until_clock=time.text))), there, time.notes(what)
-        found = suppose(what, there, reader)
+        found = parse_condition(what, there, reader)
     elif how != "for":
-        found = suppose(what, there, reader).denied(what)
+        found = parse_condition(what, there, reader).negate(what)
     elif (match := _WAITING.button.fullmatch(what)) is not None:
         found = button_condition(match["button"] or match["of"], what, there)
     elif " to " in what and (usual := usual_condition(what, there, reader)) is not None:
@@ -59,9 +67,9 @@ def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> 
     elif (match := _WAITING.person_at.fullmatch(what)) is not None and reader.is_somebody(match["who"], there):
         reading = reader.go_to(match["where"], there)
         steps, there = (*steps, *steps_of_commands(reading.commands)), reading.state
-        found = meeting(match["who"], None, what, there, reader)
+        found = presence_condition(match["who"], None, what, there, reader)
     elif reader.is_somebody(what, there):
-        found = meeting(what, None, what, there, reader)
+        found = presence_condition(what, None, what, there, reader)
     else:
         raise RefusalError(f"I do not understand what to wait for: '{what}'", [what])
     after = replace(found.holds, goal=found.holds.goal or there.goal)
@@ -69,7 +77,7 @@ def wait(where: str, how: str, what: str, state: State, reader: PlainReader) -> 
 
 
 def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
-    """Going to where it is to be waited, and what is known there."""
+    """Goes to the place of a wait; returns the state there."""
     if _WAITING.here.fullmatch(where):
         return (), state
     match = _WAITING.place.fullmatch(where)
@@ -81,12 +89,12 @@ def _gone(where: str, state: State, reader: PlainReader) -> tuple[Steps, State]:
     return steps_of_commands(reading.commands), reading.state
 
 
-def charging_in(text: str, state: State) -> Done | None:
-    """Charging up to a level; None where no level is said."""
+def parse_charging(text: str, state: State) -> Done | None:
+    """Parses charging up to a level; None where no level is said."""
     match = _WAITING.charge.fullmatch(text)
     if match is None:
         return None
-    level = FULL if match["level"].lower().startswith("full") else share_of(match["level"])
+    level = FULL if match["level"].lower().startswith("full") else parse_share(match["level"])
     if level is None:
         raise RefusalError(f"'{match['level']}' is no charge; say it in percent", [match["level"]])
     return (Dock(charging=Charging(level=level)),), replace(state, goal=None, at=None), ()
@@ -94,9 +102,9 @@ def charging_in(text: str, state: State) -> Done | None:
 
 @dataclass(frozen=True)
 class Listener:
-    """To whom something is said: the speaker, or somebody to go to, by words (`who`), and where they are.
+    """Person to whom the robot speaks: the speaker, or somebody to go to, in words (`who`), and the place.
 
-    `name` is that of a known person. Without `who` and `where` it is said on the spot.
+    `name` is that of a known person. Without `who` and `where` the robot speaks on the spot.
     """
 
     who: str | None = None
@@ -107,7 +115,7 @@ class Listener:
 
 @dataclass(frozen=True)
 class Said:
-    """What is to be said, and to whom; `text` is None where that was not said ("tell Robin")."""
+    """Speech and its listener; `text` is None where it was not said ("tell Robin")."""
 
     text: str | None
     to: Listener | None
@@ -115,7 +123,7 @@ class Said:
 
 @dataclass(frozen=True)
 class Asked:
-    """A question to somebody, the things to choose from (with their articles), and whether it is yes or no."""
+    """Question to somebody, the objects to choose from (with their articles), and whether it is yes or no."""
 
     text: str
     of: Listener
@@ -123,10 +131,10 @@ class Asked:
     yes_or_no: bool = False
 
 
-def speech_in(text: str, reader: PlainReader) -> Said | None:
-    """What a clause asks to say; None where it asks for nothing of that kind.
+def parse_speech(text: str, reader: PlainReader) -> Said | None:
+    """Parses a clause that asks the robot to speak; None for other clauses.
 
-    Raises RefusalError: what it asks to say cannot be said for somebody else, or to nobody who is known.
+    Raises RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
     """
     forms, parser = _of_world(reader.knowledge), reader.pipeline.parser
     if (match := forms.say_to.fullmatch(text) or forms.say_whom.fullmatch(text)) is not None:
@@ -161,15 +169,15 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
     raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
 
 
-def speech_to(who: str, text: str, knowledge: Knowledge) -> Said:
-    """Telling somebody something. Raises RefusalError: nobody of that name is known, or it cannot be said for them."""
+def make_speech(who: str, text: str, knowledge: Knowledge) -> Said:
+    """Makes a speech to somebody. Raises RefusalError for an unknown person, or words that change their meaning."""
     if (match := _of_world(knowledge).who.fullmatch(who)) is None:
         raise RefusalError(f"I do not know to whom to say it: '{who}'", [who])
     return Said(_told(text), _listener(match))
 
 
 def _clause(text: str, parser: DependencyParser) -> bool:
-    """Returns whether it is a whole statement: a finite verb with its subject before it."""
+    """Returns whether a text is a statement: a finite verb with its subject before it."""
     tokens = parser.parse(text)
     finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
     verbs = finite | {t.index for t in tokens if t.relation == "root"}
@@ -177,7 +185,7 @@ def _clause(text: str, parser: DependencyParser) -> bool:
 
 
 def _words(text: str, parser: DependencyParser) -> str:
-    """Words that are to be said. Raises RefusalError: they name what to say, or somebody who is not known."""
+    """Words to say. Raises RefusalError when they describe the text, or name an unknown person."""
     clause = _clause(text, parser)
     whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
     if whom is not None and not clause:
@@ -188,34 +196,34 @@ def _words(text: str, parser: DependencyParser) -> str:
 
 
 def _literal(text: str) -> str:
-    """Words that are said as they are. Raises RefusalError: they only stand for some."""
+    """Words to say literally. Raises RefusalError when they only stand for a text."""
     if ACTS.nothing.fullmatch(text) or ACTS.question.match(text) or re.match(r"to\b", text, re.IGNORECASE):
         raise RefusalError(f"what am I to say? '{text}' says nothing", [text])
     return text.strip(" ,.'\"")
 
 
 def _told(text: str) -> str:
-    """What is told in the speaker's name. Raises RefusalError: another voice would change what it means."""
+    """Statement in the speaker's place. Raises RefusalError when another voice changes its meaning."""
     word = CLAUSES.deictic.search(text) or ACTS.inner.search(text)
     if word is not None:
         raise RefusalError(f"I cannot say '{text}' for you: '{word[0]}' would mean somebody or something else", [text])
     return _literal(text)
 
 
-def template(text: str) -> str:
-    """The text with its braces kept."""
+def escape_braces(text: str) -> str:
+    """Escapes braces in a text."""
     return text.replace("{", "{{").replace("}", "}}")
 
 
 def _of_world(knowledge: Knowledge) -> Patterns:
-    """The forms of speaking to somebody in a world."""
+    """Patterns of speaking to somebody in a world."""
     people, places = knowledge.spellings(knowledge.people), knowledge.spellings(knowledge.place_names())
     return _with_names(tuple(people), tuple(places))
 
 
 @lru_cache(maxsize=16)
 def _with_names(people: tuple[str, ...], places: tuple[str, ...]) -> Patterns:
-    return ACTS.filled(names=any_of(people) or "(?!)", around=any_of(places) or "(?!)")
+    return ACTS.with_words(names=any_of(people) or "(?!)", around=any_of(places) or "(?!)")
 
 
 def _listener(match: re.Match[str]) -> Listener:
@@ -230,10 +238,10 @@ def _listener(match: re.Match[str]) -> Listener:
     return Listener(who, where, name=who)
 
 
-def question_in(text: str, knowledge: Knowledge) -> Asked | None:
-    """The question that a clause asks to put to somebody; None where it is none.
+def parse_question(text: str, knowledge: Knowledge) -> Asked | None:
+    """Parses a clause that asks the robot to put a question to somebody; None for other clauses.
 
-    Raises RefusalError: it is none that the robot can put.
+    Raises RefusalError for a question that the robot cannot put.
     """
     forms = _of_world(knowledge)
     if not re.match(r"ask\b", text, re.IGNORECASE) or forms.ask_to.fullmatch(text):
@@ -255,7 +263,7 @@ def question_in(text: str, knowledge: Knowledge) -> Asked | None:
 
 
 def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
-    """ "What he wants to drink": all that is known of that kind."""
+    """ "What he wants to drink": a choice among all known objects of that kind."""
     kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
     names = knowledge.classes(kind.removesuffix("s")) if kind else ()
     if not names:
@@ -264,10 +272,10 @@ def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
     return Asked(spoken, _listener(match), tuple(f"a {name}" for name in names))
 
 
-def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
-    """A step for each person to whom something is brought; None where it is brought to nobody of that kind.
+def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
+    """Builds a delivery to each person of a group; None for another recipient.
 
-    Raises RefusalError: it does not say in which room, nobody is known to be there, or there is only one of the thing.
+    Raises RefusalError when no room is said, nobody is known to be there, or there is only one such object.
     """
     trace = reader.actions_of(text, state)
     goals = [one.goal for one in trace.actions if one.goal is not None and one.goal.phrase is not None]
@@ -276,7 +284,7 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, S
         return None
     who = to.phrase.spoken
     if to.within is None:
-        raise RefusalError(f"I bring things to one person at a time, not to {who}; name one, or a room", [who])
+        raise RefusalError(f"I bring objects to one person at a time, not to {who}; name one, or a room", [who])
     room, knowledge = reader.room(to.within, state), reader.knowledge
     people = [name for name, facts in knowledge.people.items() if knowledge.room(facts.at) == room]
     if not people:
@@ -295,7 +303,7 @@ def for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, S
 
 
 def search_for(what: str, state: State, reader: PlainReader) -> PlainReading:
-    """Looking for something or somebody in all rooms. Raises RefusalError: for what is unclear."""
+    """Looks for an object or a person in all rooms. Raises RefusalError when it is unclear."""
     reading = reader.commands_of(what, state, (verb("find"),))
     finds = [command for command in reading.commands if command.task is Task.FIND]
     if len(finds) != len(reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):

@@ -1,4 +1,4 @@
-"""Steps as they are put together from clauses, and what is asked of clauses, conditions and commands on the way."""
+"""Intermediate results of building steps, and helpers on clauses, conditions and commands."""
 
 from __future__ import annotations
 
@@ -6,43 +6,43 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from executive.language.amounts import seconds_of, times_of
+from executive.language.amounts import parse_seconds, parse_times
 from executive.language.clauses import ACTS, CLAUSES, Clause, Cue
 from executive.language.lexicon import VerbKind
 from executive.language.questions import RefusalError
 from executive.language.roles import HERE
-from executive.language.structure.plain import PlainReader, PlainReading, State, Supposed, contrary
+from executive.language.structure.plain import PlainReader, PlainReading, SpokenCondition, State, negate
 from executive.words.command import Command, Task
 from executive.words.condition import Condition, Look, Not
 from executive.words.step import Step
 from executive.words.steps import Loop, Steps
 
 ATTACHED = (Cue.SO, Cue.NOT, Cue.OTHERWISE, Cue.FAILED)
-"""Clauses with these cues go on from what was looked at or done before."""
+"""Cues of clauses that refer to the last look or action."""
 
 
 @dataclass
 class Row:
-    """Steps as they are put together: those that are done, and clauses that are still to be understood as one.
+    """Steps built so far, and pending clauses, which are understood together.
 
-    `asked` is what was looked at or fetched last; `begun` is where in the steps the present sentence begins.
+    `asked` is the last look or fetch; `begun` is the index of the step where the present sentence begins.
     """
 
     state: State
     steps: list[Step] = field(default_factory=list)
     plain: list[Clause] = field(default_factory=list)
-    asked: LookedAt | None = None
+    asked: LastCheck | None = None
     begun: int = 0
 
 
 @dataclass(frozen=True)
-class LookedAt:
-    """A condition that the last steps looked at (`looked`), or that must hold for them; `steps` is how many they are.
+class LastCheck:
+    """Condition of the last steps: they look at it (`looked`), or need it to succeed; `steps` is their number.
 
-    `decided` says that the last step is done only if it holds.
+    `decided` says that the last step depends on the condition.
     """
 
-    supposed: Supposed
+    supposed: SpokenCondition
     looked: bool
     decided: bool = False
     steps: int = 1
@@ -50,17 +50,17 @@ class LookedAt:
 
 @dataclass(frozen=True)
 class Rounds:
-    """How often something is done, and what is known where a round begins."""
+    """Rounds of an action, and the state at the beginning of a round."""
 
     loop: Loop
     state: State
 
 
-def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
-    """Where the clauses end that belong to a condition or to rounds which begin before `at`.
+def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
+    """Index behind the clauses that belong to a condition or to rounds before `at`.
 
-    `branch` says that it is a second branch, behind which "then" goes on with what is done in either case. What is done
-    after the whole ends them; in "first ..., finally ..." it is one of the row.
+    `branch` marks a second branch, where "then" goes on behind both branches. Clauses that follow the whole end it; in
+    "first ..., finally ..." they belong to it.
     """
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
     for n, one in enumerate(clauses[at:], at):
@@ -75,25 +75,25 @@ def end_of(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: 
     return len(clauses)
 
 
-def same(one: Condition, other: Condition) -> bool:
-    """Returns whether they look at the same, whatever the verb was."""
-    return one in (other, contrary(other))
+def same_check(one: Condition, other: Condition) -> bool:
+    """Returns whether both conditions check the same, or the opposite."""
+    return one in (other, negate(other))
 
 
-def contrary_of(supposed: Supposed) -> Supposed:
-    """The contrary, with what is known then."""
-    return replace(supposed.denied(f"not {supposed.said}"), told=False)
+def negate_supposed(supposed: SpokenCondition) -> SpokenCondition:
+    """Negation of a condition, with the state behind it."""
+    return replace(supposed.negate(f"not {supposed.said}"), quotable=False)
 
 
-def sentence_of(supposed: Supposed) -> str | None:
-    """What was found, as it is told; None where it was said otherwise."""
+def statement_of(supposed: SpokenCondition) -> str | None:
+    """Words of a condition as a statement; None where they cannot be repeated."""
     said = supposed.said
-    plain = supposed.told and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
+    plain = supposed.quotable and not CLAUSES.deictic.search(said) and not re.match(r"it\b|there is one", said)
     return said if said and plain else None
 
 
 def state_behind_both(one: State, other: State) -> State:
-    """What is known behind two branches."""
+    """State behind two branches."""
     return replace(
         one,
         held=one.held if one.held == other.held else None,
@@ -103,30 +103,32 @@ def state_behind_both(one: State, other: State) -> State:
 
 
 def one_errand(reading: PlainReading) -> bool:
-    """Returns whether the commands are all about one thing, or only go somewhere and back."""
-    things = {str(thing) for command in reading.commands for thing in (command.item, command.object) if thing}
+    """Returns whether all commands are about one object, or only go somewhere and back."""
+    objects = {str(thing) for command in reading.commands for thing in (command.item, command.object) if thing}
     going = [action for action in reading.trace.resolved if action.kind is VerbKind.GO]
     bare = sum(command.item is None and command.task is None for command in reading.commands)
-    return len(things) == 1 if not bare else not things and bare <= 2 and bool(going) and going[-1].goal == HERE
+    return len(objects) == 1 if not bare else not objects and bare <= 2 and bool(going) and going[-1].goal == HERE
 
 
-def looked_at_by(reading: PlainReading, before: State, reader: PlainReader) -> LookedAt | None:
-    """What the last command looked at, or takes."""
+def find_last_check(reading: PlainReading, before: State, reader: PlainReader) -> LastCheck | None:
+    """Look or fetch of the last command."""
     commands = reading.commands
     if commands and commands[-1].task is Task.FIND:
         looks = sum(command.task is Task.FIND for command in commands)
-        return LookedAt(reader.seen(reading, reading.state, before, ""), looked=True, steps=looks)
+        return LastCheck(reader.condition_of_looks(reading, reading.state, before, ""), looked=True, steps=looks)
     taken = next((command for command in reversed(commands) if command.task is Task.GRASP), None)
     if taken is None:
         return None
     found = Command(goal=taken.goal, task=Task.FIND, object=taken.object, object_count=taken.object_count, verb="find")
-    memory = replace(reading.state.memory, where=None, told=before.memory.told)
+    memory = replace(reading.state.memory, where=None, locations=before.memory.locations)
     fails = replace(reading.state, memory=memory, held=None, goal=None, at=None)
-    return LookedAt(Supposed(Look.from_command(found), "", reading.state, fails), looked=False, steps=len(commands))
+    return LastCheck(
+        SpokenCondition(Look.from_command(found), "", reading.state, fails), looked=False, steps=len(commands)
+    )
 
 
-def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
-    """The condition at the place from where the thing is taken, when it says none of its own ("if there is one")."""
+def condition_at_source(supposed: SpokenCondition, steps: Steps, text: str) -> SpokenCondition:
+    """Adds the place where the object is taken to a condition without a place ("if there is one")."""
     taken = next((c for step in steps for c in step.commands if c.task is Task.GRASP), None)
     condition = supposed.condition
     look = condition.part if isinstance(condition, Not) else condition
@@ -137,8 +139,8 @@ def where_it_is_taken(supposed: Supposed, steps: Steps, text: str) -> Supposed:
     return replace(supposed, condition=Not(part=there) if isinstance(condition, Not) else there)
 
 
-def checked_statement(text: str) -> str | None:
-    """What is checked, as a statement: "is the door open" becomes "the door is open"."""
+def statement_of_check(text: str) -> str | None:
+    """Turns a check into a statement: "is the door open" becomes "the door is open"."""
     match = ACTS.checked.fullmatch(text)
     if match is None or match["what"] is not None:
         return None if match is None else match["what"]
@@ -146,30 +148,30 @@ def checked_statement(text: str) -> str | None:
     return None if found is None else f"{found[1]} {'are' if found[1].lower() == 'you' else 'is'} {found[2]}"
 
 
-def unclear(found: Clause) -> RefusalError:
-    """The refusal of what could belong to more than one thing."""
+def ambiguous_cue(found: Clause) -> RefusalError:
+    """Refusal of a cue that could belong to several actions."""
     said = f"{found.cue} {found.text}".strip()
     return RefusalError(f"it is not clear to what '{said}' belongs; say it first", [said])
 
 
-def nothing_said(cue: str, text: str = "") -> RefusalError:
-    """The refusal of a condition behind which it is not said what is to be done."""
+def missing_action(cue: str, text: str = "") -> RefusalError:
+    """Refusal of a condition without an action."""
     return RefusalError(f"what am I to do {f'{cue.lower()} {text}'.strip()}?", [f"{cue} {text}".strip()])
 
 
 def seconds_of_cue(cue: str) -> float:
-    """The seconds of "every ten minutes"."""
+    """Seconds of "every ten minutes"."""
     words = re.sub(r"^(?:once )?(?:every|each|per) |^once (?=an? )|^once per ", "", cue, flags=re.IGNORECASE)
-    seconds = seconds_of(words if words not in ("hour", "minute") else f"a {words}")
+    seconds = parse_seconds(words if words not in ("hour", "minute") else f"a {words}")
     if seconds is None:
         raise RefusalError(f"'{cue}' is no time that I understand", [cue])
     return seconds
 
 
 def times_of_cue(cue: str) -> int:
-    """How often "do this three times" is. Raises RefusalError: it is no number of times."""
+    """Number of "do this three times". Raises RefusalError for another text."""
     words = re.sub(r"^(?:do|repeat) (?:this |that |the following |it )?|^for ", "", cue, flags=re.IGNORECASE)
-    count = times_of(words)
+    count = parse_times(words)
     if count is None:
         raise RefusalError(f"'{cue}' is no number of times that I understand", [cue])
     return count

@@ -1,4 +1,4 @@
-"""Sentences that decide, repeat, wait and go on: from clauses to the steps of a mission."""
+"""Builder of the steps of a mission from the clauses of a sentence."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
-from executive.language.clauses import ACTS, Clause, Cue, cue_behind, cut, split
+from executive.language.clauses import ACTS, Clause, Cue, cut, split, trailing_cue
 from executive.language.items import Adverb, Chunk, verb
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
@@ -17,29 +17,29 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.conditions import suppose
+from executive.language.structure.conditions import parse_condition
 from executive.language.structure.decisions import DecisionBuilder
-from executive.language.structure.plain import PlainReader, State, at_start, behind_preposition, phrase_of_name
+from executive.language.structure.plain import PlainReader, State, initial_state, phrase_of_name, with_preposition
 from executive.language.structure.requests import (
     Asked,
     Listener,
-    charging_in,
-    for_everyone,
-    question_in,
+    escape_braces,
+    make_speech,
+    parse_charging,
+    parse_question,
+    parse_speech,
+    parse_wait,
     search_for,
-    speech_in,
-    speech_to,
-    template,
-    wait_in,
+    steps_for_everyone,
 )
 from executive.language.structure.row import (
     ATTACHED,
-    LookedAt,
+    LastCheck,
     Row,
-    checked_statement,
-    end_of,
-    nothing_said,
-    sentence_of,
+    end_of_scope,
+    missing_action,
+    statement_of,
+    statement_of_check,
 )
 from executive.words.command import Task
 from executive.words.condition import Look
@@ -53,7 +53,7 @@ class SentenceBuilder(DecisionBuilder):
     """Builder of the steps of one sentence. Its methods raise RefusalError."""
 
     def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
-        """The steps of clauses, one after the other."""
+        """Builds the steps of clauses, in order."""
         row, at = Row(state), 0
         while at < len(clauses):
             last = row.steps[-1] if row.steps and not row.plain else None
@@ -65,18 +65,18 @@ class SentenceBuilder(DecisionBuilder):
         return tuple(row.steps), row.state
 
     def _next(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
-        """Takes the clause at `at`, and those that belong to it; the index of the one behind."""
+        """Builds the clause at `at`, and those that belong to it; returns the index behind them."""
         clause = clauses[at]
         if clause.anyway or clause.ends_anyway:
-            return self.always(row, clauses, at)
+            return self.put_always(row, clauses, at)
         if clause.kind in (Cue.IF, Cue.UNLESS):
-            return self.decided(row, clauses, at)
+            return self.decide(row, clauses, at)
         if clause.kind in ATTACHED:
-            return self.attached(row, clauses, at)
+            return self.attach(row, clauses, at)
         if clause.kind is not None:
-            return (self.soon if clause.kind is Cue.SOON else self.repeated)(row, clauses, at)
-        told = bool(row.plain) and all(ACTS.told_first.match(one.text) for one in row.plain)
-        if clause.begins and not told:  # unless it goes on with "there is a hammer on the bench. bring it"
+            return (self.wait_for if clause.kind is Cue.SOON else self.repeat)(row, clauses, at)
+        stated = bool(row.plain) and all(ACTS.told_first.match(one.text) for one in row.plain)
+        if clause.begins and not stated:  # unless it goes on with "there is a hammer on the bench. bring it"
             self.flush(row)
             row.begun = len(row.steps)
         if self.verb is not None and at == 0 and ACTS.no_verb.match(clause.text):
@@ -85,7 +85,7 @@ class SentenceBuilder(DecisionBuilder):
         return self._act(row, clause, clauses, at)
 
     def _act(self, row: Row, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
-        """Takes the clause at `at`, which begins with what is to be done; the index of the one behind."""
+        """Builds the clause at `at`, which begins with an action; returns the index behind it."""
         text = clause.text
         self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
         if ACTS.answered.fullmatch(text) is not None and self._answered(row):
@@ -96,9 +96,9 @@ class SentenceBuilder(DecisionBuilder):
         for act in (self._waits, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
-        found = cue_behind(text)
+        found = trailing_cue(text)
         if found is not None and not ACTS.every_room.search(text):
-            self.modified(row, clause, found)
+            self.modify(row, clause, found)
             return at + 1
         for act in (self._everyone, self._rooms):
             if (end := act(row, clauses, at)) is not None:
@@ -107,7 +107,7 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _answered(self, row: Row) -> bool:
-        """Returns whether what was looked at before is answered anyway."""
+        """Returns whether the robot answers the last look anyway."""
         self.flush(row)
         last = row.steps[-1] if row.steps else None
         found = last is not None and bool(last.commands) and last.commands[-1].task is Task.FIND
@@ -116,7 +116,7 @@ class SentenceBuilder(DecisionBuilder):
         return looked
 
     def _known(self, row: Row) -> State:
-        """What is known behind the clauses that are still to be understood."""
+        """State behind the pending clauses."""
         return self.read_together(row.plain, row.state).state if row.plain else row.state
 
     def _waits(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
@@ -124,7 +124,7 @@ class SentenceBuilder(DecisionBuilder):
         if not ACTS.waits.match(text) or (row.plain and not ACTS.waits_for.search(text)):
             return None
         state = self._known(row)
-        done = charging_in(text, state) or wait_in(text, state, self.reader)
+        done = parse_charging(text, state) or parse_wait(text, state, self.reader)
         if done is None:
             return None
         self.flush(row)
@@ -141,41 +141,41 @@ class SentenceBuilder(DecisionBuilder):
         if (everywhere_said := ACTS.says_everywhere.fullmatch(clause.text)) is not None:
             self._in_each(row, replace(clause, joint="", text=everywhere_said[1]))
             return at + 1
-        found = cue_behind(clause.text)
+        found = trailing_cue(clause.text)
         if found is not None:  # unless it is a part of what is said
             counts = found.kind in (Cue.TIMES, Cue.EVERY) and found.text
             if not counts or re.match(r"for|until|every", found.text):
-                self.modified(row, clause, found)
+                self.modify(row, clause, found)
                 return at + 1
-        said = speech_in(clause.text, self.reader)
+        said = parse_speech(clause.text, self.reader)
         if said is None:
             return None
-        text = said.text if said.text is not None else self.told
+        text = said.text if said.text is not None else self.statement
         if text is None:
             raise RefusalError(f"what am I to say in '{clause.text}'?", [clause.text])
         self.flush(row)
         self._to(row, said.to)
-        self.put(row, Speak(speak=template(text)), row.state)
+        self.put(row, Speak(speak=escape_braces(text)), row.state)
         return at + 1
 
     def _tells_when(self, row: Row, match: re.Match[str]) -> None:
-        """ "Tell me when Robin comes" waits for that, and then tells it."""
+        """ "Tell me when Robin comes" waits for the condition, and then tells it."""
         self.flush(row)
-        supposed = suppose(match["what"], row.state, self.reader)
-        told = sentence_of(supposed)
-        if told is None:
+        supposed = parse_condition(match["what"], row.state, self.reader)
+        statement = statement_of(supposed)
+        if statement is None:
             raise RefusalError(f"what am I to say in '{match[0]}'?", [match[0]])
         self.put(row, Wait(awaited=Awaited(condition=supposed.condition)), supposed.holds)
-        said = speech_to(match["who"], told, self.reader.knowledge)
+        said = make_speech(match["who"], statement, self.reader.knowledge)
         self._to(row, said.to)
-        self.put(row, Speak(speak=template(said.text or told)), row.state)
+        self.put(row, Speak(speak=escape_braces(said.text or statement)), row.state)
 
     def _to(self, row: Row, to: Listener | None) -> None:
-        """Goes to whom something is said."""
+        """Goes to the listener."""
         if to is None or not (to.who or to.where):
             return
-        who = behind_preposition(self.reader.items_of(to.who), "to") if to.who and not to.speaker else ()
-        where = behind_preposition(self.reader.items_of(to.where), "in" if who else "to") if to.where else ()
+        who = with_preposition(self.reader.items_of(to.who), "to") if to.who and not to.speaker else ()
+        where = with_preposition(self.reader.items_of(to.where), "in" if who else "to") if to.where else ()
         going = (verb("come"), Adverb(here=True)) if to.speaker else (verb("go"), *who, *where)
         reading = self.reader.commands_of_items(going, row.state)
         if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
@@ -185,18 +185,18 @@ class SentenceBuilder(DecisionBuilder):
         person, text = row.state.memory.person, clauses[at].text
         if person is not None:
             text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
-        asked = question_in(text, self.reader.knowledge)
+        asked = parse_question(text, self.reader.knowledge)
         if asked is None:
             return None
         self.flush(row)
         self._to(row, asked.of)
         answers = self._agreed if asked.yes_or_no else self._chosen
         choices, end = answers(asked, row.state, clauses, at + 1)
-        self.put(row, Ask(ask=template(asked.text), choices=choices), replace(row.state, goal=None, at=None))
+        self.put(row, Ask(ask=escape_braces(asked.text), choices=choices), replace(row.state, goal=None, at=None))
         return end
 
     def _agreed(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
-        """What is done where the answer is yes, and where it is no."""
+        """Steps for the answers yes and no."""
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
             clause, rest = clauses[at], clauses[at].text
@@ -207,35 +207,35 @@ class SentenceBuilder(DecisionBuilder):
                 rest = rest[match.end() :].strip(" ,")
             if answer is None or found[answer]:
                 break
-            end = end_of(clauses, at + 1, branch=True)
+            end = end_of_scope(clauses, at + 1, branch=True)
             body = [*cut(rest), *clauses[at + 1 : end]]
             if not body:
-                raise nothing_said(clause.cue, clause.text)
-            found[answer], _ = self.nested(body, self._choosing(asked, 0, state))
+                raise missing_action(clause.cue, clause.text)
+            found[answer], _ = self.nest(body, self._choosing(asked, 0, state))
             at = end
         if at < len(clauses) and not found["yes"] and ACTS.brings.match(clauses[at].text):
             raise RefusalError("say 'if yes' before what is to be done then", [clauses[at].text])
         return found, at
 
     def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
-        """What is done for each of the choices: it is brought, where that was said."""
+        """Steps for each of the choices: the robot brings it, where that was said."""
         article = r"^(?:a|an|some|the|any|another) "
         names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
         if at >= len(clauses) or clauses[at].kind is not None or not ACTS.brings.match(clauses[at].text):
             return dict.fromkeys(names, ()), at
         chosen = (self._choosing(asked, n, state) for n in range(len(names)))
-        return {name: self.nested([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
+        return {name: self.nest([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
 
     def _choosing(self, asked: Asked, number: int, state: State) -> State:
-        """What is known behind the answer: "it" is what was chosen, and is given to who was asked."""
-        things = tuple(item.phrase for item in self.reader.items_of(asked.choices[number]) if isinstance(item, Chunk))
+        """State behind the answer: "it" is the chosen object, and the person who was asked receives it."""
+        objects = tuple(item.phrase for item in self.reader.items_of(asked.choices[number]) if isinstance(item, Chunk))
         person = Location(phrase_of_name(asked.of.name or "", NounKind.PERSON), "to")
-        memory = replace(state.memory, things=things, gathered=things, where=None, person=person)
+        memory = replace(state.memory, objects=objects, gathered=objects, where=None, person=person)
         return replace(state, memory=memory, recipient=person)
 
     def _checks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
-        """ "Look whether the door is open", "is the battery low": what only blocks can check."""
-        text = checked_statement(clauses[at].text)
+        """ "Look whether the door is open", "is the battery low": checks that only blocks can do."""
+        text = statement_of_check(clauses[at].text)
         if text is None:
             return None
         state = self._known(row)
@@ -245,10 +245,10 @@ class SentenceBuilder(DecisionBuilder):
             plain = refusal
         else:
             return None
-        if cue_behind(text) is not None:
+        if trailing_cue(text) is not None:
             return None
         try:
-            supposed = suppose(text, state, self.reader)
+            supposed = parse_condition(text, state, self.reader)
         except RefusalError as refusal:
             said = refusal.question is not None or refusal.kind is RefusalKind.NO_SUCH_DOOR
             raise (refusal if said else plain) from None
@@ -256,14 +256,14 @@ class SentenceBuilder(DecisionBuilder):
         found = supposed.condition
         step = Do.from_command(found.command) if isinstance(found, Look) else Check(condition=found)
         self.put_done(row, ((step,), supposed.holds, supposed.notes))
-        row.asked = LookedAt(supposed, looked=True)
+        row.asked = LastCheck(supposed, looked=True)
         return at + 1
 
     def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
         if ACTS.gives.match(text) is None or ACTS.everyone.search(text) is None:
             return None
-        done = for_everyone(text, self._known(row), self.reader)
+        done = steps_for_everyone(text, self._known(row), self.reader)
         if done is None:
             return None
         self.flush(row)
@@ -283,7 +283,7 @@ class SentenceBuilder(DecisionBuilder):
             if (match := ACTS.what_there.fullmatch(follow)) is not None:
                 what = next(filter(None, match.groups()))
                 reading, end = search_for(what, state, self.reader), at + 2
-            elif ACTS.speaks.match(follow) and cue_behind(follow) is None:
+            elif ACTS.speaks.match(follow) and trailing_cue(follow) is None:
                 self._in_each(row, replace(clauses[at + 1], joint=""))
                 return at + 2
         if reading is None:
@@ -294,7 +294,7 @@ class SentenceBuilder(DecisionBuilder):
         return end
 
     def _in_each(self, row: Row, says: Clause) -> None:
-        """Says something in every room."""
+        """Speaks in every room."""
         self.flush(row)
         for room in self.reader.knowledge.places:
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
@@ -309,11 +309,11 @@ MOST_CLAUSES: Final = 24
 
 
 def structured(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
-    """The trace of a sentence that decides, repeats, waits, says or asks, from that of its plain reading.
+    """Reads a sentence that decides, repeats, waits, says or asks, given the trace of its plain reading.
 
-    It is the plain one where the sentence lists plain commands nevertheless: where it could be read as such a list,
-    only what certainly decides or repeats is read otherwise. `clauses` are those of the sentence, where they are known,
-    and `memory` is what was spoken of before.
+    Returns the plain trace for a list of plain commands: where the sentence could be such a list, only certain
+    decisions and rounds count. `clauses` are those of the sentence, where they are known, and `memory` is that of
+    earlier sentences.
     """
     try:
         return _structured(plain, split(plain.text).clauses if clauses is None else clauses, pipeline, memory)
@@ -325,19 +325,19 @@ def structured(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipelin
 
 
 def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, memory: Memory) -> Trace:
-    """The same. Raises RefusalError: something is not surely understood; the message names the words."""
-    decides = any(one.kind is not None or cue_behind(one.text) is not None for one in clauses)
+    """Reads it. Raises RefusalError when anything is uncertain; the message names the words."""
+    decides = any(one.kind is not None or trailing_cue(one.text) is not None for one in clauses)
     if plain.refusal is None and not decides:
         return plain
     if len(clauses) > MOST_CLAUSES:
         raise RefusalError(f"{len(clauses)} parts are too many for one sentence; say it in {MOST_CLAUSES} at most")
     assert pipeline.knowledge is not None
     builder = SentenceBuilder(PlainReader(pipeline, pipeline.knowledge))
-    steps, state = builder.sequence(clauses, at_start(pipeline.knowledge, memory))
+    steps, state = builder.sequence(clauses, initial_state(pipeline.knowledge, memory))
     if all(isinstance(step, Do) for step in steps) and not builder.special:
         return plain
     if max(map(_depth, steps), default=0) > MOST_NESTED:
-        raise RefusalError("one thing inside another inside a third is too much; say it in two sentences")
+        raise RefusalError("three conditions or repetitions within each other are too many; say it in two sentences")
     parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     commands = tuple(command for step in steps for each in step.walk() for command in each.commands)
     found = Trace(plain.text, state.memory, opened=plain.opened, tokens=plain.tokens, commands=commands)
@@ -345,6 +345,6 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
 
 
 def _depth(step: Step) -> int:
-    """How deeply blocks stand within blocks; what is done at the end does not count."""
+    """Depth of nested blocks; steps at the end do not count."""
     inner = max(map(_depth, step.inner_steps), default=0)
     return inner + isinstance(step, Choose | Repeat | Try | Together | Ask)

@@ -217,6 +217,6 @@ def flat_listener(says):
 
 
 def test_answers_are_one_line():
-    refused = Understanding("", Status.REFUSED, reason="I know no thing 'x'; known: y")
-    assert answer_line(refused) == "I know no thing 'x'"
+    refused = Understanding("", Status.REFUSED, reason="I know no object 'x'; known: y")
+    assert answer_line(refused) == "I know no object 'x'"
     assert answer_line(Understanding("", Status.REFUSED)) == "I did not understand."

@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.amounts import seconds_of, share_of, time_of, times_of
+from executive.language.amounts import parse_seconds, parse_share, parse_time, parse_times
 
 
 @pytest.mark.parametrize(
@@ -21,13 +21,13 @@ from executive.language.amounts import seconds_of, share_of, time_of, times_of
     ],
 )
 def test_a_time_of_day(text, clock, taken):
-    time = time_of(text)
+    time = parse_time(text)
     assert (time.text, time.taken) == (clock, taken)
 
 
 @pytest.mark.parametrize("text", ["25:00", "half past", "half to three", "the cows", "14 pm", "", "twelve thirteen"])
 def test_what_is_no_time_of_day(text):
-    assert time_of(text) is None
+    assert parse_time(text) is None
 
 
 @pytest.mark.parametrize(
@@ -45,16 +45,16 @@ def test_what_is_no_time_of_day(text):
     ],
 )
 def test_a_span(text, seconds):
-    assert seconds_of(text) == seconds
+    assert parse_seconds(text) == seconds
 
 
 @pytest.mark.parametrize(("text", "times"), [("twice", 2), ("three times", 3), ("0 times", None), ("900 times", None)])
 def test_how_often(text, times):
-    assert times_of(text) == times
+    assert parse_times(text) == times
 
 
 @pytest.mark.parametrize(
     ("text", "share"), [("thirty percent", 0.3), ("5 percent", 0.05), ("half", 0.5), ("150 percent", None)]
 )
 def test_a_share(text, share):
-    assert share_of(text) == share
+    assert parse_share(text) == share

@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.clauses import Cue, cue_behind, cut
+from executive.language.clauses import Cue, cut, trailing_cue
 
 
 def cues(text):
@@ -32,7 +32,7 @@ def test_what_is_one_clause_stays_whole(text):
     ],
 )
 def test_what_stands_behind_is_told_apart(text, before, kind, rest):
-    found = cue_behind(text)
+    found = trailing_cue(text)
     assert (found.before, found.kind, found.text) == (before, kind, rest)
 
 
@@ -40,4 +40,4 @@ def test_what_stands_behind_is_told_apart(text, before, kind, rest):
     "text", ["check if there is a beer", "ask Robin if he wants a beer", "bring a beer", "tell me if it is there"]
 )
 def test_an_indirect_question_stands_behind_nothing(text):
-    assert cue_behind(text) is None
+    assert trailing_cue(text) is None

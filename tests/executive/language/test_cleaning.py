@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from executive.language.cleaning import addressed_to, clean, heard_wake, strip_wake
+from executive.language.cleaning import clean, find_address, find_heard_wake, strip_wake
 
 
 @pytest.mark.parametrize(
@@ -29,20 +29,20 @@ MISSED_PER_100, FALSE_PER_100 = 3, 1
 
 
 def test_of_a_hundred_calls_three_are_missed_at_most():
-    missed = [text for name, text in CALLING if addressed_to(text, ROBOTS).name != name]
+    missed = [text for name, text in CALLING if find_address(text, ROBOTS).name != name]
     assert len(missed) * 100 <= MISSED_PER_100 * len(CALLING), missed
 
 
 def test_of_a_hundred_sentences_for_nobody_one_is_taken_at_most():
     assert len(NOBODY) >= 100
-    taken = [text for text in NOBODY if addressed_to(text, ROBOTS).name is not None]
+    taken = [text for text in NOBODY if find_address(text, ROBOTS).name is not None]
     assert len(taken) * 100 <= FALSE_PER_100 * len(NOBODY), taken
 
 
 def test_of_several_robots_at_most_one_takes_a_sentence():
     others = {"Alice": ("Bob",), "Bob": ("Alice",)}
     for _, text in CALLING:
-        takers = [name for name in ROBOTS if heard_wake(text, name, others=others[name]).name == name]
+        takers = [name for name in ROBOTS if find_heard_wake(text, name, others=others[name]).name == name]
         assert len(takers) <= 1, text
 
 
@@ -116,7 +116,7 @@ def test_a_name_of_any_characters_is_taken_literally():
     ],
 )
 def test_a_misheard_name_still_wakes(transcript):
-    address = heard_wake(transcript, "Alice")
+    address = find_heard_wake(transcript, "Alice")
     assert address.name == "Alice"
     assert address.text.removeprefix("Um, ").rstrip(".") == "fetch me a drink"
 
@@ -140,14 +140,14 @@ def test_a_misheard_name_still_wakes(transcript):
     ],
 )
 def test_another_name_does_not_wake(transcript):
-    assert heard_wake(transcript, "Alice") == addressed_to(transcript, ())
+    assert find_heard_wake(transcript, "Alice") == find_address(transcript, ())
 
 
 def test_nothing_said_to_nobody_wakes_by_its_sound():
-    taken = [text for text in NOBODY if heard_wake(text, "Alice", others=("Bob",)).name is not None]
+    taken = [text for text in NOBODY if find_heard_wake(text, "Alice", others=("Bob",)).name is not None]
     assert len(taken) * 100 <= FALSE_PER_100 * len(NOBODY), taken
 
 
 def test_a_name_nearer_to_another_robot_is_not_for_this_one():
-    assert heard_wake("Hey Ellis, stop", "Alice", others=("Elise",)).name is None
-    assert heard_wake("Hey Ellis, stop", "Elise", others=("Alice",)).name == "Elise"
+    assert find_heard_wake("Hey Ellis, stop", "Alice", others=("Elise",)).name is None
+    assert find_heard_wake("Hey Ellis, stop", "Elise", others=("Alice",)).name == "Elise"

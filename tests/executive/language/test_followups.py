@@ -6,10 +6,10 @@ from executive.language.followups import (
     Amendment,
     FollowUpKind,
     Remark,
-    amended,
-    follow_up_of,
-    remark_of,
-    without_fetching,
+    amend,
+    parse_follow_up,
+    parse_remark,
+    skip_fetching,
 )
 from executive.words.command import parse_command
 from skills.api import ObjectKind
@@ -47,14 +47,14 @@ CORRECTION, ADDITION, AGAIN = FollowUpKind.CORRECTION, FollowUpKind.ADDITION, Fo
     ],
 )
 def test_how_a_sentence_goes_on_from_the_one_before(text, kind, said, preposition, old):
-    follow_up = follow_up_of(text)
+    follow_up = parse_follow_up(text)
     assert (follow_up.kind, follow_up.said, follow_up.preposition) == (kind, said, preposition)
     assert follow_up.instead_of == old
 
 
 @pytest.mark.parametrize("text", ["", "no", "go to the kitchen", "the hammer", "bring me the coke", "nothing", "stop"])
 def test_a_sentence_of_its_own_goes_on_from_nothing(text):
-    assert follow_up_of(text) is None
+    assert parse_follow_up(text) is None
 
 
 def texts(commands):
@@ -65,13 +65,13 @@ def texts(commands):
     ("by", "commands"),
     [
         (
-            Amendment(thing=ObjectKind("hammer")),
+            Amendment(kind=ObjectKind("hammer")),
             [
                 "Take [Nothing] to [workshop] and do [grasp] to [hammer]",
                 "Take [hammer] to [start] and do [Nothing] to [Nothing]",
             ],
         ),
-        (Amendment(thing=ObjectKind("hammer"), old="beer"), texts(FETCH)),
+        (Amendment(kind=ObjectKind("hammer"), old="beer"), texts(FETCH)),
         (
             Amendment(goal="Robin", goal_at="hall"),
             [str(FETCH[0]), "Take [coke] to [Robin at hall] and do [Nothing] to [Nothing]"],
@@ -90,25 +90,25 @@ def texts(commands):
     ],
 )
 def test_commands_are_amended(knowledge, by, commands):
-    assert texts(amended(FETCH, by, knowledge)) == commands
+    assert texts(amend(FETCH, by, knowledge)) == commands
 
 
 def test_the_place_that_was_named_is_changed(knowledge):
-    assert amended(FETCH, Amendment(goal="bedroom", old="kitchen"), knowledge)[0].goal == "bedroom"
+    assert amend(FETCH, Amendment(goal="bedroom", old="kitchen"), knowledge)[0].goal == "bedroom"
 
 
 def test_a_thing_that_is_held_is_not_gone_for_again(knowledge):
-    assert without_fetching(FETCH, ObjectKind("coke"), knowledge) == FETCH[1:]
+    assert skip_fetching(FETCH, ObjectKind("coke"), knowledge) == FETCH[1:]
 
 
 def test_another_thing_is_put_down_first(knowledge):
-    commands = without_fetching(FETCH, ObjectKind("hammer"), knowledge)
+    commands = skip_fetching(FETCH, ObjectKind("hammer"), knowledge)
     assert texts(commands)[0] == "Take [hammer] to [workbench] and do [place] to [hammer]"
     assert commands[1:] == FETCH
 
 
 def test_with_an_empty_hand_nothing_changes(knowledge):
-    assert without_fetching(FETCH, None, knowledge) == FETCH
+    assert skip_fetching(FETCH, None, knowledge) == FETCH
 
 
 WORDS = "no not the coke , but instead of too and a to make it another one please again ' - kitchen".split()  # noqa: SIM905
@@ -117,7 +117,7 @@ WORDS = "no not the coke , but instead of too and a to make it another one pleas
 @settings(deadline=200)
 @given(st.one_of(st.text(max_size=200), st.lists(st.sampled_from(WORDS), max_size=40).map(" ".join)))
 def test_any_text_is_read_without_an_error_and_soon(text):
-    follow_up_of(text)
+    parse_follow_up(text)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +145,7 @@ def test_any_text_is_read_without_an_error_and_soon(text):
     ],
 )
 def test_a_remark_is_known_with_and_without_politeness(text, remark):
-    assert remark_of(text) is remark
+    assert parse_remark(text) is remark
 
 
 @pytest.mark.parametrize(
@@ -165,9 +165,9 @@ def test_a_remark_is_known_with_and_without_politeness(text, remark):
     ],
 )
 def test_what_says_more_is_no_remark(text):
-    assert remark_of(text) is None
+    assert parse_remark(text) is None
 
 
 @given(st.text(max_size=300))
 def test_any_text_is_judged_without_an_error(text):
-    remark_of(text)
+    parse_remark(text)

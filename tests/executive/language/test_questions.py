@@ -1,6 +1,6 @@
 import pytest
 
-from executive.language.questions import ClarifyingQuestion, Slot, answer_by, chosen_candidate, with_answer
+from executive.language.questions import ClarifyingQuestion, Slot, chosen_candidate, insert_answer, make_answerer
 from executive.language.understand import Status, understand
 from executive.words.mission import QuestionPolicy
 
@@ -11,7 +11,7 @@ TABLE = ClarifyingQuestion(
     "kitchen table",
     "table",
 )
-CAKE = ClarifyingQuestion("I know no thing 'cake'; did you mean 'coke'?", Slot.THING, ("coke",), "coke", "cake")
+CAKE = ClarifyingQuestion("I know no object 'cake'; did you mean 'coke'?", Slot.THING, ("coke",), "coke", "cake")
 
 
 @pytest.mark.parametrize(
@@ -69,7 +69,7 @@ def test_yes_is_enough_where_there_is_one_candidate(answer):
     ],
 )
 def test_the_answer_is_put_into_the_sentence(sentence, question, answer, whole):
-    assert with_answer(sentence, question, answer) == whole
+    assert insert_answer(sentence, question, answer) == whole
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_an_answered_question_leads_to_the_commands(parser, knowledge, sentence,
 
     asked = told(sentence)
     assert asked.status is Status.QUESTION
-    answered = told(with_answer(sentence, asked.question, answer))
+    answered = told(insert_answer(sentence, asked.question, answer))
     assert (answered.reason, len(answered.commands)) == (None, commands)
 
 
@@ -104,7 +104,7 @@ def test_where_any_one_will_do_the_first_is_taken_and_said(parser, knowledge):
 
 
 def test_the_policy_says_who_answers():
-    assert answer_by(QuestionPolicy.FIRST)(TABLE) == "kitchen table"
-    assert answer_by(QuestionPolicy.REFUSE, lambda question: "2")(TABLE) is None
-    assert answer_by(QuestionPolicy.ASK)(TABLE) is None
-    assert answer_by(QuestionPolicy.ASK, lambda question: "2")(TABLE) == "2"
+    assert make_answerer(QuestionPolicy.FIRST)(TABLE) == "kitchen table"
+    assert make_answerer(QuestionPolicy.REFUSE, lambda question: "2")(TABLE) is None
+    assert make_answerer(QuestionPolicy.ASK)(TABLE) is None
+    assert make_answerer(QuestionPolicy.ASK, lambda question: "2")(TABLE) == "2"

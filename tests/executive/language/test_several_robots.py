@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from executive.language.addressees import Whom
+from executive.language.addressees import RobotChoice
 from executive.language.several_robots import understand_for_robots
 from executive.language.understand import Status, understand
 
@@ -24,9 +24,9 @@ def said(parser, knowledge):
     [
         # sentence, whose its parts are
         ("Hey Bob, go to the kitchen", ["bob"]),
-        ("go to the kitchen", [Whom.ANY]),
-        ("Hey everyone, come here", [Whom.ALL]),
-        ("you two, come here", [Whom.ALL]),
+        ("go to the kitchen", [RobotChoice.ANY]),
+        ("Hey everyone, come here", [RobotChoice.ALL]),
+        ("you two, come here", [RobotChoice.ALL]),
         ("Hey Alice and Bob, go to the kitchen", ["alice", "bob"]),
         ("Hey Alice, let Bob go to the kitchen", ["bob"]),
         ("Alice, go to the kitchen, and Bob, come here", ["alice", "bob"]),

@@ -11,8 +11,8 @@ from executive.language.spelling import (
     nearest_by_sound,
     sound_distance,
     sounds_of,
+    synonyms_for,
     synonyms_of,
-    words_for,
 )
 
 VOCABULARY = ["coke", "cokes", "beer", "wrench", "hammer", "screwdriver", "robin", "kitchen", "kitchen counter", "sofa"]
@@ -117,9 +117,9 @@ def test_a_synonym_stands_for_the_known_names(word, names):
 
 
 def test_a_name_has_its_synonyms_and_the_words_for_its_kind():
-    assert {"spanner", "monkey wrench"} <= set(words_for("wrench"))
-    assert {"cola", "soda", "soft drink"} <= set(words_for("coke"))
-    assert words_for("unicorn") == ()
+    assert {"spanner", "monkey wrench"} <= set(synonyms_for("wrench"))
+    assert {"cola", "soda", "soft drink"} <= set(synonyms_for("coke"))
+    assert synonyms_for("unicorn") == ()
 
 
 @pytest.mark.parametrize(
@@ -194,33 +194,33 @@ ALIKES = SoundAlikes(NAMES, OTHERS)
      ("nest", "desk"), ("come you", "could you"), ("when you", "would you"), ("kitchen count", "kitchen counter")],
 )  # fmt: skip
 def test_what_was_misheard_is_among_the_nearest(heard, meant):
-    assert meant in [alike.phrase for alike in ALIKES.of(heard)[:3]]
+    assert meant in [alike.phrase for alike in ALIKES.nearest(heard)[:3]]
 
 
 def test_the_costs_are_those_of_the_distance_by_sound():
     for heard in ("ranch", "big fish", "rob in"):
-        for alike in ALIKES.of(heard):
+        for alike in ALIKES.nearest(heard):
             longer = max(len(sounds_of(heard)), len(sounds_of(alike.phrase)))
             assert alike.cost == pytest.approx(sound_distance(heard, alike.phrase) * longer)
 
 
 def test_the_nearest_come_first():
-    costs = [alike.cost for alike in ALIKES.of("coats")]
+    costs = [alike.cost for alike in ALIKES.nearest("coats")]
     assert costs == sorted(costs)
 
 
 def test_the_very_words_are_not_told():
-    assert "wrench" not in [alike.phrase for alike in ALIKES.of("Wrench")]
+    assert "wrench" not in [alike.phrase for alike in ALIKES.nearest("Wrench")]
 
 
 def test_names_are_told_from_other_words():
-    assert {alike.phrase: alike.name for alike in ALIKES.of("come you")}["could you"] is False
-    assert ALIKES.of("ranch")[0].name
+    assert {alike.phrase: alike.name for alike in ALIKES.nearest("come you")}["could you"] is False
+    assert ALIKES.nearest("ranch")[0].name
 
 
 def test_what_sounds_like_nothing_known_has_no_alikes():
-    assert ALIKES.of("electricity bill") == ()
-    assert ALIKES.of("") == ALIKES.of("123") == ()
+    assert ALIKES.nearest("electricity bill") == ()
+    assert ALIKES.nearest("") == ALIKES.of("123") == ()
     assert SoundAlikes([]).of("wrench") == ()
 
 

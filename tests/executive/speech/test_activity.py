@@ -8,7 +8,7 @@ from executive.speech.activity import FRAME, Endpointer, PauseRules, load_detect
 from executive.speech.sound import RATE_HZ
 
 FRAME_S = FRAME / RATE_HZ
-RULES = PauseRules(pause_s=0.8, kept_pause_s=0.6, margin_s=0.3, least_s=0.15, most_s=5.0)
+RULES = PauseRules(pause_s=0.8, inner_pause_s=0.6, margin_s=0.3, least_s=0.15, most_s=5.0)
 
 
 def _utterances(sound, block=1600, rules=RULES, detector=None):
@@ -41,7 +41,7 @@ def test_the_size_of_the_blocks_changes_nothing():
 
 
 def test_a_pause_that_is_not_the_end_is_cut_down():
-    rules = PauseRules(pause_s=2.0, kept_pause_s=0.6)
+    rules = PauseRules(pause_s=2.0, inner_pause_s=0.6)
     (one,) = _utterances(speech_like(0.5, 1.0, 1.5, 1.0, 3.0), rules=rules)
     assert one.length_s == pytest.approx(0.3 + 1.0 + 0.6 + 1.0 + 0.3, abs=5 * FRAME_S)
 

@@ -65,7 +65,7 @@ def test_without_a_vocabulary_every_name_fits(parser):
 
 def test_the_known_phrases_are_names_calls_and_the_words_of_requests(flat):
     alikes = spoken_phrases(vocabulary_of_world(flat, called=True))
-    assert alikes.of("ranch")[0].phrase == "wrench"
-    assert "cokes" in [a.phrase for a in alikes.of("coats")]
-    assert "would you" in [a.phrase for a in alikes.of("when you")]
-    assert "Hey Alice" in [a.phrase for a in alikes.of("pay Alice")]
+    assert alikes.nearest("ranch")[0].phrase == "wrench"
+    assert "cokes" in [a.phrase for a in alikes.nearest("coats")]
+    assert "would you" in [a.phrase for a in alikes.nearest("when you")]
+    assert "Hey Alice" in [a.phrase for a in alikes.nearest("pay Alice")]

@@ -40,7 +40,7 @@ def clean(text: str) -> str:
 
 
 def placeholder(text: str) -> str | None:
-    """Finds a placeholder ("${room}", "[object]", "ROOM_NAME") or another odd piece; None without any."""
+    """Finds a placeholder ("${room}", "[object]", "ROOM_NAME") or another piece that is no word; None without any."""
     found = _PLACEHOLDER.search(_PERCENT.sub(" percent", _AND.sub("and", text)))
     return None if found is None else found[0]
 

@@ -131,7 +131,7 @@ class Patterns:
         return self._words[name] if name in self._words else self._filled(self._entry(name))
 
     def with_words(self, **words: str) -> Patterns:
-        """Copies it, with more words to insert."""
+        """Copies the patterns, with more words to insert."""
         return Patterns(self._table, self._section, {**self._words, **words})
 
     def _entry(self, name: str) -> Any:

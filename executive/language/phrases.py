@@ -158,7 +158,7 @@ class Phrase:
 
     @property
     def kind(self) -> NounKind | None:
-        """Kind of the noun: of "a piece of advice", the kind of the advice."""
+        """Kind of the noun; for "a piece of advice" the kind of the advice."""
         meant = self.head.lemma in lexicon().quantities or self.head.lemma in _ENDS
         return self.of_kind if meant and self.of_kind else self.head.kind
 

@@ -116,7 +116,7 @@ class Recording:
 
     @property
     def status(self) -> Status:
-        """OK when all utterances for the robot are, otherwise the status of the first that is not."""
+        """Status OK when all utterances for the robot are OK, otherwise that of the first that is not."""
         states = [one.meant.status for one in self.decisive]
         return next((state for state in states if state is not Status.OK), Status.OK if states else Status.REFUSED)
 

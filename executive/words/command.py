@@ -98,7 +98,10 @@ class Command:
 
     @classmethod
     def from_json(cls, values: Mapping[str, Any]) -> Command:
-        """Reads a command from JSON values, perhaps not all. Raises ValueError for an unknown task or name."""
+        """Reads a command from JSON values; missing keys have defaults.
+
+        Raises ValueError for an unknown task or a bad name.
+        """
         item, target, task = values.get("item"), values.get("object"), values.get("task")
         return cls(
             item=None if item is None else parse_object(item),

@@ -150,7 +150,7 @@ class PlainReader:
         return self._run(Trace(text), upto="reading").items
 
     def go_to(self, text: str, state: State) -> PlainReading:
-        """Goes to the place of a noun phrase, or "there"."""
+        """Understands going to a place, given by a noun phrase or "there"."""
         items = (Adverb(here=False),) if text.lower() == "there" else self.items_of(text)
         return self.commands_of_items((verb("go"), *with_preposition(items, "to")), state)
 

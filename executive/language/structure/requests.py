@@ -303,7 +303,7 @@ def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[St
 
 
 def search_for(what: str, state: State, reader: PlainReader) -> PlainReading:
-    """Looks for an object or a person in all rooms. Raises RefusalError when it is unclear."""
+    """Understands a search for an object or a person in all rooms. Raises RefusalError when it is unclear."""
     reading = reader.commands_of(what, state, (verb("find"),))
     finds = [command for command in reading.commands if command.task is Task.FIND]
     if len(finds) != len(reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):

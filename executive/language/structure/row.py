@@ -160,7 +160,7 @@ def missing_action(cue: str, text: str = "") -> RefusalError:
 
 
 def seconds_of_cue(cue: str) -> float:
-    """Seconds of "every ten minutes"."""
+    """Parses the interval in "every ten minutes", in seconds. Raises RefusalError for another text."""
     words = re.sub(r"^(?:once )?(?:every|each|per) |^once (?=an? )|^once per ", "", cue, flags=re.IGNORECASE)
     seconds = parse_seconds(words if words not in ("hour", "minute") else f"a {words}")
     if seconds is None:
@@ -169,7 +169,7 @@ def seconds_of_cue(cue: str) -> float:
 
 
 def times_of_cue(cue: str) -> int:
-    """Number of "do this three times". Raises RefusalError for another text."""
+    """Parses the number of rounds in "do this three times". Raises RefusalError for another text."""
     words = re.sub(r"^(?:do|repeat) (?:this |that |the following |it )?|^for ", "", cue, flags=re.IGNORECASE)
     count = parse_times(words)
     if count is None:

@@ -63,7 +63,7 @@ SCHEMA_PAGES = (
     SchemaPage(
         "knowledge",
         "Knowledge files",
-        "`knowledge.yaml` of a world: what the robot is told. Metres and radians, in the world frame.",
+        "`knowledge.yaml` of a world: the robot's knowledge of it. Metres and radians, in the world frame.",
         Knowledge,
         "plant/worlds/flat/knowledge.yaml",
     ),

@@ -70,8 +70,8 @@ class _Looking(Strict):
 
     max_age_s: Delay = Field(
         default=0.0,
-        description="How old an answer may be that is not asked for again (seconds, or a text such as "
-        '"2 min"); 0: each time that the condition is asked, the robot looks again.',
+        description="Age up to which an earlier answer counts (seconds, or a text such as "
+        '"2 min"); 0: the robot looks again each time that the condition is checked.',
     )
 
 
@@ -84,7 +84,7 @@ class Question(_Looking):
 class Look(_Looking):
     """Condition that an object is seen; the robot goes there and looks each time that the condition is checked."""
 
-    object: Text = Field(description="An object that is looked for; `at` says where.")
+    object: Text = Field(description="The object to look for; `at` says where.")
     at: Text | None = Field(default=None, description="The place of the object; by default anywhere.")
 
     @classmethod
@@ -106,7 +106,7 @@ class Look(_Looking):
 class LookFor(_Looking):
     """Condition that a person, or anybody, is seen."""
 
-    person: Text = Field(description='A person who is looked for, or "anybody"; `at` says where.')
+    person: Text = Field(description='The person to look for, or "anybody"; `at` says where.')
     at: Text | None = Field(default=None, description="The place of the person; by default anywhere.")
 
 
@@ -114,7 +114,7 @@ class DoorOpen(_Looking):
     """Condition that a door is open; the robot goes there and looks."""
 
     door: Annotated[tuple[Name, ...], Field(min_length=1, max_length=2)] = Field(
-        description="The two rooms that it joins, or the one room that has one door."
+        description="The two rooms that it joins, or a room with only one door."
     )
 
     @model_validator(mode="before")

@@ -46,7 +46,7 @@ class RobotFacts(_Facts):
     """Facts about the robot: its name, the names of others, and whether typed sentences must begin with its name."""
 
     name: Name = Field(description='as in "Hey Alice"')
-    others: tuple[Name, ...] = Field(default=(), description="other robots: what is said to them is not for this one")
+    others: tuple[Name, ...] = Field(default=(), description="names of other robots that are spoken to")
     require_wake: bool = Field(default=False, description="typed sentences, too, begin with the wake phrase")
 
 
@@ -68,7 +68,7 @@ class BatteryFacts(_Facts):
 class Place(_Facts):
     """Room: other names, the pose of a robot in it, its outline (world frame, m)."""
 
-    pose: Pose = Field(description="where the robot stands to be there")
+    pose: Pose = Field(description="pose of a robot in it")
     polygon: Polygon = Field(description="outline, corners (x, y)")
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
 
@@ -104,7 +104,7 @@ class Person(_Facts):
 
     at: str = Field(description="the place where they usually are")
     aliases: tuple[Name, ...] = Field(default=(), description="other names")
-    pose: Pose | None = Field(default=None, description="where exactly, when that is known")
+    pose: Pose | None = Field(default=None, description="exact pose, when it is known")
 
 
 class Knowledge(_Facts):
@@ -114,9 +114,9 @@ class Knowledge(_Facts):
     robots: RobotsFile | None = Field(
         default=None, description="the robots of runs in this world that name none themselves, by name"
     )
-    start: Pose = Field(description="where it stands at the beginning")
-    dock: Pose | None = Field(default=None, description="where it stands to charge; without one it cannot charge")
-    battery: BatteryFacts = Field(default=BatteryFacts(), description="when it charges, and until when")
+    start: Pose = Field(description="its pose at the beginning")
+    dock: Pose | None = Field(default=None, description="its pose for charging; without one it cannot charge")
+    battery: BatteryFacts = Field(default=BatteryFacts(), description="charge at which it goes to the dock and leaves")
     places: dict[Name, Place] = Field(default_factory=dict, description="the rooms by name")
     doors: tuple[Door, ...] = Field(default=(), description="the narrow passages between rooms")
     surfaces: dict[Name, SurfaceFacts] = Field(

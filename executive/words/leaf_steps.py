@@ -36,7 +36,7 @@ def _named_goal(value: object) -> object:
 
 
 Goal = Annotated[Text, BeforeValidator(_named_goal)]
-_ELSEWHERE: Final = "Whether an object that is not in its place is also searched for elsewhere; by default, yes."
+_ELSEWHERE: Final = "Whether the robot also searches elsewhere for an object that is not in its place; by default, yes."
 _GIVES: Final = (
     "Names for the skill's output ports, or for the answer; later steps read them with {from: NAME} and in expressions."
 )
@@ -45,7 +45,7 @@ _GIVES: Final = (
 class Say(Step):
     """Step in English."""
 
-    say: Text = Field(description="What to do, in English.")
+    say: Text = Field(description="The request, in English.")
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
     _meaning: tuple[Command, ...] = PrivateAttr(default=())
@@ -65,10 +65,10 @@ class Say(Step):
 class Do(Step):
     """Step of one command, given by its parts."""
 
-    take: Text | None = Field(default=None, description="What is carried; a number may stand before it.")
+    take: Text | None = Field(default=None, description="The object to carry; a number may stand before it.")
     to: Goal | None = Field(default=None, description='The place or person, or "start", or "Robin at hall".')
-    do: Task | None = Field(default=None, description="What to do there to the object.")
-    object: Text | None = Field(default=None, description="The object of the task, or who is looked for.")
+    do: Task | None = Field(default=None, description="The task there, on the object.")
+    object: Text | None = Field(default=None, description="The object of the task, or the person to look for.")
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
 
@@ -167,11 +167,11 @@ class Awaited(Strict):
     """End of a wait: a condition, a time, or a time of day."""
 
     condition: Annotated[Condition | None, Field(alias="for", description="Wait until this holds.")] = None
-    seconds: Duration | None = Field(default=None, description='So long: seconds, or "10 min".')
+    seconds: Duration | None = Field(default=None, description='Length of the wait: seconds, or "10 min".')
     until_clock: Clock | None = Field(default=None, description='Until this time of day, as in "14:30".')
-    every_s: Annotated[
-        Duration, Field(alias="every", description="How often a condition that takes a look is looked at.")
-    ] = 15.0
+    every_s: Annotated[Duration, Field(alias="every", description="How often the robot looks for the condition.")] = (
+        15.0
+    )
 
     @model_validator(mode="after")
     def _one_form(self) -> Self:
@@ -264,7 +264,7 @@ class Speak(Step):
     """`speak`: says a text to the people around."""
 
     key: ClassVar[str] = "speak"
-    speak: Text = Field(description="What to say to the people around; {NAME} puts in a value.")
+    speak: Text = Field(description="The text for the people around; {NAME} inserts a value.")
 
     @property
     def text(self) -> Template:

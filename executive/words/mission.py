@@ -24,7 +24,7 @@ DEFAULT_WORLD: Final = "flat"
 
 
 class QuestionPolicy(enum.Enum):
-    """Policy for a sentence that could mean several things."""
+    """Policy for an ambiguous sentence."""
 
     ASK = "ask"  # somebody is asked where somebody is there; else the sentence is refused
     FIRST = "first"  # the likeliest meaning is taken
@@ -35,7 +35,7 @@ class Stop(Strict):
     """Waypoint at which a person stands for a while."""
 
     at: Corner | Name = Field(description="A point (x, y) in metres, or a place by its name.")
-    pause: Delay = Field(default=0.0, description="How long the person stands there, in seconds.")
+    pause: Delay = Field(default=0.0, description="Time for which the person stands there, in seconds.")
 
 
 class Route(Strict):
@@ -44,11 +44,11 @@ class Route(Strict):
     waypoints: Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)] = Field(
         description="Points (x, y) in metres or names of places, in order; the person begins at the first."
     )
-    speed: Speed = Field(default=1.2, description="How fast the person walks, in m/s.")
+    speed: Speed = Field(default=1.2, description="Speed of the person, in m/s.")
     loop: StrictBool = Field(
         default=False, description="Whether the first waypoint follows the last; by default, once."
     )
-    start: Delay = Field(default=0.0, description="When the person sets off, in seconds from the beginning.")
+    start: Delay = Field(default=0.0, description="Time at which the person sets off, in seconds from the beginning.")
     yields: StrictBool = Field(default=True, description="Whether the person stops for a robot that is close ahead.")
 
 
@@ -65,11 +65,11 @@ class Parameter(Strict):
     """Parameter of a mission file."""
 
     type: Literal["text", "number", "truth", "place", "object", "person"] | None = Field(
-        default=None, description="What it is; a place, object or person is checked against the world."
+        default=None, description="Its type; a place, object or person is checked against the world."
     )
-    default: Scalar = Field(default=None, description="Its value where none is given.")
-    choices: tuple[Scalar, ...] | None = Field(default=None, description="The values that it may have.")
-    description: Text | None = Field(default=None, description="What it is for.")
+    default: Scalar = Field(default=None, description="Its value when none is given.")
+    choices: tuple[Scalar, ...] | None = Field(default=None, description="Its possible values.")
+    description: Text | None = Field(default=None, description="Its purpose.")
 
 
 def _short_parameter(value: object) -> object:
@@ -109,14 +109,14 @@ class MissionPart(_Whole):
     after: Name | Annotated[tuple[Name, ...], Field(min_length=1)] | None = Field(
         default=None, description="The robot, or the robots, whose parts must be done before this one begins."
     )
-    steps: Annotated[Steps, Field(description="What it does, one after the other.")]
+    steps: Annotated[Steps, Field(description="Its steps, in order.")]
     always: Annotated[
         Branch,
-        Field(description="Steps at the end of the part, whatever happened, also when the mission is cancelled."),
+        Field(description="Steps at the end of the part in any case, also when the mission is cancelled."),
     ] = ()
-    while_: Annotated[While | None, Field(alias="while", description="What must hold while the part runs.")] = None
+    while_: Annotated[While | None, Field(alias="while", description="Condition that must hold meanwhile.")] = None
     when: tuple[Handler, ...] | None = Field(
-        default=None, description="What interrupts the part, the most important first."
+        default=None, description="Conditions that interrupt the part, the most important first."
     )
 
     @property
@@ -134,7 +134,7 @@ class Mission(_Whole):
     model_config = ConfigDict(title="Errand mission")
 
     name: Name = Field(description="The mission's name; part of all path ids.")
-    description: str | None = Field(default=None, description="What it is for.")
+    description: str | None = Field(default=None, description="Its purpose.")
     world: Name = Field(default=DEFAULT_WORLD, description="A world by its name or folder.")
     robot: Name | None = Field(
         default=None,
@@ -145,7 +145,7 @@ class Mission(_Whole):
     )
     knowledge: dict[str, Any] | None = Field(
         default=None,
-        description="Laid over the world's knowledge: what stands here replaces what stands there, key by key.",
+        description="Changes of the world's knowledge: values here replace those of the world, key by key.",
     )
     people: dict[Name, Route] | None = Field(
         default=None, description="People who walk while the mission runs, by name: new ones, or those of the world."
@@ -154,7 +154,7 @@ class Mission(_Whole):
         default=None, description="Folders of `errand object import`, as seen from this file's folder."
     )
     objects: dict[Name, LooseObject] | None = Field(
-        default=None, description="Objects that lie there at the beginning besides those of the world, by name."
+        default=None, description="Further objects in the world at the beginning, by name."
     )
     parameters: _Parameters | None = Field(
         default=None,
@@ -163,24 +163,24 @@ class Mission(_Whole):
     )
     questions: QuestionPolicy | None = Field(
         default=None,
-        description="What becomes of a sentence that could mean several things. ask: who starts the mission is asked. "
-        "first: the likeliest is taken. refuse (the default): the file is refused.",
+        description="Policy for an ambiguous sentence. ask: the user who starts the mission answers. "
+        "first: the likeliest meaning counts. refuse (the default): the file is refused.",
     )
     each: Policy | None = Field(default=None, description="The policy of every step that does not say otherwise.")
     variables: dict[Name, Given] | None = Field(
         default=None,
         description="Values by name, as they are at the beginning; steps change them with `set` and `gives`.",
     )
-    steps: Annotated[Branch, Field(description="What to do, one after the other. Left out where there are `parts`.")]
+    steps: Annotated[Branch, Field(description="The steps, in order; omitted where there are `parts`.")]
     parts: Annotated[dict[Name, MissionPart], Field(min_length=1)] | None = Field(
-        default=None, description="What each robot does, by its name, all at the same time."
+        default=None, description="The part of each robot, by its name; all run at the same time."
     )
     always: Annotated[
-        Branch, Field(description="Steps at the end, whatever happened, also when the mission is cancelled.")
+        Branch, Field(description="Steps at the end in any case, also when the mission is cancelled.")
     ] = ()
-    while_: Annotated[While | None, Field(alias="while", description="What must hold while the mission runs.")] = None
+    while_: Annotated[While | None, Field(alias="while", description="Condition that must hold meanwhile.")] = None
     when: tuple[Handler, ...] | None = Field(
-        default=None, description="What interrupts the mission, the most important first."
+        default=None, description="Conditions that interrupt the mission, the most important first."
     )
     _notes: tuple[str, ...] = PrivateAttr(default=())
 

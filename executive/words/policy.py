@@ -47,7 +47,7 @@ class Guards(Strict):
     ] = None
     stale: StaleData | None = Field(
         default=None,
-        description="What an old reading means. wait: stand still for a new one. fail: the guard does not hold. "
+        description="Reaction to an old reading. wait: stand still for a new one. fail: the guard does not hold. "
         "accept: judge by the old one.",
     )
 
@@ -55,7 +55,7 @@ class Guards(Strict):
 class OperatorQuestion(Strict):
     """Question to the operator for `on_failure: ask`."""
 
-    text: Text | None = Field(default=None, description="The question; by default it tells what failed and why.")
+    text: Text | None = Field(default=None, description="The question; by default it says what failed and why.")
     limit_s: Annotated[
         Duration, Field(alias="limit", description="Seconds on the robot's clock to wait for an answer.")
     ] = 60.0
@@ -71,19 +71,19 @@ class Policy(Strict):
     retries: Attempts | None = Field(default=None, description="How many more attempts after a failure.")
     on_failure: OnFailure | None = Field(
         default=None,
-        description="What to do when it failed and no retries are left. retry: once more (or as often as `retries` "
+        description="Reaction to a failure without retries left. retry: once more (or as often as `retries` "
         "says), then stop. skip: note it and go on. ask: ask the operator. return: go back to where the robot started, "
         "then stop. stop: the mission fails.",
     )
     question: OperatorQuestion | None = Field(default=None, description="The question for `on_failure: ask`.")
-    guards: Guards | None = Field(default=None, description="What must hold while it runs.")
+    guards: Guards | None = Field(default=None, description="Guards that must hold while it runs.")
     pick_ups: Objects | None = Field(
-        default=None, description="How often an object that falls on the way is picked up again; by default, twice."
+        default=None, description="How often the robot picks up an object that it drops; by default, twice."
     )
     move_aside: Objects | None = Field(
         default=None,
-        description="How many objects that stand in the way of one that is to be taken may be moved aside, on the "
-        "surface where they stand; by default, none.",
+        description="How many objects that block every grasp the robot may move aside on their surface; "
+        "by default, none.",
     )
 
     @model_validator(mode="after")

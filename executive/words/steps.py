@@ -193,7 +193,7 @@ class Handler(Strict):
     condition: Annotated[
         Condition, Field(alias="if", description="When this begins to hold, the steps are interrupted.")
     ]
-    steps: Annotated[Steps, Field(alias="do", description="What is done then; afterwards the steps go on.")]
+    steps: Annotated[Steps, Field(alias="do", description="The steps to run then; afterwards the others go on.")]
     times: Count = Field(default=10, description="How often at most; once more is a failure.")
 
 
@@ -205,11 +205,11 @@ class Group(Step):
     name: Name | None = Field(default=None, description="What the group is called.")
     always: Annotated[
         Branch,
-        Field(description="Steps at the end of the group, whatever happened, also when the mission is cancelled."),
+        Field(description="Steps at the end of the group in any case, also when the mission is cancelled."),
     ] = ()
-    while_: Annotated[While | None, Field(alias="while", description="What must hold while the group runs.")] = None
+    while_: Annotated[While | None, Field(alias="while", description="Condition that must hold meanwhile.")] = None
     when: tuple[Handler, ...] | None = Field(
-        default=None, description="What interrupts the group, the most important first."
+        default=None, description="Conditions that interrupt the group, the most important first."
     )
 
     @property
@@ -254,11 +254,11 @@ class Ask(Answering):
         default=None, description="The answers to choose from, perhaps with the steps that each leads to."
     )
     match: Literal["place", "person", "object", "number", "text"] | None = Field(
-        default=None, description="What the answer is, where there are no choices."
+        default=None, description="Type of the answer, where there are no choices."
     )
-    limit_s: Annotated[
-        Duration, Field(alias="limit", description="How long to wait for an answer (robot's clock).")
-    ] = 60.0
+    limit_s: Annotated[Duration, Field(alias="limit", description="Time to wait for an answer (s, robot's clock).")] = (
+        60.0
+    )
     default: Scalar = Field(
         default=None, description="The answer when nobody answers in time; without one the step fails."
     )

@@ -78,12 +78,12 @@ def test_a_question_is_asked_again_of_another_place(talk, given):
     assert given() == {"later": [["Take [Nothing] to [bedroom] and do [find] to [coke]"]]}
 
 
-def test_what_was_spoken_of_is_meant_by_it(talk, given):
+def test_it_means_the_last_object(talk, given):
     talk().hear("bring it to the bedroom", 10.0)
     assert given() == {"instead": [carried("coke", "bedroom")]}
 
 
-def test_a_request_of_its_own_is_done_first(talk, given):
+def test_new_request_runs_first(talk, given):
     reply = talk().hear("go to the bathroom", 10.0)
     assert reply.text == "first: Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]"
     assert list(given()) == ["first"]
@@ -178,7 +178,7 @@ def test_a_question_waits_for_a_minute(talk):
     assert conversation.hear("yes", 66.0).kind is ReplyKind.REFUSED
 
 
-def test_who_listens_hears_which_question_waits(talk):
+def test_listener_gets_the_open_question(talk):
     heard, conversation = [], talk("go to the hall")
     conversation.listen(heard.append)
     conversation.hear("bring me the cok", 1.0)
@@ -208,7 +208,7 @@ def test_a_question_of_the_mission_is_answered(talk, control):
         ("I told Alice to wait", ReplyKind.IGNORED),
     ],
 )
-def test_where_the_name_is_required_only_what_is_said_to_it_counts(talk, text, kind):
+def test_robot_hears_only_sentences_with_its_name_when_required(talk, text, kind):
     assert talk(require_wake=True, others=("Bob",)).hear(text).kind is kind
 
 
@@ -218,7 +218,7 @@ def test_an_answer_needs_no_name(talk):
     assert conversation.hear("yes", 6.0).kind is ReplyKind.DONE
 
 
-def test_without_the_requirement_what_is_said_to_another_is_still_ignored(talk):
+def test_sentence_to_another_robot_is_ignored_without_require_wake(talk):
     assert talk().hear("Hey Bob, wait").kind is ReplyKind.IGNORED
 
 
@@ -230,7 +230,7 @@ def test_it_says_what_it_can_do(talk, text):
 @pytest.mark.parametrize(
     "text", ["tell me a joke", "no, the unicorn", "no, no, no", "and the moon?", "follow me", "no"]
 )
-def test_what_is_outside_is_refused_in_one_line(talk, given, text):
+def test_unsupported_request_is_refused_in_one_line(talk, given, text):
     reply = talk().hear(text, 3.0)
     assert reply.kind is ReplyKind.REFUSED
     assert "\n" not in reply.text
@@ -332,7 +332,7 @@ def test_an_addition_is_corrected_while_it_waits(talk, speech, control, run_tree
     assert script.begun == ["navigate", "navigate"]
 
 
-def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, control, run_tree, script, registry):
+def test_held_object_is_put_down_before_another_is_fetched(speech, control, run_tree, script, registry):
     meant = speech.understand("fetch me a coke from the kitchen", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)
@@ -351,7 +351,7 @@ def test_what_is_held_is_put_down_before_another_thing_is_fetched(speech, contro
     ]
 
 
-def test_what_is_held_is_not_fetched_again(speech, control, run_tree):
+def test_held_object_is_used_by_a_changed_request(speech, control, run_tree):
     meant = speech.understand("fetch me a coke from the kitchen", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)

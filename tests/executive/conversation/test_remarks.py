@@ -19,7 +19,7 @@ from skills.robot import Pose2D
         (20.0, 2.0, "I am 14.0 m from the kitchen"),
     ],
 )
-def test_a_place_is_told_by_its_room_and_what_is_near(knowledge, x_m, y_m, words):
+def test_place_is_described_by_its_room_and_the_nearest_surface(knowledge, x_m, y_m, words):
     assert place_in_words(Pose2D(x_m, y_m, 0.0), knowledge) == words
 
 
@@ -46,19 +46,19 @@ def control(compiled, make):
     return control
 
 
-def test_the_step_is_told_with_its_sentence(progress, control):
+def test_reply_gives_the_step_with_its_message(progress, control):
     now = progress(grasp=NodeState(Status.RUNNING, None, "closing the gripper", 0.5))
     words = doing_in_words(now, control.state, "Alice")
     assert words == "I am busy with 'fetch drink': grasp, closing the gripper (50 %)"
 
 
-def test_it_is_told_why_the_robot_stands_still(progress, control):
+def test_reply_says_why_the_robot_stands_still(progress, control):
     control.pause("somebody walks by")
     words = doing_in_words(progress(grasp=NodeState(Status.RUNNING)), control.state, "Alice")
     assert words == "I stand still (somebody walks by); then I go on with 'fetch drink': grasp"
 
 
-def test_the_last_failure_is_told_with_its_cause(progress, control):
+def test_reply_gives_the_last_failure_with_its_cause(progress, control):
     failed = NodeState(Status.FAILURE, Cause.EXECUTION, "it slipped")
     words = doing_in_words(progress(grasp=failed), control.state, "Alice")
     assert "before, grasp failed (EXECUTION: it slipped)" in words

@@ -26,7 +26,7 @@ def test_a_time_of_day(text, clock, taken):
 
 
 @pytest.mark.parametrize("text", ["25:00", "half past", "half to three", "the cows", "14 pm", "", "twelve thirteen"])
-def test_what_is_no_time_of_day(text):
+def test_other_texts_are_no_time_of_day(text):
     assert parse_time(text) is None
 
 
@@ -49,7 +49,7 @@ def test_a_span(text, seconds):
 
 
 @pytest.mark.parametrize(("text", "times"), [("twice", 2), ("three times", 3), ("0 times", None), ("900 times", None)])
-def test_how_often(text, times):
+def test_number_of_times(text, times):
     assert parse_times(text) == times
 
 

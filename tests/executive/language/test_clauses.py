@@ -18,7 +18,7 @@ def test_clauses_begin_with_verbs_and_with_words_that_decide():
 @pytest.mark.parametrize(
     "text", ["go and charge", "bring a beer and a coke", "say please step aside", "wait until 14:30"]
 )
-def test_what_is_one_clause_stays_whole(text):
+def test_one_clause_is_not_split(text):
     assert [one.text for one in cut(text)] == [text]
 
 
@@ -31,7 +31,7 @@ def test_what_is_one_clause_stays_whole(text):
         ("look for it until you find it", "look for it", Cue.UNTIL, "you find it"),
     ],
 )
-def test_what_stands_behind_is_told_apart(text, before, kind, rest):
+def test_trailing_cue_is_found(text, before, kind, rest):
     found = trailing_cue(text)
     assert (found.before, found.kind, found.text) == (before, kind, rest)
 

@@ -87,7 +87,7 @@ def test_a_bare_name_without_a_comma_does_not_wake():
     assert (result.text, result.name) == ("fetch me a drink", None)
 
 
-def test_it_is_told_who_else_was_called():
+def test_reply_names_the_robot_that_was_called():
     assert strip_wake("Hey Bob, fetch me a drink", "Alice").name == "Bob"
     assert strip_wake("fetch me a drink", "Alice").name is None
 

@@ -27,10 +27,10 @@ def hint(parser, text):
         ("sorry , bring the cup", "bring the cup"),
     ],
 )
-def test_what_is_taken_back_is_gone(parser, text, meant):
+def test_corrected_words_are_removed(parser, text, meant):
     assert hint(parser, text) == meant
 
 
 @pytest.mark.parametrize("text", ["bring the cup not", "bring the cup , no", "is the cup not here"])
-def test_what_takes_back_nothing_is_an_unknown_word(parser, text):
+def test_correction_without_a_target_is_an_unknown_word(parser, text):
     assert {"not", "no"} & set(hint(parser, text).split())

@@ -50,7 +50,7 @@ def test_command_frames_keep_the_spoken_names_and_commands_the_worlds(explained)
     assert "Take [Nothing] to [kitchen] and do [grasp] to [2 coke]" in explained["commands"]
 
 
-def test_pronouns_are_told(parser):
+def test_explanation_gives_the_meaning_of_pronouns(parser):
     explained = explain(trace_open("take the coat and the hat and bring them there, go to the attic", parser))
     assert explained["refused_at"] == "reference"
     explained = explain(trace_open("go to the attic, take the red coat and put it in the bag", parser))

@@ -46,14 +46,14 @@ CORRECTION, ADDITION, AGAIN = FollowUpKind.CORRECTION, FollowUpKind.ADDITION, Fo
         ("once more", AGAIN, "", "", ""),
     ],
 )
-def test_how_a_sentence_goes_on_from_the_one_before(text, kind, said, preposition, old):
+def test_follow_ups_are_parsed(text, kind, said, preposition, old):
     follow_up = parse_follow_up(text)
     assert (follow_up.kind, follow_up.said, follow_up.preposition) == (kind, said, preposition)
     assert follow_up.instead_of == old
 
 
 @pytest.mark.parametrize("text", ["", "no", "go to the kitchen", "the hammer", "bring me the coke", "nothing", "stop"])
-def test_a_sentence_of_its_own_goes_on_from_nothing(text):
+def test_sentence_of_its_own_is_no_follow_up(text):
     assert parse_follow_up(text) is None
 
 
@@ -97,17 +97,17 @@ def test_the_place_that_was_named_is_changed(knowledge):
     assert amend(FETCH, Amendment(goal="bedroom", old="kitchen"), knowledge)[0].goal == "bedroom"
 
 
-def test_a_thing_that_is_held_is_not_gone_for_again(knowledge):
+def test_held_object_is_not_fetched_again(knowledge):
     assert skip_fetching(FETCH, ObjectKind("coke"), knowledge) == FETCH[1:]
 
 
-def test_another_thing_is_put_down_first(knowledge):
+def test_robot_puts_another_object_down_first(knowledge):
     commands = skip_fetching(FETCH, ObjectKind("hammer"), knowledge)
     assert texts(commands)[0] == "Take [hammer] to [workbench] and do [place] to [hammer]"
     assert commands[1:] == FETCH
 
 
-def test_with_an_empty_hand_nothing_changes(knowledge):
+def test_empty_gripper_changes_no_commands(knowledge):
     assert skip_fetching(FETCH, None, knowledge) == FETCH
 
 
@@ -164,7 +164,7 @@ def test_a_remark_is_known_with_and_without_politeness(text, remark):
         "don't stop",
     ],
 )
-def test_what_says_more_is_no_remark(text):
+def test_sentence_with_more_words_is_no_remark(text):
     assert parse_remark(text) is None
 
 

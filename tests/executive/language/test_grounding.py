@@ -25,7 +25,7 @@ def told(parser, knowledge):
         ("fetch me the big screwdrver", "big screwdriver"),
     ],
 )
-def test_a_thing_by_another_name_is_known(told, sentence, thing):
+def test_object_is_found_by_a_synonym(told, sentence, thing):
     answer = told(sentence)
     assert answer.status is Status.OK, answer.reason
     assert str(answer.commands[0].object) == thing
@@ -61,7 +61,7 @@ def test_a_place_by_another_name_is_known(told, sentence, place):
         ("fetch me the coke can", ()),
     ],
 )
-def test_what_was_taken_for_something_else_is_told(told, sentence, notes):
+def test_note_says_which_name_was_taken_for_which(told, sentence, notes):
     assert told(sentence).notes == notes
 
 
@@ -78,7 +78,7 @@ def test_what_was_taken_for_something_else_is_told(told, sentence, notes):
         ("send the hammer", "goal", []),
     ],
 )
-def test_what_could_be_several_or_is_unsure_is_asked(told, sentence, slot, candidates):
+def test_ambiguous_or_doubtful_name_makes_a_question(told, sentence, slot, candidates):
     answer = told(sentence)
     assert (answer.status, answer.commands) == (Status.QUESTION, ())
     asked = answer.to_json()["question"]
@@ -94,7 +94,7 @@ def test_any_member_serves_for_a_category_and_nothing_is_asked(told, sentence):
 @pytest.mark.parametrize(
     "sentence", ["fetch me a banana", "go to the cellar", "bring the hammer to Quentin", "fetch me a unicorn"]
 )
-def test_what_is_like_nothing_known_is_refused_with_what_is_known(told, sentence):
+def test_unknown_name_is_refused_with_the_known_ones(told, sentence):
     answer = told(sentence)
     assert (answer.status, answer.question) == (Status.REFUSED, None)
     assert "known" in answer.reason
@@ -135,7 +135,7 @@ def test_the_only_person_of_a_world_is_looked_for(parser, knowledge, sentence, p
     assert [str(command) for command in answer.commands] == [f"Take [Nothing] to [{place}] and do [find] to [Robin]"]
 
 
-def test_what_is_needed_where_nothing_lies_is_brought_there(told):
+def test_object_asked_for_in_a_room_without_surfaces_is_brought_there(told):
     answer = told("I need the hammer in the hall")
     assert [str(command) for command in answer.commands] == [
         "Take [Nothing] to [workshop] and do [grasp] to [hammer]",
@@ -145,7 +145,7 @@ def test_what_is_needed_where_nothing_lies_is_brought_there(told):
 
 
 @pytest.mark.parametrize("sentence", ["bring me the hammer from the hall", "I need the hammer in the kitchen"])
-def test_what_is_to_come_from_a_room_is_looked_for_there(told, sentence):
+def test_object_from_a_room_is_looked_for_there(told, sentence):
     assert str(told(sentence).commands[1].goal) == "start"
 
 

@@ -17,7 +17,7 @@ def table(parser):
     return srsly.read_msgpack(parser._folder / "vocab" / "key2row")
 
 
-def test_affixes_are_found_in_no_word_of_letters_alone(stored):
+def test_words_of_letters_alone_have_no_affixes(stored):
     patterns = [re.compile(stored[name]) for name in ("prefix_search", "suffix_search", "infix_finditer", "url_match")]
     words = ("a", "kg", "km", "US", "USD", "McDonald", "iPhone", "KITCHEN", "kitchen", "xX", " ")
     assert not [(word, pattern.pattern[:40]) for word in words for pattern in patterns if pattern.search(word)]

@@ -97,7 +97,7 @@ def test_an_answered_question_leads_to_the_commands(parser, knowledge, sentence,
     assert (answered.reason, len(answered.commands)) == (None, commands)
 
 
-def test_where_any_one_will_do_the_first_is_taken_and_said(parser, knowledge):
+def test_first_of_indefinite_choices_is_taken_with_a_note(parser, knowledge):
     meant = understand("bring me a beer or a coke", parser=parser, knowledge=knowledge, require_wake=False)
     assert [str(command.item or command.object) for command in meant.commands] == ["beer", "beer"]
     assert meant.notes == ("of a beer or a coke I take the first",)

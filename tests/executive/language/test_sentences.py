@@ -58,7 +58,7 @@ def test_a_sentence_is_refused_whole_with_the_part_named(parser, sentence, part)
 
 
 @pytest.mark.parametrize(("sentence", "word"), sentences("question"))
-def test_a_sentence_that_leaves_something_open_is_asked_about(parser, sentence, word):
+def test_incomplete_sentence_makes_a_question(parser, sentence, word):
     answer = answer_to(sentence, parser)
     assert (answer.status, answer.commands) == (Status.QUESTION, ())
     assert word in answer.reason

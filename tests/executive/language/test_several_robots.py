@@ -52,7 +52,7 @@ def test_a_part_waits_where_that_is_said(said, sentence, after):
     assert [part.after for part in said(sentence, robots=("Alice", "Bob", "Eve")).parts] == after
 
 
-def test_a_thing_that_is_handed_on_is_taken_from_where_it_was_put(said):
+def test_next_robot_takes_an_object_from_where_the_first_put_it(said):
     first, second = said("Alice, put the beer on the kitchen table and let Bob bring it to me").parts
     assert second.after == (0,)
     assert str(second.meaning.commands[0]) == "Take [Nothing] to [kitchen table] and do [grasp] to [beer]"
@@ -79,14 +79,14 @@ def test_the_speaker_stands_by_the_robot_that_is_spoken_to(said):
         ("Hey everyone, bring me the hammer", "cannot all take the one hammer"),
     ],
 )
-def test_what_no_robot_can_do_is_refused_with_a_sentence(said, sentence, reason):
+def test_request_that_no_robot_can_do_is_refused(said, sentence, reason):
     meant = said(sentence)
     assert meant.status is not Status.OK
     assert meant.parts == ()
     assert reason in meant.reason
 
 
-def test_where_a_name_must_be_said_the_reason_gives_the_names(said):
+def test_reason_lists_the_names_when_one_must_be_said(said):
     meant = said("go to the kitchen", require_wake=True)
     assert meant.status is Status.NOT_ADDRESSED
     assert '"Hey Alice" or "Hey Bob"' in meant.reason

@@ -63,12 +63,12 @@ def test_the_nearest_name_by_sound_is_found(heard, name):
 
 
 @pytest.mark.parametrize("heard", ["ranch", "coax", "rubbing", "bear", "hummer", "screw driver"])
-def test_what_is_misheard_is_near(heard):
+def test_misheard_words_sound_near(heard):
     assert nearest_by_sound(heard, VOCABULARY).distance < 0.2
 
 
 @pytest.mark.parametrize("heard", ["umbrella", "parcel", "lamp", "vase", "violin"])
-def test_what_sounds_like_nothing_known_is_far(heard):
+def test_unknown_sound_is_far_from_all_names(heard):
     assert nearest_by_sound(heard, VOCABULARY).distance > 0.35
 
 
@@ -83,7 +83,7 @@ def test_a_spelling_of_the_very_same_sounds_is_at_no_distance():
 
 
 @pytest.mark.parametrize("silent", ["", "  ", "123", "饮料", "🙂"])
-def test_what_makes_no_sound_is_like_nothing(silent):
+def test_text_without_sound_is_similar_to_nothing(silent):
     assert nearest_by_sound(silent, VOCABULARY).distance == 1.0
 
 
@@ -135,7 +135,7 @@ def test_a_name_has_its_synonyms_and_the_words_for_its_kind():
         ("fetch me a spaner", "fetch me a spanner"),
     ],
 )
-def test_a_misspelled_name_is_corrected_and_told(parser, knowledge, text, corrected):
+def test_misspelled_name_is_corrected_with_a_note(parser, knowledge, text, corrected):
     answer = correct_spelling(text, knowledge, parser)
     assert answer.text == corrected
     assert answer.notes
@@ -150,7 +150,7 @@ def test_a_misspelled_name_is_corrected_and_told(parser, knowledge, text, correc
         ("fetch the screw driver", "fetch the screw driver"),
     ],
 )
-def test_names_written_together_or_apart_are_the_same_and_not_told(parser, knowledge, text, corrected):
+def test_names_written_together_or_apart_are_the_same_without_a_note(parser, knowledge, text, corrected):
     answer = correct_spelling(text, knowledge, parser)
     assert (answer.text, answer.notes) == (corrected, ())
 
@@ -168,12 +168,12 @@ def test_names_written_together_or_apart_are_the_same_and_not_told(parser, knowl
         "",
     ],
 )
-def test_what_may_be_right_is_left_alone(parser, knowledge, text):
+def test_possibly_right_words_are_not_corrected(parser, knowledge, text):
     assert correct_spelling(text, knowledge, parser).text == text
 
 
 @pytest.mark.parametrize(("word", "names"), [("cake", ("coke",)), ("ranch", ("wrench",)), ("unicorn", ())])
-def test_what_looks_or_sounds_alike_may_be_meant(parser, word, names):
+def test_similar_spelling_or_sound_makes_a_candidate(parser, word, names):
     assert look_alikes(word, KNOWN, parser) == names
 
 
@@ -193,7 +193,7 @@ ALIKES = SoundAlikes(NAMES, OTHERS)
     [("ranch", "wrench"), ("coats", "cokes"), ("bear", "beer"), ("rubbing", "Robin"), ("big fish", "big dish"),
      ("nest", "desk"), ("come you", "could you"), ("when you", "would you"), ("kitchen count", "kitchen counter")],
 )  # fmt: skip
-def test_what_was_misheard_is_among_the_nearest(heard, meant):
+def test_misheard_phrase_is_among_the_nearest(heard, meant):
     assert meant in [alike.phrase for alike in ALIKES.nearest(heard)[:3]]
 
 
@@ -209,16 +209,16 @@ def test_the_nearest_come_first():
     assert costs == sorted(costs)
 
 
-def test_the_very_words_are_not_told():
+def test_the_same_words_are_no_similar_sound():
     assert "wrench" not in [alike.phrase for alike in ALIKES.nearest("Wrench")]
 
 
-def test_names_are_told_from_other_words():
+def test_names_differ_from_other_words():
     assert {alike.phrase: alike.name for alike in ALIKES.nearest("come you")}["could you"] is False
     assert ALIKES.nearest("ranch")[0].name
 
 
-def test_what_sounds_like_nothing_known_has_no_alikes():
+def test_unknown_sound_has_no_similar_phrases():
     assert ALIKES.nearest("electricity bill") == ()
     assert ALIKES.nearest("") == ALIKES.of("123") == ()
     assert SoundAlikes([]).of("wrench") == ()

@@ -60,7 +60,7 @@ def tags(parser, text):
         ("go to the kitchen no to the bathroom", "no", "INTJ"),
     ],
 )
-def test_what_the_tagger_misreads_is_repaired(parser, text, word, pos):
+def test_wrong_tags_are_repaired(parser, text, word, pos):
     assert tags(parser, text)[word] == pos
 
 
@@ -74,7 +74,7 @@ def test_what_the_tagger_misreads_is_repaired(parser, text, word, pos):
         ("i want to know it", "know", "VERB"),
     ],
 )
-def test_what_the_tagger_reads_rightly_stays(parser, text, word, pos):
+def test_right_tags_stay(parser, text, word, pos):
     assert tags(parser, text)[word] == pos
 
 

@@ -32,7 +32,7 @@ def test_the_wake_phrase_changes_nothing_but_the_address(parser, knowledge, sent
 
 
 @pytest.mark.parametrize(("sentence", "words"), UNUSABLE["refused"].items())
-def test_what_is_outside_is_refused_with_its_words(parser, knowledge, sentence, words):
+def test_refusal_names_the_unsupported_words(parser, knowledge, sentence, words):
     answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
     assert (answer.status, answer.commands) == (Status.REFUSED, ())
     assert [word for word in words if word not in answer.reason] == []
@@ -40,7 +40,7 @@ def test_what_is_outside_is_refused_with_its_words(parser, knowledge, sentence, 
 
 
 @pytest.mark.parametrize(("sentence", "words"), UNUSABLE["question"].items())
-def test_what_is_left_open_is_asked(parser, knowledge, sentence, words):
+def test_missing_destination_makes_a_question(parser, knowledge, sentence, words):
     answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
     assert (answer.status, answer.commands) == (Status.QUESTION, ())
     assert [word for word in words if word not in answer.reason] == []
@@ -50,14 +50,14 @@ def test_what_is_left_open_is_asked(parser, knowledge, sentence, words):
     ("sentence", "unknown", "hint"),
     [("sing a song", "sing a song", "I can fetch"), ("bring me the wheelbarrow", "wheelbarrow", "more")],
 )
-def test_a_refusal_is_short_and_names_what_is_near_not_all_that_is_known(parser, knowledge, sentence, unknown, hint):
+def test_refusal_names_only_similar_names(parser, knowledge, sentence, unknown, hint):
     answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
     assert answer.unknown_words == (unknown,)
     assert hint in answer.reason
     assert sum(name in answer.reason for name in (*knowledge.object_names(), *knowledge.place_names())) <= 3
 
 
-def test_the_verb_is_kept(parser, knowledge):
+def test_verb_stays_as_spoken(parser, knowledge):
     answer = understand("could you pick the hammer up", parser=parser, knowledge=knowledge, require_wake=False)
     assert [command.verb for command in answer.commands] == ["pick up"]
 

@@ -211,7 +211,7 @@ def test_choices_may_be_a_list(block):
     assert list(block("- ask: which?\n  choices: [tea, coffee]").choices) == ["tea", "coffee"]
 
 
-def test_what_a_mission_does_in_the_end_and_watches(load):
+def test_mission_with_guards_and_final_steps(load):
     mission = load(
         "variables: {n: 2, name: tea, hot: true}\nalways: [dock]\nwhile: {holds: battery > 0.1}\n"
         "when: [{if: {button: x}, do: [dock]}]\nsteps: [{to: kitchen}]"
@@ -344,7 +344,7 @@ NOT_COMPILED = [
 
 
 @pytest.mark.parametrize(("text", "line", "message", "hint"), NOT_COMPILED, ids=[each[0][:40] for each in NOT_COMPILED])
-def test_not_compiled(compile_text, tmp_path, text, line, message, hint):
+def test_faults_that_only_the_compiler_finds(compile_text, tmp_path, text, line, message, hint):
     with pytest.raises(InputError) as refusal:
         compile_text(f"name: m\nsteps:\n{text}")
     error = refusal.value
@@ -370,7 +370,7 @@ def test_a_variable_that_cannot_be_one_is_refused_where_it_stands(load, value, m
     assert refusal.value.line == 4
 
 
-def test_all_that_is_wrong_in_the_steps_of_blocks_is_told_at_once(load):
+def test_all_errors_in_blocks_are_reported_together(load):
     with pytest.raises(InputError) as refusal:
         load("steps:\n- if: holding\n  then:\n  - to: mars\n  else:\n  - group:\n    - to: venus\n- to: pluto")
     assert {5, 9} <= {error.line for error in (refusal.value, *refusal.value.others)}

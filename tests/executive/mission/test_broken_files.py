@@ -26,7 +26,7 @@ def checker(parser):
     return one
 
 
-def test_the_good_ones_are_good(checker, missions):
+def test_unchanged_files_compile(checker, missions):
     faults = {path.name: list(map(str, checker.check_file(path).errors)) for path in missions}
     assert not any(faults.values()), faults
 

@@ -189,7 +189,7 @@ steps:
 """
 
 
-def test_what_one_skill_gives_a_later_one_takes(compile_text):
+def test_later_skill_takes_the_output_of_an_earlier_one(compile_text):
     tree = compile_text(DETECT)
     (grasp,) = [node for node in leaves(tree, "grasp") if node.path_id == "alice/m/2-grasp"]
     assert grasp.options["inputs"]["observation"] == FromBoard("alice/m/1-detect/observation")

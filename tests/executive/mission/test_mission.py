@@ -194,7 +194,7 @@ def test_a_mission_without_commands_is_named_for_its_first_block(spoken):
 
 
 @pytest.mark.parametrize("sentence", [STRUCTURED, "fetch me a drink"])
-def test_what_a_sentence_asks_for_comes_back_from_its_lines(spoken, sentence):
+def test_steps_of_a_sentence_survive_their_text_form(spoken, sentence):
     lines = lines_of_steps(spoken(sentence).steps)
     assert lines_of_steps(steps_from_lines(lines)) == lines
 

@@ -111,7 +111,7 @@ def test_a_table_is_cleared_object_by_object_until_nothing_is_left(run_mission, 
     ]
 
 
-def test_a_table_that_is_tidy_already_is_told(run_mission, script):
+def test_tidying_a_tidy_table_succeeds(run_mission, script):
     script.ends["detect"] = lambda skill: Failed(Cause.POSTCONDITION, "not seen")
     result = run_mission("tidy_table")
     assert (result.outcome, result.message.count("grasp")) == (Outcome.SUCCESS, 2)

@@ -70,7 +70,7 @@ def test_each_robot_has_its_steps(part):
     assert [step.commands[0].goal for step in bob.walk() if step.commands] == ["office", "bedroom", "hall"]
 
 
-def test_what_stands_at_the_top_is_for_each_part_that_says_nothing_else(part):
+def test_keys_at_the_top_apply_to_each_part(part):
     alice, bob = part("alice"), part("bob")
     assert (alice.timeout_s, bob.timeout_s) == (100.0, 50.0)
     assert alice.steps[0].retries == 2
@@ -99,7 +99,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "line", "words"), REFUSED)
-def test_what_is_wrong_with_robots_and_parts_is_told_with_its_line(load, text, line, words):
+def test_errors_in_robots_and_parts_have_their_line(load, text, line, words):
     with pytest.raises(InputError) as error:
         load(f"name: x\n{text}")
     assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)

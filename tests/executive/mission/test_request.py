@@ -28,7 +28,7 @@ def test_from_anywhere_the_stacks_of_robots_are_found(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["", "nowhere", "1 2", "1 2 3 4", "1 2 nan", "1 2 x"])
-def test_what_is_no_start_is_refused_with_a_hint(text):
+def test_invalid_start_is_refused_with_a_hint(text):
     with pytest.raises(InputError, match="--start") as error:
         parse_start(text)
     assert error.value.hint

@@ -87,7 +87,7 @@ def test_moving_aside_is_allowed_for_a_step_or_for_each(load):
         ("say: go to the hall", "to: hall\n    gives: {a: b}", 8, "'gives' goes with 'skill'"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_its_line_and_the_hint(load, old, new, line, says):
+def test_invalid_value_is_refused_with_line_and_hint(load, old, new, line, says):
     good = GOOD.replace("What now?", '"What now?"')
     assert old in good
     with pytest.raises(InputError) as error:
@@ -96,7 +96,7 @@ def test_what_does_not_fit_is_refused_with_its_line_and_the_hint(load, old, new,
     assert error.value.hint
 
 
-def test_all_errors_are_told_at_once(load):
+def test_all_errors_are_reported_together(load):
     with pytest.raises(InputError) as error:
         load("name: 3\ntimeout: 0\nsteps:\n  - {too: hall}\n  - {do: juggle, object: coke}\n")
     lines = [one.line for one in (error.value, *error.value.others)]
@@ -113,7 +113,7 @@ def test_the_json_schema_names_every_key_with_a_description():
     assert not any(each["additionalProperties"] for each in (schema, *steps))
 
 
-def test_where_a_number_is_wanted_a_parameter_may_stand():
+def test_parameter_may_replace_a_number():
     timeout = mission_json_schema()["$defs"]["Do"]["properties"]["timeout"]
     assert '"pattern"' in json.dumps(timeout)
 

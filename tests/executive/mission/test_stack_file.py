@@ -27,7 +27,7 @@ def test_an_unknown_option_is_refused_with_its_line(tmp_path):
     assert (error.value.file, error.value.line) == (file, 3)
 
 
-def test_a_stack_that_comes_with_errand_is_taken_by_its_name():
+def test_shipped_stack_is_found_by_its_name():
     assert load_stack(stack_file(Path("no_map"))).names["localiser"] == "dead_reckoning"
 
 

@@ -61,7 +61,7 @@ def test_sound_that_ends_in_the_middle_of_a_word_is_heard_to_its_end():
     assert one.end_s == pytest.approx(1.5, abs=2 * FRAME_S)
 
 
-def test_what_is_said_can_be_had_before_it_ends():
+def test_partial_text_is_available_before_the_end():
     endpointer = Endpointer(LoudIsSpeech(), RULES)
     assert list(endpointer.push(speech_like(0.5, 1.0))) == []
     assert endpointer.speaking

@@ -65,7 +65,7 @@ def _damaged(content):
 
 
 @pytest.mark.parametrize("how", ["cut off", "empty", "another kind"])
-def test_a_damaged_file_is_told_with_the_hint(tmp_path, how):
+def test_damaged_file_is_refused_with_a_hint(tmp_path, how):
     Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
     with pytest.raises(InputError, match="damaged") as refused:
         read_adapter(_damaged((tmp_path / "a.npz").read_bytes())[how], base=BASE)
@@ -85,7 +85,7 @@ def test_the_packaged_one_belongs_to_the_published_weights():
     assert all(np.isfinite(low_rank.change()).all() for low_rank in packaged.changes.values())
 
 
-def test_a_missing_one_is_told_with_the_hint(monkeypatch):
+def test_missing_adapter_is_refused_with_a_hint(monkeypatch):
     monkeypatch.setattr(adapter, "_FILE", "nowhere.npz")
     with pytest.raises(InputError, match="missing") as refused:
         packaged_adapter(base=BASE_SHA256)
@@ -114,7 +114,7 @@ def test_weights_change_where_they_stand_and_nothing_else_does(model_bin):
     assert bytes(content) == model_bin(VARIABLES | {"encoder/bias": np.full(3, 7.0, "<f4")})
 
 
-def test_what_cannot_be_written_is_not_changed(model_bin):
+def test_read_only_weights_are_not_changed(model_bin):
     with pytest.raises(ValueError, match="read-only"):
         read_model_file(model_bin(VARIABLES))["encoder/bias"][...] = 7.0
 

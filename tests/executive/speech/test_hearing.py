@@ -25,7 +25,7 @@ def test_a_call_may_be_misheard(reader, call):
     assert reading.meaning.text == "Hey Alice, go to the kitchen"
 
 
-def test_what_is_said_to_others_does_not_fit_and_is_not_corrected(reader):
+def test_speech_to_others_is_not_corrected(reader):
     reading = reader.read("Robin, go to the kitchen")
     assert not reading.fits and not reading.correctable and not reading.meaning.addressed
     assert reading.meaning.status is Status.NOT_ADDRESSED
@@ -35,7 +35,7 @@ def test_a_story_about_the_robot_is_no_call(reader):
     assert not reader.read("Alice went to the kitchen").meaning.addressed
 
 
-def test_other_robots_are_told_from_this_one(flat, parser):
+def test_names_of_other_robots_do_not_call_this_one(flat, parser):
     words = vocabulary_of_world(flat, called=True)
     reader = Reader(parser, flat, words, ("Alice",), require_wake=True, other_robots=("Ellis",))
     assert not reader.read("Hey Ellis, go to the kitchen").meaning.addressed

@@ -55,7 +55,7 @@ def test_a_much_less_likely_reading_is_not_meant():
     assert meant("play the news", "get the coke", step=50.0, otherwise=-30.0) == "play the news"
 
 
-def test_what_is_said_to_others_is_left_as_it_was_heard():
+def test_speech_to_others_keeps_its_text():
     assert meant("Robin get the ranch", "get the wrench") == "Robin get the ranch"
 
 
@@ -74,7 +74,7 @@ def test_nothing_said_means_nothing():
         ("go to the table and to the desk", "go to the table and to the desk"),
     ],
 )
-def test_what_was_said_twice_is_heard_once(said, left):
+def test_repeated_words_are_heard_once(said, left):
     assert remove_repetitions(said) == left
 
 
@@ -116,7 +116,7 @@ def test_right_words_are_left_alone():
     assert corrected("take the beer from the nest")[0].startswith("take the beer from the")
 
 
-def test_what_sounds_like_nothing_known_is_not_corrected():
+def test_unknown_sound_is_not_corrected():
     assert corrected("bring me the newspaper subscription") == []
 
 
@@ -177,5 +177,5 @@ def test_a_call_at_the_end_stays():
     assert _opening("Get me a cube from the table, Alice.", "Get me.", {}) == "Get me a cube from the table, Alice."
 
 
-def test_where_nothing_is_heard_without_expecting_names_the_call_stays():
+def test_call_stays_when_nothing_is_heard_without_expected_names():
     assert choose_opening(ScriptedRecognition(), ALICE, ("Alice",), lambda heard: False) == ALICE

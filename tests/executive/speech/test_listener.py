@@ -50,7 +50,7 @@ def test_pauses_for_thought_do_not_end_a_request(listener_to, tmp_path):
     assert listener.recogniser.lengths_s[0] < 6.0
 
 
-def test_what_is_said_to_nobody_makes_no_commands(listener_to, tmp_path):
+def test_speech_to_nobody_makes_no_commands(listener_to, tmp_path):
     heard = _heard(listener_to("Go to the kitchen."), tmp_path, speech_like(0.5, 2.0, 0.5))
     assert (heard.status, heard.addressed, heard.commands) == (Status.NOT_ADDRESSED, False, ())
     assert "Hey Alice" in heard.reason
@@ -73,17 +73,17 @@ def test_one_request_that_is_not_understood_stops_all(listener_to, tmp_path):
     assert heard.status is Status.REFUSED and heard.commands == () and heard.reason
 
 
-def test_a_silent_recording_is_told(listener_to, tmp_path):
+def test_silent_recording_is_refused(listener_to, tmp_path):
     heard = _heard(listener_to(GO), tmp_path, silence(2.0))
     assert (heard.status, heard.reason, heard.heard) == (Status.REFUSED, "the recording is silent", ())
 
 
-def test_a_recording_in_which_nobody_speaks_is_told(listener_to, tmp_path):
+def test_recording_without_speech_is_refused(listener_to, tmp_path):
     heard = _heard(listener_to(GO), tmp_path, tone(2.0, height=0.03))
     assert (heard.status, heard.reason) == (Status.REFUSED, "nobody is heard to speak")
 
 
-def test_a_sound_that_the_recogniser_takes_for_no_speech_is_told(listener_to, tmp_path):
+def test_sound_without_speech_is_refused(listener_to, tmp_path):
     assert _heard(listener_to(), tmp_path, speech_like(0.5, 2.0, 0.5)).reason == "nobody is heard to speak"
 
 
@@ -139,7 +139,7 @@ def test_a_sentence_is_finished_soon_after_its_end(hearings):
     assert ended.finished.meant.status is Status.OK
 
 
-def test_what_is_being_said_is_shown_every_second(hearings):
+def test_sentence_under_way_is_read_every_second(hearings):
     heard = hearings(speech_like(1.0, 3.0, 2.0), "Hey Alice, go to the kitchen.")
     partial_s = [hearing.time_s for hearing in heard if hearing.partial]
     assert partial_s[0] == pytest.approx(2.0, abs=0.2)
@@ -164,7 +164,7 @@ def test_a_sentence_under_way_is_finished_when_the_sound_ends(hearings):
     assert heard[-1].finished is not None
 
 
-def test_without_a_recorder_the_hint_is_told():
+def test_without_a_recorder_the_error_has_a_hint():
     with pytest.raises(InputError, match="arecord") as refused:
         next(microphone_blocks(which=lambda name: None))
     assert "alsa-utils" in refused.value.hint
@@ -186,7 +186,7 @@ def test_the_recorder_is_read_in_blocks_and_stopped(tmp_path):
     assert subprocess.run(["kill", "-0", pid], capture_output=True).returncode != 0
 
 
-def test_without_a_microphone_the_recorders_word_is_told(tmp_path):
+def test_without_a_microphone_the_error_has_the_recorders_message(tmp_path):
     which = _recorder(tmp_path, "echo 'no soundcards found' >&2; exit 1")
     with pytest.raises(InputError, match="no soundcards found"):
         next(microphone_blocks(which=which))

@@ -23,7 +23,7 @@ def test_the_prompt_holds_the_names_and_how_one_calls():
     assert "Names" not in Vocabulary().prompt
 
 
-def test_names_that_stand_in_longer_ones_are_not_told_twice():
+def test_prompt_omits_names_within_longer_ones():
     assert Vocabulary(("coke", "can of coke", "desk")).prompt.startswith("can of coke, desk. ")
 
 
@@ -42,7 +42,7 @@ def test_a_file_of_names_has_one_on_each_line(tmp_path):
         (b"\n".join(b"n%d" % n for n in range(6000)), "too many"),
     ],
 )
-def test_a_file_that_holds_no_names_is_told(tmp_path, content, told):
+def test_file_without_names_is_refused(tmp_path, content, told):
     file = tmp_path / "names.txt"
     file.write_bytes(content)
     with pytest.raises(InputError, match=told) as refused:
@@ -50,6 +50,6 @@ def test_a_file_that_holds_no_names_is_told(tmp_path, content, told):
     assert refused.value.file == file
 
 
-def test_a_missing_file_of_names_is_told(tmp_path):
+def test_missing_file_of_names_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
         read_vocabulary(tmp_path / "none.txt", None)

@@ -8,7 +8,7 @@ from executive.speech.sound import RATE_HZ, Loudness, concatenate, level_db, rea
 from skills.files.errors import InputError
 
 
-def test_silence_is_told_from_a_soft_voice():
+def test_silence_differs_from_a_soft_voice():
     assert Loudness().with_block(silence(1.0)).silent
     assert not Loudness().with_block(tone(1.0, height=0.01)).silent
 
@@ -68,7 +68,7 @@ def test_every_width_is_read(tmp_path, tag, bits, half):
     assert heard == pytest.approx(np.full(100, 0.5), abs=0.005)
 
 
-def test_the_extensible_head_tells_the_kind_further_on(tmp_path):
+def test_extensible_head_gives_the_type_further_on(tmp_path):
     extra = struct.pack("<HHIH", 22, 16, 0, PCM) + bytes.fromhex("0000 0000 1000 8000 00aa 0038 9b71")
     file = write_raw_wav(tmp_path / "a.wav", struct.pack("<h", 2**14) * 9, tag=EXTENSIBLE, bits=16, extra=extra)
     assert len(concatenate(read_wav(file))) == 9
@@ -105,46 +105,46 @@ def test_text_is_no_wav_file(tmp_path):
     assert "no wav file" in _refusal(file)
 
 
-def test_an_empty_file_is_told(tmp_path):
+def test_empty_wav_file_is_refused(tmp_path):
     file = tmp_path / "a.wav"
     file.touch()
     assert "empty" in _refusal(file)
 
 
-def test_a_missing_file_is_told(tmp_path):
+def test_missing_wav_file_is_refused(tmp_path):
     assert "no such file" in _refusal(tmp_path / "a.wav")
 
 
-def test_a_folder_is_told(tmp_path):
+def test_folder_is_refused(tmp_path):
     assert "it is a folder" in _refusal(tmp_path)
 
 
 @pytest.mark.parametrize("kept", [13, 20, 30, 40])
-def test_a_file_cut_off_in_its_head_is_told(tmp_path, kept):
+def test_file_cut_off_in_its_head_is_refused(tmp_path, kept):
     file = write_wav(tmp_path / "a.wav", tone(1.0))
     file.write_bytes(file.read_bytes()[:kept])
     assert "ends before its" in _refusal(file)
 
 
-def test_a_file_cut_off_in_its_sound_tells_how_much_is_missing(tmp_path):
+def test_error_says_how_much_sound_a_cut_off_file_lacks(tmp_path):
     file = write_wav(tmp_path / "a.wav", tone(2.0))
     file.write_bytes(file.read_bytes()[: 44 + RATE_HZ])
     assert _refusal(file) == "it ends after 0.5 s, and its head says 2.0 s"
 
 
-def test_a_file_without_sound_is_told(tmp_path):
+def test_file_without_sound_is_refused(tmp_path):
     assert "no sound" in _refusal(write_wav(tmp_path / "a.wav", []))
 
 
-def test_samples_of_an_unknown_kind_are_told(tmp_path):
+def test_samples_of_an_unknown_type_are_refused(tmp_path):
     assert "no wav file" in _refusal(write_raw_wav(tmp_path / "a.wav", b"\0" * 99, tag=UNKNOWN, bits=8))
 
 
-def test_a_rate_that_nobody_uses_is_told(tmp_path):
+def test_unusual_sample_rate_is_refused(tmp_path):
     assert "1 samples per second" in _refusal(write_raw_wav(tmp_path / "a.wav", b"\0\0", tag=PCM, bits=16, rate_hz=1))
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_a_sample_that_is_no_number_is_told_with_its_time(tmp_path, bad):
+def test_error_gives_the_time_of_a_sample_that_is_no_number(tmp_path, bad):
     data = struct.pack("<f", 0.1) * RATE_HZ + struct.pack("<f", bad)
     assert _refusal(write_raw_wav(tmp_path / "a.wav", data, tag=FLOAT, bits=32)) == "the sample at 1.000 s is no number"

@@ -56,7 +56,7 @@ def test_a_spoken_request_becomes_commands(listener, say, said, commands):
     assert list(map(str, heard.commands)) == commands
 
 
-def test_what_is_said_to_nobody_is_left_alone(listener, say):
+def test_speech_to_nobody_is_ignored(listener, say):
     heard = listener.hear_file(say("The hammer belongs on the workbench."))
     assert not heard.addressed and heard.commands == ()
 
@@ -80,7 +80,7 @@ def test_silence_holds_no_words_worth_a_command(whisper, flat):
     assert not any("kitchen" in reading.text for reading in readings)
 
 
-def test_without_the_extra_the_hint_is_told(monkeypatch):
+def test_without_the_extra_the_error_has_a_hint(monkeypatch):
     def missing(name):
         raise ImportError(name)
 
@@ -92,7 +92,7 @@ def test_without_the_extra_the_hint_is_told(monkeypatch):
     assert import_module("faster_whisper")
 
 
-def test_damaged_weights_are_told(monkeypatch):
+def test_damaged_weights_are_refused(monkeypatch):
     monkeypatch.setattr("executive.speech.whisper.BASE_SHA256", "0")
     with pytest.raises(InputError, match="damaged"):
         load_whisper()

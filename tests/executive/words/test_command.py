@@ -150,5 +150,5 @@ def test_a_command_that_has_no_text_form_cannot_be_made(wrong):
         ("orange", ObjectKind("orange")),
     ],
 )
-def test_leading_attributes_are_split_off_a_things_words(words, expected):
+def test_leading_attributes_are_split_off_an_object(words, expected):
     assert parse_object(words) == expected

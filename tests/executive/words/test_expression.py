@@ -177,19 +177,19 @@ def test_half_a_character_is_refused():
     assert "half a character" in refused(r"'\ud800'")[0]
 
 
-def test_division_by_a_value_that_is_zero_is_told_when_it_happens():
+def test_division_by_a_zero_value_fails_when_it_happens():
     expression = Expression("1 / count")
     assert expression.kind(KINDS) is Kind.NUMBER
     with pytest.raises(ExpressionError, match="divides by zero"):
         expression.value({"count": 0})
 
 
-def test_a_name_without_a_value_is_told():
+def test_name_without_a_value_is_refused():
     with pytest.raises(ExpressionError, match="'count' has no value yet"):
         Expression("count").value({})
 
 
-def test_what_is_not_needed_is_not_worked_out():
+def test_operand_that_is_not_needed_is_not_evaluated():
     assert value("held or 1 / (count - 3) > 0") is True
     assert value("1 if held else 1 / (count - 3)") == 1
 

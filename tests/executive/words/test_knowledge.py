@@ -80,7 +80,7 @@ def test_a_place_is_found_by_name_and_alias(knowledge, name, own):
         ("robot", ()),
     ],
 )
-def test_a_thing_stands_for_its_classes(knowledge, name, classes):
+def test_category_includes_its_classes(knowledge, name, classes):
     assert knowledge.classes(name) == classes
 
 
@@ -105,7 +105,7 @@ def test_a_person_is_found_by_alias(knowledge):
         (Task.GRASP, "banana", None),
     ],
 )
-def test_the_default_place_goes_by_thing_then_category_then_habit(knowledge, task, name, place):
+def test_default_place_goes_by_object_then_category_then_habit(knowledge, task, name, place):
     assert knowledge.default_place(task, name) == place
 
 

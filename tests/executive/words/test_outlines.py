@@ -25,7 +25,7 @@ def test_the_side_along_which_a_line_lies_is_found_in_a_corner_too():
     assert nearest_side(SQUARE, (2.05, 1.6), 0.9).ends == ((2.0, 0.0), (2.0, 2.0))
 
 
-def test_what_fits_lies_within_and_meets_nothing_taken():
+def test_outline_fits_within_a_polygon_beside_taken_ones():
     body = ((0.5, 0.5), (1.0, 0.5), (1.0, 1.0), (0.5, 1.0))
     assert fits(body, SQUARE, [])
     assert not fits(SQUARE, body, [])

@@ -48,7 +48,7 @@ def test_a_start_may_follow_the_kind():
         ("alice=spot@1,2,1e9", "is no start for alice"),
     ],
 )
-def test_what_is_no_list_of_robots_is_refused(option, message):
+def test_invalid_list_of_robots_is_refused(option, message):
     with pytest.raises(InputError) as error:
         parse_robots(option, KINDS)
     assert any(part in str(error.value) for part in message.split("|"))

@@ -131,6 +131,6 @@ def test_data_are_plain():
 
 
 @pytest.mark.parametrize("lines", [["- {to: hall"], ["- 3"], ["to: hall"], ["- {if: holding}"], ["- {to_: hall}"]])
-def test_what_holds_no_steps_is_refused(lines):
+def test_document_without_steps_is_refused(lines):
     with pytest.raises(ValueError, match=r".+"):
         steps_from_yaml(lines)

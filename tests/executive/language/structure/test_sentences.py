@@ -90,7 +90,7 @@ def test_a_world_without_doors_has_none_to_look_at(parser, worlds, sentence):
     assert "no door here" in answer.reason
 
 
-def test_there_is_no_place_that_was_not_spoken_of(meant):
+def test_there_needs_an_earlier_place(meant):
     answer = meant("if Robin is there bring him a beer")
     assert answer.status is Status.QUESTION
     assert "there" in answer.reason
@@ -108,7 +108,7 @@ def test_blocks_nest_no_deeper_than_two(meant):
     assert "two sentences" in answer.reason
 
 
-def test_what_is_spoken_of_is_remembered(meant):
+def test_memory_has_the_last_object(meant):
     answer = meant("if there is a beer in the kitchen bring it to Robin")
     assert [str(command) for command in meant("bring it to the office", memory=answer.memory).commands][-1].startswith(
         "Take [beer]"

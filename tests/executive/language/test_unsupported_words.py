@@ -8,7 +8,7 @@ import yaml
 from executive.language.understand import Status, understand
 from executive.words.command import parse_command
 
-ROWS = yaml.safe_load(Path(__file__).with_name("not_carried.yaml").read_text(encoding="utf-8"))
+ROWS = yaml.safe_load(Path(__file__).with_name("unsupported_words.yaml").read_text(encoding="utf-8"))
 SENTENCES = [(kind, text, part) for kind, rows in ROWS.items() for text, part in rows.items()]
 
 
@@ -38,12 +38,12 @@ def test_it_is_refused_by_its_kind_and_its_part(told, kind, sentence, part):
         ("go to the living room table", "coffee table"),
     ],
 )
-def test_what_a_command_carries_is_kept(told, sentence, goal):
+def test_carried_object_stays_in_the_command(told, sentence, goal):
     assert [command.goal for command in told(sentence).commands] == [goal]
 
 
 @pytest.mark.parametrize("sentence", ["go to the room", "go to kitchen 3", "go to the red kitchen"])
-def test_a_place_that_is_told_apart_by_what_the_world_does_not_know_is_asked_about(told, sentence):
+def test_place_with_an_unknown_description_makes_a_question(told, sentence):
     answer = told(sentence)
     assert answer.status is Status.QUESTION
     assert "kitchen" in answer.question.candidates
@@ -69,7 +69,7 @@ def test_a_question_after_one_or_the_other_is_asked_about(told, sentence):
         ("14 hammers", 14),
     ],
 )
-def test_a_number_of_things_is_kept(told, said, count):
+def test_number_of_objects_stays_in_a_correction(told, said, count):
     answer = told(f"put {said} on the coffee table")
     assert [command.object_count for command in answer.commands] == [count, count]
 
@@ -104,7 +104,7 @@ def test_a_number_of_things_is_kept(told, said, count):
         ),
     ],
 )
-def test_what_people_ask_for_becomes_what_it_means(told, sentence, commands):
+def test_requests_become_their_missions(told, sentence, commands):
     answer = told(sentence)
     assert [str(command) for command in answer.commands] == commands
     assert [str(parse_command(str(command))) for command in answer.commands] == commands

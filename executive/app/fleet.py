@@ -94,7 +94,10 @@ def _options(
     if request.sentence is not None:
         setting = Setting(request, world, _patient(knowledge), robots)
         meant = setting.understand()
-        meanings, named = [part.meaning for part in meant.parts], {part.robot for part in meant.parts} - {RobotChoice.ANY}
+        meanings, named = (
+            [part.meaning for part in meant.parts],
+            {part.robot for part in meant.parts} - {RobotChoice.ANY},
+        )
         if len(named) > 1 or (RobotChoice.ALL in named and len(robots) > 1):
             raise InputError("it is for several robots at once", hint="queue a mission for each of them")
         able = [name for name in robots if not named or name in named or RobotChoice.ALL in named]

@@ -220,7 +220,7 @@ def test_names_differ_from_other_words():
 
 def test_unknown_sound_has_no_similar_phrases():
     assert ALIKES.nearest("electricity bill") == ()
-    assert ALIKES.nearest("") == ALIKES.of("123") == ()
+    assert ALIKES.nearest("") == ALIKES.nearest("123") == ()
     assert SoundAlikes([]).of("wrench") == ()
 
 

@@ -221,7 +221,7 @@ def test_names_differ_from_other_words():
 def test_unknown_sound_has_no_similar_phrases():
     assert ALIKES.nearest("electricity bill") == ()
     assert ALIKES.nearest("") == ALIKES.nearest("123") == ()
-    assert SoundAlikes([]).of("wrench") == ()
+    assert SoundAlikes([]).nearest("wrench") == ()
 
 
 def test_words_of_known_phrases_are_known():

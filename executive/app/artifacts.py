@@ -1,5 +1,4 @@
-"""The pictures of a run: what the hand camera detected, what a question is answered with, the grasp, the hand-over, and
-the way walked from above."""
+"""Pictures of a run: detections of the hand camera, answers to questions, grasps, hand-overs, and the map with paths."""
 
 from __future__ import annotations
 
@@ -22,7 +21,6 @@ from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
 from plant.scene_pictures import (
-    Bounds,
     best_view,
     draw_detection,
     draw_map,
@@ -45,12 +43,12 @@ _SMALL_PX: Final = (320, 240)
 _ROW: Final = 4
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
 _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
-"""So far before the hand, which is drawn in by then, lies what the picture is of."""
+"""Distance of a picture's subject ahead of the hand, which is retracted by then."""
 
 
 @dataclass
 class RobotArtifacts:
-    """What one robot saw and did that is worth a picture: its first confirmed detection, and when (s) it did what."""
+    """Detections of one robot, and the times (s) of its hand-over and placement, for pictures."""
 
     seen: Mapping[str, Any] | None = None
     confirmed: Mapping[str, Any] | None = None
@@ -60,10 +58,10 @@ class RobotArtifacts:
 
 
 class Artifacts(RunVisitor):
-    """Remembers what is worth a picture, apart for each robot, and adds one to each answer for the log.
+    """Collector of each robot's detections and moments for pictures; it adds a picture to each answer in the log.
 
-    `pictures` are small JPEG files for the answers, and `numbers` says which goes with the answer of a node (path id)
-    at a time (s); once they have `MOST_BYTES`, no more are kept. `drawn` are the files that were written, by name.
+    `pictures` are small JPEG files of the answers, at most `MOST_BYTES` in all. `numbers` maps a node's path id and a
+    time (s) to the picture of the answer. `drawn` are the written files by name.
     """
 
     def __init__(self) -> None:
@@ -73,13 +71,13 @@ class Artifacts(RunVisitor):
         self.numbers: dict[tuple[str, float], int] = {}
         self.drawn: dict[str, Path] = {}
 
-    def of(self, robot_name: str) -> RobotArtifacts:
-        """What is known of a robot."""
+    def of_robot(self, robot_name: str) -> RobotArtifacts:
+        """Returns the detections and moments of a robot."""
         return self._of_robot.setdefault(robot_name, RobotArtifacts())
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Takes note of a message; an answer gets a picture."""
-        own = self.of(str(message.get("robot", "")))
+        """Takes a logged message; adds a picture to an answer."""
+        own = self.of_robot(str(message.get("robot", "")))
         if topic == DETECTIONS:
             own.looked.append(message)
             own.seen = message if message["detections"] else own.seen
@@ -87,15 +85,15 @@ class Artifacts(RunVisitor):
             own.confirmed = own.seen
             own.detection = own.detection or own.seen
         if topic == ANSWER_TOPIC:
-            message = self._shown(message, own)
+            message = self._with_picture(message, own)
         if topic == TRANSITIONS and message["to"] == "SUCCESS" and not is_from_before(str(message["message"])):
             name = _MOMENTS.get(str(message["node"]).rsplit("/", 1)[-1])
             if name is not None:
                 own.moments[name] = float(message["t"])
         return message
 
-    def _shown(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
-        """The answer with a picture: of what was found, or of all that was looked at in vain."""
+    def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
+        """Adds a picture to an answer: the found object, or all views if nothing was found."""
         looked = list(own.looked)
         own.looked.clear()
         if not looked:
@@ -108,7 +106,7 @@ class Artifacts(RunVisitor):
         return {**message, "image": self.answer}
 
     def recall(self, events: Iterable[Event]) -> None:
-        """Keeps the pictures of answers that were logged before a restart."""
+        """Restores the pictures of answers that were logged before a restart."""
         for event in events:
             if event.topic == ANSWER_TOPIC and event.data.get("format") == "jpeg" and "t" in event.data:
                 data = np.frombuffer(base64.b64decode(event.data["data"]), np.uint8)
@@ -117,7 +115,7 @@ class Artifacts(RunVisitor):
                     self._keep(event.data, np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8))
 
     def _keep(self, message: Mapping[str, Any], picture: Picture) -> None:
-        """Keeps the small picture of an answer, once, as long as there is room."""
+        """Stores the small picture of an answer, once, up to `MOST_BYTES` in all."""
         key = str(message["node"]), float(message.get("t", 0.0))
         if key in self.numbers or sum(map(len, self.pictures)) >= MOST_BYTES:
             return
@@ -128,19 +126,19 @@ class Artifacts(RunVisitor):
 
 
 def file_name(what: str, robot_name: str, robots: Sequence[str]) -> str:
-    """The name of a robot's file without its ending: among several robots it ends with the robot's."""
+    """Returns the name of a robot's file without its ending; among several robots it has the robot's name."""
     return f"{what}_{slug(robot_name)}" if len(robots) > 1 else what
 
 
 def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequence[str], folder: Path) -> Sequence[Path]:
-    """Writes the pictures of a recorded run into `folder` as PNG; gives their paths.
+    """Writes the pictures of a recorded run into `folder` as PNG; returns their paths.
 
-    What happened before a restart was not recorded by this process, and is left out.
+    Leaves out what happened before a restart, because this process did not record it.
     """
     pictures = {"map": _map(simulation, robots)}
     begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
     for robot in robots:
-        own = artifacts.of(robot)
+        own = artifacts.of_robot(robot)
         if own.detection is not None:
             pictures[file_name("detection", robot, robots)] = detection_picture(own.detection)
         last = simulation.referee.lifts(robot)[-1:]
@@ -155,7 +153,7 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequenc
 
 
 def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
-    """Writes the picture that goes with an answer as `answer.png`; its path, or None where nothing was asked."""
+    """Writes the picture of the last answer as `answer.png`; returns its path, None if no question was answered."""
     if artifacts.answer is None:
         return None
     path = folder / "answer.png"
@@ -164,7 +162,7 @@ def draw_answer(artifacts: Artifacts, folder: Path) -> Path | None:
 
 
 def to_jpeg(picture: Picture) -> bytes:
-    """A picture as a JPEG file for a page, at most 720 pixels wide."""
+    """Encodes a picture as JPEG, at most 720 pixels wide."""
     height, width = picture.shape[:2]
     scale = min(1.0, _WIDEST_PX / width)
     size = (round(width * scale), max(1, round(height * scale)))
@@ -174,7 +172,7 @@ def to_jpeg(picture: Picture) -> bytes:
 
 
 def _sheet(pictures: Sequence[Picture]) -> Picture:
-    """Pictures side by side, smaller, in rows."""
+    """Arranges pictures in a grid, at a smaller size."""
     small = [np.asarray(cv2.resize(each, _SMALL_PX, interpolation=cv2.INTER_AREA), np.uint8) for each in pictures]
     columns = min(len(small), _ROW)
     small += [np.zeros_like(small[0])] * (-len(small) % columns)
@@ -182,7 +180,7 @@ def _sheet(pictures: Sequence[Picture]) -> Picture:
 
 
 def detection_picture(message: Mapping[str, Any]) -> Picture:
-    """A logged picture with its detections drawn on it."""
+    """Draws the detections of a logged picture on it."""
     picture: Picture = message["image"]
     if picture.ndim == 2:
         picture = np.repeat(picture[..., None], 3, axis=2)
@@ -192,31 +190,25 @@ def detection_picture(message: Mapping[str, Any]) -> Picture:
 
 
 def _map(simulation: Simulation, robots: Sequence[str]) -> Picture:
-    """The world from above with the way of each robot; among several in its colour, with its name at the end."""
-    rooms = simulation.world.rooms
-    view = top_view(simulation.query_at(simulation.clock.now()), _bounds(simulation.world.corners))
-    centres = {name: tuple(np.mean(polygon, axis=0)) for name, polygon in rooms.items()}
-    start = simulation.world.start
-    ways = {name: simulation.referee.path(name) for name in robots}
-    marks = {"start": (start.x_m, start.y_m)}
-    if len(ways) == 1:
-        return draw_map(view, ways[robots[0]], labels=centres, marks=marks)
+    """Draws the world from above with the path of each robot; several robots have a colour and a name each."""
+    world, corners = simulation.world, np.array(simulation.world.corners)
+    (x0, y0), (x1, y1) = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
+    view = top_view(simulation.query_at(simulation.clock.now()), (float(x0), float(y0), float(x1), float(y1)))
+    centres = {name: tuple(np.mean(polygon, axis=0)) for name, polygon in world.rooms.items()}
+    paths = {name: simulation.referee.path(name) for name in robots}
+    if len(paths) == 1:
+        return draw_map(view, paths[robots[0]], labels=centres, marks={"start": (world.start.x_m, world.start.y_m)})
     picture = draw_map(view, np.zeros((0, 2)), labels=centres)
-    for number, (name, way) in enumerate(sorted(ways.items())):
-        if len(way):
-            pixels = view.pixels(way)
+    for number, (name, path) in enumerate(sorted(paths.items())):
+        if len(path):
+            pixels = view.pixels(path)
             draw_path(picture, pixels, rgb_of(ROBOT_COLOURS[number % len(ROBOT_COLOURS)]))
             label(picture, name, (int(pixels[-1][0]) + 14, int(pixels[-1][1]) - 14))
     return picture
 
 
-def _bounds(points: Sequence[tuple[float, float]]) -> Bounds:
-    corners = np.array(points)
-    low, high = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
-
-
 def _view(simulation: Simulation, robot_name: str, time_s: float, ahead_m: float) -> Picture:
+    """Renders the hand at a time (s) from the side with the best view."""
     query = simulation.query_at(time_s)
     X_WH = simulation.hand_pose_at(robot_name, time_s)
     across = X_WH.rotation().matrix() @ np.array([0.2, 1.0, 0.0])

@@ -1,4 +1,4 @@
-"""Judges a mission that has run: its goal conditions with the times of its run, and what it said."""
+"""Judges an ended mission: its goal conditions at the times of the run, and its speech."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _MOVING = frozenset({GoalKind.GRASPED, GoalKind.PLACED, GoalKind.HANDED_OVER, Go
 
 @dataclass(frozen=True)
 class Share:
-    """The part of a mission that another robot did, before it was handed on or beside this one.
+    """Share of a mission that another robot did, before or beside this one.
 
-    The first `done` parts of its tree belong to what is judged; all that it moved was moved by the mission.
+    The first `done` parts of its tree are judged with the mission; objects that it moved count as moved by the mission.
     """
 
     tree: CompiledTree
@@ -32,14 +32,14 @@ class Share:
 
 @dataclass(frozen=True)
 class _Move:
-    """A time in which a mission moved objects of some classes on purpose (none: of any)."""
+    """Interval in which a mission moved objects of some classes on purpose (empty: of any class)."""
 
     classes: frozenset[str]
     from_s: float
     until_s: float
 
     def concerns(self, goal: GoalCondition) -> bool:
-        """Returns whether it may move what a condition is about."""
+        """Returns whether it may have moved the object of a goal condition."""
         return not self.classes or not goal.classes or not self.classes.isdisjoint(goal.classes)
 
 
@@ -51,12 +51,11 @@ def verdict_of(
     before: Sequence[Share] = (),
     since_s: float = 0.0,
 ) -> RefereeReport:
-    """The verdict on a tree that has run; `judge` is the referee's, on the goal conditions.
+    """Returns the verdict on an ended tree; `judge` is the referee, which judges goal conditions.
 
-    A run that did not end with success has not fulfilled its mission, whatever holds. Of one that did, all that can be
-    judged counts: what it brought about, what it answered, and what it said. Steps that leave nothing to judge are
-    named. What other robots did `before` belongs to the mission as well, and what happened before `since_s` (simulated
-    time) does not.
+    A run without success has not fulfilled its mission, whatever holds. A run with success is judged by its goal
+    conditions, answers and speech; the verdict names the steps that leave nothing to judge. The shares of other robots
+    `before` belong to the mission; events before `since_s` (simulated time) do not.
     """
     conditions = conditions_of(tree, result, before=before)
     verdict = judge([replace(condition, since_s=since_s) for condition in conditions])
@@ -75,7 +74,7 @@ def verdict_of(
 
 
 def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
-    """The names of skills that were done on their own and leave nothing to judge."""
+    """Returns the names of executed skills that have no goal condition."""
     done = {one.path_id for one in result.executions if one.done}
     names = {node.path_id: node.name for node in tree.root.walk() if not is_speech(node)}
     paths = [_node_of(part) for part in tree.parts if part.goal is None and part.skill is not None]
@@ -85,17 +84,18 @@ def _unseen(tree: CompiledTree, result: RobotResult) -> Sequence[str]:
 def conditions_of(
     tree: CompiledTree, result: RobotResult, *, before: Sequence[Share] = ()
 ) -> tuple[GoalCondition, ...]:
-    """The goal conditions of a tree that has run: one for each time that a part was done, and one for each answer.
+    """Returns the goal conditions of an ended tree: one for each execution of a part, and one for each answer.
 
-    A count is one condition, however many trips it takes. Where a robot went must hold until it drives again, and
-    where an object lies or who holds it until the mission moves such an object again.
+    A count of objects is one condition for all trips. The place of a robot must hold until it drives again; the place
+    or holder of an object must hold until the mission moves such an object again.
     """
     shares = (*before, Share(tree, result, len(tree.parts)))
     moves = [move for share in shares for move in _moves(share)]
-    return tuple(condition for share in shares for condition in _of_share(share, moves, last=share is shares[-1]))
+    return tuple(each for share in shares for each in _conditions_of_share(share, moves, last=share is shares[-1]))
 
 
-def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[GoalCondition]:
+def _conditions_of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[GoalCondition]:
+    """Yields the goal conditions of one robot's share."""
     result = share.result
     for part in share.tree.parts[: share.done]:
         if part.goal is None:
@@ -112,7 +112,7 @@ def _of_share(share: Share, moves: Sequence[_Move], *, last: bool) -> Iterator[G
 
 
 def _answers(part: StepPart, condition: GoalCondition, result: RobotResult, *, done: bool) -> Iterator[GoalCondition]:
-    """One condition for each answer that a check gave, whatever became of what it stands in: it was said."""
+    """Yields a condition for each answer of a check, even if the step around it failed, because the answer was said."""
     below = f"{part.path_id}/"
     answers = [one for one in result.findings if f"{one.path_id}/".startswith(below) and isinstance(one.answer, bool)]
     for finding in answers:
@@ -129,7 +129,7 @@ def _timed(
     *,
     last: bool,
 ) -> GoalCondition:
-    """The condition of one execution, with the times at which it must hold."""
+    """Returns the condition of one execution with the times at which it must hold."""
     result, ended_s = share.result, math.inf if one.ended_s is None else one.ended_s
     between = [_Move(frozenset(), each.began_s, _end(each)) for other in result.preempting for each in other.executions]
     later = [move for move in (*moves, *between) if move.until_s > ended_s and move.concerns(condition)]
@@ -143,7 +143,7 @@ def _timed(
 
 
 def _moves(share: Share) -> Iterator[_Move]:
-    """The times when a robot moved objects on purpose, also in parts that failed or were stopped."""
+    """Yields the intervals in which a robot moved objects on purpose, also in failed or stopped parts."""
     for part in share.tree.parts:
         goal = part.goal
         if goal is None:
@@ -166,9 +166,9 @@ def _node_of(part: StepPart) -> str:
 
 
 def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str]]:
-    """For each time that a step was to say a text: whether the robot said it, and a sentence.
+    """Yields for each execution of a speech step whether the robot said the text, and a sentence on it.
 
-    What was said counts for one step, in the order of time.
+    Each utterance counts for one step, in the order of time.
     """
     nodes = list(tree.root.walk())
     filled = {key: text for node in nodes if node.kind == "set" for key, text in node.options["values"].items()}
@@ -184,13 +184,13 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
         if found is not None:
             unheard.remove(found)
         expected = text.text if isinstance(text, Template) else str(text or "")
-        told = (expected if found is None else found.text)[:SHOWN_CHARS]
-        end = "" if told.endswith((".", "!", "?")) else "."
-        yield found is not None, f'It {"said" if found is not None else "did not say"} "{told}"{end}'
+        shown = (expected if found is None else found.text)[:SHOWN_CHARS]
+        end = "" if shown.endswith((".", "!", "?")) else "."
+        yield found is not None, f'It {"said" if found is not None else "did not say"} "{shown}"{end}'
 
 
 def _is_text(heard: str, text: str | Template | Expression | None) -> bool:
-    """Returns whether the robot said the text of a step, with any values in it."""
+    """Returns whether an utterance is the text of a step, with any values in it."""
     return text.matches(heard) if isinstance(text, Template) else not isinstance(text, str) or heard == text
 
 

@@ -1,6 +1,6 @@
-"""The report of one run: what the tree claimed, what the referee saw, and what was found out.
+"""Report of one run: the tree's claim, the referee's verdict, answers and seen objects.
 
-The same dataclasses are what `--json` prints and what `report.html` shows.
+`--json` prints these dataclasses, and `report.html` shows them.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ReportedAnswer:
-    """An answer that the mission gave, or was given, when (s), and about which place where that is known.
+    """Answer to a question of the mission, with its time (s) and its place if one is known.
 
-    `picture` is the number of its picture among those of the run, from 0, where there is one.
+    `picture` is the index of its picture in the run, if there is one.
     """
 
     question: str
@@ -37,7 +37,7 @@ class ReportedAnswer:
 
 @dataclass(frozen=True)
 class ReportedObject:
-    """An object that was seen on the way: where (position in the world frame, m), and when last (s)."""
+    """Object seen during a run, with its position in the world frame (m) and the time of the last view (s)."""
 
     name: str
     surface: str | None
@@ -47,14 +47,14 @@ class ReportedObject:
 
     @property
     def where(self) -> str:
-        """The surface and the room in words."""
+        """Surface and room in words."""
         on = f"on the {self.surface}" if self.surface else ""
         return ", ".join(filter(None, (on, self.place))) or "somewhere else"
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What somebody says of a mission: who, whether it is good (None: not judged), in one word, and why."""
+    """Statement of `who` on a mission: `good` (None: not judged), one word, and the reason."""
 
     who: str
     good: bool | None
@@ -62,13 +62,13 @@ class Verdict:
     text: str
 
     def line(self) -> str:
-        """The verdict in one line, with rich markup."""
+        """Formats the verdict as one line with rich markup."""
         return f"[bold]{escape(self.who)}:[/bold] {_MARKS[self.good]} {self.word}: {escape(self.text)}"
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a mission ended, what it was to do, and what the referee saw; None where nobody but the robot saw it."""
+    """End of a mission: outcome, cause, message, commands, and the referee's verdict (None without a referee)."""
 
     outcome: str
     cause: str | None
@@ -78,26 +78,26 @@ class Ending:
 
     @property
     def claimed(self) -> bool:
-        """The tree says that the mission is achieved."""
+        """Whether the tree claims success."""
         return self.outcome == "success"
 
     @property
     def achieved(self) -> bool:
-        """The tree says so, and no referee denies it."""
+        """Whether the tree claims success and no referee denies it."""
         return self.claimed and self.seen.success is not False
 
     @property
     def false_claim(self) -> bool:
-        """The tree says so and the referee denies it."""
+        """Whether the tree claims success and the referee denies it."""
         return self.claimed and self.seen.success is False
 
     @property
     def seen(self) -> RefereeReport:
-        """What the referee saw: nothing judged where there is none."""
+        """The referee's verdict, or a verdict of nothing judged."""
         return self.referee or NOT_JUDGED
 
     def verdicts(self, *, name: str | None = None, counts: bool = False) -> Iterator[Verdict]:
-        """What the tree claims, of the robot that is named, and what the referee saw, with its counts if asked for."""
+        """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, with `counts` if set."""
         cause = f" ({self.cause})" if self.cause else ""
         who = "The tree claims" if name is None else f"{name}'s tree claims"
         yield Verdict(who, self.claimed, f"{self.outcome}{cause}", self.message)
@@ -109,18 +109,18 @@ class Ending:
 
 @dataclass(frozen=True)
 class RobotReport(Ending):
-    """How the mission of one robot ended, and which kind of robot it is."""
+    """End of the mission of one robot, with the kind of robot."""
 
     kind: str
 
 
 @dataclass(frozen=True)
 class RunReport(Ending):
-    """One run, with the keys that scripts rely on.
+    """Report of one run, with the keys that scripts rely on.
 
-    Times in seconds; `log` is the event log's path, `work` what was computed, as counters by name. `answers` has all
-    answers in order, `said` what the robot said, `seen_objects` what it is sure to have seen. `scenario` tells what
-    went wrong and happened by intention.
+    Times are in seconds. `log` is the path of the event log, and `work` has the work counters by name. `answers` and
+    `said` are in the order of time, `seen_objects` are the confirmed objects, and `scenario` lists the faults and
+    events of the run's scenario.
     """
 
     world: str
@@ -138,7 +138,7 @@ class RunReport(Ending):
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
-        """The report as JSON values; the referee's events are for people only."""
+        """Returns the report as JSON values, without the referee's sentences."""
         no_events = {"referee": {"events"}}
         without: dict[str, Any] = {**no_events, "robots": {"__all__": no_events}}
         for name in ("scenario", "robots"):
@@ -150,11 +150,11 @@ class RunReport(Ending):
 
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:
-        """A report that another process has printed."""
+        """Reads a report from the JSON values of `to_json`."""
         return _adapter().validate_python(dict(values))
 
     def lines(self) -> Iterator[str]:
-        """The verdicts and the figures, with rich markup."""
+        """Yields the verdicts and the figures as lines with rich markup."""
         figures = (
             f"{self.sim_time_s:.1f} s simulated in {self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), "
             f"{self.ticks} ticks"
@@ -186,7 +186,7 @@ def _adapter() -> TypeAdapter[RunReport]:
 
 
 def counts_text(referee: RefereeReport) -> str:
-    """The counts; those with people where there were any."""
+    """Formats the counts of collisions and drops; mentions people and robots only if they were hit."""
     with_whom = ((referee.people_hit, "with people"), (referee.robots_hit, "between robots"))
     people = "".join(f" ({count} {whom})" for count, whom in with_whom if count)
     counts = [f"{count_text(referee.collisions, 'collision')}{people}", count_text(referee.drops, "drop")]

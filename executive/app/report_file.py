@@ -1,4 +1,4 @@
-"""Writes `report.html` into a run's folder: request, verdicts, steps, answers, and pictures."""
+"""Writes `report.html` with request, verdicts, steps, answers and pictures into a run's folder."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ _SKIPS: Final = frozenset({"skip", "ask"})
 
 
 Picture = tuple[str, bytes]
-"""What a picture shows, and its JPEG file."""
+"""Caption and JPEG file of a picture."""
 
 
 @dataclass(frozen=True)
 class StepRow:
-    """A step, `depth` levels in: its name, style and word, its span (s; None: not begun), and what came of it."""
+    """Row of a step at a depth: name, state, begin and end in s (None: not begun), and the last message."""
 
     name: str
     style: NodeStyle
@@ -63,8 +63,9 @@ class StepRow:
 
 @dataclass(frozen=True)
 class MissionRow:
-    """A mission of a fleet: its number, what was asked for, its robot, how it ended (`good` is None while it has not),
-    how often it was given to another robot, and the sentence of its end.
+    """Row of a fleet's mission: number, request, robot, result, count of reassignments, and last message.
+
+    `good` is None while the mission has not ended.
     """
 
     number: int
@@ -78,7 +79,7 @@ class MissionRow:
 
 @dataclass(frozen=True)
 class ReportPart:
-    """What one robot did, or one mission of a fleet; `colour` is the robot's (hex)."""
+    """Part of a report on one robot, or on one mission of a fleet; `colour` is the robot's colour (hex)."""
 
     title: str
     colour: str
@@ -90,9 +91,10 @@ class ReportPart:
 
 @dataclass(frozen=True)
 class ReportPage:
-    """What `report.html` shows. `request` is the sentence or the file, `facts` are pairs of a name and a value.
+    """Content of `report.html`. `request` is the sentence or the file, `facts` are pairs of a name and a value.
 
-    `alone` is what the only robot did; of several, `parts` has what each did, and `missions` what they were given.
+    `alone` is the part of a single robot. For several robots, `parts` has one part each, and `missions` the missions
+    of a fleet.
     """
 
     title: str
@@ -111,7 +113,7 @@ class ReportPage:
 
 @dataclass(frozen=True)
 class EndedTree:
-    """A robot's tree in its last state, and the report on its mission."""
+    """Last state of a robot's tree, and the report on its mission."""
 
     tree: CompiledTree
     view: NodeView
@@ -119,14 +121,18 @@ class EndedTree:
 
     @property
     def picture(self) -> str:
-        """The executed nodes of the tree as SVG."""
+        """Executed nodes of the tree as SVG."""
         return to_svg(fold_to(executed_tree(self.view), DRAWN_NODES), title=self.tree.mission_name)
 
     def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
-        """The steps of the mission, with their times from the events of a log."""
+        """Returns the steps of the mission, with their times from the events of a log."""
         below = (one for _, one in self.view.walk() if one.path_id == self.tree.mission.path_id)
-        mission = next(below, self.view)
-        return tuple(step_rows(mission, frozenset(part.path_id for part in self.tree.parts), _spans(events)))
+        mission, spans = next(below, self.view), dict[str, tuple[float, float]]()
+        for event in events:
+            if event.topic == TRANSITIONS:
+                t_s, path_id = float(event.data.get("t", event.stamp_s)), str(event.data["node"])
+                spans[path_id] = (spans.get(path_id, (t_s, t_s))[0], t_s)
+        return tuple(step_rows(mission, frozenset(part.path_id for part in self.tree.parts), spans))
 
 
 def write_report(
@@ -165,7 +171,7 @@ def write_report(
 def part_of(
     ended: EndedTree, robots: Sequence[str], artifacts: Artifacts, events: Sequence[Event], *, title: str | None = None
 ) -> ReportPart:
-    """The part of a report on one robot. Its title is the robot's name and kind by default."""
+    """Builds the part of a report on one robot; its title is by default the robot's name and kind."""
     name, report = ended.tree.robot_name, ended.report
     return ReportPart(
         title=title or f"{name} ({report.kind})",
@@ -178,7 +184,7 @@ def part_of(
 
 
 def save_report(out: Path, page: ReportPage) -> Path:
-    """Writes the page of a report into a folder; returns its path."""
+    """Writes a report page into the folder `out`; returns its path."""
     path = out / REPORT
     path.write_text(render("run.html", page=page), encoding="utf-8")
     return path
@@ -187,9 +193,10 @@ def save_report(out: Path, page: ReportPage) -> Path:
 def step_rows(
     node: NodeView, parts: frozenset[str], spans: Mapping[str, tuple[float, float]], depth: int = 0
 ) -> Iterator[StepRow]:
-    """The steps of a mission, one row each: its parts, and above several parts the node that they belong to.
+    """Yields a row for each part of a mission, and for each node above several parts.
 
-    A decorator and its child make one row, with the decorator's status and the child's name.
+    `spans` are the times (s) of the first and last transition of each node. A decorator and its child share a row with
+    the decorator's status and the child's name.
     """
     outer, within = node, [node]
     while (only := _decorated(within[-1], parts)) is not None:
@@ -205,7 +212,7 @@ def step_rows(
 
 
 def _decorated(node: NodeView, parts: frozenset[str]) -> NodeView | None:
-    """The node that a decorator decorates: its only child, or its only child with parts of the mission.
+    """Returns a decorator's child: its only child, or its only child with parts of the mission.
 
     None for a part itself, and for a node with several such children.
     """
@@ -234,18 +241,8 @@ def _row(outer: NodeView, within: Sequence[NodeView], spans: Mapping[str, tuple[
     return StepRow(inner.title(), style, word, depth, spans.get(outer.path_id), state.message)
 
 
-def _spans(events: Sequence[Event]) -> dict[str, tuple[float, float]]:
-    """Times (s) of the first and the last transition of each node, by path id."""
-    spans: dict[str, tuple[float, float]] = {}
-    for event in events:
-        if event.topic == TRANSITIONS:
-            t_s, path_id = float(event.data.get("t", event.stamp_s)), str(event.data["node"])
-            spans[path_id] = (spans.get(path_id, (t_s, t_s))[0], t_s)
-    return spans
-
-
 def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
-    """The facts of a run; an empty name stands for several robots."""
+    """Returns the facts of a run; an empty name stands for several robots."""
     facts = (
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", f"{report.sim_time_s:.1f} s simulated in {report.wall_time_s:.1f} s"),
@@ -257,7 +254,7 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
 
 
 def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> Picture | None:
-    """The world from above if the run was recorded, else the robot's own map; None if there is neither."""
+    """Returns the world from above if the run was recorded, else the robot's own map; None if there is neither."""
     caption = _MAPS if several else _MAP
     if (drawn := _drawn(artifacts, "map")) is not None:
         return caption, drawn
@@ -269,8 +266,8 @@ def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> P
 
 
 def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[Picture]:
-    """The pictures of a robot in a recorded run, or the picture of its first detection."""
-    detection = artifacts.of(robot).detection
+    """Yields the pictures of a robot in a recorded run, else the picture of its first detection."""
+    detection = artifacts.of_robot(robot).detection
     for name, caption in _CAPTIONS.items():
         if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
             yield caption, drawn
@@ -285,7 +282,7 @@ def _drawn(artifacts: Artifacts, name: str) -> bytes | None:
 def with_findings(
     report: RunReport, knowledge: Knowledge, result: RunResult, artifacts: Artifacts, events: Sequence[Event]
 ) -> RunReport:
-    """The report with the answers and the speech of all missions in order, and the objects that they saw."""
+    """Adds the answers and the speech of all missions, in the order of time, and the seen objects to a report."""
     results = [each for robot in result.robots for each in (*robot.preempting, robot)]
     parts = [part for tree in result.trees.values() for part in tree.parts]
     findings = sorted((one for each in results for one in each.findings), key=lambda one: one.t_s)
@@ -294,12 +291,12 @@ def with_findings(
         report,
         answers=tuple(_answer(one, parts, artifacts) for one in findings),
         said=tuple(said),
-        seen_objects=tuple(_object(seen, knowledge) for seen in seen_objects(events)),
+        seen_objects=tuple(_reported(seen, knowledge) for seen in seen_objects(events)),
     )
 
 
 def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -> ReportedAnswer:
-    """A finding with its picture and the place of its command."""
+    """Returns an answer with its picture and the place of its command."""
     path_id = finding.path_id
     commands = (part.command for part in parts if f"{path_id}/".startswith(f"{part.path_id}/"))
     return ReportedAnswer(
@@ -312,8 +309,8 @@ def _answer(finding: Finding, parts: Sequence[StepPart], artifacts: Artifacts) -
     )
 
 
-def _object(seen: ObjectObservation, knowledge: Knowledge) -> ReportedObject:
-    """An object that was seen, with its room."""
+def _reported(seen: ObjectObservation, knowledge: Knowledge) -> ReportedObject:
+    """Returns a seen object with its room."""
     x_m, y_m, _ = seen.position_W
     rooms = (name for name, room in knowledge.places.items() if inside(room.polygon, (x_m, y_m)))
     place = knowledge.room(seen.surface) if seen.surface in knowledge.surfaces else next(rooms, None)

@@ -1,4 +1,4 @@
-"""Scenario files: faults by their words, how many more the seed draws, and events; put into a request and its world."""
+"""Scenario files: faults, random faults and events of a run; read into a request and its world."""
 
 from __future__ import annotations
 
@@ -32,15 +32,16 @@ _BEYOND_M: Final = 0.5
 
 
 def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Request:
-    """The request with its scenario files read and its random faults drawn.
+    """Reads a request's scenario files into it, and draws its random faults.
 
-    Raises InputError: a fault is none, with the line where it has one, or something in a file is not in the world.
+    Raises InputError if a fault is unknown, or the world lacks something that a file names; with the line.
     """
     cameras = tuple(camera.source for camera in spot_capabilities().cameras)
     scenario = request.scenario
     for words in scenario.faults:
         _check_fault(words, cameras, lambda what, hint: InputError(what, hint=hint))
-    objects = {rule.name: _class_of(rule.model, world) for rule in world.seed_rules.objects}
+    imported = {name: each.object.class_name for name, each in world.imports.items()}
+    objects = {rule.name: imported.get(rule.model, rule.model) for rule in world.seed_rules.objects}
     people = {rule.name: rule.route is not None for rule in world.seed_rules.people}
     for path in request.scenario_files:
         read = read_scenario(path, knowledge, cameras=cameras, objects=objects, people=people)
@@ -53,7 +54,7 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Reque
 
 
 def with_events(world: World, scenario: Scenario) -> World:
-    """The world in which the scenario's events happen. Raises InputError: it has changed, and they fit no longer."""
+    """Adds a scenario's events to the world. Raises InputError if they do not fit the world."""
     try:
         walking = world.with_walks({name: Route.model_validate(each) for name, each in scenario.people.items()})
     except WorldError as error:
@@ -62,12 +63,8 @@ def with_events(world: World, scenario: Scenario) -> World:
     return walking.with_events(doors, [MoveRule.model_validate(move) for move in scenario.moves])
 
 
-def _class_of(model: str, world: World) -> str:
-    return world.imports[model].object.class_name if model in world.imports else model
-
-
 def _with_doorways(scenario: Scenario, world: World) -> Scenario:
-    """The scenario with the true middle, width and direction of each door. Raises InputError: the map is broken."""
+    """Adds the true middle, width and direction of each door. Raises InputError if the map is broken."""
     if not scenario.doors:
         return scenario
     grid = load_grid_map(world.surveyed.scan_map_path)
@@ -75,9 +72,9 @@ def _with_doorways(scenario: Scenario, world: World) -> Scenario:
 
 
 def doorway(grid: GridMap, at_W: tuple[float, float]) -> dict[str, Any]:
-    """Middle, clear width and direction of the doorway at a point; the direction is that of the longer wall beside it.
+    """Returns middle, clear width (m) and direction of the doorway at a point.
 
-    The passage is narrowest across the doorway: of all lines through its middle, that one is shortest.
+    The shortest free line through the point crosses the doorway. The direction points to the longer wall beside it.
     """
     angles = np.arange(DIRECTIONS) * math.pi / DIRECTIONS
     lengths = [[_free_m(grid, at_W, angle), _free_m(grid, at_W, angle + math.pi)] for angle in angles]
@@ -98,14 +95,14 @@ def _free_m(grid: GridMap, at_W: tuple[float, float], yaw: float) -> float:
 
 
 def _wall_m(grid: GridMap, middle_W: FloatArray, along: FloatArray, width_m: float) -> float:
-    """Length of the wall beside the doorway in a direction, up to a little more than the door's width, in metres."""
+    """Length of the wall beside a doorway in a direction, up to the door's width and `_BEYOND_M`, in metres."""
     away_m = np.arange(0.5 * width_m + _STEP_M, 1.5 * width_m + _BEYOND_M, _STEP_M)
     met = _occupied(grid, middle_W + away_m[:, None] * along)
     return _STEP_M * float(np.count_nonzero(np.logical_and.accumulate(met)))
 
 
 def _occupied(grid: GridMap, points_W: FloatArray) -> Any:
-    """Returns whether each point (N, 2) is in an occupied cell; off the grid, all is."""
+    """Returns for each point (N, 2) whether its cell is occupied; outside the grid it is."""
     rows, columns = grid.cells(points_W).T
     inside = (rows >= 0) & (rows < grid.occupied.shape[0]) & (columns >= 0) & (columns < grid.occupied.shape[1])
     return ~inside | grid.occupied[np.where(inside, rows, 0), np.where(inside, columns, 0)]
@@ -128,23 +125,25 @@ class _Strict(BaseModel):
 
 
 class EventFile(_Strict):
-    """An event of exactly one person, door or object."""
+    """Event of exactly one person, door or object."""
 
-    person: Name | None = Field(None, description="Somebody who walks; known in the world, or somebody new.")
+    person: Name | None = Field(None, description="A person who walks: one of the world, or a new one.")
     door: tuple[Name, Name] | None = Field(None, description="The two rooms that a door joins.")
-    object: Name | None = Field(None, description="An object by its name in the world, or the first of a class.")
-    at: Delay | None = Field(None, description="When, on the robot's clock: `20`, `20 s` or `2 min`.")
+    object: Name | None = Field(None, description="An object by its name in the world, or the first object of a class.")
+    at: Delay | None = Field(None, description="Time on the robot's clock: `20`, `20 s` or `2 min`.")
     to: Corner | Spot | Name | Stops | None = Field(
         None,
-        description="A person: a place, a point [x, y], or a list of them with pauses. An object: a surface, or "
-        "[x, y, z] of what it is put on, in metres.",
+        description="A person: a place, a point [x, y], or a list of them with pauses. An object: a surface, or a "
+        "point [x, y, z] in metres, with z the height of the surface.",
     )
-    from_: Corner | Name | None = Field(None, alias="from", description="Where somebody new stands at first.")
-    speed: Speed = Field(1.2, description="How fast the person walks, in m/s.")
+    from_: Corner | Name | None = Field(None, alias="from", description="The place where a new person stands at first.")
+    speed: Speed = Field(1.2, description="Walking speed of the person, in m/s.")
     loop: StrictBool = Field(False, description="Whether the person goes on from the first place after the last.")
     yields: StrictBool = Field(True, description="Whether the person stops for a robot that is close ahead.")
-    closes: Delay | None = Field(None, description="When the door begins to close.")
-    opens: Delay | None = Field(None, description="When it begins to open; alone, it is closed at first.")
+    closes: Delay | None = Field(None, description="Time when the door begins to close.")
+    opens: Delay | None = Field(
+        None, description="Time when the door begins to open; without `closes` it is closed at first."
+    )
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> EventFile:
@@ -168,15 +167,15 @@ class EventFile(_Strict):
 
 
 class ScenarioFile(_Strict):
-    """Faults and events while a mission runs."""
+    """Faults and events of a run."""
 
-    faults: tuple[Text, ...] = Field(default=(), description="Faults by their words.")
-    random: RandomFaults = Field(0, description="How many more faults the run's seed draws.")
-    events: tuple[EventFile, ...] = Field(default=(), description="What happens in the world.")
+    faults: tuple[Text, ...] = Field(default=(), description="Faults in words.")
+    random: RandomFaults = Field(0, description="Number of further faults that the run's seed draws.")
+    events: tuple[EventFile, ...] = Field(default=(), description="Events in the world.")
 
 
 def _check_fault(words: str, cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]) -> None:
-    """Raises InputError, made of a sentence and a hint: there is no such fault."""
+    """Raises the InputError that `refusal` makes of a sentence and a hint if there is no such fault."""
     try:
         parse_fault(words, cameras=cameras)
     except ValueError as error:
@@ -192,29 +191,29 @@ def read_scenario(
     objects: Mapping[str, str],
     people: Mapping[str, bool],
 ) -> Scenario:
-    """The scenario of a file in a world, its places as points.
+    """Reads a scenario file for a world; resolves its places to points.
 
-    `cameras` are the robot's, `objects` the classes of the world's objects by their names, `people` tells of those in
-    the world whether they walk already.
+    `cameras` are the robot's cameras, `objects` maps the world's objects to their classes, and `people` maps its people
+    to whether they walk already.
 
     Raises:
-        InputError: a key is wrong, or a fault, place, door, object or person is not there; with the line.
+        InputError: a key is wrong, or a fault, place, door, object or person is unknown; with the line.
     """
     source = read_yaml(path)
     file, problems = validate(ScenarioFile, source), Problems()
     for number, words in enumerate(file.faults):
         with problems:
             _check_fault(words, cameras, partial(source.error, ("faults", number)))
-    reader = _Events(source, knowledge, objects, people)
+    reader = _EventReader(source, knowledge, objects, people)
     for number, event in enumerate(file.events):
         with problems:
-            reader.take(event, ("events", number))
+            reader.add(event, ("events", number))
     problems.raise_any()
     return Scenario(file.faults, file.random, reader.people, tuple(reader.doors), tuple(reader.moves))
 
 
-class _Events:
-    """Collects the events of a file, each checked against the world."""
+class _EventReader:
+    """Reader of a file's events, which checks each against the world."""
 
     def __init__(
         self, source: YamlSource, knowledge: Knowledge, objects: Mapping[str, str], known_people: Mapping[str, bool]
@@ -225,22 +224,22 @@ class _Events:
         self.doors: list[Mapping[str, Any]] = []
         self.moves: list[Mapping[str, Any]] = []
 
-    def take(self, event: EventFile, path: KeyPath) -> None:
-        """Takes in one. Raises InputError."""
+    def add(self, event: EventFile, path: KeyPath) -> None:
+        """Adds an event. Raises InputError."""
         if event.person is not None:
-            self._walk(event, event.person, path)
+            self._add_walk(event, event.person, path)
         elif event.door is not None:
-            self._door(event, event.door, path)
+            self._add_door(event, event.door, path)
         elif event.object is not None:
-            self._move(event, event.object, path)
+            self._add_move(event, event.object, path)
 
-    def _walk(self, event: EventFile, said: str, path: KeyPath) -> None:
+    def _add_walk(self, event: EventFile, said: str, path: KeyPath) -> None:
         name = self._knowledge.person(said) or said
         if name in self.people:
             hint = "give its 'to' a list of places, with pauses"
             raise self._source.error((*path, "person"), f"{name} has an event already", hint)
         if self._known_people.get(name, False):
-            raise self._source.error((*path, "person"), f"{name} walks already", "take somebody who stands")
+            raise self._source.error((*path, "person"), f"{name} walks already", "name a person who stands")
         if name not in self._known_people and event.from_ is None:
             hint = suggestion(said, self._known_people, f"add 'from', where {name} stands at first")
             raise self._source.error((*path, "person"), f"there is no {said} in the world", hint)
@@ -252,7 +251,7 @@ class _Events:
         self.people[name] = {**route, "waypoints": points}
 
     def _point(self, at: Corner | str, path: KeyPath) -> Corner:
-        """A place as a point."""
+        """Returns the point of a place. Raises InputError."""
         if not isinstance(at, str):
             return at
         place = self._knowledge.place(at)
@@ -262,7 +261,7 @@ class _Events:
         pose = self._knowledge.place_pose(place)
         return pose.x, pose.y
 
-    def _door(self, event: EventFile, rooms: tuple[str, str], path: KeyPath) -> None:
+    def _add_door(self, event: EventFile, rooms: tuple[str, str], path: KeyPath) -> None:
         names = tuple(self._knowledge.place(room) or room for room in rooms)
         doors = [door for door in self._knowledge.doors if set(door.between) == set(names)]
         if not doors:
@@ -276,7 +275,7 @@ class _Events:
             times = {"closes": event.closes, "opens": event.opens}
             self.doors.append({"name": name, "at": door.at, "width": door.width, **times})
 
-    def _move(self, event: EventFile, said: str, path: KeyPath) -> None:
+    def _add_move(self, event: EventFile, said: str, path: KeyPath) -> None:
         classes = self._knowledge.classes(self._knowledge.object_name(said) or said)
         named = [name for name in self._objects if name.lower() == said.lower()]
         of_class = [name for name, kind in self._objects.items() if kind in classes]
@@ -286,7 +285,7 @@ class _Events:
         self.moves.append({"name": (named or of_class)[0], "at": event.at, "to": self._rest(event.to, (*path, "to"))})
 
     def _rest(self, to: Any, path: KeyPath) -> str | Spot:
-        """The surface or the point where an object is put."""
+        """Returns the surface or the point where an object is put. Raises InputError."""
         if not isinstance(to, str):
             x, y, z = to
             return x, y, z
@@ -299,6 +298,6 @@ class _Events:
 
 
 def _stops(to: Any) -> list[Stop]:
-    """The places where a person goes, one after the other."""
+    """Returns the places where a person goes, in order."""
     single = isinstance(to, str) or isinstance(to[0], float | int)
     return [each if isinstance(each, Stop) else Stop(at=each, pause=0.0) for each in ((to,) if single else to)]

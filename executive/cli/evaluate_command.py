@@ -1,4 +1,4 @@
-"""`errand evaluate`: a scenario file, random missions, or a mission at many seeds; `errand report`: their results."""
+"""`errand evaluate` runs an evaluation file, random missions, or a mission at many seeds; `errand report` shows results."""
 
 from __future__ import annotations
 
@@ -23,48 +23,44 @@ from skills.quantities import Count
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.evaluate.results import Case, Evaluated, Evaluation, ResultsFile, RunSpec
+    from executive.app.evaluate.results import Case, Evaluation, Results, ResultsFile, RunSpec
     from executive.app.evaluate.summary import Group, StandingRow
 
 RESULTS: Final = "results.sqlite"
+_FILE_HELP: Final = "An evaluation file, a mission file, or a name of `errand missions`."
+EvaluationOrMission = Annotated[Path | None, typer.Argument(metavar="FILE", help=_FILE_HELP, show_default=False)]
+ResultsPath = Annotated[
+    Path | None, typer.Option(help="Results file; by default results.sqlite in the folder for logs.")
+]
 
 
 @takes_request(without=("file", "seed", "record"), out=Path("out/evaluate"))
 def evaluate(
     request: Request,
-    file: Annotated[
-        Path | None,
-        typer.Argument(
-            metavar="FILE", help="A scenario file, a mission file, or a name of `errand missions`.", show_default=False
-        ),
-    ] = None,
-    seeds: Annotated[str | None, typer.Option(help="Such as 1-20 or 1,4,7; 1-20 unless said.")] = None,
-    jobs: Annotated[int, quantity_option(Count, help="How many processes on this machine.")] = 2,
-    workers: Annotated[int | None, quantity_option(Count, help="A local Dask cluster of so many workers.")] = None,
+    file: EvaluationOrMission = None,
+    seeds: Annotated[str | None, typer.Option(help="Such as 1-20 or 1,4,7; by default 1-20.")] = None,
+    jobs: Annotated[int, quantity_option(Count, help="Number of processes on this machine.")] = 2,
+    workers: Annotated[int | None, quantity_option(Count, help="Number of workers of a local Dask cluster.")] = None,
     scheduler: Annotated[
         str | None, typer.Option(metavar="tcp://HOST:PORT", help="The scheduler of a Dask cluster.")
     ] = None,
-    results: Annotated[
-        Path | None,
-        typer.Option(help="Where results land; results.sqlite in the folder for logs."),
-    ] = None,
+    results: ResultsPath = None,
     each_fault: Annotated[
-        bool, typer.Option("--each-fault", help="Without any, then with each fault and scenario alone.")
+        bool, typer.Option("--each-fault", help="First without faults, then with each fault and scenario alone.")
     ] = False,
     anyway: ANYWAY = False,
     random_missions: Annotated[
-        int | None, quantity_option(Count, help="Runs so many random English missions; each seed draws one.")
+        int | None, quantity_option(Count, help="Number of random English missions to run; each seed draws one.")
     ] = None,
     worlds: Annotated[
-        str | None, typer.Option(metavar="WORLD,...", help="The worlds of random missions, in turn; flat unless said.")
+        str | None, typer.Option(metavar="WORLD,...", help="Worlds of the random missions, in turn; by default flat.")
     ] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Runs a scenario file, random missions, or a mission at many seeds; count claims and what the referee saw.
+    """Runs an evaluation file, random missions, or a mission at many seeds; counts claims and the referee's verdicts.
 
-    A scenario file says what is run, where and with what varied. Results of scenarios and of random missions land in a
-    file, and the same command goes on where it stopped. Of a mission, faults and scenarios are all in each run, unless
-    each is to be tried alone.
+    An evaluation file names missions, worlds and variations. Its results and those of random missions are stored in a
+    file, and the same command continues an interrupted evaluation.
     """
     from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
     from executive.app.evaluate.evaluation_file import is_evaluation, load_evaluation
@@ -73,37 +69,41 @@ def evaluate(
     from executive.words.mission import DEFAULT_WORLD
 
     console, out, request = console_for(as_json), request.out, replace(request, out=Request.out)
-    has_own = each_fault or request != Request()
-    pool, kept_in = Pool(jobs, workers, scheduler), results or out / RESULTS
+    has_own, of_file = each_fault or request != Request(), file is not None and is_evaluation(file)
+    pool, stored_in = Pool(jobs, workers, scheduler), results or out / RESULTS
     run = partial(evaluate_runs, pool=pool, out=out, tell=plain_lines(console), progress=partial(_bar, console))
     if random_missions is not None:
-        if has_own or file is not None:
-            what = "--random-missions draws itself what is run"
-            raise InputError(what, hint="give only --worlds, --seeds, who works, and where results land")
+        _refuse_options(has_own or file is not None, "--random-missions chooses the runs itself", _FOR_RANDOM)
         evaluation = drawn_missions(random_missions, worlds or DEFAULT_WORLD, seeds or "1-")
         console.print(f"errand evaluate {evaluation.name}", markup=False)
-        found = run(evaluation, results=kept_in, checked=not anyway)
-        values = _shown(evaluation, found, kept_in, console)
-    elif file is not None and is_evaluation(file):
-        if has_own or seeds is not None or worlds is not None:
-            what = "a scenario file says itself what is run"
-            raise InputError(what, hint="write missions, worlds, seeds, faults and stacks into it", file=file)
-        evaluation, before = load_evaluation(file), None if anyway else refuse_impossible_runs
-        found = run(evaluation, results=kept_in, before=before)
-        values = _shown(evaluation, found, kept_in, console)
+        found = run(evaluation, results=stored_in, checked=not anyway)
+    elif file is not None and of_file:
+        _refuse_options(has_own or bool(seeds or worlds), "an evaluation file chooses the runs itself", _FOR_FILE, file)
+        evaluation = load_evaluation(file)
+        found = run(evaluation, results=stored_in, before=None if anyway else refuse_impossible_runs)
     else:
-        if worlds is not None:
-            raise InputError("--worlds is for --random-missions", hint="name one world by --world")
+        _refuse_options(worlds is not None, "--worlds is for --random-missions", "name one world by --world")
         evaluation = _at_seeds(replace(request, file=file), seeds or "1-20", each_fault=each_fault, anyway=anyway)
-        with _file_of(results) as kept_in:
-            found = run(evaluation, results=kept_in)
-        values = _shown_seeds(found.cases, console)
+        with _file_of(results) as stored_in:
+            found = run(evaluation, results=stored_in)
+    by_seed = random_missions is None and not of_file
+    values = _show_seeds(found.cases, console) if by_seed else _show(evaluation, found, stored_in, console)
     finish(values, as_json, good=all(case.report.achieved for case in found.cases))
+
+
+_FOR_RANDOM: Final = "give only --worlds, --seeds, --results, --out, and the options for workers"
+_FOR_FILE: Final = "write missions, worlds, seeds, faults and stacks into it"
+
+
+def _refuse_options(given: bool, what: str, hint: str, file: Path | None = None) -> None:
+    """Raises InputError if options are given that do not fit."""
+    if given:
+        raise InputError(what, hint=hint, file=file)
 
 
 @contextmanager
 def _bar(console: Console, total: int) -> Iterator[Callable[[], None]]:
-    """A bar of progress over so many runs."""
+    """Shows a progress bar over a number of runs."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -122,7 +122,7 @@ def _bar(console: Console, total: int) -> Iterator[Callable[[], None]]:
 
 @contextmanager
 def _file_of(results: Path | None) -> Iterator[Path]:
-    """The results file that the user names, else a temporary one."""
+    """Yields the results file that the user names, else a temporary one."""
     if results is not None:
         yield results
         return
@@ -131,7 +131,7 @@ def _file_of(results: Path | None) -> Iterator[Path]:
 
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
-    """A request at many seeds, its questions answered once. Raises InputError: it cannot be done."""
+    """Builds the runs of a request at many seeds; asks its questions once. Raises InputError."""
     from executive.app.checker import prepare_checked
     from executive.app.evaluate.evaluation_file import evaluation_at_seeds, seed_range
 
@@ -142,8 +142,8 @@ def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> 
     return evaluation_at_seeds(replace(asked, file=prepared.request.file), chosen, each_fault=each_fault)
 
 
-def _shown_seeds(cases: Sequence[Case], console: Console) -> dict[str, Any]:
-    """Shows a mission at many seeds, a row for each run, under several conditions one for each of those; as JSON."""
+def _show_seeds(cases: Sequence[Case], console: Console) -> dict[str, Any]:
+    """Shows the runs of a mission at many seeds, a table for each condition; returns JSON values."""
     from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import totals_of
 
@@ -157,11 +157,11 @@ def _shown_seeds(cases: Sequence[Case], console: Console) -> dict[str, Any]:
         show_table(console, header, map(_seed_row, own))
     result: dict[str, Any] = {"runs": [case.report.to_json() for case in cases], **totals_of(cases)}
     if "" not in conditions:
-        told = [{CONDITION: name, "runs": len(own), **totals_of(own)} for name, own in conditions.items()]
+        rows = [{CONDITION: name, "runs": len(own), **totals_of(own)} for name, own in conditions.items()]
         console.print()
         head = (CONDITION, "runs", "tree", "referee", "false claims")
-        show_table(console, head, (tuple(map(str, each.values())) for each in told))
-        result["conditions"] = told
+        show_table(console, head, (tuple(map(str, each.values())) for each in rows))
+        result["conditions"] = rows
     counts = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in totals_of(cases).items())
     console.print(f"{len(cases)} runs: {counts}")
     return result
@@ -183,13 +183,13 @@ def _seed_row(case: Case) -> tuple[str, ...]:
     )
 
 
-def _shown(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Console) -> dict[str, Any]:
-    """Shows a scenario or random missions: success by groups, claims against verdicts, what to look at; as JSON."""
+def _show(evaluation: Evaluation, found: Results, stored_in: Path, console: Console) -> dict[str, Any]:
+    """Shows the results of an evaluation file or of random missions; returns JSON values."""
     from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import groups_of, standings_json, totals_of
 
     _show_cases(console, found)
-    console.print(f"Results: {kept_in}; a report: errand report {kept_in} --html report.html", markup=False)
+    console.print(f"Results: {stored_in}; a report: errand report {stored_in} --html report.html", markup=False)
     rate, groups = found.about.get("missions_per_hour"), groups_of(found.cases)
     conditions = [
         {CONDITION: group.name, "runs": len(group.cases), **totals_of(group.cases)}
@@ -207,24 +207,30 @@ def _shown(evaluation: Evaluation, found: Evaluated, kept_in: Path, console: Con
     }
 
 
-def _show_cases(console: Console, found: Evaluated) -> None:
-    """Shows success by groups, claims against verdicts, and each run that is to be looked at with its log's folder."""
+def _show_cases(console: Console, found: Results) -> None:
+    """Shows success by groups, claims against verdicts, and each run to inspect with the folder of its log."""
     from executive.app.evaluate.results import Standing
-    from executive.app.evaluate.summary import groups_of, standing_rows, to_look_at
+    from executive.app.evaluate.summary import cases_to_inspect, groups_of, standing_rows
 
     head = ("", "runs", "success", "95 %", *(standing.column for standing in Standing))
     show_table(console, head, map(_group_row, groups_of(found.cases)))
     console.print()
     rows = standing_rows(found.cases)
     show_table(console, ("claim against verdict", "runs", "share", "95 %", "causes"), map(_standing_row, rows))
-    looked_at = [(case, found.log_folder(case)) for case in to_look_at(found.cases)]
-    if looked_at:
-        console.print()
-        rows_of = (
-            (case.label, case.report.world, str(case.run.request.seed), case.asked, case.why, str(folder or ""))
-            for case, folder in looked_at
+    inspected = [
+        (
+            each.label,
+            each.report.world,
+            str(each.run.request.seed),
+            each.asked,
+            each.why,
+            str(found.log_folder(each) or ""),
         )
-        show_table(console, ("run", "world", "seed", "asked for", "why", "log"), rows_of)
+        for each in cases_to_inspect(found.cases)
+    ]
+    if inspected:
+        console.print()
+        show_table(console, ("run", "world", "seed", "request", "why", "log"), inspected)
 
 
 def _group_row(group: Group) -> tuple[str, ...]:
@@ -241,44 +247,44 @@ def _standing_row(row: StandingRow) -> tuple[str, ...]:
 
 
 def command_of(run: RunSpec) -> str:
-    """The command line that repeats a run alone."""
+    """Returns the command line that repeats a run."""
     return shlex.join(["errand", "run", *request_arguments(run.request)])
 
 
 def report(
-    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A file of `errand evaluate SCENARIO`.")],
-    html: Annotated[Path | None, typer.Option(help="Write a page that needs nothing else.")] = None,
+    results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A results file of `errand evaluate`.")],
+    html: Annotated[Path | None, typer.Option(help="Write an HTML page that needs no other file.")] = None,
     against: Annotated[Path | None, typer.Option(metavar="RESULTS", help="Compare with another results file.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Reports the results of an evaluation: success with intervals, causes, where the time goes, each failure."""
+    """Reports the results of an evaluation: success rates, causes, run time by skill, and each failure."""
     from executive.app.evaluate.results import ResultsFile
     from executive.app.evaluate.summary import summary_json, to_page
 
     console = console_for(as_json)
-    with ResultsFile(results) as kept:
-        found, other = _evaluated(kept), None
+    with ResultsFile(results) as stored:
+        found, other = _results(stored), None
         if against is not None:
             with ResultsFile(against) as compared_with:
-                other = _evaluated(compared_with).cases
+                other = _results(compared_with).cases
         _show_report(console, found, other)
         if html is not None:
-            page = to_page(found, kept.evidence, command_of, against=other, other=str(against or ""))
+            page = to_page(found, stored.evidence, command_of, against=other, other=str(against or ""))
             with writing(html):
                 html.write_text(page, encoding="utf-8")
             console.print(f"Written: {html}", markup=False)
         finish(summary_json(found, command_of, other), as_json)
 
 
-def _evaluated(kept: ResultsFile) -> Evaluated:
-    """All runs that have a result. Raises InputError: none has."""
-    found = kept.evaluated()
+def _results(stored: ResultsFile) -> Results:
+    """Returns all runs that have a result. Raises InputError if there are none."""
+    found = stored.results()
     if not found.cases:
-        raise InputError("it holds no result yet", hint="give the command that writes it again", file=kept.path)
+        raise InputError("it holds no result yet", hint="repeat the command that writes it", file=stored.path)
     return found
 
 
-def _show_report(console: Console, found: Evaluated, other: Sequence[Case] | None) -> None:
+def _show_report(console: Console, found: Results, other: Sequence[Case] | None) -> None:
     from executive.app.evaluate.summary import causes_of, comparisons_of, label_of, time_rows
 
     _show_cases(console, found)

@@ -1,1 +1,1 @@
-"""Evaluation at scale: a scenario file becomes runs, runs become results in one file, and results a report."""
+"""Evaluation at scale: an evaluation file gives runs, runs give results in one file, and results give a report."""

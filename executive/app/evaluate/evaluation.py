@@ -1,4 +1,4 @@
-"""Gives out the runs of an evaluation, and keeps each result as it ends, with what its log shows of a failure."""
+"""Distributes the runs of an evaluation to workers, and stores each result with evidence of failures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.app.checker import prepare_checked
-from executive.app.evaluate.results import Case, Evaluated, Evaluation, Evidence, ResultsFile, RunSpec, Standing
+from executive.app.evaluate.results import Case, Evaluation, Evidence, Results, ResultsFile, RunSpec, Standing
 from executive.app.evaluate.workers import Pool, installed_code
 from executive.app.mission_run import return_memory, run_request
 from executive.app.report import RunReport
@@ -36,7 +36,7 @@ from executive.words.variation import NO_VARIATION
 from skills.files.errors import InputError, Problems
 
 Progress = Callable[[int], AbstractContextManager[Callable[[], None]]]
-"""Shows how many of so many runs are done; what it gives is called after each."""
+"""Shows progress over a number of runs; the yielded function is called after each run."""
 LOGS: Final = "logs"
 REFUSED: Final = "REFUSED"
 MOST_ENTRIES: Final = 60
@@ -57,54 +57,54 @@ def evaluate_runs(
     progress: Progress = lambda total: nullcontext(lambda: None),
     before: Callable[[Sequence[RunSpec]], None] | None = None,
     checked: bool = False,
-) -> Evaluated:
-    """Runs what is still missing of the runs, and keeps each result in the file `results`, files of runs in `out`.
+) -> Results:
+    """Executes the runs that have no result yet; writes results to the file `results` and files of runs to `out`.
 
     Args:
         evaluation: the runs.
-        pool: who works on them.
-        results: the results file, made where there is none.
-        out: the folder for the files of runs.
+        pool: the workers.
+        results: the results file, which is created if missing.
+        out: the folder for files of runs.
         tell: shows a line.
-        progress: shows how far it is.
-        before: is called with the missing runs before the first begins, to refuse them all by InputError.
-        checked: whether a run that `errand check` would refuse counts as refused.
+        progress: shows the progress.
+        before: called with the missing runs before the first begins; may refuse them by InputError.
+        checked: whether a run with errors of `errand check` counts as refused.
 
     Raises:
-        InputError: from `before`, or results cannot be kept; those that are there stay.
+        InputError: `before` refuses the runs, or results cannot be written; stored results stay.
     """
-    with ResultsFile(results, create=True) as kept, kept.claimed():
-        kept.begin(evaluation, code=installed_code())
-        done = kept.done()
+    with ResultsFile(results, create=True) as stored, stored.claimed():
+        stored.begin(evaluation, code=installed_code())
+        done = stored.done_ids()
         missing = [run for run in evaluation.runs if run.id not in done]
         if missing and before is not None:
             before(missing)
         if done:
-            tell(f"{len(done)} of {len(evaluation.runs)} runs have a result in {kept.path}.")
-        kept.note(logs=str((out / LOGS).resolve()))
+            tell(f"{len(done)} of {len(evaluation.runs)} runs have a result in {stored.path}.")
+        stored.note(logs=str((out / LOGS).resolve()))
         if missing:
-            _work_through(missing, kept, pool, out, progress, checked=checked)
-        return kept.evaluated()
+            _execute(missing, stored, pool, out, progress, checked=checked)
+        return stored.results()
 
 
-def _work_through(
-    missing: Sequence[RunSpec], kept: ResultsFile, pool: Pool, out: Path, progress: Progress, *, checked: bool
+def _execute(
+    missing: Sequence[RunSpec], stored: ResultsFile, pool: Pool, out: Path, progress: Progress, *, checked: bool
 ) -> None:
-    """Keeps the result of each run as it ends; one that was cancelled is left to the next time."""
+    """Stores the result of each run as it ends; leaves a cancelled run to the next time."""
     with pool.opened() as workers, progress(len(missing)) as advance:
         count, began = workers.count, time.monotonic()
-        for finished in workers.give_out(partial(run_one, checked=checked), missing):
+        for finished in workers.map_items(partial(run_one, checked=checked), missing):
             run = finished.item
             case = finished.result or Case(run, _report(run, "error", "ERROR", finished.lost))
             if case.report.outcome != _CANCELLED:
-                kept.add(_with_files(case, out / (run.folder or f"{LOGS}/{run.id}")))
+                stored.add(_write_files(case, out / (run.folder or f"{LOGS}/{run.id}")))
                 advance()
         hours = (time.monotonic() - began) / 3600.0
-    kept.note(workers=str(count), missions_per_hour=f"{len(missing) / hours:.1f}")
+    stored.note(workers=str(count), missions_per_hour=f"{len(missing) / hours:.1f}")
 
 
-def _with_files(case: Case, folder: Path) -> Case:
-    """The case, its files written into a folder of its own, and its log named where there is one."""
+def _write_files(case: Case, folder: Path) -> Case:
+    """Writes the files of a case into a folder, and sets the path of its log."""
     files = case.evidence.files
     if not files:
         return case
@@ -115,7 +115,7 @@ def _with_files(case: Case, folder: Path) -> Case:
 
 
 def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:
-    """Understands and checks what differs by more than the seed, the light and the like. Raises InputError with all."""
+    """Checks each run once for all seeds and variations. Raises InputError with all errors."""
     problems, seen = Problems(), set[str]()
     for run in runs:
         request = run.request
@@ -129,19 +129,20 @@ def refuse_impossible_runs(runs: Sequence[RunSpec]) -> None:
 
 
 def run_one(spec: RunSpec, *, checked: bool = False) -> Case:
-    """Runs it from beginning to end. What goes wrong with it, a refusal included, is a result and raises nothing.
+    """Executes a run and returns its result. Never raises: refusals and defects are results.
 
-    When `checked`, what `errand check` finds refuses it.
+    With `checked`, errors of `errand check` refuse the run.
     """
     began = time.monotonic()
     with _ONE_AT_A_TIME, tempfile.TemporaryDirectory(prefix="errand-run-", ignore_cleanup_errors=True) as folder:
-        case = _ran(spec, Path(folder), checked)
+        case = _run_in(Path(folder), spec, checked)
     return_memory()
     worker = f"{platform.node()}:{os.getpid()}"
     return replace(case, spent_s=round(time.monotonic() - began, 3), worker=worker)
 
 
-def _ran(spec: RunSpec, folder: Path, checked: bool) -> Case:
+def _run_in(folder: Path, spec: RunSpec, checked: bool) -> Case:
+    """Executes a run with its files in a temporary folder."""
     try:
         request = replace(_request(spec, folder), out=folder / "out", record=False)
         prepared = prepare_checked(request, anyway=not checked)
@@ -162,13 +163,13 @@ def _ran(spec: RunSpec, folder: Path, checked: bool) -> Case:
 
 
 def _request(spec: RunSpec, folder: Path) -> Request:
-    """The request with its files as they were when it was given out: where they lie, or copies where those differ."""
+    """Returns the request with the file texts of the evaluation's start; copies them if the files have changed."""
     request = spec.request
-    if all(_is_text(Path(path), text) for path, text in spec.files.items()):
+    if all(_has_text(Path(path), text) for path, text in spec.files.items()):
         return request
 
     def copied(name: str, path: Path | None) -> Path | None:
-        """Writes the texts of a file and of those beside it into a folder; the file's path there."""
+        """Writes a file and the files beside it into a folder; returns the file's path there."""
         if path is None:
             return None
         for each, text in spec.files.items():
@@ -187,14 +188,14 @@ def _request(spec: RunSpec, folder: Path) -> Request:
     )
 
 
-def _is_text(path: Path, text: str) -> bool:
+def _has_text(path: Path, text: str) -> bool:
     with suppress(OSError, UnicodeDecodeError):
         return path.read_text(encoding="utf-8") == text
     return False
 
 
 def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:
-    """The report of a run that gave none."""
+    """Returns the report of a run that ended without one."""
     return RunReport(
         outcome=outcome,
         cause=cause,
@@ -212,7 +213,7 @@ def _report(spec: RunSpec, outcome: str, cause: str, message: str) -> RunReport:
 
 
 def steps_of(events: Sequence[Event]) -> dict[str, float]:
-    """Run time of each skill by its name (s, on the robot's clock); skills that run at once count each."""
+    """Run time of each skill by name (s, on the robot's clock); skills in parallel count each."""
     skills, since, spent = dict[str, str](), dict[str, float](), defaultdict[str, float](float)
     for event in events:
         if event.topic == TREE:
@@ -231,14 +232,14 @@ def steps_of(events: Sequence[Event]) -> dict[str, float]:
 
 
 def evidence_of(events: Sequence[Event], files: Mapping[str, bytes]) -> Evidence:
-    """The last of what happened, the map with the robot's way, and the last pictures that were taken."""
+    """Returns the end of the timeline, the map with the robot's path, and the last pictures."""
     entries = [(entry.t, entry.about, entry.text) for entry in timeline(events, leaves_only=True) if entry.text]
     return Evidence(tuple(entries[-MOST_ENTRIES:]), tuple(_pictures(events)), dict(files))
 
 
 def _pictures(events: Sequence[Event]) -> Iterator[tuple[str, bytes]]:
     with suppress(InputError):
-        yield "the map, with the way of the robot", _jpeg(map_picture(events))
+        yield "the map, with the path of the robot", _jpeg(map_picture(events))
     taken = [event for event in events if event.data.get("format") == "jpeg" and event.data.get("data")]
     for event in taken[-MOST_PICTURES:]:
         data = np.frombuffer(base64.b64decode(event.data["data"]), np.uint8)
@@ -248,7 +249,7 @@ def _pictures(events: Sequence[Event]) -> Iterator[tuple[str, bytes]]:
 
 
 def _jpeg(picture: NDArray[np.uint8]) -> bytes:
-    """A picture (height, width, 3; blue, green, red), made small, as a JPEG file."""
+    """Encodes a picture (height, width, 3; blue, green, red) as a small JPEG."""
     height, width = picture.shape[:2]
     scale = min(1.0, _WIDEST_PX / width)
     size = (round(width * scale), max(1, round(height * scale)))

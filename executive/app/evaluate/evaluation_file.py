@@ -1,4 +1,4 @@
-"""Makes the runs of an evaluation: a scenario file (missions, worlds, variations) multiplied out, or many seeds."""
+"""Builds the runs of an evaluation: the product of missions, worlds and variations of a file, or many seeds."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ from skills.quantities import LongDuration, Seed
 
 MOST_RUNS: Final = 200_000
 CONDITION: Final = "condition"
-"""The dimension by which runs with one fault or scenario alone vary."""
+"""Dimension of runs that have one fault or scenario each."""
 _NOTHING: Final = ("none", "default")
 FileFinder = Callable[[Path], Path]
-"""The file that a path means: itself, or one of that name that comes with Errand. Raises InputError."""
+"""Returns the file of a path, or the shipped file of that name. Raises InputError."""
 
 
 def is_evaluation(path: Path) -> bool:
-    """Returns whether a file is a scenario for evaluations, and no mission. Raises InputError: it cannot be read."""
+    """Returns whether a file is an evaluation file, and no mission. Raises InputError if it cannot be read."""
     if path.suffix not in (".yaml", ".yml") or not is_file(path):
         return False
     data = read_yaml(path).data
@@ -50,15 +50,15 @@ def is_evaluation(path: Path) -> bool:
 
 
 def load_evaluation(path: Path) -> Evaluation:
-    """The runs of a scenario file, in the order of missions, worlds, robots, variations, seeds.
+    """Reads the runs of an evaluation file, in the order of missions, worlds, robots, variations, seeds.
 
     Raises:
-        InputError: with file and line; a key, a mission, a file or a value is wrong, or the runs are too many.
+        InputError: a key, mission, file or value is wrong, or there are too many runs; with file and line.
     """
     source = read_yaml(path)
     runs = tuple(_Reader(validate(EvaluationFile, source), source).runs())
     if len(runs) > MOST_RUNS:
-        raise source.error((), f"these are {len(runs)} runs, more than {MOST_RUNS}", "split it into several files")
+        raise source.error((), f"the file gives {len(runs)} runs, more than {MOST_RUNS}", "split it into several files")
     twice = len(runs) - len({run.id for run in runs})
     if twice:
         raise source.error((), f"{twice} of the runs stand in it twice", "list each mission, value and seed once")
@@ -66,9 +66,9 @@ def load_evaluation(path: Path) -> Evaluation:
 
 
 def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: bool) -> Evaluation:
-    """A request at many seeds; with `each_fault` first without any, then with each fault and scenario file alone.
+    """Builds the runs of a request at many seeds; with `each_fault` without faults, then with each fault or scenario.
 
-    Raises InputError: there is none to try alone.
+    Raises InputError if there is no fault to try.
     """
     asked = asked.from_anywhere()
     name = asked.sentence or (asked.file.stem if asked.file is not None else "")
@@ -83,9 +83,9 @@ def evaluation_at_seeds(asked: Request, seeds: Sequence[int], *, each_fault: boo
 
 
 def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Request]]:
-    """The request under each condition by name: with all its faults and scenarios, or without, and with each alone.
+    """Returns the request under each condition by name: as it is, or without faults and then with each alone.
 
-    Raises InputError: there are none to try alone.
+    Raises InputError if there is no fault to try.
     """
     if not each_fault:
         return [("", asked)]
@@ -100,10 +100,12 @@ def _conditions(asked: Request, *, each_fault: bool) -> Sequence[tuple[str, Requ
 
 
 def seed_range(text: str, count: int | None = None) -> tuple[int, ...]:
-    """Seeds from "1-20", "3" or "1,4,7-9"; of a `count` the first so many, where the last range may be open: "8001-".
+    """Parses seeds such as "1-20", "3" or "1,4,7-9".
+
+    With a `count` it returns the first `count` seeds, and the last range may be open, as in "8001-".
 
     Raises:
-        InputError: it is no range of seeds, or holds fewer.
+        InputError: the text is no range of seeds, or holds fewer than `count`.
     """
     seeds, parts = list[int](), text.split(",")
     try:
@@ -124,13 +126,13 @@ def seed_range(text: str, count: int | None = None) -> tuple[int, ...]:
 
 @dataclass(frozen=True)
 class _Reader:
-    """One scenario file."""
+    """Reader of one evaluation file."""
 
     file: EvaluationFile
     source: YamlSource
 
     def runs(self) -> Iterator[RunSpec]:
-        """All runs. Raises InputError."""
+        """Yields all runs. Raises InputError."""
         missions = [self._mission(entry, ("missions", index)) for index, entry in enumerate(self.file.missions)]
         worlds = [None] if self.file.worlds is None else [self._world(name) for name in self.file.worlds]
         seeds, variations = self._seeds(), [*self._variations(self.file.variations)]
@@ -140,7 +142,7 @@ class _Reader:
             yield from (RunSpec(replace(first, seed=seed), name, varied, files) for seed in seeds)
 
     def _robots(self) -> Sequence[tuple[RobotConfig, ...]]:
-        """The robots that are tried in turn. Raises InputError with the line: a name or kind is none."""
+        """Returns the groups of robots to try. Raises InputError with the line if a name or kind is wrong."""
         named = self.file.robots or ({},)
         fleets = [named] if isinstance(named, dict) else named
         kinds = [{name: NamedRobot.model_validate({"kind": kind}) for name, kind in each.items()} for each in fleets]
@@ -158,24 +160,25 @@ class _Reader:
             raise self.source.error(("seeds",), error.message, error.hint) from error
 
     def _mission(self, entry: str | MissionEntry, path: KeyPath) -> tuple[str, Request]:
-        """The name of an entry and its request; a text with spaces that names no file is a sentence."""
+        """Returns the name and the request of an entry; a text with spaces that names no file is a sentence."""
         if isinstance(entry, str):
             is_file = entry.endswith((".yaml", ".yml")) or " " not in entry.strip()
             entry = MissionEntry.model_validate({"file" if is_file else "say": entry})
         if entry.say is not None:
             return entry.name or entry.say, Request(entry.say, answers=entry.answers)
         assert entry.file is not None
-        found = self._found(entry.file, path, mission_file)
+        found = self._find(entry.file, path, mission_file)
         request = Request(file=found, given=entry.set, answers=entry.answers)
         values = ", ".join(f"{name}={value}" for name, value in entry.set.items())
         return entry.name or Path(entry.file).stem + (f" ({values})" if values else ""), request
 
     def _world(self, name: str) -> str:
+        """Returns a world's name, or its folder as seen from the file."""
         folder = self.source.path.parent / name
         return str(folder.resolve()) if is_file(folder / "world.dmd.yaml") else name
 
-    def _found(self, name: str, path: KeyPath, finder: FileFinder | None = None) -> Path:
-        """A file as seen from the scenario file, or one that comes with Errand. Raises InputError with the line."""
+    def _find(self, name: str, path: KeyPath, finder: FileFinder | None = None) -> Path:
+        """Returns a file as seen from the evaluation file, or a shipped file. Raises InputError with the line."""
         beside = self.source.path.parent / name
         try:
             found = beside if is_file(beside) or finder is None else finder(Path(name))
@@ -186,7 +189,7 @@ class _Reader:
         return found.resolve()
 
     def _light(self, light: str | float, path: KeyPath) -> str:
-        """A light of the file by its name or its brightness. Raises InputError with the line: it is neither."""
+        """Returns a light's name or brightness. Raises InputError with the line if it is neither."""
         words = light if isinstance(light, str) else f"{light:g}"
         try:
             parse_light(words)
@@ -195,36 +198,36 @@ class _Reader:
         return words
 
     def _variations(self, lists: VariationsFile) -> Iterator[tuple[Mapping[str, Any], Mapping[str, str]]]:
-        """For each combination what it changes in a request, and in words what is varied."""
+        """Yields for each combination the changed fields of a request, and the varied values in words."""
         several = [name for name in type(lists).model_fields if len(getattr(lists, name)) > 1]
         lights = [self._light(light, ("variations", "light", index)) for index, light in enumerate(lists.light)]
         scenarios, stacks = self._files("scenario", lists.scenario), self._files("stack", lists.stack, stack_file)
         for light, clutter, people, friction, faults, scenario, stack in product(
             lights, lists.clutter, lists.people, lists.friction, lists.faults, scenarios, stacks
         ):
-            named, happens = _faults(faults)
-            told = {"light": light, "clutter": clutter, "people": people, "friction": f"{friction:g}"}
-            told |= {"faults": named, "scenario": scenario[0], "stack": stack[0]}
+            named, injected = _faults(faults)
+            words = {"light": light, "clutter": clutter, "people": people, "friction": f"{friction:g}"}
+            words |= {"faults": named, "scenario": scenario[0], "stack": stack[0]}
             changes = {
                 "variation": Variation(light, clutter, people, friction),
-                "scenario": happens,
+                "scenario": injected,
                 "scenario_files": () if scenario[1] is None else (scenario[1],),
                 "stack": stack[1],
             }
-            yield changes, {name: str(told[name]) for name in several}
+            yield changes, {name: str(words[name]) for name in several}
 
     def _files(
         self, key: str, names: Sequence[str], finder: FileFinder | None = None
     ) -> Sequence[tuple[str, Path | None]]:
-        """Each file of a list with its name; None where none is meant. Raises InputError with the line."""
+        """Returns each file of a list with its name; None for `none` and `default`. Raises InputError with the line."""
         return [
-            (name, None if name in _NOTHING else self._found(name, ("variations", key, index), finder))
+            (name, None if name in _NOTHING else self._find(name, ("variations", key, index), finder))
             for index, name in enumerate(names)
         ]
 
 
 def _faults(entry: str | FaultsFile) -> tuple[str, Scenario]:
-    """The name of an entry, and the faults that it means."""
+    """Returns the name of an entry and its faults."""
     if isinstance(entry, str):
         return entry, Scenario(() if entry in _NOTHING else (entry,))
     drawn = (f"{entry.random} random",) if entry.random else ()
@@ -233,14 +236,14 @@ def _faults(entry: str | FaultsFile) -> tuple[str, Scenario]:
 
 
 def _files_of(request: Request) -> Mapping[str, str]:
-    """The texts of a request's files and of all that they use, by path."""
+    """Returns the texts of a request's files and of the files that they use, by path."""
     others = (path for path in (request.stack, *request.scenario_files) if path is not None)
     used = {} if request.file is None else dict(_with_used(request.file))
     return {**used, **{str(path): read_text(path) for path in others}}
 
 
 def _with_used(file: Path) -> Iterator[tuple[str, str]]:
-    """The path and text of a mission file, and of all that it uses and that lie in its folder."""
+    """Yields path and text of a mission file and of the files that it uses."""
     todo, known = [file], set[Path]()
     while todo:
         path = todo.pop()
@@ -252,7 +255,7 @@ def _with_used(file: Path) -> Iterator[tuple[str, str]]:
 
 
 def _uses(data: Any) -> Iterator[str]:
-    """The files that stand under a key `use` or `stack` anywhere in a document."""
+    """Yields the files under a key `use` or `stack` anywhere in a document."""
     if isinstance(data, dict):
         yield from (value for key, value in data.items() if key in ("use", "stack") and isinstance(value, str))
     for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
@@ -264,13 +267,13 @@ class _Strict(BaseModel):
 
 
 class MissionEntry(_Strict):
-    """A mission: exactly one of `say` and `file`."""
+    """Mission of an evaluation: exactly one of `say` and `file`."""
 
     say: Text | None = Field(None, description="A sentence.")
     file: Name | None = Field(
         None, description="A mission file, as seen from this file, or a name of `errand missions`."
     )
-    name: Name | None = Field(None, description="What the report calls it.")
+    name: Name | None = Field(None, description="Name in the report.")
     set: dict[str, Any] = Field(default_factory=dict, description="Values for the parameters of the file.")
     answers: tuple[Text, ...] = Field((), description="Answers to the questions that it leaves open.")
 
@@ -284,11 +287,11 @@ class MissionEntry(_Strict):
 
 
 class FaultsFile(_Strict):
-    """Faults by their words, and how many more the seed draws."""
+    """Faults of one condition: in words, and drawn by the seed."""
 
-    name: Name | None = Field(None, description="What the report calls it.")
-    faults: tuple[Text, ...] = Field((), description="Faults by their words.")
-    random: RandomFaults = Field(0, description="How many more the run's seed draws.")
+    name: Name | None = Field(None, description="Name in the report.")
+    faults: tuple[Text, ...] = Field((), description="Faults in words.")
+    random: RandomFaults = Field(0, description="Number of further faults that the run's seed draws.")
 
 
 Light = Name | Brightness
@@ -296,24 +299,24 @@ _SOME = Field(min_length=1)
 
 
 class VariationsFile(_Strict):
-    """Lists of values; each value of one is tried with each of all others."""
+    """Lists of values, of which all combinations are tried."""
 
     light: Annotated[tuple[Light, ...], _SOME] = Field(
         (NORMAL_LIGHT,), description="Lights by name (normal, dim, bright, evening, low sun), or brightnesses."
     )
-    clutter: Annotated[tuple[Clutter, ...], _SOME] = Field((0,), description="How many more objects lie about.")
-    people: Annotated[tuple[MorePeople, ...], _SOME] = Field((0,), description="How many more people walk about.")
+    clutter: Annotated[tuple[Clutter, ...], _SOME] = Field((0,), description="Number of added objects.")
+    people: Annotated[tuple[MorePeople, ...], _SOME] = Field((0,), description="Number of added people who walk.")
     friction: Annotated[tuple[Friction, ...], _SOME] = Field(
         (1.0,), description="Factors on the friction of loose objects and robots."
     )
     faults: Annotated[tuple[Text | FaultsFile, ...], _SOME] = Field(
-        ("none",), description="Sensor and other faults: `none`, the words of one, or several together."
+        ("none",), description="Faults: `none`, one in words, or several together."
     )
     scenario: Annotated[tuple[Name, ...], _SOME] = Field(
         ("none",), description="`none`, or files of faults and events, as `errand run --scenario` takes them."
     )
     stack: Annotated[tuple[Name, ...], _SOME] = Field(
-        ("default",), description="`default`, `no_map`, or stack files: what the robot uses."
+        ("default",), description="Stacks: `default`, `no_map`, or stack files."
     )
 
 
@@ -327,13 +330,13 @@ class EvaluationFile(_Strict):
         description="Sentences, names of `errand missions`, and mission files, as seen from this file."
     )
     worlds: Annotated[tuple[Name, ...], _SOME] | None = Field(
-        None, description="Worlds by name or folder; by default each mission's own."
+        None, description="Worlds by name or folder; by default the world of each mission."
     )
     robots: Robots | Annotated[tuple[Robots, ...], _SOME] | None = Field(
-        None, description="Robots by name, each with its kind, or a list of such mappings to be tried in turn."
+        None, description="Robots by name, each with its kind, or a list of such mappings, of which each is tried."
     )
     seeds: Text | Annotated[tuple[Seed, ...], _SOME] = Field(
         "1-20", description="Seeds such as `1-20`, or a list of them."
     )
-    time_limit: LongDuration | None = Field(None, description="Each run ends after so long on the robot's clock.")
-    variations: VariationsFile = Field(VariationsFile.model_validate({}), description="What is varied.")
+    time_limit: LongDuration | None = Field(None, description="Time limit of each run on the robot's clock.")
+    variations: VariationsFile = Field(VariationsFile.model_validate({}), description="Values to vary.")

@@ -1,9 +1,9 @@
-"""Random missions in English: sentences of all kinds that make sense in a world, each chosen by its seed."""
+"""Draws random missions in English that make sense in a world, one for each seed."""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -22,11 +22,11 @@ from skills.files.yaml_source import read_yaml
 
 _TABLE: Final[Mapping[str, Mapping[str, Any]]] = read_yaml(Path(__file__).with_suffix(".yaml")).data
 KINDS: Final[Mapping[str, tuple[str, ...]]] = {kind: tuple(about["sentences"]) for kind, about in _TABLE.items()}
-"""The sentences of each kind of mission, with slots for what the world has."""
+"""Sentences of each kind of mission, with slots for names of the world."""
 TURNS: Final = tuple(kind for kind, about in _TABLE.items() for _ in range(about["turns"]))
-"""The kinds in the order of the seeds."""
+"""Kinds of missions in the order of the seeds."""
 TIME_LIMIT_S: Final = 3600.0
-"""Clearing a workbench into a far room takes six trips."""
+"""Time limit of a run; clearing a workbench into a far room takes six trips."""
 _SHARE_OF_ALIASES: Final = 0.2
 _NUMBERS: Final = MappingProxyType({2: "two", 3: "three"})
 _ORDINARY: Final = ("a", "the")
@@ -34,10 +34,7 @@ _ORDINARY: Final = ("a", "the")
 
 @dataclass(frozen=True)
 class KnownWorld:
-    """A world that missions are drawn for.
-
-    `name` is its name or folder, as runs take it; `carried` are the classes of objects that the robot can carry.
-    """
+    """World of random missions, by its name or folder; `carried` are the classes that the robot can carry."""
 
     name: str
     knowledge: Knowledge
@@ -45,16 +42,17 @@ class KnownWorld:
 
 
 def random_missions(count: int, worlds: str, seeds: str) -> Evaluation:
-    """The runs of the first `count` seeds, in worlds by name or folder ("flat,shop").
+    """Draws the runs of the first `count` seeds, in worlds by name or folder ("flat,shop").
 
     Raises:
-        InputError: a world cannot be used, it is named twice, or there are too few seeds or too many missions.
+        InputError: a world cannot be used or is named twice, or there are too few seeds or too many missions.
     """
     names = [name.strip() for name in worlds.split(",")]
     if len(set(names)) < len(names):
         raise InputError(f"--worlds {worlds} names a world twice", hint="name each once")
     if count > MOST_RUNS:
-        raise InputError(f"these are {count} runs, more than {MOST_RUNS}", hint="give several ranges of seeds in turn")
+        what = f"--random-missions {count} is more than {MOST_RUNS} runs"
+        raise InputError(what, hint="give several ranges of seeds in turn")
     chosen = seed_range(seeds, count)
     if len(set(chosen)) < count:
         raise InputError(f"--seeds {seeds} names a seed twice", hint="name each once")
@@ -63,7 +61,7 @@ def random_missions(count: int, worlds: str, seeds: str) -> Evaluation:
 
 
 def _known_world(name: str) -> KnownWorld:
-    """The knowledge of a world, and the classes that the usual robot can carry there. Raises InputError."""
+    """Opens a world with the classes that the default robot can carry there. Raises InputError."""
     world = open_world(name)
     knowledge, abilities = knowledge_of(world), abilities_in(world)
     carried = frozenset(
@@ -78,10 +76,10 @@ def _known_world(name: str) -> KnownWorld:
 
 
 def random_evaluation(worlds: Sequence[KnownWorld], seeds: Iterable[int], *, name: str) -> Evaluation:
-    """One run for each seed, in the worlds in turn; a run is the same whichever other seeds there are.
+    """Draws one run for each seed, in the worlds in turn; a run depends on its own seed alone.
 
     Raises:
-        InputError: nothing can be asked for in one of the worlds.
+        InputError: no sentence fits one of the worlds.
     """
     runs = list[RunSpec]()
     for seed in seeds:
@@ -92,8 +90,10 @@ def random_evaluation(worlds: Sequence[KnownWorld], seeds: Iterable[int], *, nam
 
 
 def random_sentence(world: KnownWorld, seed: int) -> tuple[str, str]:
-    """The kind of mission whose turn it is at a seed, and a sentence of it. Of a kind that the world has no use for,
-    the next one is taken. Raises InputError: there is none at all."""
+    """Returns the kind of mission of a seed and a sentence of that kind; skips kinds that do not fit the world.
+
+    Raises InputError if no kind fits.
+    """
     rng = random.Random(f"{seed}")
     first = seed % len(TURNS)
     for kind in dict.fromkeys((*TURNS[first:], *TURNS[:first])):
@@ -104,11 +104,11 @@ def random_sentence(world: KnownWorld, seed: int) -> tuple[str, str]:
             except LookupError:
                 continue
     hint = "give its knowledge.yaml places, surfaces or objects"
-    raise InputError(f"nothing can be asked for in the world {world.name}", hint=hint)
+    raise InputError(f"no sentence fits the world {world.name}", hint=hint)
 
 
 class _Slots(dict[str, str]):
-    """The words for the slots of one sentence; equal slots get equal words. Raises LookupError: the world has none."""
+    """Words for the slots of one sentence; equal slots get equal words. Raises LookupError if the world has none."""
 
     def __init__(self, world: KnownWorld, rng: random.Random) -> None:
         super().__init__()
@@ -120,17 +120,17 @@ class _Slots(dict[str, str]):
         return words
 
     def choice(self, what: str, names: Iterable[str]) -> str:
-        """One of the names, the same each time that it is asked for. Raises LookupError: there are none."""
+        """Returns one of the names, the same at each call. Raises LookupError if there are none."""
         if what not in self._meant:
             self._meant[what] = self._rng.choice(list(names))
         return self._meant[what]
 
     def called(self, name: str, aliases: Sequence[str]) -> str:
-        """A name or one of its aliases."""
+        """Returns a name or one of its aliases."""
         return self._rng.choice(aliases) if aliases and self._rng.random() < _SHARE_OF_ALIASES else name
 
     def placed(self, name: str) -> str:
-        """A room or surface with its article; a numbered one has none."""
+        """Returns a room or surface with its article; a numbered one has none."""
         known = self._known
         facts = known.places[name] if name in known.places else known.surfaces[name]
         called = self.called(name, facts.aliases)
@@ -138,7 +138,7 @@ class _Slots(dict[str, str]):
         return called if numbered else f"the {called}"
 
     def object(self, article: str | None = None, *, what: str = "object", carried: bool = True) -> str:
-        """An object with its article."""
+        """Returns an object with its article."""
         known = self._known
         names = [name for name in known.things if name in self._carried or not carried]
         other = [name for name in names if name != self._meant.get("object")] if what != "object" else names
@@ -146,80 +146,79 @@ class _Slots(dict[str, str]):
         return _with_article(article or self._rng.choice(_ORDINARY), self.called(name, known.things[name].aliases))
 
     def usual_surfaces(self, names: Iterable[str]) -> list[str]:
-        """The surfaces where objects of these classes usually are."""
+        """Returns the usual surfaces of objects of these classes."""
         usual = (spot for name in names for spot in self._known.things[name].usual)
         return list(dict.fromkeys(surface for spot in usual for surface in self._known.surfaces_in(spot)))
 
     def home(self, names: Iterable[str]) -> str:
-        """The one room where these classes are. Raises LookupError: there is none, or several."""
+        """Returns the one room of these classes. Raises LookupError if there is none, or several."""
         rooms = {self._known.room(surface) for surface in self.usual_surfaces(names)}
         if len(rooms) != 1:
             raise LookupError
         return self.placed(rooms.pop())
 
     def chosen(self) -> list[str]:
-        """The class that the sentence is about."""
+        """Returns the class of the sentence's object."""
         if "object" not in self._meant:
             self.object()
         return [self._meant["object"]]
 
     def members(self) -> list[str]:
-        """The classes of the category that the sentence is about: those that the robot can carry."""
+        """Returns the classes of the sentence's category that the robot can carry."""
         known, found = self._known, dict[str, list[str]]()
         for category in known.categories():
             found[category] = [name for name in known.classes(category) if name in self._carried]
         return found[self.choice("category", [name for name, members in found.items() if len(members) > 1])]
 
     def category(self) -> str:
-        """The category that the sentence is about."""
+        """Returns the sentence's category."""
         self.members()
         return self._meant["category"]
 
     def some(self) -> str:
-        """A number of objects of the category."""
+        """Returns a number of objects of the category."""
         most = len(self.members())
         return f"{_NUMBERS[self._rng.choice([count for count in _NUMBERS if count <= most])]} {plural(self.category())}"
 
     def room(self, what: str = "room") -> str:
-        """A room, another one than that of the other slots."""
+        """Returns a room that differs from the rooms of other slots."""
         taken = [self._meant.get(other) for other in ("room", "second room")]
         return self.placed(self.choice(what, [name for name in self._known.places if name not in taken]))
 
     def surface(self, names: Iterable[str] = ()) -> str:
-        """A surface where objects of these classes are not to be expected."""
+        """Returns a surface that is not usual for these classes."""
         usual = self.usual_surfaces(names)
         return self.placed(self.choice("surface", [name for name in self._known.surfaces if name not in usual]))
 
     def furnished(self, names: Iterable[str] = ()) -> str:
-        """A room with surfaces, where objects of these classes are not to be expected."""
+        """Returns a room with surfaces that is not usual for these classes."""
         known = self._known
         homes = {known.room(surface) for surface in self.usual_surfaces(names)}
         rooms = (name for name in known.places if known.surfaces_in(name) and name not in homes)
         return self.placed(self.choice("furnished room", rooms))
 
     def person(self, *, only: bool = False) -> str:
-        """Somebody, or the `only` one that there is."""
+        """Returns a person; with `only` the world must have exactly one."""
         people = self._known.people
         if only and len(people) != 1:
             raise LookupError
         return self.choice("person", people)
 
     def room_of_person(self) -> str:
-        """The room where the person usually is."""
+        """Returns the usual room of the sentence's person."""
         return self.placed(self._known.room(self._known.people[self.person()].at))
 
     def to_clear(self) -> str:
-        """A surface whose usual objects the robot can all carry."""
-        return self.choice("cleared", self._clearable())
-
-    def _clearable(self) -> Iterator[str]:
-        for surface in self._known.surfaces:
-            usual = [name for name in self._known.things if surface in self.usual_surfaces([name])]
-            if usual and all(name in self._carried for name in usual):
-                yield surface
+        """Returns a surface whose usual objects the robot can all carry."""
+        usual = {
+            surface: [name for name in self._known.things if surface in self.usual_surfaces([name])]
+            for surface in self._known.surfaces
+        }
+        clearable = (surface for surface, names in usual.items() if names and self._carried.issuperset(names))
+        return self.choice("cleared", clearable)
 
     def cleared_onto(self) -> str:
-        """Another surface."""
+        """Returns a surface other than the one to clear."""
         return self.placed(self.choice("onto", [name for name in self._known.surfaces if name != self.to_clear()]))
 
 
@@ -259,4 +258,4 @@ _SLOTS: Final[Mapping[str, Callable[[_Slots], str]]] = MappingProxyType(
         "room of a person": lambda slots: slots.room_of_person(),
     }
 )
-"""The words for each slot. `drink` stands for any category with several members."""
+"""Words for each slot. `drink` stands for any category with several members."""

@@ -1,4 +1,4 @@
-"""Runs of an evaluation as plain data, their results, and the SQLite file of both, where each lands as it ends."""
+"""Runs of an evaluation as plain data, their results, and the SQLite file of both."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ _COUNTERS_OF_THE_MACHINE: Final = ("bytes_logged",)
 
 @dataclass(frozen=True)
 class RunSpec:
-    """A request, what people call its `mission`, and in words what is varied, by dimension.
+    """Specification of a run: its request, the name of its `mission`, and the varied values by dimension.
 
-    `files` has the texts of the request's files and of all that they use, by path, so that a machine that has none of
-    them can run it. A run with a `folder` leaves all its files there, else only one that is to be looked at leaves any.
+    `files` has the texts of the request's files and of the files that they use, by path, so that a machine without
+    them can run it. A run with a `folder` writes all its files there; without one only a failed run writes files.
     """
 
     request: Request
@@ -39,7 +39,7 @@ class RunSpec:
 
     @cached_property
     def id(self) -> str:
-        """The hash of its content: equal for equal runs, wherever the files lie."""
+        """Hash of its content: equal for equal runs, wherever the files lie."""
         content = json.loads(replace(self.request, out=Path()).to_json())
         for name in {"file", "stack"} & content.keys():
             content[name] = self.files.get(content[name], content[name])
@@ -49,25 +49,25 @@ class RunSpec:
 
     @property
     def variation_words(self) -> str:
-        """The variation on one line."""
+        """Variation on one line."""
         return ", ".join(f"{name} {value}" for name, value in self.varied.items())
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """All runs of an evaluation; `name` is that of its scenario file, or says what is drawn."""
+    """Runs of an evaluation; `name` is its file, or the options of its random missions."""
 
     name: str
     runs: Sequence[RunSpec]
 
     @cached_property
     def digest(self) -> str:
-        """Equal for evaluations of the same runs."""
+        """Hash that is equal for evaluations of the same runs."""
         return hashlib.sha256("".join(run.id for run in self.runs).encode()).hexdigest()[:_ID_LETTERS]
 
 
 class Standing(enum.Enum):
-    """The claim of a run against the referee's verdict in words and as a column; after the first, the gravest first."""
+    """Claim of a run against the referee's verdict, in words and as a column; after the first, the gravest first."""
 
     FULFILLED = "claimed and fulfilled", "fulfilled"
     FALSE_CLAIM = "claimed, not fulfilled: FALSE CLAIM", "false claims"
@@ -87,7 +87,7 @@ _NO_CLAIM: Final = {"refused": Standing.REFUSED, "error": Standing.BROKEN}
 
 @dataclass(frozen=True)
 class Evidence:
-    """Evidence of a failure: the timeline as (s, about, text), pictures as caption and JPEG file, other files."""
+    """Evidence of a failure: timeline as (s, subject, text), pictures with captions as JPEG, other files."""
 
     timeline: tuple[tuple[float, str, str], ...] = ()
     pictures: tuple[tuple[str, bytes], ...] = ()
@@ -96,10 +96,10 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Case:
-    """A run, its report, and what a page shows of it.
+    """Result of a run: its report, and evidence for the report page.
 
-    `steps_s` tells how long each skill ran, on the robot's clock. `spent_s` is the wall's time from the beginning of
-    the work on it to its end, `worker` where it ran.
+    `steps_s` is the run time of each skill on the robot's clock. `spent_s` is the wall time of the run, `worker` the
+    machine and process that executed it.
     """
 
     run: RunSpec
@@ -111,7 +111,7 @@ class Case:
 
     @cached_property
     def standing(self) -> Standing:
-        """The claim against the verdict."""
+        """Claim against verdict."""
         if self.report.claimed:
             return _CLAIMED[self.report.seen.success]
         if self.report.outcome in _NO_CLAIM:
@@ -120,35 +120,35 @@ class Case:
 
     @property
     def cause(self) -> str:
-        """Why it is no success; empty where it is one."""
+        """Cause of a failure or false claim; empty for a success."""
         if self.report.achieved:
             return ""
         return FALSE_CLAIM if self.report.false_claim else self.report.cause or "ERROR"
 
     @property
     def failure_cause(self) -> str:
-        """The cause that a run which failed gives; empty for all others."""
+        """Cause that a failed run reports; empty for all others."""
         failed = self.standing in (Standing.FAILED, Standing.FULFILLED_YET_FAILED)
         return self.report.cause or "" if failed else ""
 
     @property
     def label(self) -> str:
-        """The claim against the verdict, with the cause of a failure."""
+        """Claim against verdict in words, with the cause of a failure."""
         return self.standing.words + (f" ({self.failure_cause})" if self.failure_cause else "")
 
     @property
     def why(self) -> str:
-        """The sentence that goes with the cause, or says why it was not judged."""
+        """Sentence on the cause, or on why the run was not judged."""
         return self.report.seen.why if self.report.claimed else self.report.message
 
     @property
     def asked(self) -> str:
-        """The sentence, else the name of the mission."""
+        """Sentence of the request, else the name of the mission."""
         return self.run.request.sentence or self.run.mission
 
     @property
     def digest(self) -> str:
-        """Equal for equal results, wherever and however fast they came: wall times and paths are left out."""
+        """Hash of the result without wall times and paths: equal on every machine."""
         report = {name: value for name, value in self.report.to_json().items() if name not in _OF_THE_MACHINE}
         report["work"] = {name: count for name, count in report["work"].items() if name not in _COUNTERS_OF_THE_MACHINE}
         text = json.dumps([report, dict(self.steps_s)], sort_keys=True)
@@ -160,7 +160,7 @@ RESULTS_FILE: Final = FileKind(
     option="--results",
     application_id=0x45525256,  # "ERRV"
     version=2,
-    absent="`errand evaluate SCENARIO` writes one",
+    absent="`errand evaluate FILE` writes one",
     lost="its results",
     older="read it with the version that wrote it",
     claimed="writes its results just now",
@@ -190,27 +190,27 @@ CREATE TABLE picture (
 
 
 @dataclass(frozen=True)
-class Evaluated:
-    """The runs that have a result, and what is known about all of them."""
+class Results:
+    """Runs that have a result, and facts about the evaluation."""
 
     cases: Sequence[Case]
     about: Mapping[str, str]
 
     def log_folder(self, case: Case) -> Path | None:
-        """The folder with the log of a run; None where there is none, or the evaluation ran on another machine."""
+        """Returns the folder with the log of a run; None if this machine has none."""
         folder = Path(self.about["logs"]) / case.run.id if "logs" in self.about else None
         return folder if folder is not None and folder.is_dir() else None
 
 
 class ResultsFile(Database):
-    """One results file."""
+    """File of results."""
 
     kind = RESULTS_FILE
 
     def begin(self, evaluation: Evaluation, *, code: str) -> None:
-        """Notes all runs of an evaluation and the version that runs them, or checks that they are those of the file.
+        """Stores the runs of an evaluation and the version of the code, or checks that the file holds the same.
 
-        Raises InputError: it holds the results of other runs, or of another version of Errand.
+        Raises InputError if it holds the results of other runs, or of another version of Errand.
         """
         about = self.about()
         if not about:
@@ -232,22 +232,22 @@ class ResultsFile(Database):
             raise InputError(what, hint=hint, file=self.path)
 
     def about(self) -> Mapping[str, str]:
-        """The scenario, the digest of its runs, and the version of the code; empty where nothing was begun."""
+        """Returns facts by name: evaluation file, digest of the runs, version of the code; empty in a new file."""
         return {row["name"]: row["value"] for row in self.rows("SELECT name, value FROM about")}
 
     def note(self, **facts: str) -> None:
-        """Keeps facts about the evaluation by name."""
+        """Stores facts about the evaluation by name."""
         with self.writing() as connection:
             connection.executemany("INSERT OR REPLACE INTO about VALUES (?, ?)", facts.items())
 
-    def done(self) -> frozenset[str]:
-        """The ids of the runs that have a result."""
+    def done_ids(self) -> frozenset[str]:
+        """Returns the ids of the runs that have a result."""
         return frozenset(run_id for (run_id,) in self.rows("SELECT id FROM result"))
 
     def add(self, case: Case) -> bool:
-        """Keeps a result, whole or not at all; False where the run had one already, which stays.
+        """Stores a result in one transaction; returns False if the run has a result already, which stays.
 
-        Raises InputError: it cannot be written.
+        Raises InputError if it cannot be written.
         """
         run_id, evidence = case.run.id, case.evidence
         with self.writing() as connection:
@@ -267,8 +267,8 @@ class ResultsFile(Database):
             connection.executemany("INSERT INTO picture VALUES (?, ?, ?, ?)", pictures)
         return True
 
-    def evaluated(self) -> Evaluated:
-        """The runs that have a result, in order, without evidence. Raises InputError: it is damaged."""
+    def results(self) -> Results:
+        """Returns the runs that have a result, in order, without evidence. Raises InputError if the file is damaged."""
         files = {row["path"]: row["text"] for row in self.rows("SELECT path, text FROM file")}
         query = "SELECT spec, report, steps, spent_s, worker FROM result JOIN run USING (id) ORDER BY number"
         cases = [
@@ -281,10 +281,10 @@ class ResultsFile(Database):
             )
             for spec, report, steps, spent_s, worker in self.rows(query)
         ]
-        return Evaluated(cases, self.about())
+        return Results(cases, self.about())
 
     def evidence(self, run_id: str) -> Evidence:
-        """The timeline and the pictures of a run."""
+        """Returns the timeline and the pictures of a run."""
         packed = self.rows("SELECT entries FROM timeline WHERE id = ?", run_id)
         entries = json.loads(zlib.decompress(packed[0][0])) if packed else []
         pictures = self.rows("SELECT caption, jpeg FROM picture WHERE id = ? ORDER BY number", run_id)
@@ -292,7 +292,7 @@ class ResultsFile(Database):
 
 
 def _spec_text(run: RunSpec) -> str:
-    """A run as JSON, its files by path only."""
+    """Encodes a run as JSON, its files by path only."""
     text: bytes = form(RunSpec).dump_json(replace(run, files=dict.fromkeys(run.files, "")), exclude_defaults=True)
     return text.decode()
 

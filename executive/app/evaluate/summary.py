@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 from scipy.stats import binomtest, fisher_exact
 
-from executive.app.evaluate.results import Case, Evaluated, Evidence, RunSpec, Standing
+from executive.app.evaluate.results import Case, Evidence, Results, RunSpec, Standing
 from executive.view.html import render
 
 _CONFIDENCE: Final = 0.95
@@ -21,18 +21,18 @@ _PLAIN: Final = "as it is"
 
 
 class Rate(NamedTuple):
-    """A number of successes out of a total."""
+    """Rate of successes in a number of runs."""
 
     successes: int
     total: int
 
     @property
     def value(self) -> float:
-        """The share, 0 where there was none."""
+        """Share of successes; 0 without runs."""
         return self.successes / self.total if self.total else 0.0
 
     def interval(self) -> tuple[float, float]:
-        """Wilson's score interval, 95 %; (0, 1) where there was none (Wilson 1927)."""
+        """Wilson score interval, 95 %; (0, 1) without runs (Wilson 1927)."""
         if not self.total:
             return 0.0, 1.0
         found = binomtest(self.successes, self.total).proportion_ci(_CONFIDENCE, method="wilson")
@@ -40,14 +40,14 @@ class Rate(NamedTuple):
 
     @property
     def interval_text(self) -> str:
-        """The interval in per cent."""
+        """Interval in per cent."""
         low, high = self.interval()
         return f"{low:.1%} to {high:.1%}"
 
 
 @dataclass(frozen=True)
 class Group:
-    """Cases that have something in common: the mission, the world, the robots or what is varied."""
+    """Cases with the same mission, world, robots or varied value."""
 
     dimension: str
     name: str
@@ -55,32 +55,32 @@ class Group:
 
     @property
     def label(self) -> str:
-        """Dimension and name of the group, in words."""
+        """Dimension and name in words."""
         return label_of(self.dimension, self.name)
 
     @cached_property
     def rate(self) -> Rate:
-        """The rate of success."""
+        """Rate of success."""
         return Rate(sum(case.report.achieved for case in self.cases), len(self.cases))
 
     @cached_property
     def standings(self) -> Mapping[Standing, int]:
-        """How many cases have each standing."""
+        """Number of cases with each standing."""
         return Counter(case.standing for case in self.cases)
 
     def to_json(self) -> dict[str, Any]:
-        """Its counts as JSON values."""
+        """Returns its counts as JSON values."""
         rate = {"runs": self.rate.total, "achieved": self.rate.successes, "interval": self.rate.interval()}
         return {"dimension": self.dimension, "name": self.name, **rate, **totals_of(self.cases)}
 
 
 def label_of(dimension: str, name: str) -> str:
-    """A dimension and a name in words."""
+    """Returns a dimension and a name in words."""
     return name if dimension == _ALL else f"{dimension}: {name}"
 
 
 def totals_of(cases: Sequence[Case]) -> Mapping[str, int]:
-    """The counts of claims and verdicts, by their keys in JSON."""
+    """Returns the counts of claims and verdicts by their JSON keys."""
     return {
         "successes": sum(case.report.claimed for case in cases),
         "referee_successes": sum(case.report.seen.success is True for case in cases),
@@ -89,7 +89,7 @@ def totals_of(cases: Sequence[Case]) -> Mapping[str, int]:
 
 
 def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
-    """All runs, then those of each mission, world, robot and value that is varied, where there are several."""
+    """Returns the group of all runs, then a group for each mission, world, robot and varied value if there are several."""
     keyed = _keyed(cases)
     several = Counter(dimension for dimension, _ in keyed)
     order = list(several)
@@ -98,26 +98,20 @@ def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
 
 
 def _keyed(cases: Sequence[Case]) -> dict[tuple[str, str], list[Case]]:
-    """The cases by dimension and name."""
+    """Groups the cases by dimension and name."""
     keyed: dict[tuple[str, str], list[Case]] = {(_ALL, "all runs"): list(cases)}
     for case in cases:
-        for dimension, name in _keys(case):
+        run, world = case.run, case.report.world or case.run.request.world or ""
+        keys = {"mission": run.mission, "world": world, "robots": ",".join(map(str, run.request.robots)), **run.varied}
+        keys |= {"variation": run.variation_words} if len(run.varied) > 1 else {}
+        for dimension, name in keys.items():
             keyed.setdefault((dimension, name or _PLAIN), []).append(case)
     return keyed
 
 
-def _keys(case: Case) -> Iterator[tuple[str, str]]:
-    yield "mission", case.run.mission
-    yield "world", case.report.world or case.run.request.world or ""
-    yield "robots", ",".join(map(str, case.run.request.robots))
-    yield from case.run.varied.items()
-    if len(case.run.varied) > 1:
-        yield "variation", case.run.variation_words
-
-
 @dataclass(frozen=True)
 class StandingRow:
-    """A claim against a verdict: how many runs of all, and their causes with their numbers."""
+    """Row of the table of claims against verdicts: the rate of runs, and the counts of their causes."""
 
     standing: Standing
     rate: Rate
@@ -125,7 +119,7 @@ class StandingRow:
 
 
 def standing_rows(cases: Sequence[Case]) -> Sequence[StandingRow]:
-    """The table of claims against verdicts; all runs but those of its first row are to be looked at."""
+    """Returns the table of claims against verdicts."""
     found: dict[Standing, list[Case]] = {standing: [] for standing in Standing}
     for case in cases:
         found[case.standing].append(case)
@@ -139,8 +133,8 @@ def standing_rows(cases: Sequence[Case]) -> Sequence[StandingRow]:
     ]
 
 
-def to_look_at(cases: Iterable[Case]) -> Sequence[Case]:
-    """The runs that are not claimed and fulfilled, the gravest first."""
+def cases_to_inspect(cases: Iterable[Case]) -> Sequence[Case]:
+    """Returns the cases that are not claimed and fulfilled, the gravest first."""
     order = list(Standing)
     found = [case for case in cases if case.standing is not Standing.FULFILLED]
     return sorted(found, key=lambda case: order.index(case.standing))
@@ -148,7 +142,7 @@ def to_look_at(cases: Iterable[Case]) -> Sequence[Case]:
 
 @dataclass(frozen=True)
 class CauseRow:
-    """A cause, how often, and its most frequent messages with their numbers."""
+    """Cause of failures, with its number of runs and the counts of its most frequent messages."""
 
     cause: str
     runs: int
@@ -156,7 +150,7 @@ class CauseRow:
 
 
 def causes_of(cases: Iterable[Case], *, most: int = 5) -> Sequence[CauseRow]:
-    """The causes of what failed, the most frequent first."""
+    """Returns the causes of failures, the most frequent first."""
     why = defaultdict[str, Counter[str]](Counter)
     for case in cases:
         if case.cause:
@@ -167,7 +161,7 @@ def causes_of(cases: Iterable[Case], *, most: int = 5) -> Sequence[CauseRow]:
 
 @dataclass(frozen=True)
 class TimeRow:
-    """A skill: in how many runs it ran, how long in all (s, on the robot's clock), and its share of all runs' time."""
+    """Run time of a skill: number of runs, total time (s, on the robot's clock), and share of the time of all runs."""
 
     skill: str
     runs: int
@@ -176,7 +170,7 @@ class TimeRow:
 
 
 def time_rows(cases: Sequence[Case]) -> Sequence[TimeRow]:
-    """Where the time goes, the most first; the rest is what no skill took."""
+    """Returns the run time of each skill, the longest first."""
     total_s = max(sum(case.report.sim_time_s for case in cases), 1e-9)
     spent = defaultdict[str, list[float]](list)
     for case in cases:
@@ -188,10 +182,10 @@ def time_rows(cases: Sequence[Case]) -> Sequence[TimeRow]:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two results, those `here` and those `there`: success of each, and how likely chance alone is (p).
+    """Comparison of the rates `here` and `there` of two results files, with the p-value.
 
-    Of runs with one id in both, `only_here` and `only_there` succeeded in one of them alone (McNemar); where there is
-    none, all runs of each are compared (Fisher).
+    Runs with the same id are paired: `only_here` and `only_there` count runs that succeeded in one file only
+    (McNemar's test). Without pairs, all runs of each file are compared (Fisher's test).
     """
 
     dimension: str
@@ -205,7 +199,7 @@ class Comparison:
 
 
 def comparisons_of(here: Sequence[Case], there: Sequence[Case]) -> Sequence[Comparison]:
-    """Two results compared: in all, and by what the groups are by where both have it."""
+    """Compares two results: all runs, and each group that both have."""
     twins, others, found = {case.run.id: case for case in there}, _keyed(there), list[Comparison]()
     paired = any(case.run.id in twins for case in here)
     for group in groups_of(here):
@@ -223,23 +217,23 @@ def comparisons_of(here: Sequence[Case], there: Sequence[Case]) -> Sequence[Comp
 
 
 def mcnemar(only_first: int, only_second: int) -> float:
-    """The exact two-sided p of McNemar's test for pairs of which only one succeeded; 1 where there are none."""
+    """Exact two-sided p of McNemar's test, from the pairs of which only one run succeeded; 1 without such pairs."""
     discordant = only_first + only_second
     return 1.0 if discordant == 0 else float(binomtest(only_first, discordant, 0.5).pvalue)
 
 
 def fisher(first: Rate, second: Rate) -> float:
-    """The two-sided p of Fisher's exact test that two rates are one."""
+    """Two-sided p of Fisher's exact test for two rates."""
     table = [[rate.successes, rate.total - rate.successes] for rate in (first, second)]
     return float(fisher_exact(table).pvalue)
 
 
 CommandOf = Callable[[RunSpec], str]
-"""The command line that repeats a run alone."""
+"""Returns the command line that repeats a run."""
 
 
-def standings_json(found: Evaluated, command_of: CommandOf) -> dict[str, Any]:
-    """Claims against verdicts as JSON values: the counts, and each run that is to be looked at."""
+def standings_json(found: Results, command_of: CommandOf) -> dict[str, Any]:
+    """Returns claims against verdicts as JSON values: the counts, and each run that failed or claimed falsely."""
     return {
         "standings": {
             row.standing.words: {"runs": row.rate.successes, "interval": row.rate.interval(), "causes": row.causes}
@@ -258,13 +252,13 @@ def standings_json(found: Evaluated, command_of: CommandOf) -> dict[str, Any]:
                 "log": None if (folder := found.log_folder(case)) is None else str(folder),
                 "command": command_of(case.run),
             }
-            for case in to_look_at(found.cases)
+            for case in cases_to_inspect(found.cases)
         ],
     }
 
 
-def summary_json(found: Evaluated, command_of: CommandOf, against: Sequence[Case] | None = None) -> dict[str, Any]:
-    """All that the results say as JSON values, compared with the cases of another file where these are given."""
+def summary_json(found: Results, command_of: CommandOf, against: Sequence[Case] | None = None) -> dict[str, Any]:
+    """Returns the summary as JSON values, with a comparison if the cases of another file are given."""
     cases = found.cases
     comparisons = {} if against is None else {"against": [asdict(each) for each in comparisons_of(cases, against)]}
     return {
@@ -280,18 +274,26 @@ def summary_json(found: Evaluated, command_of: CommandOf, against: Sequence[Case
 
 
 def to_page(
-    found: Evaluated,
+    found: Results,
     evidence: Callable[[str], Evidence],
     command_of: CommandOf,
     *,
     against: Sequence[Case] | None = None,
     other: str = "",
 ) -> str:
-    """The results as one HTML file that needs nothing else.
+    """Renders the results as one HTML file that needs no other file.
 
-    `evidence` finds that of a run by its id; `against` are the cases of another results file, `other` its name.
+    `evidence` returns the evidence of a run by its id; `against` are the cases of another results file, `other` its
+    name.
     """
-    cases, about = found.cases, found.about
+    cases, about, work = found.cases, found.about, Counter[str]()
+    for case in cases:
+        work.update(case.report.work)
+    inspected = list[tuple[Case, Evidence, bool, Sequence[str]]]()
+    for case, seen, has_pictures in _with_evidence(cases, evidence):
+        folder = found.log_folder(case)
+        log = [] if folder is None else [f"errand log {folder / 'log.mcap'}"]
+        inspected.append((case, seen, has_pictures, (command_of(case.run), *log)))
     return render(
         "evaluation.html",
         title=Path(about["scenario"]).stem.replace("_", " "),
@@ -307,31 +309,17 @@ def to_page(
         comparisons=None if against is None else comparisons_of(cases, against),
         causes=causes_of(cases),
         times=time_rows(cases),
-        work=_mean_work(cases),
-        to_look_at=[(*each, _repeats(found, each[0], command_of)) for each in _with_evidence(cases, evidence)],
+        work=[(name, count / max(1, len(cases))) for name, count in sorted(work.items())],
+        to_look_at=inspected,
     )
 
 
-def _repeats(found: Evaluated, case: Case, command_of: CommandOf) -> Sequence[str]:
-    """The commands that repeat a run, and print its log where that is on this machine."""
-    folder = found.log_folder(case)
-    return (command_of(case.run), *([] if folder is None else [f"errand log {folder / 'log.mcap'}"]))
-
-
 def _with_evidence(cases: Sequence[Case], find: Callable[[str], Evidence]) -> Iterator[tuple[Case, Evidence, bool]]:
-    """Each run that is to be looked at, its evidence, and whether there is room for its pictures."""
-    room = MOST_PICTURE_BYTES
-    for case in to_look_at(cases):
+    """Yields each case to inspect, its evidence, and whether its pictures fit into the page's size limit."""
+    left_bytes = MOST_PICTURE_BYTES
+    for case in cases_to_inspect(cases):
         evidence = find(case.run.id)
         size = sum(len(jpeg) for _, jpeg in evidence.pictures)
-        has_room = size <= room
-        room -= size if has_room else 0
-        yield case, replace(evidence, pictures=evidence.pictures if has_room else ()), has_room
-
-
-def _mean_work(cases: Sequence[Case]) -> Sequence[tuple[str, float]]:
-    """The mean of each work counter, by name."""
-    work = Counter[str]()
-    for case in cases:
-        work.update(case.report.work)
-    return [(name, count / max(1, len(cases))) for name, count in sorted(work.items())]
+        fits = size <= left_bytes
+        left_bytes -= size if fits else 0
+        yield case, replace(evidence, pictures=evidence.pictures if fits else ()), fits

@@ -1,6 +1,6 @@
-"""Workers: run one function on many items, in processes of this machine or on a Dask cluster.
+"""Workers that apply one function to many items, in processes of this machine or on a Dask cluster.
 
-A worker may die; its item is given to another. A Dask cluster needs the extra `cluster`.
+If a worker dies, another one takes its item. A Dask cluster needs the extra `cluster`.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ from executive.record.announce import versions
 from skills.files.errors import InputError
 
 MOST_DEATHS: Final = 3
-"""Work with which so many workers have died is given up."""
+"""Number of dead workers after which an item is given up."""
 _ROOT: Final = Path(__file__).resolve().parents[3]
 _PACKAGES: Final = ("executive", "skills", "plant", "missions")
 _LIBRARIES: Final = ("drake", "numpy", "numba", "onnxruntime", "ompl", "opencv-python-headless", "scipy")
 _LETTERS: Final = 12
 ANSWER_S: Final = 10.0
-"""Longest wait for a scheduler, and for its first worker."""
+"""Longest wait for a scheduler, and for its first worker, in s."""
 GONE_S: Final = 120.0
-"""Longest wait for a result while no worker is connected: a nanny, or a person, may start another."""
+"""Longest wait for a result without a connected worker, in s; a nanny or a person may start one."""
 _LOOK_S: Final = 5.0
-_GO_ON: Final = "what was done is kept; the same command goes on where it stopped"
+_GO_ON: Final = "finished runs are stored; the same command continues"
 _START_ONE: Final = f"start workers again; {_GO_ON}"
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -45,7 +45,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class WorkResult(Generic[Item, Result]):
-    """An item and its result; `result` is None where each worker that took it has died, as `lost` says."""
+    """Item and its result; `result` is None and `lost` says why if each worker with the item has died."""
 
     item: Item
     result: Result | None
@@ -54,15 +54,17 @@ class WorkResult(Generic[Item, Result]):
 
 @dataclass(frozen=True)
 class LocalWorkers:
-    """So many processes on this machine, which keep what they have imported and loaded from item to item.
+    """Processes on this machine, each of which keeps its imports and loaded models from item to item.
 
-    One that dies is replaced, and its item is begun again by another.
+    A process that dies is replaced, and its item begins again in another.
     """
 
     count: int
 
-    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[WorkResult[Item, Result]]:
-        """Has each item worked on once, and gives each as it ends. What the function raises is raised here.
+    def map_items(
+        self, function: Callable[[Item], Result], items: Sequence[Item]
+    ) -> Iterator[WorkResult[Item, Result]]:
+        """Applies the function to each item; yields each result as it ends, and raises what the function raises.
 
         Closing the iterator ends the processes.
         """
@@ -93,7 +95,7 @@ class LocalWorkers:
 
 
 class _Process:
-    """One worker process, begun with its first item."""
+    """One worker process, which starts with its first item."""
 
     def __init__(self) -> None:
         self._pool = ProcessPoolExecutor(1, multiprocessing.get_context("spawn"), initializer=_begin)
@@ -106,14 +108,14 @@ class _Process:
         return _Process()
 
     def end(self) -> None:
-        """Ends it at once, whatever it does."""
+        """Kills the process."""
         for process in list((self._pool._processes or {}).values()):
             process.kill()
         self._pool.shutdown(wait=True, cancel_futures=True)
 
 
 def _begin() -> None:
-    """A worker does not hear Ctrl-C at the terminal, and ends with its starter, which may be killed itself."""
+    """Prepares a worker process: it ignores Ctrl-C, and ends when the process that started it ends."""
     os.setpgrp()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     starter = multiprocessing.parent_process()
@@ -128,27 +130,29 @@ def _begin() -> None:
 
 
 class _OtherVersionError(Exception):
-    """A worker has another Errand than the process that gives out the work."""
+    """Error of a worker whose version of Errand differs from this process."""
 
 
 class ClusterWorkers:
-    """The workers of a connected Dask client."""
+    """Workers of a connected Dask client."""
 
     def __init__(self, client: Any) -> None:
-        """Raises InputError: there is no worker, or one is of another version, or works on several things at once."""
+        """Raises InputError if there is no worker, or a worker has another version or several threads."""
         self._client = client
         self._check()
 
     @property
     def count(self) -> int:
-        """The number of workers that are connected now."""
+        """Number of connected workers."""
         return len(self._client.scheduler_info(n_workers=-1)["workers"])
 
-    def give_out(self, function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[WorkResult[Item, Result]]:
-        """As `LocalWorkers.give_out`.
+    def map_items(
+        self, function: Callable[[Item], Result], items: Sequence[Item]
+    ) -> Iterator[WorkResult[Item, Result]]:
+        """Applies the function to each item, as `LocalWorkers.map_items` does.
 
         Raises:
-            InputError: the scheduler or all workers are gone, or a worker of another version has come.
+            InputError: the scheduler or all workers are gone, or a worker of another version has joined.
         """
         from distributed.scheduler import KilledWorker
 
@@ -159,7 +163,7 @@ class ClusterWorkers:
         for each in futures:
             each.add_done_callback(ended.put)
         try:
-            with _told_of_loss():
+            with _errors_as_input():
                 for _ in futures:
                     future = self._patiently(ended.get)
                     item = item_of[future.key]
@@ -178,9 +182,9 @@ class ClusterWorkers:
                 self._client.cancel(futures, force=True)
 
     def _patiently(self, get: Callable[..., Any]) -> Any:
-        """What `get` gives, asked again and again. Raises InputError: for `GONE_S` no worker is connected.
+        """Repeats `get` until it returns. Raises InputError if no worker is connected for `GONE_S`.
 
-        A result is lost with the last worker that holds it, and comes when another has done the work again.
+        A result is lost with the last worker that holds it; another worker then computes it again.
         """
         seen_s = time.monotonic()
         while True:
@@ -193,8 +197,8 @@ class ClusterWorkers:
                     raise InputError(f"no worker has been connected for {GONE_S:g} s", hint=_START_ONE) from error
 
     def _check(self) -> None:
-        """Refuses what would give other results. Raises InputError."""
-        with _told_of_loss():
+        """Refuses workers that would give other results. Raises InputError."""
+        with _errors_as_input():
             try:
                 self._client.wait_for_workers(1, timeout=ANSWER_S)
             except TimeoutError as error:
@@ -205,14 +209,14 @@ class ClusterWorkers:
             for address, facts in found.items():
                 if facts["nthreads"] != 1:
                     what = f"the worker at {address} has {facts['nthreads']} threads, and a mission needs a process"
-                    raise InputError(what, hint="start it with --nthreads 1; --nworkers says how many processes")
+                    raise InputError(what, hint="start it with --nthreads 1, and several processes by --nworkers")
             codes = self._client.run(_code_here, on_error="return")
         for address, code in codes.items():
             _refuse_other(address, code)
 
 
 def _refuse_other(address: str, code: Any) -> None:
-    """Raises InputError: a worker has no Errand, or another."""
+    """Raises InputError if a worker has no Errand, or another version."""
     own = installed_code()
     if isinstance(code, ModuleNotFoundError):
         raise InputError(f"the worker at {address} has no Errand ({code})", hint=f"install {own} there")
@@ -226,15 +230,15 @@ def _code_here() -> str:
 
 
 def _checked(expected: str, function: Callable[[Item], Result], item: Item) -> Result:
-    """Works on an item where the code is the same."""
+    """Applies a function to an item if the worker has the expected version."""
     if installed_code() != expected:
         raise _OtherVersionError(f"a worker has another version of Errand ({installed_code()}; here it is {expected})")
     return function(item)
 
 
 @contextmanager
-def _told_of_loss() -> Iterator[None]:
-    """A scheduler that is gone becomes an InputError."""
+def _errors_as_input() -> Iterator[None]:
+    """Raises InputError for a lost scheduler and for a worker of another version."""
     try:
         yield
     except _OtherVersionError as error:
@@ -258,7 +262,7 @@ def _distributed() -> Any:
 def local_cluster(count: int) -> Iterator[ClusterWorkers]:
     """Starts `count` worker processes on this machine, each with a nanny that replaces it when it dies.
 
-    Raises InputError: the extra is not installed.
+    Raises InputError if the extra `cluster` is not installed.
     """
     distributed = _distributed()
     with (
@@ -277,9 +281,9 @@ def local_cluster(count: int) -> Iterator[ClusterWorkers]:
 
 @contextmanager
 def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
-    """The workers of a scheduler.
+    """Connects to the workers of a scheduler.
 
-    Raises InputError: the extra is not installed, the address is none, or nothing answers there.
+    Raises InputError if the extra `cluster` is not installed, or no scheduler answers at the address.
     """
     distributed = _distributed()
     try:
@@ -292,15 +296,15 @@ def scheduler_at(address: str) -> Iterator[ClusterWorkers]:
 
 
 Workers = LocalWorkers | ClusterWorkers
-"""Workers that apply a function to items: `count` of them."""
+"""Workers that apply a function to items; `count` is their number."""
 
 
 @dataclass(frozen=True)
 class Pool:
-    """The workers to use: `jobs` local processes, a local cluster of `workers`, or the workers of a `scheduler`.
+    """Choice of workers: `jobs` local processes, a local cluster of `workers`, or the workers of a `scheduler`.
 
     Raises:
-        InputError: both of a cluster and a scheduler are given.
+        InputError: both a cluster and a scheduler are given.
     """
 
     jobs: int = 2
@@ -309,12 +313,12 @@ class Pool:
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.scheduler is not None:
-            hint = "a scheduler has the workers that were started for it"
+            hint = "give one of them; a scheduler has its own workers"
             raise InputError("--workers and --scheduler do not go together", hint=hint)
 
     @contextmanager
     def opened(self) -> Iterator[Workers]:
-        """The workers, for as long as the context is open. Raises InputError: they cannot be had."""
+        """Opens the workers for the length of the context. Raises InputError if they are not available."""
         if self.scheduler is not None:
             with scheduler_at(self.scheduler) as workers:
                 yield workers
@@ -327,7 +331,7 @@ class Pool:
 
 @cache
 def installed_code() -> str:
-    """The version, and a hash of all files of the code, the models and the worlds, and of the libraries' versions."""
+    """Returns the version with a hash of code, models, worlds and the versions of libraries."""
     made, known = hashlib.sha256(), versions((*_LIBRARIES, "spot-errand"))
     for package in _PACKAGES:
         for path in sorted((_ROOT / package).rglob("*")):

@@ -44,4 +44,4 @@ def test_of_many_looks_without_an_answer_only_the_last_are_remembered():
     artifacts = Artifacts()
     for _ in range(100):
         artifacts.message("detections", looked())
-    assert len(artifacts.of("").looked) == 12
+    assert len(artifacts.of_robot("").looked) == 12

@@ -29,7 +29,7 @@ class Here:
 
     count = 1
 
-    def give_out(self, function, items):
+    def map_items(self, function, items):
         return (Done(item, function(item)) for item in reversed(items))
 
 

@@ -27,7 +27,7 @@ class Here:
 
     count = 1
 
-    def give_out(self, function, items):
+    def map_items(self, function, items):
         return (Done(item, function(item)) for item in items)
 
 
@@ -102,7 +102,7 @@ def test_the_report_shows_the_same_table(ran, tmp_path):
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--say", "go to the hall"), "--random-missions draws itself what is run"),
+        (("--say", "go to the hall"), "--random-missions chooses the runs itself"),
         (("--seeds", "1-3"), "'1-3' holds 3 seeds, fewer than 6"),
         (("--seeds", "1,1-"), "names a seed twice"),
         (("--worlds", "flat,flat"), "names a world twice"),

@@ -100,7 +100,7 @@ def _give_out(
     workers: Workers, function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
 ) -> Iterator[tuple[int, Mapping[str, bytes] | None]]:
     """As `errand_train.dataset.shards.GiveOut` says."""
-    for finished in workers.give_out(function, numbers):
+    for finished in workers.map_items(function, numbers):
         yield finished.item, finished.result
 
 

@@ -33,7 +33,7 @@ def address(options):
 
 def test_each_item_is_worked_on_once(address):
     with scheduler_at(address) as workers:
-        finished = list(workers.give_out(cheap_run.square, range(20)))
+        finished = list(workers.map_items(cheap_run.square, range(20)))
     assert sorted(one.item for one in finished) == list(range(20))
     assert all(one.result == one.item**2 for one in finished)
 
@@ -44,7 +44,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(tmp_path):
         distributed.LocalCluster(n_workers=2, **IN_PROCESSES) as started,
         scheduler_at(started.scheduler_address) as workers,
     ):
-        finished = list(workers.give_out(cheap_run.square_or_die, [(number, str(tmp_path)) for number in range(30)]))
+        finished = list(workers.map_items(cheap_run.square_or_die, [(number, str(tmp_path)) for number in range(30)]))
     assert sorted(one.item[0] for one in finished) == list(range(30))
     assert all(one.result == one.item[0] ** 2 for one in finished)
 
@@ -60,7 +60,7 @@ def test_workers_of_another_version_are_refused_before_anything_runs(address, mo
 
 def test_what_a_run_raises_is_raised_here(address):
     with scheduler_at(address) as workers, pytest.raises(ZeroDivisionError):
-        list(workers.give_out(cheap_run.divide, [1, 0]))
+        list(workers.map_items(cheap_run.divide, [1, 0]))
 
 
 def test_a_worker_with_two_threads_is_refused():
@@ -98,7 +98,7 @@ def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(options,
         pytest.raises(InputError, match=r"no worker has been connected for 0\.5 s; start workers again; what"),
         scheduler_at(started.scheduler_address) as workers,
     ):
-        for finished in workers.give_out(cheap_run.slow_square, range(200)):
+        for finished in workers.map_items(cheap_run.slow_square, range(200)):
             landed.append(finished.item)
             if len(landed) == 3:
                 started.scale(0)
@@ -114,7 +114,7 @@ def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept(options):
         pytest.raises(InputError, match="the scheduler has stopped answering"),
         scheduler_at(started.scheduler_address) as workers,
     ):
-        for finished in workers.give_out(cheap_run.slow_square, range(200)):
+        for finished in workers.map_items(cheap_run.slow_square, range(200)):
             landed.append(finished.item)
             if len(landed) == 3:
                 started.close()

@@ -24,8 +24,8 @@ def test_results_are_kept_once_and_read_back(tmp_path):
         assert (kept.add(case(RUNS[1])), kept.add(case(RUNS[1], "failure"))) == (True, False)
     with ResultsFile(tmp_path / "r.sqlite") as kept:
         kept.begin(EVALUATION, code="1")
-        (found,) = kept.evaluated().cases
-        assert (found.run, found.report.achieved, kept.done()) == (RUNS[1], True, {RUNS[1].id})
+        (found,) = kept.results().cases
+        assert (found.run, found.report.achieved, kept.done_ids()) == (RUNS[1], True, {RUNS[1].id})
         assert kept.evidence(RUNS[1].id) == case(RUNS[1]).evidence
 
 

@@ -2,15 +2,15 @@
 
 import pytest
 
-from executive.app.evaluate.results import Case, Evaluated, Evidence, RunSpec, Standing
+from executive.app.evaluate.results import Case, Evidence, Results, RunSpec, Standing
 from executive.app.evaluate.summary import (
     Rate,
+    cases_to_inspect,
     comparisons_of,
     fisher,
     groups_of,
     mcnemar,
     standing_rows,
-    to_look_at,
     to_page,
 )
 from executive.app.report import RunReport
@@ -72,7 +72,7 @@ def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
 
 
 def test_what_is_to_be_looked_at_begins_with_false_claims():
-    assert [each.run.request.seed for each in to_look_at(CASES)] == [3, 4, 5, 6, 7, 8, 9]
+    assert [each.run.request.seed for each in cases_to_inspect(CASES)] == [3, 4, 5, 6, 7, 8, 9]
 
 
 def test_a_false_claim_is_explained_by_the_referee_and_a_failure_by_the_robot():
@@ -88,7 +88,7 @@ def test_runs_are_grouped_by_kind_and_by_world_with_the_counts_of_each_standing(
 def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands(tmp_path):
     log = tmp_path / CASES[2].run.id
     log.mkdir()
-    found = Evaluated(CASES, {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
+    found = Results(CASES, {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
     page = to_page(found, lambda _: Evidence(), lambda _: "errand run --say x")
     assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
     assert page.count("errand run --say x\n") == 7

@@ -9,20 +9,20 @@ from tests.executive.app.evaluate import cheap_run
 
 
 def test_each_item_is_worked_on_once():
-    finished = list(LocalWorkers(2).give_out(cheap_run.square, range(20)))
+    finished = list(LocalWorkers(2).map_items(cheap_run.square, range(20)))
     assert sorted(one.item for one in finished) == list(range(20))
     assert all(one.result == one.item**2 for one in finished)
 
 
 def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(tmp_path):
     items = [(number, str(tmp_path)) for number in range(30)]
-    finished = list(LocalWorkers(2).give_out(cheap_run.square_or_die, items))
+    finished = list(LocalWorkers(2).map_items(cheap_run.square_or_die, items))
     assert sorted(one.item[0] for one in finished) == list(range(30))
     assert all(one.result == one.item[0] ** 2 for one in finished)
 
 
 def test_what_kills_each_worker_is_given_up_and_takes_nothing_along():
-    finished = {one.item: one for one in LocalWorkers(2).give_out(cheap_run.always_die, range(6))}
+    finished = {one.item: one for one in LocalWorkers(2).map_items(cheap_run.always_die, range(6))}
     assert (finished[3].result, "3 worker processes have died" in finished[3].lost) == (None, True)
     assert [finished[number].result for number in (0, 1, 2, 4, 5)] == [0, 1, 2, 4, 5]
 
@@ -33,7 +33,7 @@ sys.path.insert(0, {folder!r})
 import cheap_run
 from executive.app.evaluate.workers import LocalWorkers
 if __name__ == "__main__":
-    list(LocalWorkers(2).give_out(cheap_run.never_end, range(4)))
+    list(LocalWorkers(2).map_items(cheap_run.never_end, range(4)))
 """
 
 

@@ -1,4 +1,4 @@
-"""Pictures of a run: detections of the hand camera, answers to questions, grasps, hand-overs, and the map with paths."""
+"""Pictures of a run: detections of the hand camera, answers to questions, grasps, hand-overs, and a map with paths."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ class Ending:
         return self.referee or NOT_JUDGED
 
     def verdicts(self, *, name: str | None = None, counts: bool = False) -> Iterator[Verdict]:
-        """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, with `counts` if set."""
+        """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, perhaps with counts."""
         cause = f" ({self.cause})" if self.cause else ""
         who = "The tree claims" if name is None else f"{name}'s tree claims"
         yield Verdict(who, self.claimed, f"{self.outcome}{cause}", self.message)

@@ -1,4 +1,4 @@
-"""`errand evaluate` runs an evaluation file, random missions, or a mission at many seeds; `errand report` shows results."""
+"""`errand evaluate`: an evaluation file, random missions, or a mission at many seeds. `errand report`: results."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ RESULTS: Final = "results.sqlite"
 _FILE_HELP: Final = "An evaluation file, a mission file, or a name of `errand missions`."
 EvaluationOrMission = Annotated[Path | None, typer.Argument(metavar="FILE", help=_FILE_HELP, show_default=False)]
 ResultsPath = Annotated[
-    Path | None, typer.Option(help="Results file; by default results.sqlite in the folder for logs.")
+    Path | None, typer.Option(help="Results file; by default results.sqlite in --out.")
 ]
 
 

@@ -89,7 +89,7 @@ def totals_of(cases: Sequence[Case]) -> Mapping[str, int]:
 
 
 def groups_of(cases: Sequence[Case]) -> Sequence[Group]:
-    """Returns the group of all runs, then a group for each mission, world, robot and varied value if there are several."""
+    """Returns the group of all runs, then a group for each mission, world, robot and varied value among several."""
     keyed = _keyed(cases)
     several = Counter(dimension for dimension, _ in keyed)
     order = list(several)

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 import pytest
 from typer.testing import CliRunner
 
+from executive.app.checker import prepare_checked
 from executive.app.evaluate import evaluation
 from executive.app.evaluate.random_missions import random_missions
 from executive.app.evaluate.workers import Pool
@@ -79,10 +80,12 @@ def test_the_same_command_runs_only_what_is_missing(ran, tmp_path):
 
 
 def test_what_cannot_be_done_counts_as_refused_with_its_words(ran, tmp_path, monkeypatch):
-    def refuse(prepared):
-        raise InputError("there is no way into the hall")
+    def refuse(request, *, anyway):
+        if not anyway:
+            raise InputError("there is no way into the hall")
+        return prepare_checked(request, anyway=True)
 
-    monkeypatch.setattr(evaluation, "refuse_impossible", refuse)
+    monkeypatch.setattr(evaluation, "prepare_checked", refuse)
     _, values = evaluate("--out", str(tmp_path / "checked"))
     assert values["standings"]["refused"]["runs"] == 6
     assert {each["why"] for each in values["to_look_at"]} == {"there is no way into the hall"}

@@ -95,7 +95,7 @@ def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(options,
     landed = []
     with (
         started,
-        pytest.raises(InputError, match=r"no worker has been connected for 0\.5 s; start workers again; what"),
+        pytest.raises(InputError, match=r"no worker has been connected for 0\.5 s; start workers again; finished"),
         scheduler_at(started.scheduler_address) as workers,
     ):
         for finished in workers.map_items(cheap_run.slow_square, range(200)):

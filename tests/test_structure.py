@@ -25,8 +25,8 @@ LINES = {
     "executive/conversation": 591,
     "executive/view": 1383,
     "executive/testing": 812,
-    "executive/app": 7436,
-    "executive/cli": 3818,
+    "executive/app": 7419,
+    "executive/cli": 3822,
     "skills": 25002,
     "plant": 11726,
 }

@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 RESULTS: Final = "results.sqlite"
 _FILE_HELP: Final = "An evaluation file, a mission file, or a name of `errand missions`."
 EvaluationOrMission = Annotated[Path | None, typer.Argument(metavar="FILE", help=_FILE_HELP, show_default=False)]
-ResultsPath = Annotated[
-    Path | None, typer.Option(help="Results file; by default results.sqlite in --out.")
-]
+ResultsPath = Annotated[Path | None, typer.Option(help="Results file; by default results.sqlite in --out.")]
 
 
 @takes_request(without=("file", "seed", "record"), out=Path("out/evaluate"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -37,14 +37,14 @@ from plant.worlds.world import DoorRule, add_package
 
 TIME_STEP_S = 0.0125
 NEAR_RIGID = 0.1
-"""Contact of light objects is as soft as this times a time step's (Castro et al. 2022, section V.B); Drake's 1.0 lets
-80 N press a fingertip 3 cm into a cube of 50 g."""
+"""SAP's near-rigid threshold (Castro et al. 2022, section V.B); Drake's default of 1.0 lets 80 N press a fingertip
+3 cm into a cube of 50 g."""
 FLOOR_TOP_M = 0.01
 TRAY_PATH = Path(__file__).parent / "models" / "tray" / "tray.sdf"
 X_PT_HOME = RigidTransform(
     RotationMatrix(np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])), np.array([0.0, 0.0, 1.08])
 )
-"""Where a person P keeps a tray T that is not in use: upright within the torso, the handle up."""
+"""Pose of an unused tray T in a person P: upright within the torso, the handle up."""
 
 
 @dataclass(frozen=True)
@@ -148,16 +148,19 @@ def _filter_collisions(
     floor = GeometrySet(_floor_geometries(plant, scene_graph))
     for robot in robots:
         robot.filter_collisions(filters, floor)
-    prescribed, anchored = GeometrySet([*_shapes_of(plant, moved)]), GeometrySet([*_anchored_shapes(plant)])
+    bodies = [plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())]
+    instances = {int(instance) for instance in moved}
+    prescribed = GeometrySet(_shapes(plant, (body for body in bodies if int(body.model_instance()) in instances)))
+    anchored = GeometrySet(_shapes(plant, (body for body in bodies if plant.IsAnchored(body))))
     filters.Apply(CollisionFilterDeclaration().ExcludeWithin(prescribed).ExcludeBetween(prescribed, anchored))
 
 
 def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
-    """Builds a world's geometry and some models, and throw them away. Raises InputError: Drake cannot use a file."""
+    """Builds a world's geometry and models for a check alone. Raises InputError when Drake cannot use a file."""
     plant, _ = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     parser, logger = parser_of(plant), logging.getLogger("drake")
     level = logger.level
-    logger.setLevel(logging.CRITICAL)  # what it would log is in the error
+    logger.setLevel(logging.CRITICAL)  # its message is part of the error
     try:
         if directives is not None:
             add_scenery(plant, directives, parser_of)
@@ -168,7 +171,7 @@ def try_geometry(directives: Path | None, models: Iterable[Path]) -> None:
 
 
 def parser_of(plant: MultibodyPlant) -> Parser:
-    """A parser that knows the package of the worlds and models."""
+    """Returns a parser that knows the package of the worlds and models."""
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
     add_package(parser.package_map())
@@ -188,7 +191,7 @@ def _add_model(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Mode
 
 
 def _add_tray(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> RigidBody:
-    """A tray out of sight in the body of a person, without weight, since it is moved as the person wants."""
+    """Adds the tray of a person: hidden in the torso and without weight, because its pose is prescribed."""
     instance = add_model(parser, TRAY_PATH)
     plant.RenameModelInstance(instance, f"{model.name}'s tray")
     plant.set_gravity_enabled(instance, False)
@@ -199,7 +202,7 @@ def _add_tray(plant: MultibodyPlant, parser: Parser, model: LooseModel) -> Rigid
 
 
 def _let_slide(plant: MultibodyPlant, frame: Frame, model: LooseModel) -> None:
-    """Holds a model upright at its height, by a planar joint."""
+    """Lets a model slide upright at its height, by a planar joint."""
     x, y, z = model.X_WM.translation()
     level = RigidTransform(np.array([0.0, 0.0, z]))
     floor = plant.AddFrame(FixedOffsetFrame(f"{model.name}_floor", plant.world_frame(), level))
@@ -208,21 +211,13 @@ def _let_slide(plant: MultibodyPlant, frame: Frame, model: LooseModel) -> None:
     joint.set_default_rotation(RollPitchYaw(model.X_WM.rotation()).yaw_angle())
 
 
-def _shapes_of(plant: MultibodyPlant, instances: Sequence[ModelInstanceIndex]) -> Iterator[GeometryId]:
-    """The collision shapes of model instances."""
-    for index in (body for instance in instances for body in plant.GetBodyIndices(instance)):
-        yield from plant.GetCollisionGeometriesForBody(plant.get_body(index))
-
-
-def _anchored_shapes(plant: MultibodyPlant) -> Iterator[GeometryId]:
-    """The collision shapes of all that is fixed to the world."""
-    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
-        if plant.IsAnchored(body):
-            yield from plant.GetCollisionGeometriesForBody(body)
+def _shapes(plant: MultibodyPlant, bodies: Iterable[RigidBody]) -> list[GeometryId]:
+    """Collision shapes of bodies."""
+    return [shape for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)]
 
 
 def _floor_geometries(plant: MultibodyPlant, scene_graph: SceneGraph) -> list[GeometryId]:
-    """Fixed collision boxes that end at the floor's height, and half spaces."""
+    """Collision boxes and half spaces that are fixed to the world and end at the height of the floor."""
     inspector = scene_graph.model_inspector()
     context = plant.CreateDefaultContext()
     floor = []

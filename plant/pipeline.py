@@ -1,7 +1,7 @@
-"""The plant steps towards the next tick while this one is computed, as the world does not wait for a robot's computer.
+"""Pipelined stepping: the plant steps towards the next tick while the present tick is computed.
 
-What a tick commands begins when the step under way is done: one period late, as over a radio link. Readings are those
-of the tick's beginning. Whether a thread does the step or `advance` itself, the same calls give the same run.
+A command of a tick begins when the step under way is done: one period late, as over a radio link. Readings are those of
+the tick's beginning. The same calls give the same run, whether a thread does the steps or `advance` itself.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from plant.robots.servos import arm_set_point
 from skills.robot import ArmTrajectory, CommandId, CommandState, CommandStatus, Lease, Robot
 
 Background = Callable[[Callable[[], None]], "Future[None]"]
-"""Begins work beside the caller's."""
+"""Begins work in the background."""
 
 _EXACT_S, _LEAST_S = 1e-9, 1e-6
 _BEGIN_LATER = frozenset({"drive", "stand", "sit", "point_head", "set_gripper"})
 
 
 class Pipeline:
-    """The clock of an engine that steps ahead, and its robots; implements the Clock protocol."""
+    """Clock of an engine that steps ahead, with its robots; implements the Clock protocol."""
 
     def __init__(self, engine: Engine, background: Background | None = None) -> None:
-        """`background` does the steps beside the ticks; without one `advance` does them."""
+        """`background` does the steps while the ticks are computed; without it `advance` does them."""
         self._engine, self._background = engine, background or _at_once
         self._robots = {name: PipelinedRobot(robot, self) for name, robot in engine.robots.items()}
         self._now_s: float | None = None
@@ -42,7 +42,7 @@ class Pipeline:
 
     @property
     def happened(self) -> Sequence[tuple[float, str]]:
-        """What doors did, and what somebody moved, by now: the time (s) and a sentence each."""
+        """Events of doors and moved objects until now: the time (s) and a sentence for each."""
         return [(time_s, sentence) for time_s, sentence in self._engine.happened if time_s <= self.now() + _EXACT_S]
 
     def now(self) -> float:
@@ -50,9 +50,9 @@ class Pipeline:
         return self._engine.now() if self._now_s is None else self._now_s
 
     def advance(self, dt_s: float) -> None:
-        """Lets dt_s pass: end the step under way, takes readings, begins what was commanded, and step on by as much.
+        """Advances by dt_s: waits for the step under way, takes readings, begins commands and starts the next step.
 
-        Raises what went wrong in the step. Raises ValueError: that step is longer than dt_s.
+        Raises the exception of the step under way. Raises ValueError when that step is longer than dt_s.
         """
         until_s = self.now() + dt_s
         self.settle()
@@ -68,21 +68,21 @@ class Pipeline:
         self._under_way = self._background(partial(self._engine.step, dt_s))
 
     def reached_s(self) -> float:
-        """The time (s) that the plant has reached, once no step is under way."""
+        """Time (s) that the plant has reached; call it while no step is under way."""
         return self._engine.now()
 
     def settle(self) -> None:
-        """Waits until no step is under way. Raises what went wrong in it."""
+        """Waits until no step is under way. Raises the exception of that step."""
         under_way, self._under_way = self._under_way, None
         if under_way is not None:
             under_way.result()
 
 
 class PipelinedRobot:
-    """A robot whose commands begin when the step under way is done; until then they count as running.
+    """A robot whose commands begin when the step under way is done, and count as running until then.
 
-    Verbs of the lease wait for that step, since they are answered at once. The time of an arm's trajectory counts from
-    its command: the arm takes it up where it should be by then. All else is passed on.
+    Verbs of the lease wait for that step, because they are answered at once. The time of an arm's trajectory counts
+    from its command: the arm begins at the point that it should have reached by then.
     """
 
     def __init__(self, robot: Robot, pipeline: Pipeline) -> None:
@@ -92,7 +92,7 @@ class PipelinedRobot:
         self._running: dict[CommandId, CommandId] = {}  # by the ids given here, those of the robot
 
     def begin_commands(self) -> None:
-        """Gives the robot what was commanded; no step may be under way."""
+        """Passes the waiting commands to the robot; no step may be under way."""
         for command, begin in self._commanded:
             self._running[command] = begin()
         self._commanded = []
@@ -108,13 +108,13 @@ class PipelinedRobot:
         return command
 
     def _settled(self) -> Robot:
-        """The robot, once no step is under way and it has all that was commanded."""
+        """Returns the robot, once no step is under way and its waiting commands have begun."""
         self._pipeline.settle()
         self.begin_commands()
         return self._robot
 
     def __getattr__(self, verb: str) -> Any:
-        """A verb of the robot: those that move it begin later, those that sense or tell are its own."""
+        """Returns a verb of the robot; a verb that moves the robot begins later."""
         value = getattr(self._robot, verb)
         if verb in _BEGIN_LATER:
             value = partial(self._begin_later, value)
@@ -130,20 +130,21 @@ class PipelinedRobot:
 
         def begin() -> CommandId:
             late_s = self._pipeline.reached_s() - commanded_s
-            return self._robot.move_arm(_taken_up(trajectory, late_s), until_s=until_s, lease=lease)
+            return self._robot.move_arm(_remaining(trajectory, late_s), until_s=until_s, lease=lease)
 
         return self._later(begin)
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command if it still runs."""
-        return self._later(lambda: self._stop(lease, only))
 
-    def _stop(self, lease: Lease, only: CommandId | None) -> CommandId:
-        inner = None if only is None else self._running.get(only, CommandId(0))  # what is over is none of its commands
-        return self._robot.stop(lease=lease, only=inner)
+        def begin() -> CommandId:
+            inner = None if only is None else self._running.get(only, CommandId(0))  # 0: that command is over
+            return self._robot.stop(lease=lease, only=inner)
+
+        return self._later(begin)
 
     def command_status(self, command: CommandId) -> CommandStatus:
-        """What became of a command, as of the last readings. Raises KeyError for an id never given."""
+        """Returns the status of a command as of the last readings. Raises KeyError for an unknown id."""
         return self._statuses.status(command)
 
     def acquire_lease(self, holder: str) -> Lease:
@@ -151,16 +152,16 @@ class PipelinedRobot:
         return self._settled().acquire_lease(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Takes the lease from the one that holds it; the robot stops."""
+        """Takes the lease from its holder; the robot stops."""
         return self._settled().take_lease(holder)
 
     def return_lease(self, lease: Lease) -> None:
-        """Gives the lease back; the robot stops. A lease that was taken away is ignored."""
+        """Returns the lease; the robot stops. A lease that no longer counts is ignored."""
         self._settled().return_lease(lease)
 
 
-def _taken_up(trajectory: ArmTrajectory, late_s: float) -> ArmTrajectory:
-    """What is left of a trajectory that begins so late, from where the arm should be by then."""
+def _remaining(trajectory: ArmTrajectory, late_s: float) -> ArmTrajectory:
+    """Rest of a trajectory that begins late_s after its command, from the point that the arm should have reached."""
     left_s = trajectory.times_s - late_s
     ahead = left_s > _LEAST_S
     here, _ = arm_set_point(trajectory, late_s)
@@ -168,7 +169,7 @@ def _taken_up(trajectory: ArmTrajectory, late_s: float) -> ArmTrajectory:
 
 
 def _at_once(work: Callable[[], None]) -> Future[None]:
-    """Does the work now."""
+    """Does the work in the caller's thread."""
     done: Future[None] = Future()
     try:
         work()

@@ -1,4 +1,4 @@
-"""What happens in the plant: kept as states over time and shown afterwards as one HTML file, or shown while it does."""
+"""Recordings of the plant: positions over time, shown afterwards in one HTML file or live in a browser."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ FRAMES_PER_SECOND = 16.0
 _MOST_BYTES = 9.5e6
 _BODY_BYTES = 105.0
 _FEWEST_FRAMES = 400
-"""A frame takes so much of a file for each body; the shapes of a world take about ten megabytes."""
+"""A frame takes `_BODY_BYTES` of a file for each body; the shapes of a world take about ten megabytes."""
 BESIDE_M = (-0.7, -1.5, 3.0)
-"""Where a camera that goes along stands from the robot, in the world's axes."""
+"""Offset of the following camera from the robot, in the axes of the world."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class Frame:
 
 
 class Recorder:
-    """Keeps the plant's positions at a fixed rate, and in a long run fewer of them; call it after every step.
+    """Recorder of the plant's positions at a fixed rate; call it after every step.
 
-    When there are too many frames, those go that the frames before and after tell best: while little moves there are
-    few, and while a robot works there are many.
+    When there are too many frames, it drops the frames that their neighbours interpolate best: few frames remain of the
+    time in which little moves, many of the time in which a robot works.
     """
 
     def __init__(
@@ -46,34 +46,34 @@ class Recorder:
         *,
         most_frames: int | None = None,
     ) -> None:
-        """Record from the plant's `context`, `most_frames` at most (None: as many as fit into a file of 20 MB)."""
+        """Records from the plant's `context`, at most `most_frames` (None: as many as fit into a file of 20 MB)."""
         self._plant, self._context = world.plant, context
         self._period_s = 1.0 / frames_per_second
         self._frames: list[Frame] = []
         self._most = most_frames or max(_FEWEST_FRAMES, round(_MOST_BYTES / (_BODY_BYTES * world.plant.num_bodies())))
 
     def __call__(self, now_s: float) -> None:
-        """Keeps a frame when one is due."""
+        """Records a frame when one is due."""
         if not self._frames or now_s - self._frames[-1].time_s >= self._period_s - 1e-9:
             self._frames.append(Frame(now_s, self._plant.GetPositions(self._context).copy()))
         if len(self._frames) > self._most:
-            self._frames = thinned(self._frames)
+            self._frames = thin_out(self._frames)
 
     @property
     def frames(self) -> Sequence[Frame]:
-        """All frames so far."""
+        """Frames recorded so far."""
         return self._frames
 
     def at(self, time_s: float) -> Frame:
-        """The last frame at or before a time, or the first. Raises LookupError when nothing was recorded."""
+        """Returns the last frame at or before a time, or the first. Raises LookupError when there are no frames."""
         if not self._frames:
             raise LookupError("nothing was recorded")
         earlier = [frame for frame in self._frames if frame.time_s <= time_s + 1e-9]
         return earlier[-1] if earlier else self._frames[0]
 
 
-def thinned(frames: Sequence[Frame]) -> list[Frame]:
-    """A quarter fewer frames: of every second one, the half that the frames before and after tell best.
+def thin_out(frames: Sequence[Frame]) -> list[Frame]:
+    """Drops a quarter of the frames: of every second frame, the half that its neighbours interpolate best.
 
     The first and the last frame stay.
     """
@@ -83,20 +83,20 @@ def thinned(frames: Sequence[Frame]) -> list[Frame]:
     share = (times_s[inner] - times_s[inner - 1]) / (times_s[inner + 1] - times_s[inner - 1])
     between = positions[inner - 1] + share[:, None] * (positions[inner + 1] - positions[inner - 1])
     off = np.max(np.abs(positions[inner] - between), axis=1, initial=0.0)
-    gone = set(inner[np.argsort(off, kind="stable")[: (len(inner) + 1) // 2]].tolist())
-    return [frame for number, frame in enumerate(frames) if number not in gone]
+    dropped = set(inner[np.argsort(off, kind="stable")[: (len(inner) + 1) // 2]].tolist())
+    return [frame for number, frame in enumerate(frames) if number not in dropped]
 
 
 @dataclass(frozen=True)
 class View:
-    """Where a camera stands and what it looks at, in the world frame (m)."""
+    """View of a camera: its position and its target, in the world frame (m)."""
 
     p_WCamera: tuple[float, float, float]
     p_WTarget: tuple[float, float, float]
 
     @staticmethod
     def over(corners_W: Sequence[tuple[float, float]]) -> View:
-        """From the south and above, so that all corners (x, y) are seen."""
+        """Returns a view from the south and above that shows all corners (x, y)."""
         low, high = np.min(corners_W, axis=0), np.max(corners_W, axis=0)
         x, y = (float(value) for value in (low + high) / 2)
         size = float(np.linalg.norm(high - low))
@@ -104,14 +104,14 @@ class View:
 
     @staticmethod
     def beside(p_W: FloatArray) -> View:
-        """Near a point, from where a robot of about a metre fills the picture."""
+        """Returns a view of a point, in which a robot of about a metre fills the picture."""
         x, y, z = (float(value) for value in p_W)
         dx, dy, dz = BESIDE_M
         return View((x + dx, y + dy, z + dz), (x, y, z))
 
 
 def prepare_view(meshcat: Meshcat, view: View | None) -> None:
-    """Light without a grid and axes, and the camera on `view`."""
+    """Removes the grid and the axes, sets the light, and sets the camera to `view`."""
     for helper in ("/Grid", "/Axes"):
         meshcat.SetProperty(helper, "visible", False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 1.6)
@@ -120,7 +120,7 @@ def prepare_view(meshcat: Meshcat, view: View | None) -> None:
 
 
 def set_camera(meshcat: Meshcat, view: View) -> None:
-    """Puts the camera of all browsers there."""
+    """Sets the camera of all browsers to a view."""
     meshcat.SetCameraPose(np.array(view.p_WCamera), np.array(view.p_WTarget))
 
 
@@ -147,16 +147,13 @@ EASY_PERIOD_WALL_S = 0.7
 
 
 class LiveScene:
-    """Shows the plant's positions; call it after every tick, from the thread that made it.
+    """Live scene of the plant in browsers; call it after every tick, from the thread that made it.
 
-    It reads the plant's context and changes nothing there: a run is the same with it and without.
+    It only reads the plant's context, so a run is the same with and without it.
     """
 
     def __init__(self, world: WorldDiagram, context: Context, view: View | None = None) -> None:
-        """Shows the plant of `context`, seen from `view`, with the camera behind the first robot where one is followed.
-
-        Raises RuntimeError when no port is free.
-        """
+        """Shows the plant of `context` from `view`. Raises RuntimeError when no port is free."""
         self._plant, self._context, self._view = world.plant, context, view
         self._followed = next((robot.body for _, robot in sorted(world.robots.items())), None)
         self._follows, self._camera_at = False, view
@@ -170,25 +167,25 @@ class LiveScene:
 
     @property
     def url(self) -> str:
-        """The address of the scene; by another name of this machine, so that a browser draws it in a process apart."""
+        """Address of the scene; its other host name makes a browser draw it in a process of its own."""
         return f"http://localhost:{self._meshcat.port()}"
 
     def __call__(self, now_s: float) -> None:
-        """Refresh the scene when it is time again on the wall's clock."""
+        """Refreshes the scene when it is due in wall time."""
         if time.perf_counter() - self._published_s >= self._period_s:
             self._root_context.SetTime(now_s)
             self.publish()
 
     def go_easy(self) -> None:
-        """Refresh seldom, for a browser that draws without a graphics processor; from any thread."""
+        """Refreshes less often, for a browser without a graphics processor; callable from any thread."""
         self._period_s = EASY_PERIOD_WALL_S
 
     def follow(self, wanted: bool) -> None:
-        """Lets the camera go along with the first robot, or shows the whole world again; from any thread."""
+        """Lets the camera follow the first robot, or show the whole world; callable from any thread."""
         self._follows = wanted
 
     def publish(self) -> None:
-        """Refresh the scene now."""
+        """Refreshes the scene now."""
         camera = self._camera()
         if camera is not None and camera != self._camera_at:
             set_camera(self._meshcat, camera)

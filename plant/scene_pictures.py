@@ -47,14 +47,14 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class MapView:
-    """The world from above, and the camera that saw it: up in the picture is the world's y, right its x."""
+    """Picture of the world from above with its camera: up in the picture is the world's y, right its x."""
 
     picture: Picture
     X_WC: RigidTransform
     intrinsics: Intrinsics
 
     def pixels(self, points_W: FloatArray, z_m: float = 0.0) -> FloatArray:
-        """Pixels (N, 2) of points (N, 2 or more columns: x, y) at a height."""
+        """Projects points (N, 2 or more columns: x, y) at a height to pixels (N, 2)."""
         points = np.asarray(points_W, dtype=np.float64).reshape(len(points_W), -1)[:, :2]
         at_height = np.column_stack([points, np.full(len(points), z_m)])
         x, y, z = (self.X_WC.inverse() @ at_height.T).reshape(3, -1)
@@ -63,7 +63,7 @@ class MapView:
 
     @property
     def pixels_per_m(self) -> float:
-        """Scale at the floor."""
+        """Scale at the floor, in pixels per metre."""
         return self.intrinsics.fx / float(self.X_WC.translation()[2])
 
 
@@ -75,13 +75,13 @@ def render_view(
     fov_y_rad: float = float(np.radians(50.0)),
     renderer: str = "vtk",
 ) -> Picture:
-    """What a free camera at X_WC (z forward, x right, y down) sees; `size` is (width, height)."""
+    """Renders the view of a free camera at X_WC (z forward, x right, y down); `size` is (width, height)."""
     intrinsics = _centred_intrinsics(size, size[1] / 2.0 / float(np.tan(fov_y_rad / 2.0)))
     return _render(query_object, X_WC, intrinsics, renderer, NEAR_M, FAR_M)
 
 
 def look_at(eye_W: ArrayLike, target_W: ArrayLike) -> RigidTransform:
-    """X_WC of a camera at eye_W that looks at target_W with the horizon level. Raises ValueError when they coincide."""
+    """Pose X_WC of a camera at eye_W that faces target_W with a level horizon. Raises ValueError if they coincide."""
     forward = np.asarray(target_W, dtype=np.float64) - np.asarray(eye_W, dtype=np.float64)
     if float(np.linalg.norm(forward)) < 1e-6:
         raise ValueError("look_at: eye and target are the same point")
@@ -101,9 +101,9 @@ def best_view(
     facing_W: Sequence[float] | None = None,
     renderer: str = "vtk",
 ) -> RigidTransform:
-    """X_WC of a camera around the target, from a side where nothing near the line of sight hides it.
+    """Pose X_WC of a camera around the target, on the side with the clearest line of sight.
 
-    `facing_W` (x, y) is the side preferred, for a robot the way to its left or right. The clearest side wins.
+    `facing_W` (x, y) is the direction of the preferred side, for a robot its left or right.
     """
     target = np.asarray(target_W, dtype=np.float64)
     first = float(np.arctan2(facing_W[1], facing_W[0])) if facing_W is not None else 0.0
@@ -117,7 +117,7 @@ def best_view(
 
 
 def _clear_share(query_object: QueryObject, X_WC: RigidTransform, target_W: FloatArray, renderer: str) -> float:
-    """Share of the lines of sight around the target that reach almost as far as it does."""
+    """Share of the lines of sight around the target that no nearer surface blocks."""
     intrinsics = _centred_intrinsics((48, 48), 90.0)
     distance = float(np.linalg.norm(X_WC.translation() - target_W))
     camera = depth_render_camera(intrinsics, renderer, (NEAR_M, distance + 5.0))
@@ -134,7 +134,7 @@ def top_view(
     cut_height_m: float = _CUT_HEIGHT_M,
     renderer: str = "vtk",
 ) -> MapView:
-    """The world from far above, cut open at a height; `bounds_W` is (x_min, y_min, x_max, y_max) on the floor.
+    """Renders the world from above, cut open at a height; `bounds_W` is (x_min, y_min, x_max, y_max) on the floor.
 
     Raises ValueError for bounds without an area.
     """
@@ -157,10 +157,11 @@ def draw_map(
     labels: Mapping[str, tuple[float, float]] | None = None,
     marks: Mapping[str, tuple[float, float]] | None = None,
 ) -> Picture:
-    """The map with the way walked (N, 2 or more columns: x, y), place names, marked points and a scale bar."""
+    """Draws a path (N, 2 or more columns: x, y), labels, marked points and a scale bar on a copy of a map."""
     picture = view.picture.copy()
     for text, centre in (labels or {}).items():
-        _centred_label(picture, text, view.pixels(np.array([centre]))[0])
+        (x, y), (width, height) = view.pixels(np.array([centre]))[0], _text_size(text, picture)
+        label(picture, text, (round(float(x) - width / 2), round(float(y) + height / 2)))
     draw_path(picture, view.pixels(path_W) if len(path_W) else np.zeros((0, 2)))
     for text, point in (marks or {}).items():
         pixel = view.pixels(np.array([point]))[0]
@@ -171,7 +172,7 @@ def draw_map(
 
 
 def draw_path(picture: Picture, pixels: FloatArray, ink: Colour = PATH_COLOUR) -> None:
-    """Draws a way given in pixels (N, 2): a light seam below the line, a dot at its start, an arrow at its end."""
+    """Draws a path in pixels (N, 2): a line with a light rim, a dot at its start, an arrow head at its end."""
     if len(pixels) < 1:
         return
     thick = max(3, picture.shape[1] // 320)
@@ -183,7 +184,7 @@ def draw_path(picture: Picture, pixels: FloatArray, ink: Colour = PATH_COLOUR) -
 
 
 def draw_detection(picture: Picture, box: tuple[float, float, float, float], name: str, score: float) -> Picture:
-    """A copy of a picture with a box (left, top, right, bottom in pixels) and its label with the score from 0 to 1."""
+    """Draws a box (left, top, right, bottom in pixels) with its name and score (0 to 1) on a copy of a picture."""
     drawn = np.ascontiguousarray(picture).copy()
     corners = np.array([[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]])
     for colour, width in ((INK, 5), (BOX_COLOUR, 2)):
@@ -196,7 +197,7 @@ def draw_detection(picture: Picture, box: tuple[float, float, float, float], nam
 
 
 def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colour = PLATE) -> None:
-    """Writes text with its lower left corner at a pixel, moved inside the picture where needed, on a plate."""
+    """Writes text on a plate with its lower left corner at a pixel, moved inside the picture if needed."""
     width, height = _text_size(text, picture)
     pad = 5
     x = int(np.clip(origin[0], pad, max(pad, picture.shape[1] - width - pad)))
@@ -206,12 +207,12 @@ def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colou
 
 
 def png_bytes(picture: Picture, compression: int = 1) -> bytes:
-    """The PNG file of an RGB picture. A compression of 9 makes the smallest file and takes five times as long."""
-    coded, data = cv2.imencode(
+    """Encodes an RGB picture as PNG. A compression of 9 gives the smallest file and takes five times as long."""
+    encoded, data = cv2.imencode(
         ".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_PNG_COMPRESSION, compression]
     )
-    if not coded:
-        raise OSError("the picture could not be coded as PNG")
+    if not encoded:
+        raise OSError("the picture cannot be encoded as PNG")
     return data.tobytes()
 
 
@@ -228,7 +229,7 @@ def _centred_intrinsics(size: tuple[int, int], focal_px: float) -> Intrinsics:
 def _render(
     query_object: QueryObject, X_WC: RigidTransform, intrinsics: Intrinsics, renderer: str, near_m: float, far_m: float
 ) -> Picture:
-    """Renders at twice the size and shrinks, since the renderer leaves jagged edges."""
+    """Renders at twice the size and shrinks the picture, because the renderer leaves jagged edges."""
     k = intrinsics
     double = Intrinsics(2 * k.width, 2 * k.height, 2 * k.fx, 2 * k.fy, 2 * k.cx + 0.5, 2 * k.cy + 0.5)
     camera = colour_render_camera(double, renderer, near_m=near_m, far_m=far_m)
@@ -243,7 +244,7 @@ def _fixed_point(pixels: FloatArray) -> NDArray[np.int32]:
 
 
 def _arrow_head(picture: Picture, pixels: FloatArray, length: float, ink: Colour) -> None:
-    """A filled triangle at the end of a way, pointing along its last stretch."""
+    """Draws a filled triangle at the end of a path, pointing along its last piece."""
     tip = pixels[-1]
     behind = pixels[np.linalg.norm(pixels - tip, axis=1) > length / 2.0]
     if not len(behind):
@@ -257,20 +258,15 @@ def _arrow_head(picture: Picture, pixels: FloatArray, length: float, ink: Colour
 
 
 def _dot(picture: Picture, pixel: FloatArray, colour: Colour) -> None:
-    """A filled dot with a light rim."""
+    """Draws a filled dot with a light rim."""
     radius = max(5, picture.shape[1] // 180)
     centre = (round(float(pixel[0])), round(float(pixel[1])))
     cv2.circle(picture, centre, radius + 2, PLATE, cv2.FILLED, cv2.LINE_AA)
     cv2.circle(picture, centre, radius, colour, cv2.FILLED, cv2.LINE_AA)
 
 
-def _centred_label(picture: Picture, text: str, centre: FloatArray) -> None:
-    width, height = _text_size(text, picture)
-    label(picture, text, (round(float(centre[0]) - width / 2), round(float(centre[1]) + height / 2)))
-
-
 def _scale_bar(picture: Picture, pixels_per_m: float) -> None:
-    """A bar of a round length at the lower left, at most a quarter of the picture wide."""
+    """Draws a scale bar of a round length at the lower left, at most a quarter of the picture wide."""
     longest = picture.shape[1] / 4.0 / pixels_per_m
     length_m = max([step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if step <= longest], default=0.1)
     left, bottom = 24, picture.shape[0] - 24
@@ -305,14 +301,14 @@ _FLAT = 0.4
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball around all of a model, in its frame: middle (3,) and radius (m)."""
+    """Ball that encloses a model, in the model's frame: centre (3,) and radius (m)."""
 
     middle: FloatArray
     radius_m: float
 
 
 def portrait(mesh: Path, ball: Ball, size_m: tuple[float, float, float], size_px: tuple[int, int]) -> Picture:
-    """A visual mesh that fills a picture (width, height); what is flat is seen more from above."""
+    """Renders a visual mesh so that it fills a picture (width, height); a flat one is seen more from above."""
     scene = SceneGraph()
     parameters = RenderEngineVtkParams(default_clear_color=np.array(GROUND), lights=lights())
     scene.AddRenderer("vtk", MakeRenderEngineVtk(parameters))
@@ -335,7 +331,7 @@ _SURFACE = (196, 160, 110)
 _ARROW_M = 0.8
 
 Door = tuple[Point, float]
-"""Its middle and its width (m)."""
+"""Centre and width (m) of a door."""
 
 
 def draw_world(
@@ -347,9 +343,9 @@ def draw_world(
     labels: Mapping[str, Point],
     doors: Iterable[Door],
 ) -> Picture:
-    """The plan over a grid's grey values (rows from the south).
+    """Draws the plan of a world over a grid's grey values (rows from the south).
 
-    Rooms are tinted and surfaces outlined, doors are circles as wide as they, the start is an arrow. `labels` are
+    Rooms are tinted, surfaces outlined, doors are circles of their width, and the start is an arrow. `labels` are
     written at their points.
     """
     rows, columns = cells.shape
@@ -371,7 +367,7 @@ def draw_world(
 
 
 def _view(picture: Picture, origin_m: tuple[float, float], pixels_per_m: float) -> MapView:
-    """A camera high above the floor's middle that saw the grid as it is."""
+    """Returns the grid as the picture of a camera high above the centre of the floor."""
     height, width = picture.shape[:2]
     focal = pixels_per_m * _ABOVE_M
     down = RotationMatrix(np.diag([1.0, -1.0, -1.0]))

@@ -1,8 +1,8 @@
-"""The scenery of a world: what stands fast, as shapes of the world body itself.
+"""The scenery of a world: the shapes of fixed models, registered on the world body itself.
 
-To Drake a link that is welded to the world is still a body, and every step of the plant goes through it. So the
-directives are read into a plant that is thrown away, and the shapes of what is welded there are registered on the world
-body. A model with a part that moves stays a model.
+A link that is welded to the world is still a body for Drake, and costs time in every step. So the directives are read
+into a temporary plant, and the shapes of its welded models are registered on the world body. A model with a moving part
+stays a model.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _RELATIVE_URI = re.compile(r"<uri>\s*(?![a-z]+://)([^<\s]+)\s*</uri>")
 def add_scenery(
     plant: MultibodyPlant, directives: Path, parser_of: Callable[[MultibodyPlant], Parser]
 ) -> dict[GeometryId, str]:
-    """Adds the directives' world to `plant` (before Finalize); returns the model each collision shape comes from.
+    """Adds the directives' world to `plant` (before Finalize); returns the model name of each collision shape.
 
     Raises:
         InputError: Drake cannot use the directives or a model.
@@ -66,7 +66,7 @@ def add_scenery(
 
 
 def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
-    """Adds the model of a file. Of SDF the text is parsed: for each file that it opens itself, the parser takes 50 ms.
+    """Adds the model of a file. SDF is parsed from text, because the parser takes 50 ms for each file that it opens.
 
     Raises:
         InputError: Drake cannot use the file.
@@ -78,7 +78,7 @@ def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
                 parser.AddModelsFromString(_RELATIVE_URI.sub(rf"<uri>{path.parent.as_uri()}/\1</uri>", text), "sdf")
             )
         except RuntimeError:
-            pass  # once more, for a message that names the file
+            pass  # parses the file again, for a message that names it
     try:
         return _only(parser.AddModels(str(path)))
     except (RuntimeError, ValueError) as error:
@@ -86,9 +86,9 @@ def add_model(parser: Parser, path: Path) -> ModelInstanceIndex:
 
 
 def _refused(file: Path, error: Exception) -> InputError:
-    """What Drake says of a file, in one line."""
-    said = " ".join(str(error).split()) or type(error).__name__
-    return InputError(f"the simulation cannot use it: {said[:300]}", hint="correct the file", file=file)
+    """Error with Drake's message about a file, in one line."""
+    reason = " ".join(str(error).split()) or type(error).__name__
+    return InputError(f"the simulation cannot use it: {reason[:300]}", hint="correct the file", file=file)
 
 
 def _only(instances: Sequence[ModelInstanceIndex]) -> ModelInstanceIndex:
@@ -114,7 +114,7 @@ def _process(directives: Sequence[ModelDirective], plant: MultibodyPlant, parser
 def _copy_fixed(
     scratch: MultibodyPlant, inspector: SceneGraphInspector, moving: set[str], plant: MultibodyPlant
 ) -> dict[GeometryId, str]:
-    """Registers the shapes of all models that do not move on the world body of `plant`."""
+    """Registers the shapes of all fixed models on the world body of `plant`; returns their models."""
     context, world, pieces = scratch.CreateDefaultContext(), plant.world_body(), {}
     for geometry in inspector.GetAllGeometryIds():
         body = scratch.GetBodyFromFrameId(inspector.GetFrameId(geometry))
@@ -135,7 +135,7 @@ def _copy_fixed(
 
 
 def _copy_appearance(inspector: SceneGraphInspector, geometry: GeometryId, visual: GeometryInstance) -> None:
-    """Gives a shape the appearance of another, but for the label, which names a body of the other's plant."""
+    """Copies the appearance of a shape, without the label, which names a body of the temporary plant."""
     illustration = inspector.GetIllustrationProperties(geometry)
     if illustration is not None:
         visual.set_illustration_properties(illustration)
@@ -147,7 +147,7 @@ def _copy_appearance(inspector: SceneGraphInspector, geometry: GeometryId, visua
 
 
 def _moving_models(scratch: MultibodyPlant, directives: Sequence[ModelDirective]) -> set[str]:
-    """Names of the models with a part that is not fixed to the world, and of those that they are welded to."""
+    """Names of the models with a part that is not fixed to the world, and of models welded to them."""
     bodies = (BodyIndex(index) for index in range(scratch.num_bodies()))
     moving = {_model_of(scratch, index) for index in bodies if not scratch.IsAnchored(scratch.get_body(index))}
     for each in reversed(directives):
@@ -157,7 +157,7 @@ def _moving_models(scratch: MultibodyPlant, directives: Sequence[ModelDirective]
 
 
 def _models_of(directive: ModelDirective) -> set[str]:
-    """Names of the models that a directive is about."""
+    """Names of the models that a directive refers to."""
     if directive.add_model is not None:
         return {directive.add_model.name}
     if directive.add_weld is not None:
@@ -172,11 +172,11 @@ def _models_of(directive: ModelDirective) -> set[str]:
 
 
 def _scope(name: str) -> str:
-    """The model in whose scope a name such as `table::leg` stands; of a name of the world, nothing."""
+    """Model of a scoped name such as `table::leg`; empty for a name of the world."""
     return name.partition("::")[0] if "::" in name else ""
 
 
 def _model_of(plant: MultibodyPlant, body: BodyIndex) -> str:
-    """The model in the directives that a body belongs to; a body of the world itself has none."""
+    """Name of the model in the directives that a body belongs to."""
     instance = plant.get_body(body).model_instance()
     return str(plant.GetModelInstanceName(instance)).partition("::")[0]

@@ -1,1 +1,1 @@
-"""People who walk."""
+"""People in the plant: they walk on routes, and receive objects from robots."""

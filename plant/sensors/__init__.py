@@ -1,1 +1,1 @@
-"""Sensors of the plant: each turns the simulator's truth into a reading as noisy as the real one, from a seed."""
+"""Sensors of the plant: they turn the true state into readings with realistic noise, from a seed."""

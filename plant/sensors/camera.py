@@ -1,4 +1,4 @@
-"""A camera on a robot's link: renders colour or grey and depth, as noisy as the real one."""
+"""A camera on a link of a robot: colour or grey pictures and depth, with noise."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NO_DEPTH = np.zeros((0, 0), dtype=np.float32)
 
 
 class Camera(NoisySensor):
-    """One camera of one robot. Deterministic for a seed and an order of pictures."""
+    """Camera of one robot; the same seed and the same order of pictures give the same noise."""
 
     def __init__(
         self,
@@ -34,7 +34,7 @@ class Camera(NoisySensor):
     ) -> None:
         """`link_frame` is the geometry frame of the link (`MultibodyPlant.GetBodyFrameIdOrThrow`).
 
-        What is rendered is counted in `work`, by size.
+        `work` counts the rendered pictures by size.
         """
         super().__init__(rng)
         self._work = Counter() if work is None else work
@@ -58,9 +58,9 @@ class Camera(NoisySensor):
         visual: bool = True,
         depth: bool = True,
     ) -> Image:
-        """A picture at the query object's state; `frames` is the robot's frame tree at that instant.
+        """Takes a picture, its depth, or both; `frames` is the robot's frame tree at the same time.
 
-        The arrays of what is not asked for are empty.
+        The array of the part that is not taken is empty.
         """
         colour = self._picture.colour(self._render(query_object, self._colour_camera)) if visual else None
         grey = _NO_PICTURE if colour is None else _grey(colour)
@@ -77,7 +77,7 @@ class Camera(NoisySensor):
         )
 
     def _take_depth(self, query_object: QueryObject, grey: NDArray[np.uint8]) -> NDArray[np.float32]:
-        """Noisy depth; where no picture was taken, a small one shows what is too dark or too shiny."""
+        """Renders noisy depth; without a picture, a small one shows the spots that are too dark or too shiny."""
         lens = self.spec.depth_intrinsics()
         seen = grey if grey.size else _grey(self._render(query_object, self._faint_camera))
         small = seen if seen.shape == (lens.height, lens.width) else cv2.resize(seen, (lens.width, lens.height))
@@ -87,7 +87,7 @@ class Camera(NoisySensor):
         return self._depth.depth(clean_m, np.asarray(small, dtype=np.uint8))
 
     def _render(self, query_object: QueryObject, camera: ColorRenderCamera) -> NDArray[np.uint8]:
-        """The clean picture (H, W, 3) RGB."""
+        """Renders the clean picture (H, W, 3) RGB."""
         info = camera.core().intrinsics()
         self._work[f"pictures_{info.width()}x{info.height()}"] += 1
         image = query_object.RenderColorImage(camera, self._link_frame, self._X_LC)

@@ -1,4 +1,4 @@
-"""Where a robot's cameras sit and what they see: typed, read from a YAML file."""
+"""Specifications of a robot's cameras: pose, intrinsics and depth range, read from a YAML file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NEAR_M = 0.05
 
 
 class CameraSpec(BaseModel):
-    """One camera. The pose is in `link`: camera z forward, x right, y down; intrinsics are those of the full picture.
+    """One camera. Its pose is in `link`: z forward, x right, y down; the intrinsics are of the full picture.
 
     `picture_shrink` and `depth_shrink` divide the pixels of the picture and of the depth, which share the pose.
     """
@@ -51,11 +51,11 @@ class CameraSpec(BaseModel):
 
     @property
     def frame(self) -> str:
-        """The camera's name in the frame tree."""
+        """Name of the camera in the frame tree."""
         return f"{self.name}_camera"
 
     def X_link_camera(self) -> RigidTransform:
-        """The camera's pose in its link."""
+        """Pose of the camera in its link."""
         return RigidTransform(RollPitchYaw(np.radians(self.rpy_deg)), np.array(self.xyz_m))
 
     def intrinsics(self) -> Intrinsics:
@@ -67,7 +67,7 @@ class CameraSpec(BaseModel):
         return self.shrunk(self.depth_shrink)
 
     def shrunk(self, factor: int) -> Intrinsics:
-        """The same view with 1 / factor of the pixels on each side."""
+        """Intrinsics of the same view with 1 / factor of the pixels on each side."""
         return Intrinsics(
             width=self.width // factor,
             height=self.height // factor,
@@ -79,7 +79,7 @@ class CameraSpec(BaseModel):
 
 
 def load_cameras(path: Path) -> dict[str, CameraSpec]:
-    """Camera specs by name, in the file's order. Raises InputError with file, line, camera and field."""
+    """Reads camera specs by name, in the file's order. Raises InputError with file, line, camera and field."""
     source = read_yaml(path)
     if not isinstance(source.data, dict):
         raise source.error(
@@ -89,7 +89,7 @@ def load_cameras(path: Path) -> dict[str, CameraSpec]:
 
 
 def _spec(source: YamlSource, name: str, entry: object) -> CameraSpec:
-    """The data of one camera."""
+    """Validates the data of one camera. Raises InputError."""
     if not isinstance(entry, dict):
         raise source.error((name,), f"camera {name}: should be a mapping of keys to values", "correct it")
     try:
@@ -103,7 +103,7 @@ def _spec(source: YamlSource, name: str, entry: object) -> CameraSpec:
 def colour_render_camera(
     intrinsics: Intrinsics, renderer: str, *, near_m: float = NEAR_M, far_m: float = FAR_M
 ) -> ColorRenderCamera:
-    """Drake's colour camera with these intrinsics; what is nearer or farther is cut away."""
+    """Drake's colour camera with these intrinsics; it cuts off nearer and farther surfaces."""
     from pydrake.geometry import ColorRenderCamera
 
     return ColorRenderCamera(_core(intrinsics, renderer, near_m, far_m), False)

@@ -1,9 +1,9 @@
 """A spinning 16-beam LiDAR: rays against the scene's collision shapes, with range noise and lost returns.
 
-The casting of rays is compiled, one call per revolution. Shapes are taken nearest first. A shape is tried only on the
-columns (azimuths) that its bounding box spans, and a column is skipped when all its rings already end nearer than the
-shape begins: indoors walls hide most of the rest. Ranges are along the ray; `NO_RETURN_M` stands for no hit (finite,
-since the kernels use fast arithmetic).
+The casting of rays is compiled, one call per revolution. Shapes are tried nearest first, and only on the columns
+(azimuths) that their bounding boxes span. A column is skipped when all its rings already end nearer than the shape
+begins: indoors walls hide most of the rest. Ranges are along the ray; `NO_RETURN_M` stands for no hit (finite, because
+the kernels use fast arithmetic).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _EPS = 1.0e-9
 
 
 def _compiled(function: FunctionT) -> FunctionT:
-    """numba's njit with a disk cache, fast arithmetic and without the GIL, keeping the function's type."""
+    """Compiles a function with numba: disk cache, fast arithmetic, no GIL; its type stays the same."""
     return cast(FunctionT, numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")(function))
 
 
@@ -50,9 +50,9 @@ def cast_rays(
     elevations: FloatArray,
     azimuths: FloatArray,
 ) -> FloatArray:
-    """Ranges (azimuths, rings) in metres from the lidar frame L to the shapes.
+    """Casts rays from the lidar frame L to the shapes; returns ranges (azimuths, rings) in metres.
 
-    `azimuths` are evenly spaced, increasing, and cover one turn from azimuths[0]; shapes are given in the world.
+    `azimuths` are evenly spaced, increasing, and cover one turn from azimuths[0]; the shapes are in the world frame.
     """
     shapes = len(kinds)
     columns, rings = len(azimuths), len(elevations)
@@ -129,7 +129,7 @@ def _columns_spanned(R_LG: FloatArray, p_LG: FloatArray, half: FloatArray, azimu
 
 @_compiled
 def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shorten one column's ranges to a box; the loop has no branches, so that it runs on vector units."""
+    """Shortens one column's ranges to a box; the loop has no branches, so that it runs on vector units."""
     origin, across, up = rays
     ox, oy, oz = origin[0], origin[1], origin[2]
     hx, hy, hz = half[0], half[1], half[2]
@@ -151,7 +151,7 @@ def _cast_box(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray,
 
 @_compiled
 def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shorten one column's ranges to a cylinder along its z: the round wall cut by the slab of the caps."""
+    """Shortens one column's ranges to a cylinder along its z: the round wall cut by the slab of the caps."""
     origin, across, up = rays
     ox, oy, oz = origin[0], origin[1], origin[2]
     c = ox * ox + oy * oy - half[0] * half[0]
@@ -173,7 +173,7 @@ def _cast_cylinder(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatA
 
 @_compiled
 def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shorten one column's ranges to an ellipsoid, by scaling space until it is the unit ball."""
+    """Shortens one column's ranges to an ellipsoid, by scaling space until it is the unit ball."""
     origin, across, up = rays
     ox, oy, oz = origin[0] / half[0], origin[1] / half[1], origin[2] / half[2]
     c = ox * ox + oy * oy + oz * oz - 1.0
@@ -191,7 +191,7 @@ def _cast_ellipsoid(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: Float
 
 @_compiled
 def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatArray, half: FloatArray) -> None:
-    """Shorten one column's ranges to a capsule along its z: a cylinder and two balls (half[2] includes a ball)."""
+    """Shortens one column's ranges to a capsule along its z: a cylinder and two balls (half[2] includes a ball)."""
     origin, across, up = rays
     straight = half[2] - half[0]
     barrel = np.array([half[0], half[0], straight])
@@ -206,8 +206,8 @@ def _cast_capsule(row: FloatArray, rays: Rays, cos_e: FloatArray, sin_e: FloatAr
 class LidarSpec:
     """Beams and noise. The defaults are those of a Velodyne VLP-16 at 20 revolutions a second.
 
-    Elevations run evenly over +- `half_fov_rad`; `dropout` is the share of returns lost at random. A LiDAR that does
-    not see all around has `columns` about straight ahead.
+    Elevations are even over +- `half_fov_rad`; `dropout` is the share of returns lost at random. A LiDAR with less
+    than a full turn has `columns` around straight ahead.
     """
 
     rings: int = 16
@@ -224,12 +224,12 @@ class LidarSpec:
         return np.linspace(-self.half_fov_rad, self.half_fov_rad, self.rings, dtype=np.float64)
 
     def azimuths_rad(self) -> NDArray[np.float64]:
-        """Column azimuths over one turn from -pi on, counter-clockwise from the lidar's x."""
+        """Column azimuths over one turn from -pi, counter-clockwise from the lidar's x."""
         columns = round(2.0 * np.pi / self.azimuth_step_rad)
         return -np.pi + np.arange(columns, dtype=np.float64) * (2.0 * np.pi / columns)
 
-    def seen(self) -> slice:
-        """Which of the columns it sees."""
+    def visible_columns(self) -> slice:
+        """Slice of the columns of a full turn that the LiDAR sees."""
         turn = round(2.0 * np.pi / self.azimuth_step_rad)
         columns = turn if self.columns is None else self.columns
         first = (turn - columns + 1) // 2
@@ -237,7 +237,7 @@ class LidarSpec:
 
 
 class Lidar(NoisySensor):
-    """The LiDAR of one robot, fixed to a body of it."""
+    """LiDAR of one robot, fixed to one of its bodies."""
 
     def __init__(
         self,
@@ -251,10 +251,9 @@ class Lidar(NoisySensor):
         spec: LidarSpec | None = None,
         work: Counter[str] | None = None,
     ) -> None:
-        """Builds for a finalized plant.
+        """`plant` is finalized. The beams pass through the `unseen` model instances, by default the LiDAR's own.
 
-        `unseen` are the model instances that the beams pass through, by default the one that carries the lidar.
-        The rays cast are counted in `work`.
+        `work` counts the rays.
         """
         super().__init__(rng)
         self._work = Counter() if work is None else work
@@ -262,22 +261,22 @@ class Lidar(NoisySensor):
         self._plant, self._body, self._X_BL = plant, body, X_BL
         self._scene = RayScene(plant, inspector, (body.model_instance(),) if unseen is None else unseen)
         self._elevations, self._turn = self.spec.elevations_rad(), self.spec.azimuths_rad()
-        self._azimuths = self._turn[self.spec.seen()]
+        self._azimuths = self._turn[self.spec.visible_columns()]
         self._grain = NoiseTile(rng, len(self._elevations), len(self._azimuths))
 
     def scan(
         self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
     ) -> Scan:
-        """One revolution at the context's state. `X_OB` is the odometry at the same instant.
+        """Takes one revolution at the context's state. `X_OB` is the odometry at the same time.
 
-        `X_BL` is where the robot takes the lidar to be in its body frame, by default its pose on the body it is on.
+        `X_BL` is the pose of the lidar in the body frame as the robot knows it, by default its mounted pose.
         """
         return self.revolution(plant_context, stamp_s, X_OB, X_BL)()
 
     def revolution(
         self, plant_context: Context, stamp_s: float, X_OB: RigidTransform, X_BL: RigidTransform | None = None
     ) -> Callable[[], Scan]:
-        """Computes such a scan when it is called, of the state that the context has now; to be called once."""
+        """Returns a function that computes a scan of the context's present state; call it once."""
         X_WL = self._plant.EvalBodyPoseInWorld(plant_context, self._body) @ self._X_BL
         shapes = self._scene.world_shapes(plant_context)
         return lambda: Scan(
@@ -290,11 +289,11 @@ class Lidar(NoisySensor):
         )
 
     def true_ranges(self, plant_context: Context, X_WL: RigidTransform) -> NDArray[np.float32]:
-        """Ranges (rings, azimuths) without noise from a pose, `NO_RETURN_M` where nothing is hit."""
+        """Ranges (rings, azimuths) without noise from a pose; `NO_RETURN_M` where a ray hits nothing."""
         return self._ranges(self._scene.world_shapes(plant_context), X_WL)
 
     def _ranges(self, shapes: ShapeArrays, X_WL: RigidTransform) -> NDArray[np.float32]:
-        """Ranges to shapes in the world."""
+        """Casts all rays of a revolution; returns ranges (rings, azimuths) in metres."""
         self._work["lidar_rays"] += len(self._elevations) * len(self._turn)
         ranges = cast_rays(
             shapes.kinds,
@@ -306,10 +305,10 @@ class Lidar(NoisySensor):
             self._elevations,
             self._turn,
         )
-        return np.ascontiguousarray(ranges.T[:, self.spec.seen()], dtype=np.float32)
+        return np.ascontiguousarray(ranges.T[:, self.spec.visible_columns()], dtype=np.float32)
 
     def _measured(self, ranges_m: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Ranges with noise; NaN where lost or out of range."""
+        """Adds noise to ranges; lost returns and returns out of range become NaN."""
         spec = self.spec
         noisy = ranges_m + np.float32(spec.sigma_m) * self._grain.crop()[..., 0]
         lost = (noisy < spec.min_range_m) | (noisy > min(spec.max_range_m, NO_RETURN_M / 2.0))

@@ -19,14 +19,14 @@ from skills.robot import Intrinsics
 
 
 class NoisySensor(Stateful, saved=("noise",)):
-    """A sensor of one robot."""
+    """A sensor with a random generator of its own, whose state is saved."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self._rng = rng
 
     @property
     def noise(self) -> Mapping[str, Any]:
-        """The state of the generator."""
+        """State of the random generator."""
         return self._rng.bit_generator.state
 
     @noise.setter
@@ -53,9 +53,9 @@ class PictureNoise:
 class DepthNoise:
     """Depth errors: sigma = `sigma_m` + `sigma_per_m` z^2; holes at edges, grazing angles, dark and shiny spots.
 
-    A step between neighbours above `edge_m` + `edge_share` z is an edge, of which `edge_loss` is lost; surfaces whose
-    normal is within asin(`grazing`) of being square to the ray are lost; `dark` and `shiny` are grey values beyond
-    which patches are lost; `speck` is the share of pixels lost anywhere.
+    A step between neighbours above `edge_m` + `edge_share` z is an edge; the share `edge_loss` of its pixels is lost.
+    A surface within asin(`grazing`) of the ray's direction is lost. `dark` and `shiny` are grey values beyond which
+    patches are lost. `speck` is the share of pixels that are lost anywhere.
     """
 
     sigma_m: float = 0.0015
@@ -70,7 +70,7 @@ class DepthNoise:
 
 
 class NoiseTile:
-    """Standard normal grain, larger than the picture, cropped at a random place for every picture."""
+    """Tile of standard normal grain, larger than the picture, cropped at a random position for each picture."""
 
     def __init__(self, rng: np.random.Generator, height: int, width: int, channels: int = 1) -> None:
         """Draws the tile for pictures of height x width x channels."""
@@ -79,16 +79,16 @@ class NoiseTile:
         self._tile = rng.standard_normal(shape, dtype=np.float32)
 
     def crop(self) -> NDArray[np.float32]:
-        """Grain (height, width, channels); a view, not to be written."""
+        """Returns grain (height, width, channels), a view that must not be written."""
         top, left = self._rng.integers(0, _TILE_MARGIN, 2)
         return self._tile[top : top + self._height, left : left + self._width]
 
 
 class PictureDegrader:
-    """Turns clean colour pictures of one size into noisy ones."""
+    """Degrades clean colour pictures of one size: blur, vignette and grain."""
 
     def __init__(self, rng: np.random.Generator, height: int, width: int, noise: PictureNoise, shrink: int = 1) -> None:
-        """`shrink` tells by how much the picture is smaller than the sensor's, for the blur."""
+        """`shrink` is the factor by which the picture is smaller than the sensor's; it divides the blur."""
         self._noise, self._sigma = noise, noise.blur_px / shrink
         self._grain = NoiseTile(rng, height, width, 3)
         y, x = np.mgrid[0:height, 0:width].astype(np.float32)
@@ -96,7 +96,7 @@ class PictureDegrader:
         self._gain = np.repeat((1.0 - noise.vignette * radius2)[..., None], 3, axis=2).astype(np.float32)
 
     def colour(self, clean: ColourArray) -> ColourArray:
-        """A noisy (H, W, 3) uint8 picture."""
+        """Returns a noisy (H, W, 3) uint8 picture."""
         blurred = cv2.GaussianBlur(clean, (3, 3), self._sigma)
         lit = cv2.multiply(blurred, self._gain, dtype=cv2.CV_32F)
         noisy = cv2.scaleAdd(self._grain.crop(), self._noise.grain, lit)
@@ -104,7 +104,7 @@ class PictureDegrader:
 
 
 class DepthDegrader:
-    """Turns clean depth of one size into depth as a real camera gives it."""
+    """Degrades clean depth images of one size: noise, holes and range."""
 
     def __init__(
         self, rng: np.random.Generator, intrinsics: Intrinsics, range_m: tuple[float, float], noise: DepthNoise
@@ -116,7 +116,7 @@ class DepthDegrader:
         self._patches = NoiseTile(rng, intrinsics.height // 8 + 1, intrinsics.width // 8 + 1)
 
     def depth(self, clean_m: DepthArray, grey: ColourArray) -> DepthArray:
-        """Noisy depth (H, W) in metres, whole millimetres, 0 for none; `grey` (H, W) tells dark and shiny spots."""
+        """Returns noisy depth (H, W) in m, rounded to 1 mm, 0 for none; `grey` (H, W) has dark and shiny spots."""
         near, far = self._range
         valid = np.isfinite(clean_m) & (clean_m >= near) & (clean_m <= far)
         z = np.where(valid, clean_m, np.float32(0.0)).astype(np.float32)
@@ -129,24 +129,24 @@ class DepthDegrader:
         return np.where(keep, np.round(noisy, 3), np.float32(0.0)).astype(np.float32)
 
     def _edge(self, z: DepthArray) -> NDArray[np.bool_]:
-        """Pixels beside steps in depth: steeper than any surface that can be seen, and beyond the noise."""
+        """Mask of the pixels beside steps in depth that are steeper than any visible surface and exceed the noise."""
         kernel = np.ones((3, 3), dtype=np.uint8)
         step = cv2.dilate(z, kernel) - cv2.erode(z, kernel)
         steepest = 2.0 / (self._intrinsics.fx * self._noise.grazing)
         return np.asarray(step > self._noise.edge_m + (self._noise.edge_share + steepest) * z)
 
     def _grazing(self, z: DepthArray) -> NDArray[np.bool_]:
-        """Pixels whose surface is nearly along the ray."""
+        """Mask of the pixels whose surface is nearly parallel to the ray."""
         dx = cv2.Sobel(z, cv2.CV_32F, 1, 0, ksize=3, scale=self._intrinsics.fx / 8.0)
         dy = cv2.Sobel(z, cv2.CV_32F, 0, 1, ksize=3, scale=self._intrinsics.fy / 8.0)
         return np.asarray(dx * dx + dy * dy > z * z / self._noise.grazing**2)
 
     def _unseen(self, grey: ColourArray) -> NDArray[np.bool_]:
-        """Patches lost on spots too dark or too shiny."""
+        """Mask of the patches that are lost on dark and shiny spots."""
         patches = cv2.resize(self._patches.crop()[..., 0], (grey.shape[1], grey.shape[0]))
         return np.asarray(((grey < self._noise.dark) | (grey > self._noise.shiny)) & (patches > 0.0))
 
     def _not_specks(self) -> NDArray[np.bool_]:
-        """All pixels but a few lost anywhere."""
+        """Mask of all pixels except the few that are lost anywhere."""
         shape = (self._intrinsics.height, self._intrinsics.width)
         return np.asarray(self._rng.random(shape, dtype=np.float32) >= self._noise.speck)

@@ -24,10 +24,10 @@ class JointNoise:
 
 
 class JointModel(NoisySensor):
-    """All joint sensors of one robot."""
+    """Joint encoders and torque sensors of one robot."""
 
     def __init__(self, rng: np.random.Generator, names: Sequence[str], noise: JointNoise | None = None) -> None:
-        """`names` gives the order of the arrays in `update`."""
+        """`names` is the order of the joints in the arrays of `update`."""
         super().__init__(rng)
         self._names, self._noise = tuple(names), noise or JointNoise()
         self._offsets = rng.normal(0.0, self._noise.offset_rad, len(self._names))
@@ -35,7 +35,7 @@ class JointModel(NoisySensor):
     def update(
         self, stamp_s: float, position_rad: FloatArray, velocity_rad_s: FloatArray, effort_nm: FloatArray
     ) -> Joints:
-        """Reading at stamp_s from the true arrays (joints,). Raises ValueError when a length is wrong."""
+        """Reads the joints at stamp_s from the true arrays (joints,). Raises ValueError when a length is wrong."""
         noise = self._rng.standard_normal((3, len(self._names)))
         read = (
             position_rad + self._offsets + self._noise.position_rad * noise[0],
@@ -60,10 +60,10 @@ class ImuNoise:
 
 
 class ImuModel(NoisySensor, saved=("_last",)):
-    """The IMU of one robot; acceleration comes from the change of velocity between two updates."""
+    """IMU of one robot; the acceleration is the change of velocity between two updates."""
 
     def __init__(self, rng: np.random.Generator, noise: ImuNoise | None = None) -> None:
-        """Draws this run's biases."""
+        """Draws the biases of the run."""
         super().__init__(rng)
         self._noise = noise or ImuNoise()
         self._gyro_bias = rng.normal(0.0, self._noise.gyro_bias_rad_s, 3)
@@ -93,9 +93,10 @@ class ImuModel(NoisySensor, saved=("_last",)):
 
 @dataclass(frozen=True)
 class BatterySpec:
-    """`runtime_s` from full to empty at load 1; at load 0 it draws `idle_share` of that; the gauge errs by `sigma`.
+    """Battery data: `runtime_s` from full to empty at load 1, the share `idle_share` of that drain at load 0.
 
-    On a dock it goes from empty to full in `charge_s`: a quick dock, so that missions need not wait for an hour.
+    The gauge errs by `sigma`. A dock charges from empty to full in `charge_s`: fast, so that missions need not wait for
+    an hour.
     """
 
     runtime_s: float = 5400.0
@@ -105,10 +106,10 @@ class BatterySpec:
 
 
 class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
-    """The battery of one robot."""
+    """Battery of one robot."""
 
     def __init__(self, rng: np.random.Generator, charge: float = 1.0, spec: BatterySpec | None = None) -> None:
-        """Starts with a charge from 0 to 1. Raises ValueError for another."""
+        """Starts with a charge from 0 to 1. Raises ValueError for any other value."""
         if not 0.0 <= charge <= 1.0:
             raise ValueError(f"battery charge must be from 0 to 1, not {charge}")
         super().__init__(rng)
@@ -116,7 +117,7 @@ class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
         self._stamp_s: float | None = None
 
     def update(self, stamp_s: float, load: float, *, docked: bool = False) -> Battery:
-        """Reading at stamp_s after a load from 0 (standing) to 1 (walking), or on a dock, since the last update."""
+        """Reads the charge at stamp_s, after a load from 0 (standing) to 1 (walking), or on a dock."""
         elapsed = 0.0 if self._stamp_s is None else max(0.0, stamp_s - self._stamp_s)
         self._stamp_s = stamp_s
         if docked:
@@ -128,7 +129,7 @@ class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
 
 
 def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:
-    """The charge left after elapsed_s at a load (cut to 0..1)."""
+    """Charge that is left after elapsed_s at a load (cut to 0..1)."""
     share = spec.idle_share + (1.0 - spec.idle_share) * min(max(load, 0.0), 1.0)
     return max(0.0, charge - elapsed_s * share / spec.runtime_s)
 
@@ -137,9 +138,9 @@ def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) 
 class OdometryNoise:
     """Standard deviations.
 
-    `scale` is the relative error of distance, `turn_scale` that of angles turned, both drawn once per run and cut at
-    two sigma, as is `drift_rad_per_m`, the steady turn per metre. `wander_*` are random walks per square root metre.
-    Below `still_m_s` and `still_rad_s` the robot stands and nothing adds up. The rest is white noise of each reading.
+    `scale` is the relative error of distances, `turn_scale` that of turns, and `drift_rad_per_m` a steady turn per
+    metre; each is drawn once per run and cut at two sigma. `wander_*` are random walks per square root of a metre.
+    Below `still_m_s` and `still_rad_s` the robot stands, and no error adds up. The rest is white noise of each reading.
     """
 
     scale: float = 0.008
@@ -157,7 +158,7 @@ class OdometryNoise:
 
 @dataclass(frozen=True)
 class _Last:
-    """The truth and the estimate of the last update."""
+    """True pose and estimate of the last update."""
 
     stamp_s: float
     true: Pose2D
@@ -165,10 +166,10 @@ class _Last:
 
 
 class OdometryModel(NoisySensor, saved=("_last",)):
-    """Odometry of one robot. `odom` (O) lies on the floor under the body at the first update."""
+    """Odometry of one robot; the frame `odom` (O) lies on the floor below the body at the first update."""
 
     def __init__(self, rng: np.random.Generator, noise: OdometryNoise | None = None) -> None:
-        """Draws this run's systematic errors."""
+        """Draws the systematic errors of the run."""
         super().__init__(rng)
         self._noise = noise or OdometryNoise()
         scale, turn_scale, drift = np.clip(rng.standard_normal(3), -2.0, 2.0)
@@ -190,7 +191,7 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         return Odometry(stamp_s, self._lifted(estimate, X_WB), self._velocity(true.yaw_rad, w_WB_W, v_WB_W))
 
     def _step(self, last: _Last, true: Pose2D, dt_s: float) -> Pose2D:
-        """The next estimate: the true motion since the last, in the body's frame, with errors."""
+        """Next estimate: the true motion since the last update, in the body frame, with errors."""
         forward, left = _turned(true.x_m - last.true.x_m, true.y_m - last.true.y_m, -last.true.yaw_rad)
         turn = _wrapped(true.yaw_rad - last.true.yaw_rad)
         distance = float(np.hypot(forward, left))
@@ -205,7 +206,7 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         return Pose2D(estimate.x_m + dx, estimate.y_m + dy, _wrapped(estimate.yaw_rad + turn))
 
     def _lifted(self, estimate: Pose2D, X_WB: RigidTransform) -> RigidTransform:
-        """X_OB: the planar estimate with the true height, roll and pitch and their reading noise."""
+        """Pose X_OB: the planar estimate with the true height, roll and pitch, and noise on these."""
         rpy, noise = RollPitchYaw(X_WB.rotation()), self._noise
         roll = rpy.roll_angle() + float(self._rng.normal(0.0, noise.tilt_rad))
         pitch = rpy.pitch_angle() + float(self._rng.normal(0.0, noise.tilt_rad))
@@ -213,7 +214,7 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         return RigidTransform(RollPitchYaw(roll, pitch, estimate.yaw_rad), [estimate.x_m, estimate.y_m, height])
 
     def _velocity(self, yaw_rad: float, w_WB_W: FloatArray, v_WB_W: FloatArray) -> tuple[float, float, float]:
-        """(vx, vy, wz) in the level body frame, with noise."""
+        """Velocity (vx, vy, wz) in the level body frame, with noise."""
         vx, vy = _turned(float(v_WB_W[0]), float(v_WB_W[1]), -yaw_rad)
         noise = self._rng.standard_normal(3) * (
             self._noise.velocity_m_s,
@@ -224,13 +225,13 @@ class OdometryModel(NoisySensor, saved=("_last",)):
 
 
 def _turned(x: float, y: float, angle_rad: float) -> tuple[float, float]:
-    """(x, y) turned counter-clockwise."""
+    """Rotates (x, y) counter-clockwise."""
     c, s = float(np.cos(angle_rad)), float(np.sin(angle_rad))
     return c * x - s * y, s * x + c * y
 
 
 def _wrapped(angle_rad: float) -> float:
-    """The same angle in [-pi, pi)."""
+    """Angle, wrapped to [-pi, pi)."""
     return float((angle_rad + np.pi) % (2.0 * np.pi) - np.pi)
 
 
@@ -239,10 +240,10 @@ _TOLERANCE_S = 1e-6
 
 @dataclass(frozen=True)
 class GripperNoise:
-    """Noise of the readings, and when the robot believes that it holds something; openings are of a hinged gripper.
+    """Noise of the readings, and the limits of the belief that the gripper holds an object.
 
-    It does when the read force is at least `holding_force_n` with the gripper wider than `closed` for
-    `holding_after_s` on end; the belief ends as soon as one of both is no longer so for that time.
+    The belief begins when the force is at least `holding_force_n` and the opening above `closed` for `holding_after_s`
+    without a break, and ends when one of these fails for that time. The defaults are for a hinged gripper (rad).
     """
 
     opening: float = 0.003
@@ -254,10 +255,10 @@ class GripperNoise:
 
 
 class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
-    """The gripper of one robot."""
+    """Gripper sensors of one robot."""
 
     def __init__(self, rng: np.random.Generator, noise: GripperNoise | None = None) -> None:
-        """Starts empty. A share of the force error is systematic and drawn here."""
+        """Starts without an object. Draws the systematic part of the force error."""
         super().__init__(rng)
         self._noise = noise or GripperNoise()
         self._force_scale = 1.0 + float(rng.normal(0.0, self._noise.force_share))
@@ -265,9 +266,9 @@ class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
         self._changing_since_s: float | None = None
 
     def update(self, stamp_s: float, opening: float, force_n: float) -> Gripper:
-        """Reading at stamp_s from the true opening (0 closed) and clamp force at the tip.
+        """Reads the gripper at stamp_s from the true opening (0 closed) and the force at its tip.
 
-        `force_n` is what the gripper presses with, 0 while it moves freely.
+        `force_n` is 0 while the gripper moves freely.
         """
         read = opening + float(self._rng.normal(0.0, self._noise.opening))
         force = max(0.0, force_n * self._force_scale + float(self._rng.normal(0.0, self._noise.force_n)))
@@ -276,7 +277,7 @@ class GripperModel(NoisySensor, saved=("_holding", "_changing_since_s")):
         return Gripper(stamp_s, max(0.0, read), force, self._holding)
 
     def _settle(self, stamp_s: float, gripped: bool) -> None:
-        """Changes the belief once the readings have said so for long enough."""
+        """Changes the belief once the readings contradict it for long enough."""
         if gripped == self._holding:
             self._changing_since_s = None
             return

@@ -1,7 +1,7 @@
 """The scene's proximity shapes as plain arrays, ready for ray casting.
 
-Every shape is a row: a kind, half extents (3,) along its own axes, and the frame that carries it. Meshes and convex
-hulls stand in by their oriented bounding boxes, half spaces by a very wide box under the surface.
+Every shape is a row: a kind, half extents (3,) along its own axes, and its pose in the frame of its body. Oriented
+bounding boxes stand for meshes and convex hulls, a very wide box below the surface for a half space.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ HALF_SPACE_HALF_WIDTH_M = 500.0
 
 
 class ShapeKind(enum.IntEnum):
-    """How a row is to be intersected."""
+    """Kind of a shape, which decides how rays are intersected with it."""
 
     BOX = 0
     CYLINDER = 1
@@ -60,7 +60,7 @@ class ShapeArrays:
 
     @staticmethod
     def from_rows(rows: list[Row]) -> ShapeArrays:
-        """Stack rows of (kind, half extents, X_FG)."""
+        """Stacks rows of (kind, half extents, X_FG)."""
         return ShapeArrays(
             kinds=np.array([kind for kind, _, _ in rows], dtype=np.int64),
             half_extents_m=np.array([half for _, half, _ in rows], dtype=np.float64).reshape(-1, 3),
@@ -70,9 +70,9 @@ class ShapeArrays:
 
 
 class RayScene:
-    """All proximity shapes of a plant but those of some model instances; poses are refreshed from a context.
+    """Proximity shapes of a plant, without those of some model instances, at the poses of a context.
 
-    Shapes on anchored bodies are placed once. The others follow their bodies.
+    Shapes on anchored bodies are placed once; the others follow their bodies.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class RayScene:
         self._half_extents_m = np.concatenate([self._anchored.half_extents_m, self._moving.half_extents_m])
 
     def world_shapes(self, plant_context: Context) -> ShapeArrays:
-        """All shapes in the world frame at the context's state."""
+        """Returns all shapes in the world frame at the context's state."""
         if not len(self._moving):
             return self._anchored
         R_WF, p_WF = self._body_poses(plant_context)
@@ -121,7 +121,7 @@ class RayScene:
         )
 
     def _slot(self, body: RigidBody) -> int:
-        """The index of a moving body among those tracked, added when new."""
+        """Index of a moving body among the known ones; adds a new body."""
         for slot, known in enumerate(self._bodies):
             if known.index() == body.index():
                 return slot
@@ -129,7 +129,7 @@ class RayScene:
         return len(self._bodies) - 1
 
     def _body_poses(self, plant_context: Context) -> tuple[FloatArray, FloatArray]:
-        """Rotations (B, 3, 3) and positions (B, 3) of the moving bodies in the world."""
+        """Rotations (B, 3, 3) and positions (B, 3) of the moving bodies in the world frame."""
         matrices = np.array(
             [self._plant.EvalBodyPoseInWorld(plant_context, body).GetAsMatrix34() for body in self._bodies]
         )
@@ -137,7 +137,7 @@ class RayScene:
 
 
 def shape_row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:
-    """(kind, half extents, X_FG) of one geometry in its frame F. Raises ValueError for an unbounded shape."""
+    """Row (kind, half extents, X_FG) of one geometry in its frame F. Raises ValueError for an unbounded shape."""
     shape, X_FG = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
     maker = _MAKERS.get(type(shape))
     if maker is not None:

@@ -1,4 +1,4 @@
-"""The sensors of one robot together: snapshots taken from the plant's state, with noise from the seed."""
+"""All sensors of one robot: readings of the plant's state, with noise from the seed."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _STILL_M_S = 0.02
 
 @dataclass(frozen=True)
 class LidarMount:
-    """A LiDAR on a link: its pose there, what it is, and every how many seconds it has turned once."""
+    """A LiDAR on a link: its pose there, its specification, and the time of a revolution (s)."""
 
     link: RigidBody
     X_LinkL: RigidTransform
@@ -50,9 +50,9 @@ class SensorSuite(
     ABC,
     saved=("_odometry_model", "_imu_model", "_joint_model", "_gripper_model", "_battery_model", "_lidar", "_cameras"),
 ):
-    """All sensors of one robot. Pictures are taken when asked for; `update` takes the readings, which are attributes.
+    """All sensors of one robot: `update` takes the readings, which are attributes; `image` takes pictures.
 
-    A kind of robot says how its gripper reads, and where the frames are that its encoders know of.
+    Each kind of robot implements the reading of its gripper and the frames of its links.
     """
 
     def __init__(
@@ -66,7 +66,7 @@ class SensorSuite(
         runtime_s: float,
         gripper_noise: GripperNoise | None = None,
     ) -> None:
-        """Cameras sit on links of the body."""
+        """`cameras` are on the links that their specifications name."""
         self._body, self._index = body, joints
         self._dock, self._scene, self._context = body.robot.dock, options.scene, options.context
         self._kinematics = body.plant.CreateDefaultContext()
@@ -98,14 +98,14 @@ class SensorSuite(
         return plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(link, self._body.instance).index())
 
     def power_up(self, now_s: float) -> None:
-        """Takes the first readings."""
+        """Starts the sensors and takes the first readings."""
         self._scan: Scan | None = None
         self._revolution: Callable[[], Scan] | None = None
         self._scanned_s = -math.inf
         self.update(now_s)
 
     def update(self, now_s: float) -> None:
-        """Takes new readings of all but the cameras."""
+        """Takes new readings of all sensors except the cameras."""
         plant, index = self._body.plant, self._index
         self._now_s = now_s
         X_WB = plant.EvalBodyPoseInWorld(self._context, self._body.body)
@@ -127,29 +127,29 @@ class SensorSuite(
 
     @property
     def scan(self) -> Scan | None:
-        """The latest revolution of the LiDAR, computed when it is first read: the plant may step by then."""
+        """Latest revolution of the LiDAR, computed when it is first read; the plant may have stepped since."""
         if self._revolution is not None:
             self._scan, self._revolution = self._revolution(), None
         return self._scan
 
     def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
-        """The body's pose that odometry measures, but for its errors."""
+        """Pose of the body that odometry measures, before errors are added."""
         return X_WB
 
     @abstractmethod
     def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
-        """The true opening, and the force at the tip (N), 0 while it moves freely."""
+        """True opening of the gripper, and the force at its tip (N), 0 while it moves freely."""
 
     @abstractmethod
     def _X_BL(self) -> RigidTransform:
-        """Pose of the LiDAR in the body frame, as far as the robot knows it."""
+        """Pose of the LiDAR in the body frame, as the robot knows it."""
 
     @abstractmethod
     def _frames_of_links(self) -> Mapping[str, tuple[str, RigidTransform]]:
-        """Frames of links that bear cameras, or are the hand, by link: the frame's name and its pose in the body."""
+        """Frames of the hand and of links with cameras, by link: name of the frame and its pose in the body frame."""
 
     def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
-        """What the motors do: the servos' law with limits, as the plant's solver has it at the end of a step."""
+        """Efforts of the motors: the servo law with limits, as the solver applies it at the end of a step."""
         plant, instance = self._body.plant, self._body.instance
         servos = plant.get_desired_state_input_port(instance)
         if not servos.HasValue(self._context):
@@ -167,11 +167,11 @@ class SensorSuite(
         return off_m < _DOCKED_WITHIN_M and float(np.linalg.norm(v_WB[:2])) < _STILL_M_S
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
-        """Renders a picture, its depth, or both, as all was at the last `update`.
+        """Renders a picture, its depth, or both, at the state of the last `update`.
 
         Raises:
             ValueError: the source is unknown.
-            LookupError: nothing is rendered.
+            LookupError: the Diagram has no scene for cameras.
         """
         if source not in self._cameras:
             raise ValueError(f"{self._body.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
@@ -181,7 +181,7 @@ class SensorSuite(
         return self._cameras[source].take(query, self._now_s, self._frames(), visual=visual, depth=depth)
 
     def _frames(self) -> FrameTree:
-        """The frame tree from odometry and joint encoders."""
+        """Builds the frame tree from odometry and joint encoders."""
         links = self._frames_of_links()
         edges = {"body": ("odom", self.odometry.X_OB), "lidar": ("body", self._X_BL())}
         edges |= {frame: ("body", X_BF) for frame, X_BF in links.values()}
@@ -191,7 +191,7 @@ class SensorSuite(
         return FrameTree(edges)
 
     def _X_BLinks(self, joint_names: tuple[str, ...], links: tuple[str, ...]) -> list[RigidTransform]:
-        """Poses of links in the body frame, with these joints where their encoders read."""
+        """Poses of links in the body frame, with the named joints at their encoder readings."""
         plant, instance = self._body.plant, self._body.instance
         positions = plant.GetPositions(self._kinematics)
         for name in joint_names:
@@ -203,7 +203,7 @@ class SensorSuite(
 
 
 def _generators(seed: int, robot_name: str) -> Iterator[np.random.Generator]:
-    """Independent generators, the same for the same seed and name."""
+    """Iterates over independent generators; the same seed and name give the same ones."""
     sequence = np.random.SeedSequence([seed, zlib.crc32(robot_name.encode())])
     while True:
         (child,) = sequence.spawn(1)

@@ -5,7 +5,7 @@ import pytest
 
 from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
-from plant.recording import Frame, Recorder, save_html, thinned
+from plant.recording import Frame, Recorder, save_html, thin_out
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
 
@@ -67,4 +67,4 @@ def test_a_long_recording_keeps_few_frames_and_most_of_them_where_something_move
 
 def test_a_frame_that_lies_between_its_neighbours_goes_first():
     frames = [Frame(float(t), np.array([x])) for t, x in enumerate((0.0, 1.0, 2.0, 9.0, 4.0))]
-    assert [frame.time_s for frame in thinned(frames)] == [0.0, 2.0, 3.0, 4.0]
+    assert [frame.time_s for frame in thin_out(frames)] == [0.0, 2.0, 3.0, 4.0]

@@ -7,7 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from plant.snapshot_file import SnapshotError, SnapshotFile, encoded, read_snapshot
+from plant.snapshot_file import SnapshotError, SnapshotFile, encode, read_snapshot
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def path(tmp_path):
 
 def content(number, value):
     array = np.full((2, 3), float(value))
-    return encoded(number, {"value": value}, {"x": (array.shape, array.tobytes())})
+    return encode(number, {"value": value}, {"x": (array.shape, array.tobytes())})
 
 
 def test_the_newest_is_read(path):
@@ -65,7 +65,7 @@ def test_on_a_disk_that_is_full_the_one_before_stays_whole(path, monkeypatch):
 
 def test_a_shorter_one_over_a_longer_one_is_read(path):
     file = SnapshotFile(path)
-    file.write(encoded(file.next_number, {"value": "long" * 99}, {}))
+    file.write(encode(file.next_number, {"value": "long" * 99}, {}))
     file.write(content(file.next_number, 2))
     file.write(content(file.next_number, 3))
     assert read_snapshot(path).values["value"] == 3
@@ -96,7 +96,7 @@ def rows(*values):
 
 def write_with_rows(file, value):
     file.append(rows(value))
-    file.write(encoded(file.next_number, {"value": value}, {}, file.rows))
+    file.write(encode(file.next_number, {"value": value}, {}, file.rows))
 
 
 def test_what_grows_is_appended_and_read_as_far_as_it_belongs_to_the_snapshot(path):
@@ -133,5 +133,5 @@ def test_another_process_spares_the_rows_of_the_last_snapshot_until_it_has_writt
     again = SnapshotFile(path, width=2)
     again.append(rows(4))
     assert read_snapshot(path).rows.tolist() == rows(1, 2, 3).tolist()
-    again.write(encoded(again.next_number, {}, {}, again.rows))
+    again.write(encode(again.next_number, {}, {}, again.rows))
     assert read_snapshot(path).rows.tolist() == rows(4).tolist()

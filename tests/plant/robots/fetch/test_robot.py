@@ -19,7 +19,7 @@ WALL = """<sdf version="1.7"><model name="wall"><link name="wall">
 
 
 def test_the_lidar_sees_220_degrees_in_662_points():
-    azimuths = lidar_spec().azimuths_rad()[lidar_spec().seen()]
+    azimuths = lidar_spec().azimuths_rad()[lidar_spec().visible_columns()]
     assert len(azimuths) == 662
     assert math.degrees(azimuths[-1] - azimuths[0]) == pytest.approx(220.0, abs=0.1)
     assert math.degrees(azimuths[0] + azimuths[-1]) == pytest.approx(0.0, abs=0.5)

@@ -197,9 +197,7 @@ class Leg:
         return tuple(lengths)
 
 
-class Walk(
-    Stateful, saved=("_leg", "_done_m", "_wait_s", "_detour", "place_W", "yaw_rad", "heading_rad", "held_s")
-):
+class Walk(Stateful, saved=("_leg", "_done_m", "_wait_s", "_detour", "place_W", "yaw_rad", "heading_rad", "held_s")):
     """A person on the legs of a route, who faces along the path. Call `advance` once a step.
 
     `held_s` is the time for which the person has waited for a robot.

@@ -1,4 +1,4 @@
-"""Which bodies touch now, and bumps: touches of a robot with what it should keep clear of, counted once each."""
+"""Contacts between bodies, and collisions: contacts of a robot with an obstacle, each counted once."""
 
 from __future__ import annotations
 
@@ -14,29 +14,27 @@ Pair = tuple[int, int]
 
 FLOOR_Z_M = 0.04
 MOVES_M_S = 0.05
-"""A robot that was faster than this all along just before has caused a contact with a person."""
+"""A robot that was faster than this just before a contact with a person has caused the contact."""
 
 
-def touching(
+def contact_heights(
     penetrations: Sequence[PenetrationAsPointPair], entity_of_geometry: Mapping[GeometryId, int]
 ) -> dict[Pair, float]:
-    """Pairs of entities' numbers (lower first) in contact, and the height of their lowest contact point (m)."""
+    """Height (m) of the lowest contact point for each pair of entities in contact; the lower number comes first."""
     lowest: dict[Pair, float] = {}
     for each in penetrations:
         a, b = entity_of_geometry[each.id_A], entity_of_geometry[each.id_B]
-        _lower(lowest, a, b, float(each.p_WCa[2] + each.p_WCb[2]) / 2.0)
+        pair = (a, b) if a < b else (b, a)
+        height_m = float(each.p_WCa[2] + each.p_WCb[2]) / 2.0
+        lowest[pair] = min(height_m, lowest.get(pair, height_m))
     return lowest
-
-
-def _lower(lowest: dict[Pair, float], a: int, b: int, z: float) -> None:
-    pair = (a, b) if a < b else (b, a)
-    lowest[pair] = min(z, lowest.get(pair, z))
 
 
 @dataclass(frozen=True)
 class Collision:
-    """A robot bumped into something, perhaps `other_robot`, or into a `person`; or that person `walked_in`: into a
-    robot that stood.
+    """Collision of a robot with an obstacle, with `other_robot` or with a `person`.
+
+    The person has `walked_in` when the robot stood still.
     """
 
     time_s: float
@@ -49,40 +47,40 @@ class Collision:
 
 
 class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
-    """Counts rising edges of contact between robots and scenery, persons or other robots.
+    """Counter of new contacts between robots and scenery, people or other robots.
 
-    A pair that parts for less than `debounce_s` is still the same bump. What touches at first does not count. With a
-    person or another robot a robot is one, whatever part of it touches.
+    A pair that parts for less than `debounce_s` is still the same collision. Contacts of the first update do not count.
+    All contacts of a robot with the same person or the same other robot are one pair, whichever parts touch.
     """
 
     def __init__(self, entities: Mapping[int, Entity], debounce_s: float = 0.5) -> None:
-        """Starts with a clean record."""
+        """Starts without collisions. `entities` are all bodies by number."""
         self._entities, self._debounce_s = entities, debounce_s
         self._first_of = {entity.owner: number for number, entity in sorted(entities.items(), reverse=True)}
         self._last_touched_s: dict[Pair, float] | None = None
         self.collisions: list[Collision] = []
 
     def update(self, time_s: float, pairs: Mapping[Pair, float], speeds_m_s: Mapping[str, float]) -> None:
-        """Takes in the pairs that touch at time_s, with the height of their lowest contact.
+        """Records the pairs in contact at time_s, with the heights of their lowest contacts.
 
-        `speeds_m_s` are those of the robots just before they touched.
+        `speeds_m_s` has the speed of each robot just before the contact.
         """
-        bumps = {self._counted_as(pair): pair for pair, z in pairs.items() if self._is_bump(pair, z)}
+        touching = {self._counted_as(pair): pair for pair, z in pairs.items() if self._counts(pair, z)}
         if self._last_touched_s is None:
-            self._last_touched_s = dict.fromkeys(bumps, time_s)
-        for counted, pair in bumps.items():
+            self._last_touched_s = dict.fromkeys(touching, time_s)
+        for counted, pair in touching.items():
             if time_s - self._last_touched_s.get(counted, float("-inf")) > self._debounce_s:
                 self.collisions.append(self._collision(time_s, pair, speeds_m_s))
             self._last_touched_s[counted] = time_s
 
     def _counted_as(self, pair: Pair) -> Pair:
-        """The pair itself; with a person or another robot, one that stands for the whole robot."""
+        """Pair that stands for a contact: whole robots with people and other robots, else the pair itself."""
         a, b = (self._entities[number] for number in pair)
         whole = Kind.PERSON in (a.kind, b.kind) or (a.kind in ROBOT_KINDS and b.kind in ROBOT_KINDS)
         return (self._first_of[a.owner], self._first_of[b.owner]) if whole else pair
 
-    def _is_bump(self, pair: Pair, z: float) -> bool:
-        """Returns whether a touch is a collision: not feet on the floor, not loose objects, not a robot with itself."""
+    def _counts(self, pair: Pair, z: float) -> bool:
+        """Returns whether a contact is a collision: no feet on the floor, no loose object, no robot with itself."""
         kinds = {self._entities[index].kind for index in pair}
         if Kind.OBJECT in kinds or not kinds & ROBOT_KINDS:
             return False
@@ -96,5 +94,5 @@ class CollisionCounter(Stateful, saved=("_last_touched_s", "collisions")):
         person = other.owner if other.kind is Kind.PERSON else None
         walked_in = person is not None and speeds_m_s.get(robot.owner, 0.0) <= MOVES_M_S
         other_robot = other.owner if other.kind in ROBOT_KINDS else None
-        told = f"{other.label} walked into {robot.label}" if walked_in else f"{robot.label} hit {other.label}"
-        return Collision(time_s, robot.owner, robot.kind, f"{told} at {time_s:.2f} s.", person, walked_in, other_robot)
+        event = f"{other.label} walked into {robot.label}" if walked_in else f"{robot.label} hit {other.label}"
+        return Collision(time_s, robot.owner, robot.kind, f"{event} at {time_s:.2f} s.", person, walked_in, other_robot)

@@ -1,4 +1,4 @@
-"""Who is who in the plant: which body belongs to which robot, object, person or piece of scenery."""
+"""Entities of the plant: the robot, object, person or piece of scenery that each body belongs to."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Kind(enum.Enum):
-    """What a body is, as far as the referee cares."""
+    """Kind of a body, as the referee distinguishes them."""
 
     SCENERY = "scenery"
     PERSON = "person"
@@ -35,7 +35,7 @@ ROBOT_KINDS = frozenset({Kind.BODY, Kind.LEG, Kind.ARM, Kind.GRIPPER})
 
 @dataclass(frozen=True)
 class Entity:
-    """One body's role: the model instance that owns it, and a name to be used in sentences."""
+    """Role of one body: its kind, the model instance that owns it, and its name in sentences."""
 
     kind: Kind
     owner: str
@@ -45,8 +45,8 @@ class Entity:
 BASE_LINK = "body"
 
 
-def _kind(link: str, robot: RobotKind) -> Kind:
-    """What a robot's link is."""
+def _kind_of_link(link: str, robot: RobotKind) -> Kind:
+    """Kind of a robot's link."""
     if link in robot.gripper_links:
         return Kind.GRIPPER
     if link in robot.trunk_links:
@@ -56,9 +56,9 @@ def _kind(link: str, robot: RobotKind) -> Kind:
 
 @dataclass(frozen=True)
 class Entities:
-    """All entities by number, the entity of each collision shape, and the bodies whose motion is watched.
+    """All entities by number, the entity of each collision shape, and the bodies whose motion is observed.
 
-    A body's entity has its index; pieces of the scenery have the numbers after those.
+    The number of a body's entity is the body's index; pieces of the scenery have the numbers after the bodies.
     """
 
     all: Mapping[int, Entity]
@@ -70,29 +70,29 @@ class Entities:
     hands: Mapping[str, RigidBody]
 
     @staticmethod
-    def of(
+    def from_plant(
         plant: MultibodyPlant,
         placements: Iterable[Placement],
         robots: Mapping[str, RobotKind],
         persons: Sequence[str],
         scenery: Mapping[GeometryId, str],
     ) -> Entities:
-        """Reads the entities off a finalized plant. Raises ValueError that names what is not there.
+        """Reads the entities of a finalized plant. Raises ValueError with the name that the plant does not have.
 
-        `scenery` names the pieces of furniture whose shapes belong to the world body.
+        `scenery` names the piece of furniture of each collision shape of the world body.
         """
-        things = [placed for placed in placements if placed.name not in persons]
-        objects = {placed.name: _first_body(plant, placed.name) for placed in things}
+        loose = [placed for placed in placements if placed.name not in persons]
+        objects = {placed.name: _bodies(plant, placed.name)[0] for placed in loose}
         roles = {int(body.index()): Entity(Kind.OBJECT, name, f"the {name}") for name, body in objects.items()}
         entities = {int(body.index()): _scenery(plant, body) for body in _all_bodies(plant)} | roles
         for name in persons:
             entities |= {int(body.index()): Entity(Kind.PERSON, name, name) for body in _bodies(plant, name)}
             tray = f"{name}'s tray"
             if plant.HasModelInstanceNamed(tray):
-                entities[int(_first_body(plant, tray).index())] = Entity(Kind.TRAY, name, tray)
+                entities[int(_bodies(plant, tray)[0].index())] = Entity(Kind.TRAY, name, tray)
         for name in robots:
             for body in _bodies(plant, name):
-                kind = _kind(body.name(), robots[name])
+                kind = _kind_of_link(body.name(), robots[name])
                 entities[int(body.index())] = Entity(kind, name, f"{name}'s {kind.value} ({body.name()})")
         bases = _links(plant, dict.fromkeys(robots, BASE_LINK))
         for name in set(robots) - set(bases):
@@ -101,23 +101,22 @@ class Entities:
         entities |= {number: Entity(Kind.SCENERY, name, f"the {name}") for name, number in pieces.items()}
         return Entities(
             all=entities,
-            of_geometry=_geometry_owners(plant) | {each: pieces[name] for each, name in scenery.items()},
+            of_geometry={
+                each: int(body.index())
+                for body in _all_bodies(plant)
+                for each in plant.GetCollisionGeometriesForBody(body)
+            }
+            | {each: pieces[name] for each, name in scenery.items()},
             objects=objects,
-            classes={placed.name: placed.class_name for placed in things},
-            persons={name: _first_body(plant, name) for name in persons},
+            classes={placed.name: placed.class_name for placed in loose},
+            persons={name: _bodies(plant, name)[0] for name in persons},
             bases=bases,
             hands=_links(plant, {name: kind.gripper_links[0] for name, kind in robots.items()}),
         )
 
 
-def _geometry_owners(plant: MultibodyPlant) -> dict[GeometryId, int]:
-    """The body index of every collision geometry."""
-    owned = ((body, plant.GetCollisionGeometriesForBody(body)) for body in _all_bodies(plant))
-    return {geometry: int(body.index()) for body, geometries in owned for geometry in geometries}
-
-
 def _scenery(plant: MultibodyPlant, body: RigidBody) -> Entity:
-    """A part of the world, called by its model's name."""
+    """Entity of a body of the scenery, with the name of its model."""
     instance = plant.GetModelInstanceName(body.model_instance())
     name = body.name() if instance in _NAMELESS_INSTANCES else instance
     return Entity(Kind.SCENERY, name, f"the {name}")
@@ -128,17 +127,13 @@ def _all_bodies(plant: MultibodyPlant) -> list[RigidBody]:
 
 
 def _bodies(plant: MultibodyPlant, instance_name: str) -> list[RigidBody]:
-    """All bodies of a model instance. Raises ValueError for an instance that is not there."""
+    """All bodies of a model instance. Raises ValueError when the plant has no such instance."""
     if not plant.HasModelInstanceNamed(instance_name):
-        raise ValueError(f"the referee was told of {instance_name!r}, but the plant has no model instance of that name")
+        raise ValueError(f"the referee expects {instance_name!r}, but the plant has no model instance of that name")
     instance = plant.GetModelInstanceByName(instance_name)
     return [plant.get_body(index) for index in plant.GetBodyIndices(instance)]
 
 
-def _first_body(plant: MultibodyPlant, instance_name: str) -> RigidBody:
-    return _bodies(plant, instance_name)[0]
-
-
 def _links(plant: MultibodyPlant, links: Mapping[str, str]) -> dict[str, RigidBody]:
-    """A link of each robot, of those that have it."""
+    """The named link of each robot that has it."""
     return {name: body for name, link in links.items() for body in _bodies(plant, name) if body.name() == link}

@@ -1,4 +1,4 @@
-"""Judges goal conditions against the recorded truth. Pure functions: the same record gives the same verdict."""
+"""Judges goal conditions by the recorded truth. Pure functions: the same record gives the same verdict."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from skills.robot import FloatArray
 NEAR_PERSON_M = 2.0
 NAMED_REGIONS = 3
 PERSON = "person"
-LOOKS_AT_DOOR_S = 2.0
-"""The robot may have looked at the door so long before its answer."""
+DOOR_LOOK_S = 2.0
+"""Longest time between the robot's look at a door and its answer."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Whether one condition holds, and one plain sentence."""
+    """Finding on one condition: whether it holds, and a sentence that says why."""
 
     holds: bool
     sentence: str
 
 
-def judge(conditions: Sequence[GoalCondition], truth: Truth, *, bumps: Sequence[Collision]) -> RefereeReport:
-    """The verdict on all conditions, each at the times at which it must hold."""
+def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequence[Collision]) -> RefereeReport:
+    """Judges all conditions at the times at which they must hold, and counts collisions and drops."""
     findings = [_judge_one(condition, truth) for condition in conditions]
     success = all(finding.holds for finding in findings) if findings else None
     since_s = min((condition.since_s for condition in conditions), default=0.0)
-    bumps = [bump for bump in bumps if bump.time_s >= since_s]
-    own = [bump for bump in bumps if not bump.walked_in]
+    collisions = [each for each in collisions if each.time_s >= since_s]
+    own = [each for each in collisions if not each.walked_in]
     drops = sum(when_s >= since_s for history in truth.histories for when_s in history.dropped_s)
     return RefereeReport(
         success,
         " ".join(dict.fromkeys(finding.sentence for finding in findings)),
         collisions=len(own),
         drops=drops,
-        people_hit=sum(bump.person is not None for bump in own),
-        hit_by_people=len(bumps) - len(own),
-        robots_hit=sum(bump.other_robot is not None for bump in own),
+        people_hit=sum(each.person is not None for each in own),
+        hit_by_people=len(collisions) - len(own),
+        robots_hit=sum(each.other_robot is not None for each in own),
     )
 
 
@@ -53,17 +53,17 @@ def _judge_one(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _until_s(condition: GoalCondition, truth: Truth) -> float:
-    """When its step ended."""
+    """Time when the step of a condition ended, or now."""
     return truth.now_s if condition.ended_s is None else min(condition.ended_s, truth.now_s)
 
 
 def _is_past(condition: GoalCondition) -> bool:
-    """Returns whether only the past counts, not the end of the mission."""
+    """Returns whether a condition is about the past, not the end of the mission."""
     return condition.when is not When.END_OF_MISSION and condition.ended_s is not None
 
 
 def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Returns whether a later step of the same mission lifted it."""
+    """Returns whether a later step of the same mission lifted an object again."""
     ended_s = _until_s(condition, truth)
     return any(
         lift.time_s > ended_s and from_s <= lift.time_s <= until_s + SETTLE_S
@@ -73,7 +73,7 @@ def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 
 def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
-    """Lifted from the source, and still in the gripper where that must hold."""
+    """Judges whether the objects were lifted from the source, and held at the times at which they must be."""
     until_s = _until_s(condition, truth)
     from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
     candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
@@ -93,7 +93,7 @@ def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -> bool:
-    """Returns whether a robot has it in its gripper at the times at which it must."""
+    """Returns whether a robot holds an object at the times at which it must."""
 
     def own(robot: str | None) -> bool:
         return robot is not None and condition.robot in (None, robot)
@@ -108,7 +108,7 @@ def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -
 
 
 def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
-    """Resting on the person's tray, let go."""
+    """Judges whether the objects rest on the person's tray, released by the gripper."""
     people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
@@ -130,7 +130,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalCondition, truth: Truth) -> bool:
-    """Whether it came to rest on the tray of one of the people, and rested there at the times at which it must."""
+    """Returns whether an object came to rest on the tray of a person, and stayed at the times at which it must."""
     until_s = _until_s(condition, truth)
     for person in people:
         for first_s, last_s in truth.given.get((history.name, person), ()):
@@ -144,7 +144,7 @@ def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalC
 def _why_not_handed(
     condition: GoalCondition, objects: Sequence[ObjectHistory], people: Mapping[str, FloatArray]
 ) -> str:
-    """The sentence on a hand-over that failed: where the object is, or else what was wanted."""
+    """Sentence on a failed hand-over: where the object is, or which object was wanted."""
     if not objects:
         return f"No {_wanted(condition)} was brought{_out_of(condition.source)}."
     history = next((one for one in objects if one.held_by is not None), objects[0])
@@ -158,7 +158,7 @@ def _why_not_handed(
 
 
 def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
-    """Resting in the goal, let go."""
+    """Judges whether the objects rest in the goal, released by the gripper."""
     until_s = _until_s(condition, truth)
     objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     done = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
@@ -176,7 +176,7 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> str:
-    """Where an object is that does not rest in the goal, or did not when it was to."""
+    """Clause that says where an object is that does not, or did not, rest in the goal in time."""
     now = _rest_in(history, condition.goal)
     if now is not None and not history.lies_where_others_put_it:
         return f"the {history.name} was not on {_where(condition.goal)} at the end of its step"
@@ -186,7 +186,7 @@ def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
-    """Where in the goal a robot put it, if it was there at the times at which it must be."""
+    """Place in the goal where a robot put an object; None if it was not there at the times at which it must be."""
     until_s = _until_s(condition, truth)
     if condition.when is When.SOME_TIME:
         rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
@@ -203,7 +203,7 @@ def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> F
 
 
 def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
-    """The body in the place at the times at which it must be."""
+    """Judges whether the robot's body was in the goal at the times at which it must be."""
     robots = [name for name in truth.robots if condition.robot in (None, name)]
     if not robots:
         return Finding(False, f"There is no robot {condition.robot}.")
@@ -225,7 +225,7 @@ def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
 
 
 def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence[FloatArray]:
-    """The positions that count, in the order of time."""
+    """Positions of a path that count for a condition, in the order of time."""
     until_s = _until_s(condition, truth)
     if condition.when in (When.SOME_TIME, When.ALWAYS):
         return list(path.between(condition.from_s, until_s))
@@ -235,7 +235,7 @@ def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence
 
 
 def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
-    """The robot near a person at the times at which it must be; the person may walk."""
+    """Judges whether the robot was near a person, who may walk, at the times at which it must be."""
     person, path = condition.person or "", truth.robots[robot]
     other = truth.persons.get(person)
     if other is None:
@@ -250,7 +250,7 @@ def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Fi
 
 
 def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
-    """The answer equal to the truth at the time when it was given."""
+    """Judges whether an answer was true at the time when it was given."""
     then_s, aside = condition.answered_s, []
     if condition.classes == (PERSON,):
         when_s = truth.now_s if then_s is None else then_s
@@ -277,12 +277,12 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
-    """Compares the answer with the state of the door while the robot looked; while it moves, both answers are right."""
+    """Judges an answer by the state of the door while the robot looked; while it moves, both answers are right."""
     then_s = truth.now_s if condition.answered_s is None else condition.answered_s
     (doorway,) = condition.source
     changes = next((each for (x, y), each in truth.doors.items() if doorway.contains((x, y, 0.0))), ())
-    before = [share for begun_s, share in changes if begun_s <= then_s - LOOKS_AT_DOOR_S]
-    shares = {*before[-1:], *(share for begun_s, share in changes if then_s - LOOKS_AT_DOOR_S < begun_s <= then_s)}
+    before = [share for begun_s, share in changes if begun_s <= then_s - DOOR_LOOK_S]
+    shares = {*before[-1:], *(share for begun_s, share in changes if then_s - DOOR_LOOK_S < begun_s <= then_s)}
     was = {frozenset(): "open", frozenset({0.0}): "open", frozenset({1.0}): "closed"}.get(frozenset(shares), "moving")
     right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
@@ -290,15 +290,15 @@ def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
-    """All that rested in the source rests in the goal; without a goal, no longer in the source."""
+    """Judges whether all objects of the source rest in the goal or, without a goal, have left the source."""
     source = condition.source
     there = [one for one in truth.histories if _was_in(one, condition, truth)]
     if not there:
         return Finding(True, f"nothing stood on {_where(source)}.")
     if not condition.goal:
         left = [one for one in there if _is_left(one, condition, truth)]
-        told = f"{_names(left)} {'is' if len(left) == 1 else 'are'}" if left else "nothing is"
-        return Finding(not left, f"{told} left on {_where(source)}.")
+        rest = f"{_names(left)} {'is' if len(left) == 1 else 'are'}" if left else "nothing is"
+        return Finding(not left, f"{rest} left on {_where(source)}.")
     missing = [one for one in there if _put_in(one, condition, truth) is None]
     if not missing:
         return Finding(True, f"{_names(there)} {'stands' if len(there) == 1 else 'stand'} on {_where(condition.goal)}.")
@@ -308,7 +308,7 @@ def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Returns whether it rested in the source when the step began, or came to rest there while it ran."""
+    """Returns whether an object rested in the source when the step began, or came to rest there during it."""
     from_s, until_s = condition.from_s, _until_s(condition, truth)
     came = zip(history.rested_s, history.rests_W, strict=True)
     began_W = history.at(from_s)
@@ -317,7 +317,7 @@ def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> b
 
 
 def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
-    """Returns whether it was in the source at the end of the step, or is there now though nobody put it back."""
+    """Returns whether an object was in the source at the end of the step, or is there now without being put back."""
     until_s = _until_s(condition, truth)
     put = history.put_by(until_s)
     then_W = put[1] if put is not None else history.at(until_s)
@@ -346,7 +346,7 @@ def _of_class(condition: GoalCondition, truth: Truth) -> list[ObjectHistory]:
 
 
 def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until_s: float) -> Lift | None:
-    """The first time that the condition's robot lifted it, from the source where one is named."""
+    """First lift of an object by the condition's robot in an interval, from the source if one is given."""
     return next(
         (
             lift
@@ -360,22 +360,22 @@ def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until
 
 
 def _rest_in(history: ObjectHistory, goal: Sequence[Region]) -> FloatArray | None:
-    """Where in the goal it rests now; None when nowhere."""
+    """Position of an object that rests in the goal now; None when it does not."""
     return history.last.p_WO if history.resting and _region_at(goal, history.last.p_WO) is not None else None
 
 
 def _region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
-    """The name, with its article, of the first region that a point lies in."""
+    """Name, with its article, of the first region that contains a point."""
     return next((_the(region.name) for region in regions if region.contains(p_W)), None)
 
 
 def _the(name: str) -> str:
-    """A place's name with the article; a pose or a proper name has none."""
+    """Name of a place with its article; a pose or a proper name has none."""
     return name if name.startswith(("(", "the ")) or name[:1].isupper() else f"the {name}"
 
 
 def _apart_m(p: FloatArray, q: FloatArray) -> float:
-    """Horizontal distance."""
+    """Horizontal distance between two points (m)."""
     return float(np.hypot(p[0] - q[0], p[1] - q[1]))
 
 
@@ -392,20 +392,20 @@ def _wanted(condition: GoalCondition) -> str:
 
 
 def _tally(done: Collection[ObjectHistory], condition: GoalCondition) -> str:
-    """How much of what was asked for was done: "no beer was", "1 of 2 beer was", "2 of 3 beer were"."""
+    """Count of the objects that fulfil a condition: "no beer was", "1 of 2 beer was", "2 of 3 beer were"."""
     if condition.needed == 1:
         return f"no {_wanted(condition)} was"
     return f"{len(done)} of {condition.needed} {_wanted(condition)} {'was' if len(done) == 1 else 'were'}"
 
 
 def _from(condition: GoalCondition, lift: Lift) -> str:
-    """The source that a lift was from."""
+    """Phrase with the source of a lift."""
     region = _region_at(condition.source, lift.from_W)
     return "" if region is None else f" from {region}"
 
 
 def _where(regions: Sequence[Region]) -> str:
-    """Regions by name while they are few, else how many."""
+    """Names of regions if there are few, else their number."""
     names = tuple(dict.fromkeys(_the(region.name) for region in regions))
     return " or ".join(names) if len(names) <= NAMED_REGIONS else f"any of {len(names)} places"
 

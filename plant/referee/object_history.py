@@ -1,4 +1,4 @@
-"""The history of one loose object: where it rested, who lifted it, whether it was dropped."""
+"""The history of one loose object: its resting places, lifts and drops."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ REST_S = 0.2
 FLICKER_S = 0.15
 SETTLE_S = 1.0
 SET_DOWN_S = 0.3
-"""What stood on the floor so shortly before the gripper left it was set down."""
+"""An object that touched the floor this shortly before the gripper left it was set down, not dropped."""
 
 
 @dataclass(frozen=True)
 class ObjectSample:
-    """An object at one moment: its place, what touches it.
+    """An object at one time: its position and its contacts.
 
-    `gripper` names the robot whose gripper touches it, `X_WH` is that hand's pose; `supported` tells contact with
-    anything that is no part of a robot, `on_floor` that the floor is among it; `tray_of` names whose tray is.
+    `gripper` names the robot whose gripper touches it, with the hand's pose `X_WH`. `supported` means contact with
+    a body that is no part of a robot, `on_floor` contact with the floor. `tray_of` names the person whose tray
+    touches it.
     """
 
     time_s: float
@@ -42,7 +43,7 @@ class ObjectSample:
 
 @dataclass(frozen=True)
 class Lift:
-    """An object was lifted off the place where it had rested."""
+    """Lift of an object off its resting place `from_W`."""
 
     time_s: float
     robot: str
@@ -51,9 +52,10 @@ class Lift:
 
 @dataclass(eq=False)
 class ObjectHistory(Stateful):
-    """The record of one object; `take` is called with every sample.
+    """History of one object; `add` is called with every sample.
 
-    `rests_W` are the places where it rested, `rested_s` since when; at `dropped_s` it was dropped.
+    `rests_W` are its resting places, `rested_s` the times at which it came to rest there, `dropped_s` the times of its
+    drops.
     """
 
     name: str
@@ -80,68 +82,68 @@ class ObjectHistory(Stateful):
     _by_others: list[int] = field(default_factory=list)
 
     def own_rests_W(self, from_s: float, until_s: float = math.inf) -> list[FloatArray]:
-        """Where it came to rest in that time, except its first place and where somebody who is no robot put it."""
+        """Places where it came to rest in an interval, without its first place and moves by people."""
         rests = enumerate(zip(self.rested_s, self.rests_W, strict=True))
         own = [(when_s, p_W) for number, (when_s, p_W) in rests if number > 0 and number not in self._by_others]
         return [p_W for when_s, p_W in own if from_s <= when_s <= until_s]
 
     def lifts_since(self, since_s: float) -> list[Lift]:
-        """Its lifts since a time."""
+        """Lifts since a time."""
         return [lift for lift in self.lifts if lift.time_s >= since_s]
 
     @property
     def drops(self) -> int:
-        """How often it was dropped."""
+        """Number of drops."""
         return len(self.dropped_s)
 
     @property
     def lies_where_others_put_it(self) -> bool:
-        """Returns whether somebody who is no robot moved it last."""
+        """Returns whether a person moved it last."""
         return len(self.rests_W) - 1 in self._by_others and not self._carried
 
     @property
     def last(self) -> ObjectSample:
-        """The latest sample. Raises ValueError before the first."""
+        """Latest sample. Raises ValueError before the first."""
         if self._last is None:
             raise ValueError("the referee has not observed anything yet")
         return self._last
 
     @property
     def resting(self) -> bool:
-        """Still, supported, and in nobody's gripper."""
+        """Returns whether it is still, supported, and in no gripper."""
         return self.held_by is None and self._supported and self.speed_m_s < STILL_M_S
 
     @property
     def held_by(self) -> str | None:
-        """The robot whose gripper has it, or had it a moment ago."""
+        """Robot whose gripper holds it, or held it a moment ago."""
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
     def in_the_air(self) -> bool:
-        """Carried in a gripper and touching nothing but the robot."""
+        """Returns whether a gripper carries it and it touches only the robot."""
         return self._carried and self.held_by is not None and not self._supported
 
     @property
     def on_tray_of(self) -> str | None:
-        """The person on whose tray it rests."""
+        """Person on whose tray it rests."""
         return self._tray_of if self.resting and self.last.time_s - self._tray_s <= FLICKER_S else None
 
     @property
     def _supported(self) -> bool:
-        """On something, now or a moment ago."""
+        """Returns whether a body other than a robot supports it, or did a moment ago."""
         return self.last.time_s - self._supported_s <= FLICKER_S
 
     def at(self, time_s: float) -> FloatArray | None:
-        """Where it rested at a time; None when it was carried or moved."""
+        """Resting place at a time; None when it was carried or moved."""
         places = [(since_s, p_W) for since_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if since_s <= time_s]
         since_s, p_W = places[-1] if places else (self.rested_s[0], self.rests_W[0])
-        gone = any(since_s < lift.time_s <= time_s for lift in self.lifts)
-        return None if gone else p_W
+        lifted = any(since_s < lift.time_s <= time_s for lift in self.lifts)
+        return None if lifted else p_W
 
     def put_by(self, time_s: float) -> tuple[float, FloatArray] | None:
-        """Since when and where it rested at a time, or came to rest within SETTLE_S after it; None: it did not.
+        """Time and place of its rest at a time, or of a rest that began within SETTLE_S after it; None without a rest.
 
-        What somebody who is no robot put down does not count, nor does its first place.
+        Its first place and places where a person put it do not count.
         """
         lifted_s = max((lift.time_s for lift in self.lifts if lift.time_s <= time_s), default=-math.inf)
         again_s = min((lift.time_s for lift in self.lifts if lift.time_s > time_s), default=math.inf)
@@ -159,26 +161,28 @@ class ObjectHistory(Stateful):
         return when_s, self.rests_W[number]
 
     def held_at(self, time_s: float) -> str | None:
-        """The robot that had it in its gripper at a time, or lifted it within SETTLE_S after it; None: nobody."""
+        """Robot that held it at a time, or lifted it within SETTLE_S after it; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= time_s]
         after = [lift for lift in self.lifts if time_s < lift.time_s <= time_s + SETTLE_S]
         held = [lift for lift in before[-1:] if not self._ended_between(lift.time_s, time_s)]
         return next((lift.robot for lift in (*held, *after)), None)
 
     def held_always(self, from_s: float, until_s: float) -> str | None:
-        """The robot that had it in its gripper all that time; None: nobody."""
+        """Robot that held it during the whole interval; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= from_s + SETTLE_S]
         held = (lift.robot for lift in before[-1:] if not self._ended_between(lift.time_s, until_s))
         return next(held, None)
 
     def _ended_between(self, from_s: float, until_s: float) -> bool:
-        """Returns whether it came to rest, or was dropped, in that time."""
+        """Returns whether it came to rest or was dropped in an interval."""
         return any(from_s < when_s <= until_s for when_s in (*self.rested_s, *self.dropped_s))
 
-    def take(self, sample: ObjectSample) -> None:
-        """Takes in one more sample."""
-        with_hand = self._moves_with_hand(sample)
-        self._measure_speed(sample)
+    def add(self, sample: ObjectSample) -> None:
+        """Adds a sample to the history."""
+        with_hand, last = self._moves_with_hand(sample), self._last
+        if last is not None and sample.time_s > last.time_s:
+            moved_m = float(np.linalg.norm(sample.p_WO - last.p_WO))
+            self.speed_m_s = moved_m / (sample.time_s - last.time_s)
         if sample.gripper is not None:
             self.touches += self._last is None or sample.time_s - self._grip_s > 0.5
             self._grip_s, self._grip_robot = sample.time_s, sample.gripper
@@ -197,17 +201,17 @@ class ObjectHistory(Stateful):
         self._note_rest(sample)
 
     def stay(self, time_s: float) -> None:
-        """Takes in that all is as it was in the last sample."""
+        """Adds a sample at time_s that equals the last one."""
         last, since_s = self.last, self._still_since_s
         rests = since_s is not None and time_s - since_s > 2.0 * REST_S and self.speed_m_s == 0.0
         if not (rests and last.supported and last.gripper is None and last.tray_of is None and not self._carried):
-            self.take(replace(last, time_s=time_s))
+            self.add(replace(last, time_s=time_s))
             return
         self._last = ObjectSample(time_s, last.p_WO, None, last.X_WH, supported=True, on_floor=last.on_floor)
         self._supported_s = time_s
 
     def moved_by_others(self, p_WO: FloatArray, time_s: float) -> None:
-        """Somebody who is no robot has put it at p_WO: no fall, no knock, and no robot's doing."""
+        """Records that a person has moved it to p_WO, which is no drop and no placement by a robot."""
         self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)
         self._grip_s = self._tray_s = float("-inf")
         self._carried, self._left_z_m, self._dropped, self._still_since_s = False, None, False, None
@@ -217,19 +221,14 @@ class ObjectHistory(Stateful):
         self.events.append(f"Somebody moved the {self.name} at {time_s:.2f} s.")
 
     def forget_past(self) -> None:
-        """Starts over for another mission: what is held keeps how it came there, all else counts from where it is."""
+        """Forgets the history for another mission; only a held object keeps its lifts and rests."""
         if self._last is not None and self.held_by is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
         self.events, self.dropped_s, self.touches = [], [], 0
 
-    def _measure_speed(self, sample: ObjectSample) -> None:
-        if self._last is None or sample.time_s <= self._last.time_s:
-            return
-        self.speed_m_s = float(np.linalg.norm(sample.p_WO - self._last.p_WO)) / (sample.time_s - self._last.time_s)
-
     def _moves_with_hand(self, sample: ObjectSample) -> bool:
-        """Returns whether it keeps its place in the hand since the last sample."""
+        """Returns whether it has kept its place in the hand since the last sample."""
         last = self._last
         if last is None or sample.X_WH is None or last.X_WH is None or sample.time_s <= last.time_s:
             return False
@@ -237,17 +236,17 @@ class ObjectHistory(Stateful):
         return float(np.linalg.norm(slip)) / (sample.time_s - last.time_s) < WITH_HAND_M_S
 
     def _note_lift(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Begins a carry once the gripper has raised it clear of its place, or borne it well away from there."""
+        """Begins a carry once the gripper has raised it off its place, or moved it well away from there."""
         if sample.gripper is None or sample.supported or not with_hand:
             return
-        way_W = sample.p_WO - self.rests_W[-1]
-        if not self._carried and (way_W[2] >= LIFT_M or float(np.linalg.norm(way_W[:2])) >= AWAY_M):
+        moved_W = sample.p_WO - self.rests_W[-1]
+        if not self._carried and (moved_W[2] >= LIFT_M or float(np.linalg.norm(moved_W[:2])) >= AWAY_M):
             self.lifts.append(Lift(sample.time_s, sample.gripper, self.rests_W[-1]))
             self.events.append(f"{sample.gripper} lifted the {self.name} at {sample.time_s:.2f} s.")
             self._carried = True
 
     def _note_leaving(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Remember the height at which a carried object left the gripper, or lies on a tray: it may sink that far."""
+        """Records the height at which a carried object left the gripper or lies on a tray; a fall begins there."""
         if sample.gripper is not None and with_hand:
             self._left_z_m, self._dropped = None, False
             self._grip_z_m = float(sample.p_WO[2])
@@ -257,7 +256,7 @@ class ObjectHistory(Stateful):
             self._left_z_m = float(sample.p_WO[2])
 
     def _note_fall(self, sample: ObjectSample) -> None:
-        """Counts a drop once it is clear that it falls, or lies on the floor without having been set down there."""
+        """Counts a drop once it has fallen, or lies on the floor without having been set down there."""
         if self._left_z_m is None or self._dropped:
             return
         set_down = self._grip_s - self._set_down_s <= SET_DOWN_S
@@ -267,7 +266,7 @@ class ObjectHistory(Stateful):
             self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")
 
     def _note_rest(self, sample: ObjectSample) -> None:
-        """Ends a carry, and remember the place, once it has lain still and lets go for a while."""
+        """Ends a carry and records the place, once it has rested for a while."""
         if not self.resting:
             self._still_since_s = None
             return
@@ -275,7 +274,8 @@ class ObjectHistory(Stateful):
             self._still_since_s = sample.time_s
         if sample.time_s - self._still_since_s < REST_S:
             return
-        self._note_knock(sample)
+        if not self._carried and self.rests_W[-1][2] - sample.p_WO[2] > FALL_M:
+            self.events.append(f"The {self.name} was knocked down before {sample.time_s:.2f} s.")
         if self._carried or float(np.linalg.norm(sample.p_WO - self.rests_W[-1])) > 0.02:
             self._rests(sample)
         self._carried, self._left_z_m, self._dropped = False, None, False
@@ -283,8 +283,3 @@ class ObjectHistory(Stateful):
     def _rests(self, sample: ObjectSample) -> None:
         self.rests_W.append(sample.p_WO)
         self.rested_s.append(sample.time_s)
-
-    def _note_knock(self, sample: ObjectSample) -> None:
-        """Tells of an object that came to lie lower without having been carried."""
-        if not self._carried and self.rests_W[-1][2] - sample.p_WO[2] > FALL_M:
-            self.events.append(f"The {self.name} was knocked down before {sample.time_s:.2f} s.")

@@ -1,4 +1,4 @@
-"""The referee itself: looks at the truth while the plant runs, and judges afterwards."""
+"""The referee: observes the true state while the plant runs, and judges goal conditions afterwards."""
 
 from __future__ import annotations
 
@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.geometry import GeometryId
-from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from executive.words.goal import GoalCondition, RefereeReport
-from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, touching
+from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, contact_heights
 from plant.referee.entities import Entities, Kind
 from plant.referee.judge import judge
 from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
-from plant.referee.truth import TimedPath, Truth, extend, note_stay
+from plant.referee.truth import TimedPath, Truth, extend_path, extend_stays
 from plant.saved_state import State, Stateful
 from skills.robot import FloatArray
 
@@ -31,12 +30,13 @@ BEFORE_SAMPLES = 3
 
 
 DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, float]]]]
+"""Returns the changes of each door by its position, as in `Truth.doors`."""
 
 
 class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
-    """Watches one plant. `observe` at about 20 Hz while it runs, `judge` whenever wanted.
+    """Referee of one plant: call `observe` at about 20 Hz while it runs, and `judge` at any time.
 
-    Its state is the whole record, without the paths; of people, only where they are.
+    Its saved state is the whole record without the paths; of people it has only their positions.
     """
 
     def __init__(
@@ -49,14 +49,13 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         scenery: Mapping[GeometryId, str] = MappingProxyType({}),
         doors: DoorHistories = dict,
     ) -> None:
-        """Builds for a finalized plant; `scenery` names the pieces of furniture whose shapes are the world body's.
+        """`plant` is finalized; `scenery` names the piece of furniture of each collision shape of the world body.
 
-        `placements` are the loose objects; those named in `persons` are people. `robots` has the kind of each robot by
-        the name of its model instance, and `doors` gives `Truth.doors`. Raises ValueError that names what the plant
-        does not have.
+        `placements` are the loose objects and the people; `persons` names the people. `robots` has the kind of each
+        robot by the name of its model instance. Raises ValueError with the name that the plant does not have.
         """
         self._plant, self._geometry = plant, plant.get_geometry_query_input_port()
-        self._entities = Entities.of(plant, placements, robots, persons, scenery)
+        self._entities = Entities.from_plant(plant, placements, robots, persons, scenery)
         self._doors = doors
         self._counter = CollisionCounter(self._entities.all)
         self._histories = {name: ObjectHistory(name, self._entities.classes[name]) for name in self._entities.objects}
@@ -71,47 +70,47 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
-        """All bumps so far, those included where a person walked into a robot."""
+        """All collisions so far, also those in which a person walked into a robot."""
         return tuple(self._counter.collisions)
 
     @property
     def drops(self) -> int:
-        """Objects dropped so far."""
+        """Number of drops so far."""
         return sum(history.drops for history in self._histories.values())
 
     @property
     def objects(self) -> Mapping[str, ObjectHistory]:
-        """What is known of each loose object, by name."""
+        """History of each loose object, by name."""
         return dict(self._histories)
 
     @property
     def events(self) -> tuple[str, ...]:
-        """What happened, one sentence each: bumps, lifts, drops."""
-        told = [event for history in self._histories.values() for event in history.events]
-        return (*told, *(collision.sentence for collision in self._counter.collisions))
+        """Sentences about the events so far: lifts, drops and collisions."""
+        events = [event for history in self._histories.values() for event in history.events]
+        return (*events, *(collision.sentence for collision in self._counter.collisions))
 
     def lifts(self, robot: str) -> tuple[Lift, ...]:
-        """All that a robot has lifted off its place so far, in the order of time."""
+        """Lifts by a robot so far, in the order of time."""
         all_lifts = (lift for history in self._histories.values() for lift in history.lifts if lift.robot == robot)
         return tuple(sorted(all_lifts, key=lambda lift: lift.time_s))
 
     def path(self, robot: str) -> FloatArray:
-        """The path of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
-        return self._timed_path(robot)[:, :3]
+        """Path of a robot's body so far, (N, 3) in the world, a point every few centimetres. Raises KeyError."""
+        return _timed(self._paths[robot])[:, :3]
 
     def observe(self, plant_context: Context, time_s: float, *, asleep: Collection[str] = ()) -> None:
-        """Takes in the plant's state at time_s; objects that are `asleep` are as they were before."""
+        """Records the plant's state at time_s; the objects in `asleep` have not moved since the last call."""
         penetrations = self._geometry.Eval(plant_context).ComputePointPairPenetration()
         self.contact_points += len(penetrations)
-        pairs = touching(penetrations, self._entities.of_geometry)
+        pairs = contact_heights(penetrations, self._entities.of_geometry)
         self._counter.update(time_s, pairs, self._speeds_before())
         self._speeds_m_s.append(self._speeds(plant_context))
         self._bases = {name: self._position(plant_context, body) for name, body in self._entities.bases.items()}
         self._persons = {name: self._position(plant_context, body) for name, body in self._entities.persons.items()}
         for name, p_WB in self._bases.items():
-            extend(self._paths[name], p_WB, time_s)
+            extend_path(self._paths[name], p_WB, time_s)
         for name, p_W in self._persons.items():
-            extend(self._person_paths[name], p_W, time_s)
+            extend_path(self._person_paths[name], p_W, time_s)
         self._now_s = time_s
         neighbours = self._neighbours(pairs)
         for name, body in self._entities.objects.items():
@@ -119,25 +118,27 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             if name in asleep:
                 history.stay(time_s)
             else:
-                history.take(self._sample(plant_context, time_s, self._position(plant_context, body), touches))
-        self._note_given(time_s)
+                history.add(self._sample(plant_context, time_s, self._position(plant_context, body), touches))
+        for history in self._histories.values():
+            if history.on_tray_of is not None:
+                extend_stays(self._given.setdefault((history.name, history.on_tray_of), []), time_s)
 
     def judge(self, conditions: Sequence[GoalCondition]) -> RefereeReport:
-        """Returns whether all conditions hold at their times. Raises ValueError before the first sample."""
+        """Judges all conditions at the times at which they must hold. Raises ValueError before the first sample."""
         if not self._bases:
             raise ValueError("the referee has not observed anything yet")
         truth = Truth(
             now_s=self._now_s,
             histories=tuple(self._histories.values()),
-            robots={name: TimedPath(self._timed_path(name)) for name in self._paths},
+            robots={name: TimedPath(_timed(path)) for name, path in self._paths.items()},
             persons={name: TimedPath(_timed(path)) for name, path in self._person_paths.items()},
             given=dict(self._given),
             doors=self._doors(),
         )
-        return judge(conditions, truth, bumps=self._counter.collisions)
+        return judge(conditions, truth, collisions=self._counter.collisions)
 
     def go_on(self, state: State, paths: Mapping[str, FloatArray]) -> None:
-        """Goes on with such a record; paths are arrays (N, 4) of `points`. Raises ValueError: they have no times."""
+        """Restores a record with the paths of the robots, (N, 4) like `points`. Raises ValueError for other shapes."""
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
             raise ValueError("paths without times")
         self.restore(state)
@@ -145,7 +146,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         self._person_paths = {name: [np.append(p_W, self._now_s)] for name, p_W in self._persons.items()}
 
     def forget_past(self) -> None:
-        """Another mission is judged by what happens from now on."""
+        """Forgets the record, so that the next mission is judged by what happens from now on."""
         self._counter.collisions, self._given = [], {}
         self._paths = {name: [] for name in self._paths}
         self._person_paths = {name: [] for name in self._person_paths}
@@ -153,23 +154,20 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
             history.forget_past()
 
     def moved_by_others(self, name: str, plant_context: Context, time_s: float) -> None:
-        """Somebody who is no robot has put an object where it is now. Raises KeyError: there is no such object."""
+        """Records that a person has moved an object to its present pose. Raises KeyError for an unknown object."""
         self._histories[name].moved_by_others(self._position(plant_context, self._entities.objects[name]), time_s)
 
     def points(self, robot: str) -> Sequence[FloatArray]:
-        """The points of `path`, each with its time (s), not to be changed; as more are added, those stay."""
+        """Points of `path`, each with its time (s); the list only grows, and must not be changed."""
         return self._paths[robot]
 
-    def _timed_path(self, robot: str) -> FloatArray:
-        return _timed(self._paths[robot])
-
     def _speeds_before(self) -> dict[str, float]:
-        """The least speed of each robot just before now: a push that began unnoticed does not count as its own."""
+        """Lowest recent speed of each robot; a push that has just begun does not count as the robot's own motion."""
         names = self._speeds_m_s[-1] if self._speeds_m_s else ()
         return {name: min(speeds[name] for speeds in self._speeds_m_s) for name in names}
 
     def _speeds(self, plant_context: Context) -> dict[str, float]:
-        """How fast each robot's body and hand are, the faster of the two (m/s); nothing where there is nobody."""
+        """Speed (m/s) of each robot, the higher of its body's and its hand's; empty when the world has no people."""
         if not self._entities.persons:
             return {}
         speeds: dict[str, float] = {}
@@ -179,11 +177,11 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         return speeds
 
     def _position(self, plant_context: Context, body: object) -> FloatArray:
-        """The body origin's position in the world."""
+        """Position (3,) of a body's origin in the world."""
         return np.array(self._plant.EvalBodyPoseInWorld(plant_context, body).translation())
 
     def _neighbours(self, pairs: Mapping[Pair, float]) -> dict[int, dict[int, float]]:
-        """For each object's body, the bodies that touch it and the height of the lowest contact."""
+        """Bodies that touch each object, with the heights of their lowest contacts, by the object's number."""
         found: dict[int, dict[int, float]] = {}
         for (a, b), z in pairs.items():
             for this, other in ((a, b), (b, a)):
@@ -194,30 +192,20 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
     def _sample(
         self, plant_context: Context, time_s: float, p_WO: FloatArray, touches: Mapping[int, float]
     ) -> ObjectSample:
-        """An object now, with the bodies that touch it."""
+        """Sample of an object now, with the bodies that touch it."""
         entities = {index: self._entities.all[index] for index in touches}
         gripper = next((entity.owner for entity in entities.values() if entity.kind is Kind.GRIPPER), None)
+        hand = None if gripper is None else self._entities.hands.get(gripper)
         still = (Kind.SCENERY, Kind.PERSON, Kind.TRAY, Kind.OBJECT)
         return ObjectSample(
             time_s=time_s,
             p_WO=p_WO,
             gripper=gripper,
-            X_WH=self._hand_pose(plant_context, gripper),
+            X_WH=None if hand is None else self._plant.EvalBodyPoseInWorld(plant_context, hand),
             supported=any(entity.kind in still for entity in entities.values()),
             on_floor=any(entities[i].kind is Kind.SCENERY and z < FLOOR_Z_M for i, z in touches.items()),
             tray_of=next((entity.owner for entity in entities.values() if entity.kind is Kind.TRAY), None),
         )
-
-    def _hand_pose(self, plant_context: Context, robot: str | None) -> RigidTransform | None:
-        if robot is None or robot not in self._entities.hands:
-            return None
-        return self._plant.EvalBodyPoseInWorld(plant_context, self._entities.hands[robot])
-
-    def _note_given(self, time_s: float) -> None:
-        """Remember which object rests on whose tray, and in which times."""
-        for history in self._histories.values():
-            if history.on_tray_of is not None:
-                note_stay(self._given.setdefault((history.name, history.on_tray_of), []), time_s)
 
 
 def _timed(path: Sequence[FloatArray]) -> FloatArray:

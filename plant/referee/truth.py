@@ -18,16 +18,16 @@ ON_TRAY_GAP_S = 0.5
 
 @dataclass(frozen=True)
 class TimedPath:
-    """Where a robot or a person went: points (m, world) with the times (s) at which they were reached, (N, 4)."""
+    """Path of a robot or a person: points (m, world) with the times (s) at which they were reached, (N, 4)."""
 
     points: FloatArray
 
     def at(self, time_s: float) -> FloatArray:
-        """The position at a time, (3,)."""
+        """Position (3,) at a time."""
         return self.points[self._index(time_s), :3]
 
     def between(self, from_s: float, until_s: float) -> FloatArray:
-        """The positions from just before a time to another, (N, 3)."""
+        """Positions (N, 3) from just before one time until another."""
         first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
         return self.points[first : self._index(until_s) + 1, :3]
 
@@ -37,11 +37,11 @@ class TimedPath:
 
 @dataclass(frozen=True)
 class Truth:
-    """The record up to `now_s`: histories of the objects, and the paths of robots and people by name.
+    """Record up to `now_s`: histories of the objects, and the paths of robots and people by name.
 
-    `given` has for each object and person the times (s) from and to which the object rested on the person's tray.
-    `doors` has for the place (x, y) of each door that moves the times from which it was closed to a share: 0 open, 1
-    closed, between while it moves. A door that is not among them is open.
+    `given` has the intervals (s) in which an object rested on a person's tray, by object and person. `doors` has the
+    times (s) and states of each sliding door by its position (x, y): 0 open, 1 closed, between while it moves. Any
+    other door is open.
     """
 
     now_s: float
@@ -52,27 +52,27 @@ class Truth:
     doors: Mapping[Point, Sequence[tuple[float, float]]] = field(default_factory=dict)
 
 
-def extend(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
-    """Adds a point to a path, with its time, when it is some way from the last."""
+def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
+    """Adds a point with its time to a path when it is `PATH_STEP_M` from the last point."""
     if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
         path.append(np.append(p_W, time_s))
 
 
-def note_stay(stays: list[tuple[float, float]], time_s: float) -> None:
-    """Adds that an object rests on a tray now: the last stay goes on, unless it ended some time ago."""
+def extend_stays(stays: list[tuple[float, float]], time_s: float) -> None:
+    """Extends the last interval on a tray to time_s, or begins another when the last ended some time ago."""
     goes_on = bool(stays) and time_s - stays[-1][1] <= ON_TRAY_GAP_S
     first_s = stays.pop()[0] if goes_on else time_s
     stays.append((first_s, time_s))
 
 
 def trajectory_error_m(estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> float:
-    """Root mean square (m) of what separates the positions after alignment (Umeyama, 1991, without scale)."""
-    moved = aligned(_positions(estimated), estimated, true)
+    """Absolute trajectory error (m): root mean square distance after alignment (Umeyama, 1991, without scale)."""
+    moved = align(_positions(estimated), estimated, true)
     return float(np.sqrt(np.mean(np.sum((moved - _positions(true)) ** 2, axis=1))))
 
 
-def aligned(points: FloatArray, estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> FloatArray:
-    """Points (N, 2) of the estimate's frame in that of the truth, by what aligns the two trajectories best."""
+def align(points: FloatArray, estimated: Sequence[Pose2D], true: Sequence[Pose2D]) -> FloatArray:
+    """Transforms points (N, 2) of the estimate's frame by the best alignment of two trajectories."""
     ours, theirs = _positions(estimated), _positions(true)
     middle_ours, middle_theirs = ours.mean(axis=0), theirs.mean(axis=0)
     a, b = ours - middle_ours, theirs - middle_theirs

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.referee.truth import aligned, trajectory_error_m
+from plant.referee.truth import align, trajectory_error_m
 from plant.robots.spot.model import spot_facts
 from plant.sensors.lidar import Lidar
 from plant.sensors.proprioception import OdometryModel
@@ -181,7 +181,7 @@ def walls_within(world, grids, mapper: Mapper, true: list[Pose2D], band: str) ->
     surveyed_grid = load_grid_map(path)
     cells = np.argwhere(grids.probabilities[band] > 0.65)
     points = (cells[:, ::-1] + 0.5) * 0.025 + np.array(grids.origin_m)
-    off = surveyed_grid.distance_m(aligned(points, mapper.graph.poses, true))
+    off = surveyed_grid.distance_m(align(points, mapper.graph.poses, true))
     return {f"{round(100 * limit)} cm": round(float(np.mean(off <= limit)), 4) for limit in (0.05, 0.1, 0.15)}
 
 
@@ -190,7 +190,7 @@ def free_seen(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
     surveyed_grid = load_grid_map(world.surveyed.keepout_map_path)
     x0, y0 = grids.origin_m
     cells = np.argwhere(grids.observed["keepout"] & (grids.probabilities["keepout"] < 0.45))
-    points = aligned((cells[:, ::-1] + 0.5) * 0.025 + np.array([x0, y0]), mapper.graph.poses, true)
+    points = align((cells[:, ::-1] + 0.5) * 0.025 + np.array([x0, y0]), mapper.graph.poses, true)
     covered = np.zeros_like(surveyed_grid.occupied)
     rows, columns = surveyed_grid.cells(points).T
     inside = (rows >= 0) & (columns >= 0) & (rows < covered.shape[0]) & (columns < covered.shape[1])
@@ -203,7 +203,7 @@ def obstacles_found(world, grids, mapper: Mapper, true: list[Pose2D]) -> float:
     """The share of the keep-out's surface by the ground where the body fits that the map has within 10 cm."""
     truth = load_grid_map(world.surveyed.keepout_map_path)
     cells = np.argwhere(grids.probabilities["keepout"] > 0.65)
-    points = aligned((cells[:, ::-1] + 0.5) * 0.025 + np.array(grids.origin_m), mapper.graph.poses, true)
+    points = align((cells[:, ::-1] + 0.5) * 0.025 + np.array(grids.origin_m), mapper.graph.poses, true)
     rows, columns = truth.cells(points).T
     inside = (rows >= 0) & (columns >= 0) & (rows < truth.occupied.shape[0]) & (columns < truth.occupied.shape[1])
     found = np.ones(truth.occupied.shape, dtype=np.uint8)

@@ -17,9 +17,9 @@ from executive.tree.compiler import CompiledTree, StepPart
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.outlines import inside
-from plant.referee.judge import LOOKS_AT_DOOR_S, judge
+from plant.referee.judge import DOOR_LOOK_S, judge
 from plant.referee.object_history import ObjectHistory, ObjectSample
-from plant.referee.truth import TimedPath, Truth, extend, note_stay
+from plant.referee.truth import TimedPath, Truth, extend_path, extend_stays
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from tests.executive.conftest import KNOWLEDGE, ManualClock
 
@@ -127,7 +127,7 @@ class ScriptedWorld:
         if not self.lie(now_s, "navigate"):
             self.robot_W = (inputs.goal.x_m, inputs.goal.y_m)
             self.drives.append((now_s, self.robot_W))
-            extend(self.path, np.array([*self.robot_W, 0.5]), now_s)
+            extend_path(self.path, np.array([*self.robot_W, 0.5]), now_s)
         return Succeeded("there")
 
     def detect(self, now_s: float, inputs: Any) -> Succeeded | Failed:
@@ -230,7 +230,7 @@ class ScriptedWorld:
         for name, history in self.histories.items():
             place, p_W = self.places[name], self.position(name)
             held = place == HAND
-            history.take(
+            history.add(
                 ObjectSample(
                     time_s=now_s,
                     p_WO=p_W,
@@ -242,8 +242,8 @@ class ScriptedWorld:
                 )
             )
             if history.on_tray_of is not None:
-                note_stay(self.given.setdefault((name, history.on_tray_of), []), now_s)
-        extend(self.path, np.array([*self.robot_W, 0.5]), now_s)
+                extend_stays(self.given.setdefault((name, history.on_tray_of), []), now_s)
+        extend_path(self.path, np.array([*self.robot_W, 0.5]), now_s)
 
     def judge(self, conditions: Sequence[GoalCondition], now_s: float) -> RefereeReport:
         """The referee's verdict."""
@@ -252,7 +252,7 @@ class ScriptedWorld:
         changes = [(n * DOOR_STAYS_S, 0.0 if n % 2 == 0 else 1.0) for n in range(int(now_s / DOOR_STAYS_S) + 1)]
         doors = {DOOR_W: changes}
         truth = Truth(now_s, tuple(self.histories.values()), robots, people, self.given, doors)
-        return judge(conditions, truth, bumps=())
+        return judge(conditions, truth, collisions=())
 
 
 def _seen(observations: list[ObjectObservation]) -> Succeeded:
@@ -332,7 +332,7 @@ class _Person:
     def answers(self, goal: GoalCondition, t_s: float) -> Collection[bool]:
         """The right answers: both where a door moved while the robot looked."""
         if goal.kind is GoalKind.DOOR_OPEN:
-            return {door_is_open(max(0.0, t_s - LOOKS_AT_DOOR_S)), door_is_open(t_s)}
+            return {door_is_open(max(0.0, t_s - DOOR_LOOK_S)), door_is_open(t_s)}
         return {self.count(goal, t_s) >= max(1, goal.count)}
 
     def done(self, goal: GoalCondition, begun_s: float, ended_s: float) -> bool:

@@ -584,7 +584,8 @@ def test_an_answer_about_a_door_is_judged_by_how_it_was_while_the_robot_looked(a
     truth = Truth(40.0, (), {"alice": TimedPath(nothing)}, {}, {}, {(2.5, 0.0): OPENS_AND_CLOSES})
     asked = GoalCondition(GoalKind.DOOR_OPEN, source=(DOORWAY,), answered_s=answered_s)
     told = {
-        answer: judge([dataclasses.replace(asked, answer=answer)], truth, bumps=()) for answer in (True, False, None)
+        answer: judge([dataclasses.replace(asked, answer=answer)], truth, collisions=())
+        for answer in (True, False, None)
     }
     assert {answer for answer, verdict in told.items() if verdict.success} == right
 

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from plant.referee.truth import aligned, trajectory_error_m
+from plant.referee.truth import align, trajectory_error_m
 from skills.geometry import compose
 from skills.robot import Pose2D
 
@@ -23,4 +23,4 @@ def test_the_error_is_the_root_mean_square():
 def test_points_move_with_the_trajectory():
     moved = [compose(Pose2D(3.0, -1.0, 0.7), pose) for pose in TRUE]
     points = np.array([(pose.x_m, pose.y_m) for pose in moved])
-    assert aligned(points, moved, TRUE) == pytest.approx(np.array([(pose.x_m, pose.y_m) for pose in TRUE]))
+    assert align(points, moved, TRUE) == pytest.approx(np.array([(pose.x_m, pose.y_m) for pose in TRUE]))

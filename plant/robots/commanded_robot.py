@@ -1,4 +1,4 @@
-"""What all simulated robots share behind the Robot protocol: sensing, arm and gripper, commands and the lease."""
+"""Base class of all simulated robots behind the Robot protocol: sensing, arm and gripper, commands and the lease."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ GoalT = TypeVar("GoalT")
 
 
 class LeaseManager:
-    """Hands out one robot's lease; the lease with the highest number counts."""
+    """Manager of one robot's lease; only the lease with the highest number counts."""
 
     def __init__(self, robot_name: str) -> None:
         self._robot_name = robot_name
@@ -46,11 +46,11 @@ class LeaseManager:
 
     @property
     def current(self) -> Lease | None:
-        """The lease that counts, None while it is free."""
+        """Lease that counts, or None while it is free."""
         return self._current
 
     def acquire(self, holder: str) -> Lease:
-        """A lease for `holder`. Raises LeaseError while another's is out."""
+        """Gives a free lease to `holder`. Raises LeaseError while another holder has it."""
         if self._current is not None:
             raise LeaseError(
                 f"{self._robot_name}: the lease is held by {self._current.holder!r}; ask for its return, or take it"
@@ -58,20 +58,20 @@ class LeaseManager:
         return self.take(holder)
 
     def take(self, holder: str) -> Lease:
-        """A lease for `holder`, from whoever has it."""
+        """Gives the lease to `holder`, also while another holder has it."""
         self._number += 1
         self._current = Lease(self._robot_name, holder, self._number)
         return self._current
 
     def give_back(self, lease: Lease) -> bool:
-        """True when `lease` was the one that counted."""
+        """Frees the lease; returns False when `lease` did not count."""
         if lease != self._current:
             return False
         self._current = None
         return True
 
     def refusal(self, lease: Lease) -> str | None:
-        """Why `lease` gives no right to move, or None when it does."""
+        """Reason why `lease` does not allow motion; None when it does."""
         if lease == self._current:
             return None
         holder = self._current.holder if self._current else "nobody"
@@ -79,15 +79,15 @@ class LeaseManager:
 
 
 class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
-    """A robot that senses, keeps the book of its commands, and obeys who holds its lease.
+    """Simulated robot that senses, and runs the commands of the holder of its lease.
 
-    What it keeps are its servos and sensors; commands and leases do not outlive its computer.
+    Its saved state is that of servos and sensors; commands and leases end with its computer.
     """
 
     def __init__(
         self, body: RobotBody, index: ActuatedJoints, sensors: SensorSuite, context: Context, gripper: GripperTolerances
     ) -> None:
-        """Takes over the robot as it stands in the plant's `context` at time 0."""
+        """Takes over the robot at the state of the plant's `context`, at time 0."""
         self._name, self._capabilities, self._sensors = body.name, body.kind.capabilities(), sensors
         self._plant, self._instance, self._index, self._context = body.plant, body.instance, index, context
         joints = self._joints()
@@ -100,11 +100,11 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
 
     @property
     def name(self) -> str:
-        """The robot's name."""
+        """Name of the robot."""
         return self._name
 
     def capabilities(self) -> Capabilities:
-        """What this robot is and can do."""
+        """Capabilities of this robot."""
         return self._capabilities
 
     def odometry(self) -> Odometry:
@@ -194,13 +194,13 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
-        """What became of a command. Raises KeyError for an id never given."""
+        """Returns the status of a command. Raises KeyError for an unknown id."""
         return self._commands.status(command)
 
     # -- own ------------------------------------------------------------------------------------------------------
 
     def lease_holder(self) -> Lease | None:
-        """The lease that counts now; None while it is free."""
+        """Lease that counts now, or None while it is free."""
         return self._leases.current
 
     def acquire_lease(self, holder: str) -> Lease:
@@ -208,12 +208,12 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         return self._leases.acquire(holder)
 
     def take_lease(self, holder: str) -> Lease:
-        """Takes the lease from whoever holds it; the robot stops."""
+        """Takes the lease from its holder; the robot stops."""
         self._halt_all("the lease was taken by " + repr(holder))
         return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
-        """Gives the lease back; the robot stops. A lease that was taken away is ignored."""
+        """Returns the lease; the robot stops. A lease that no longer counts is ignored."""
         if self._leases.give_back(lease):
             self._halt_all("the lease was returned")
 
@@ -225,7 +225,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         self._sensors.update(now_s)
 
     def control(self, now_s: float, dt_s: float) -> None:
-        """Command all servos for the next dt_s of simulated time, which bear the robot's weight besides."""
+        """Commands all servos for the next dt_s of simulated time, with feed-forward against gravity."""
         self._now_s = now_s
         self._expire()
         joints, rates = self._joints(), self._rates()
@@ -240,17 +240,17 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         plant.get_actuation_input_port(self._instance).FixValue(context, feed_forward)
 
     def state(self) -> State:
-        """What the robot itself keeps, and whether its arm moves."""
+        """Returns the state of servos and sensors, and whether the arm moves."""
         return {**super().state(), "arm_moves": self._commands.running(Part.ARM) is not None}
 
     def restore(self, state: State) -> None:
-        """Has such a state: an arm that was moving holds where it is; the gripper keeps its clamp."""
+        """Restores a state: an arm that was moving holds its position, and the gripper keeps its force."""
         super().restore(state)
         if state["arm_moves"]:
             self._arm.hold(self._joints())
 
     def power_up(self, now_s: float) -> None:
-        """Begins again where it stands: nobody has the lease, no command runs; take readings."""
+        """Starts the robot where it stands, without lease and commands, and takes readings."""
         self._now_s = now_s
         self._commands, self._leases = CommandTable(), LeaseManager(self._name)
         self._sensors.power_up(now_s)
@@ -263,14 +263,14 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
 
     @abstractmethod
     def _fingers_at(self, joints: FloatArray, rates: FloatArray) -> tuple[float, float]:
-        """How far the gripper is open, and how fast its fingers move, in the unit of its kind and s."""
+        """Opening of the gripper and rate of its fingers, in the unit of its kind and per second."""
 
     @abstractmethod
     def _desired(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> FloatArray:
-        """Positions and velocities that all joints but the arm's are to have after dt_s."""
+        """Desired positions and velocities of all joints after dt_s; the caller fills in those of the arm."""
 
     def _hold_still(self, part: Part) -> None:
-        """Makes where a part is the place where it stays; a gripper that clamps something goes on clamping."""
+        """Sets the goal of a part to its present position; a gripper that clamps an object keeps its force."""
         if part is Part.ARM:
             self._arm.hold(self._joints())
         if part is Part.GRIPPER:

@@ -65,10 +65,7 @@ class PlacedRobot:
 
 
 class RobotBody(ABC):
-    """One robot's bodies and joints in a plant.
-
-    `body` has the protocol's body frame B, `hand` its hand frame H.
-    """
+    """Bodies and joints of one robot in a plant; `body` has the protocol's body frame B, `hand` the hand frame H."""
 
     def __init__(
         self,
@@ -98,7 +95,7 @@ class RobotBody(ABC):
 
     @property
     def hand(self) -> RigidBody:
-        """The last link of the arm."""
+        """Last link of the arm."""
         return self.plant.GetBodyByName(self.kind.gripper_links[0], self.instance)
 
     def outline_W(self, context: Context) -> FloatArray:
@@ -108,11 +105,11 @@ class RobotBody(ABC):
         return np.asarray(self.plant.EvalBodyPoseInWorld(context, self.body).multiply(corners_B.T).T[:, :2])
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
-        """The model instances that make up this robot."""
+        """Model instances of this robot."""
         return (self.instance,)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Lets links of this robot pass each other, and what never touches the floor pass it."""
+        """Lets links of this robot pass each other, and links that never stand on the floor pass it."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))
@@ -140,22 +137,22 @@ class RobotBody(ABC):
 
 
 class PlantRobot(Robot, Protocol):
-    """A simulated robot: the protocol, and what the simulation calls in turn."""
+    """Simulated robot: the protocol, and the methods that the engine calls."""
 
     def control(self, now_s: float, dt_s: float) -> None:
-        """Command all servos for the next dt_s of simulated time."""
+        """Commands all servos for the next dt_s of simulated time."""
 
     def sense(self, now_s: float) -> None:
         """Takes new sensor readings."""
 
     def state(self) -> State:
-        """What the robot itself keeps: servos and sensors. Commands and leases do not outlive its computer."""
+        """Returns the state of servos and sensors; commands and leases end with the robot's computer."""
 
     def restore(self, state: State) -> None:
-        """Has such a state, before it powers up."""
+        """Restores a state, before `power_up`."""
 
     def power_up(self, now_s: float) -> None:
-        """Begins again where it stands: nobody has the lease, no command runs; take readings."""
+        """Starts the robot where it stands, without lease and commands, and takes readings."""
 
 
 @dataclass(frozen=True)
@@ -195,13 +192,13 @@ class RobotKind:
 
 @cache
 def robot_kinds() -> Mapping[str, EntryPoint]:
-    """The kinds that are installed, by name. The modules of each are loaded when it is first used."""
+    """Entry points of the installed kinds by name; a kind is loaded when it is first used."""
     return {entry.name: entry for entry in sorted(installed_plugins(GROUP))}
 
 
 @cache
 def robot_kind(name: str) -> RobotKind:
-    """A kind by its name. Raises KeyError: it is not installed. Raises InputError: its plug-in is broken."""
+    """Loads a kind by its name. Raises KeyError when it is not installed, InputError when its plug-in is broken."""
     entry = robot_kinds()[name]
     try:
         kind: RobotKind = run_plugin(entry, entry.load)

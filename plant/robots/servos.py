@@ -1,4 +1,4 @@
-"""A robot's joints and their servos: where they stand in the plant's state, set points of an arm and of a gripper."""
+"""The joints and servos of a robot: indices in the plant's state, and set points of arm and gripper."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Indices = NDArray[np.int64]
 
 
 class ActuatedJoints:
-    """The actuated joints of a model instance, in the order of its actuators; after Finalize.
+    """Actuated joints of a model instance, in the order of its actuators; after Finalize.
 
-    `positions` and `velocities` index the plant's state. In the actuators' desired state positions come first, then
-    velocities: a joint's place there is its number here, and `rates_of` gives that of its velocity.
-    Each kind of robot says which are the arm's, and their speed limits (rad/s).
+    `positions` and `velocities` are indices in the plant's state. The desired state of the actuators has all positions
+    first, then all velocities: a joint's number is the index of its position; `rates_of` gives that of its velocity.
+    Each kind of robot sets the numbers of the arm's joints and their speed limits (rad/s).
     """
 
     arm: Indices
@@ -42,17 +42,17 @@ class ActuatedJoints:
         self._damping = np.array([each.d for each in gains])
 
     def numbers(self, names: Sequence[str]) -> Indices:
-        """The joints' numbers, in the order of `names`."""
+        """Numbers of joints, in the order of `names`."""
         return np.array([self.names.index(name) for name in names])
 
     def rates_of(self, numbers: Indices) -> Indices:
-        """Where the velocities of joints stand in the desired state."""
+        """Indices of the joints' velocities in the desired state."""
         return len(self.names) + numbers
 
     def efforts_of(
         self, desired: FloatArray, feed_forward: FloatArray, positions: FloatArray, rates: FloatArray
     ) -> FloatArray:
-        """Efforts of the actuators in a state, for a desired state and feed-forward efforts."""
+        """Efforts of the actuators at positions and rates, for a desired state and feed-forward efforts."""
         goals, goal_rates = desired[: len(self.names)], desired[len(self.names) :]
         wanted = self.stiffness * (goals - positions) + self._damping * (goal_rates - rates) + feed_forward
         efforts: FloatArray = np.minimum(np.maximum(wanted, -self.efforts), self.efforts)
@@ -61,7 +61,7 @@ class ActuatedJoints:
 
 @dataclass(frozen=True)
 class GripperGoal:
-    """Opening to reach (0 closed, in the unit of the gripper's kind) with at most `force_n` at the tip."""
+    """Opening that a gripper reaches (0 closed, in the unit of its kind) with at most `force_n` at the tip."""
 
     opening: float
     force_n: float
@@ -69,7 +69,7 @@ class GripperGoal:
 
 @dataclass(frozen=True)
 class GripperTolerances:
-    """When an opening is reached, and when the fingers stand still against something (units of the opening, s)."""
+    """Limits at which an opening is reached, and fingers count as blocked by an object (units of the opening, s)."""
 
     arrived: float
     stall_rate: float
@@ -77,7 +77,7 @@ class GripperTolerances:
 
 
 class Closing(enum.Enum):
-    """How far a gripper is with its goal."""
+    """Progress of a gripper towards its goal."""
 
     MOVING = "moving"
     ARRIVED = "arrived"
@@ -85,28 +85,28 @@ class Closing(enum.Enum):
 
 
 class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
-    """The present goal of one gripper, and the one before."""
+    """Servo of one gripper: its goal, and the previous goal."""
 
     def __init__(self, opening: float, tolerances: GripperTolerances) -> None:
-        """The gripper stands at an opening."""
+        """Starts at an opening."""
         self._tolerances = tolerances
         self.goal = self._before = GripperGoal(opening, 20.0)
         self._still_s = 0.0
 
     def begin(self, goal: GripperGoal) -> None:
-        """Takes a new goal."""
+        """Sets a goal."""
         self._before, self.goal = self.goal, goal
         self._still_s = 0.0
 
     def follow(self, opening: float, rate: float, dt_s: float) -> Closing:
-        """How far it is, after dt_s at an opening that changes at a rate."""
+        """Returns the progress after dt_s at an opening that changes at a rate."""
         self._still_s = self._still_s + dt_s if rate < self._tolerances.stall_rate else 0.0
         if abs(opening - self.goal.opening) < self._tolerances.arrived:
             return Closing.ARRIVED
         return Closing.BLOCKED if self._still_s > self._tolerances.stall_s else Closing.MOVING
 
     def halt(self, opening: float, rate: float) -> None:
-        """Stay: a moving gripper where it is; one that holds an object keeps its force, or gets that of before."""
+        """Stops a moving gripper where it is; a gripper that holds an object keeps its force, or its previous goal."""
         if rate >= self._tolerances.stall_rate:
             self.goal = GripperGoal(opening, self.goal.force_n)
         elif self.goal.opening > opening:
@@ -114,12 +114,12 @@ class GripperServo(Stateful, saved=("goal", "_before", "_still_s")):
 
 
 def clip(value: float, most: float) -> float:
-    """The value, cut to [-most, most]."""
+    """Value, clipped to [-most, most]."""
     return min(max(value, -most), most)
 
 
 def gripper_set_point(goal: float, now: float, lead: float) -> float:
-    """Position that a servo is given so that it pushes with no more than its gain times `lead`."""
+    """Set point with which a servo pushes with at most its gain times `lead`."""
     return min(max(goal, now - lead), now + lead)
 
 
@@ -129,20 +129,20 @@ _TRAJECTORY_START_RAD = 0.25
 
 
 class ArmServos(Stateful, saved=("goal_rad",)):
-    """Set points of one arm's joints."""
+    """Servos of one arm: the set points of its joints."""
 
     def __init__(self, joints: ActuatedJoints, now_rad: FloatArray) -> None:
-        """`now_rad` is where all joints are."""
+        """Holds the arm; `now_rad` has the positions of all joints."""
         self._arm, self._fastest_rad_s = joints.arm, joints.fastest_arm_rad_s
         self._lower, self._upper = joints.lower[self._arm] - 1e-3, joints.upper[self._arm] + 1e-3
         self.hold(now_rad)
 
     def hold(self, joints_rad: FloatArray) -> None:
-        """Stay where all joints are."""
+        """Holds the arm at its present position; `joints_rad` has the positions of all joints."""
         self.goal_rad, self.rate_rad_s = joints_rad[self._arm], np.zeros(len(self._arm))
 
     def refusal(self, trajectory: ArmTrajectory) -> str | None:
-        """Why the arm cannot follow a trajectory from here."""
+        """Reason why the arm cannot follow a trajectory from its set point; None when it can."""
         positions = trajectory.positions_rad
         if positions.shape[1] != len(self._arm):
             return f"move_arm: {positions.shape[1]} joints given, the arm has {len(self._arm)}"
@@ -162,7 +162,7 @@ class ArmServos(Stateful, saved=("goal_rad",)):
     def follow(
         self, trajectory: ArmTrajectory | None, elapsed_s: float, joints_rad: FloatArray, rates_rad_s: FloatArray
     ) -> bool:
-        """Take the set points at a time since the trajectory's start, if there is one; True when it has ended there."""
+        """Sets the set points at a time since the trajectory's start; returns True when the arm has reached its end."""
         self.rate_rad_s = np.zeros(len(self._arm))
         if trajectory is None:
             return False
@@ -174,7 +174,7 @@ class ArmServos(Stateful, saved=("goal_rad",)):
 
 
 def arm_set_point(trajectory: ArmTrajectory, elapsed_s: float) -> tuple[FloatArray, FloatArray]:
-    """Positions and velocities (J,), (J,) of a trajectory at a time since its start; at rest beyond its ends."""
+    """Positions (J,) and velocities (J,) of a trajectory at a time since its start; at rest beyond its ends."""
     times, positions = trajectory.times_s, trajectory.positions_rad
     if len(times) == 1 or elapsed_s >= times[-1]:
         return positions[-1].copy(), np.zeros(positions.shape[1])

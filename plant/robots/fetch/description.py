@@ -1,4 +1,4 @@
-"""Fetch's model as URDF text, made of the facts in `fetch.yaml` and of primitive shapes."""
+"""Fetch's URDF text, made from the facts in `fetch.yaml` and primitive shapes."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ HEAD_CAMERA = "head"
 
 @cache
 def fetch_facts() -> Mapping[str, Any]:
-    """The facts in `fetch.yaml`."""
+    """Facts in `fetch.yaml`."""
     facts: Mapping[str, Any] = read_yaml(FACTS).data
     return facts
 
 
 @cache
 def head_camera() -> CameraSpec:
-    """The head's camera: colour and depth of the same size."""
+    """Camera of the head: colour and depth with the same intrinsics."""
     camera = fetch_facts()["camera"]
     width, height = camera["width"], camera["height"]
     focal = width / 2.0 / math.tan(math.radians(camera["horizontal_field_of_view_deg"]) / 2.0)
@@ -58,7 +58,7 @@ def head_camera() -> CameraSpec:
 
 
 def fetch_urdf(*, root: str = BASE_LINK) -> str:
-    """URDF text of Fetch whose free root link is `base_link`, or `body`, from which the base then hangs.
+    """URDF text of Fetch with the free root link `base_link`, or `body`, below which the base then hangs.
 
     The lift's joint reads the same either way: 0 with the torso down.
     """
@@ -85,7 +85,7 @@ def fetch_urdf(*, root: str = BASE_LINK) -> str:
 
 
 def _base(facts: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The base with the column on it, as one link."""
+    """Facts of the base and its column as one link."""
     base, column = facts["base"], facts["column"]
     offset = np.array(column["xyz"])
     parts = [({**base, "mass": base["mass"] - facts["casters"]["mass"]}, np.zeros(3)), (column, offset)]
@@ -110,7 +110,7 @@ def _moved(shape: urdf.Shape, offset: Any) -> urdf.Shape:
 
 
 def _add(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> None:
-    """A link with what touches and what is drawn."""
+    """Adds a link with its collision and visual shapes."""
     link = urdf.add_link(robot, name, part)
     for index, shape in enumerate(part["shapes"]):
         urdf.add_collision(link, f"{name}_{index}", shape, {})
@@ -124,7 +124,7 @@ def _add(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> None
 
 
 def _add_casters(robot: ElementTree.Element, casters: Mapping[str, Any]) -> None:
-    """What else stands on the floor: a link of its own, since what touches there is no collision."""
+    """Adds the casters as a link of their own, because their contact with the floor is no collision."""
     radius = casters["radius"]
     link = urdf.add_link(robot, CASTERS_LINK, {**casters, "com": (0, 0, radius)})
     urdf.add_fixed(robot, CASTERS_LINK, BASE_LINK, CASTERS_LINK, (0, 0, 0))
@@ -158,7 +158,7 @@ def _add_lift(robot: ElementTree.Element, lift: Mapping[str, Any], root: str) ->
 
 
 def _add_finger(robot: ElementTree.Element, name: str, side: int, finger: Mapping[str, Any]) -> None:
-    """A finger; the one of the side -1 is mirrored along the closing, z."""
+    """Adds a finger; the finger of side -1 is mirrored along z, the direction of closing."""
     pads = finger["pads"]
     part = {
         **finger,
@@ -179,5 +179,5 @@ def _mirrored(xyz: Sequence[float], side: int) -> list[float]:
 
 
 def arm_joint_names() -> Sequence[str]:
-    """The seven arm joints from the shoulder on, without the gripper."""
+    """Names of the seven arm joints from the shoulder on, without the gripper."""
     return tuple(part["link"] for part in fetch_facts()["arm"])

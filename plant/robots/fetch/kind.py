@@ -1,4 +1,4 @@
-"""Fetch as a kind of robot: what it is and can do."""
+"""Fetch as a kind of robot: its capabilities, and how it is built in a plant."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _CORNERS = 12
 
 @cache
 def fetch_capabilities() -> Capabilities:
-    """The capabilities of Fetch."""
+    """Capabilities of Fetch."""
     facts = fetch_facts()
     body, arm, head = facts["capabilities"], facts["arm"], facts["head"]
     arm_room = facts["arm_room"]
@@ -97,7 +97,7 @@ def _gripper() -> GripperCapabilities:
 
 
 def _round(radius_m: float) -> tuple[tuple[float, float], ...]:
-    """A polygon about a circle, counter-clockwise."""
+    """Polygon that circumscribes a circle, counter-clockwise."""
     out_m = radius_m / math.cos(math.pi / _CORNERS)
     angles = [(k + 0.5) * math.tau / _CORNERS for k in range(_CORNERS)]
     return tuple((out_m * math.cos(a), out_m * math.sin(a)) for a in angles)

@@ -1,4 +1,4 @@
-"""One Fetch inside a MultibodyPlant: the model on its own wheels, its servos' gains, and where its joints stand."""
+"""Fetch in a MultibodyPlant: its model on its own wheels, the gains of its servos, and the indices of its joints."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _GAINS = {
 
 
 class FetchModel(RobotBody):
-    """Fetch's bodies and joints in a plant. It stands on its wheels and casters; its fingers are geared together."""
+    """Bodies and joints of Fetch in a plant; it stands on wheels and casters, and its fingers are coupled."""
 
     def __init__(self, plant: MultibodyPlant, robot: PlacedRobot) -> None:
         """Adds the robot to `plant` (before Finalize)."""
@@ -62,7 +62,7 @@ class FetchModel(RobotBody):
 
 
 class JointIndex(ActuatedJoints):
-    """Fetch's joints: the numbers of wheels, lift, head, arm and fingers."""
+    """Joints of Fetch: the numbers of wheels, lift, head, arm and fingers."""
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
         super().__init__(plant, instance)

@@ -36,16 +36,16 @@ _LIDAR_SIGMA_M = 0.015
 
 
 def axle() -> Axle:
-    """Fetch's driven wheels."""
+    """Axle of Fetch's driven wheels."""
     wheel = fetch_facts()["wheel"]
     return Axle(wheel["radius"], wheel["offset"][1])
 
 
 class FetchSensors(SensorSuite, saved=("_odometer",)):
-    """All sensors of one Fetch."""
+    """Sensors of one Fetch."""
 
     def __init__(self, model: FetchModel, joints: JointIndex, options: SensorOptions) -> None:
-        """`options.context` is the plant's."""
+        """Mounts the sensors on `model`."""
         self._joints, facts = joints, fetch_facts()
         self._p_BaseL = np.array(facts["lidar"]["xyz"])
         wheels_rad = model.plant.GetPositions(options.context)[joints.positions[joints.wheels]]
@@ -61,11 +61,11 @@ class FetchSensors(SensorSuite, saved=("_odometer",)):
         )
 
     def count_wheels(self, wheels_rad: FloatArray) -> None:
-        """Takes in where the wheels (2,) are: encoders count faster than readings are asked for."""
+        """Counts the turns of the wheels (2,) in each control period, more often than readings are taken."""
         self._odometer.count(wheels_rad)
 
     def _reckoned(self, X_WB: RigidTransform) -> RigidTransform:
-        """The pose that the encoders count, at the height of the lift, tilted as the body really is."""
+        """Pose by the wheel encoders, at the height of the lift, with the true tilt of the body."""
         plant = self._body.plant
         positions = np.asarray(plant.GetPositions(self._context)[self._joints.positions])
         self._odometer.count(positions[self._joints.wheels])
@@ -75,7 +75,7 @@ class FetchSensors(SensorSuite, saved=("_odometer",)):
         return RigidTransform(tilted, np.array([pose.x_m, pose.y_m, height_m]))
 
     def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
-        """How far the fingers are apart, and the force of each on what is between them."""
+        """Distance between the fingers, and the force of each finger on an object between them."""
         fingers = self._joints.fingers
         opening = float(positions[fingers].sum())
         if float(np.abs(rates[fingers]).max()) > _GRIPPER_MOVES_M_S:
@@ -83,7 +83,7 @@ class FetchSensors(SensorSuite, saved=("_odometer",)):
         return opening, max(0.0, -float(efforts[fingers].mean()))
 
     def _X_BL(self) -> RigidTransform:
-        """The LiDAR stays with the base when the lift moves the body frame."""
+        """Pose of the LiDAR, which stays with the base when the lift moves the body frame."""
         height_m = fetch_facts()["lift"]["height"] + self.joints.position_rad[LIFT_JOINT]
         return RigidTransform(self._p_BaseL - [0.0, 0.0, height_m])
 
@@ -93,7 +93,7 @@ class FetchSensors(SensorSuite, saved=("_odometer",)):
 
 
 def lidar_spec() -> LidarSpec:
-    """One ring ahead and to the sides."""
+    """Specification of the planar LiDAR: one ring ahead and to the sides."""
     lidar = fetch_facts()["lidar"]
     return LidarSpec(
         rings=1,
@@ -110,7 +110,7 @@ _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.002, stall_rate=0.004)
 _LIFT_ARRIVED_M = 0.01
 _HEAD_ARRIVED_RAD, _HEAD_STILL_RAD_S = 0.01, 0.05
 _HEAD_SPEED_SHARE = 0.8
-"""Of the head's top speed, so that its weak motors follow."""
+"""Share of the head's top speed that its weak motors can follow."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class _LiftGoal:
 
 
 class FetchRobot(CommandedRobot, saved=("_fingers_m", "_wheels", "_head", "_head_goal", "_lift", "_lift_goal")):
-    """One Fetch: takes commands under a lease and turns them into set points of the plant's servos."""
+    """One Fetch: turns the commands of the lease's holder into set points of the plant's servos."""
 
     _index: JointIndex
 
@@ -209,7 +209,7 @@ class FetchRobot(CommandedRobot, saved=("_fingers_m", "_wheels", "_head", "_head
             self._commands.finish(Part.HEAD, CommandState.DONE)
 
     def _fingers(self, desired: FloatArray, now_m: FloatArray, dt_s: float) -> None:
-        """Sets points of the fingers: they go at their speed, and push with no more than the goal's force."""
+        """Sets the set points of the fingers, at their speed and with at most the goal's force."""
         goal, most_m = self._gripper.goal, self._finger_m_s * dt_s
         self._fingers_m = self._fingers_m + np.clip(goal.opening / 2.0 - self._fingers_m, -most_m, most_m)
         lead_m = goal.force_n / FINGER_GAIN_N_M

@@ -1,4 +1,4 @@
-"""Two driven wheels: set points that follow a velocity within limits, and the way that the encoders count."""
+"""Two driven wheels: set points that follow a velocity within limits, and odometry by their encoders."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from plant.saved_state import Stateful
 from skills.robot import FloatArray, Pose2D, quantities
 
 _MEAN_AHEAD = 0.75
-"""Of the way of a control period: where the two steps of the plant in it end, in the mean."""
+"""Mean share of a control period's distance at the ends of its two plant steps."""
 
 
 @dataclass(frozen=True)
 class WheelLimits(LocomotionLimits):
-    """Two driven wheels that bear a base: what they make of a velocity; the motors alone could push at 2.6 m/s^2.
+    """Limits of two driven wheels that bear a base; the motors alone could accelerate it by 2.6 m/s^2.
 
-    `lead_rad` is how far a wheel's set point runs ahead of it where it cannot follow.
+    `lead_rad` is the greatest distance of a wheel's set point from a wheel that cannot follow.
     """
 
     speed_m_s: quantities.Speed = 1.0
@@ -35,7 +35,7 @@ class WheelLimits(LocomotionLimits):
 
 @dataclass(frozen=True)
 class Axle:
-    """Wheels of a radius at y = +- `half_track_m`, the left one first."""
+    """Two wheels of a radius at y = +- `half_track_m`, the left one first."""
 
     radius_m: float
     half_track_m: float
@@ -46,13 +46,13 @@ class Axle:
         return np.array([speed_m_s - across, speed_m_s + across]) / self.radius_m
 
     def travel(self, turned_rad: FloatArray) -> tuple[float, float]:
-        """Way ahead (m) and turn (rad) of the base for what the wheels (2,) have turned without slip."""
+        """Distance ahead (m) and turn (rad) of the base for turns (rad) of the wheels (2,) without slip."""
         left_m, right_m = (self.radius_m * turned_rad).tolist()
         return (left_m + right_m) / 2.0, (right_m - left_m) / (2.0 * self.half_track_m)
 
 
 class WheelServos(Stateful, saved=("_speed", "_turn_rate", "_due_rad")):
-    """Set points of the wheels for a wanted velocity; at rest they hold the wheels where they are."""
+    """Servos of the wheels: set points for a wanted velocity; at rest they hold the wheels."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray, limits: WheelLimits) -> None:
         """The wheels (2,) stand at `now_rad`."""
@@ -74,7 +74,7 @@ class WheelServos(Stateful, saved=("_speed", "_turn_rate", "_due_rad")):
 
 
 class WheelOdometer(Stateful, saved=("pose", "_last_rad")):
-    """The base's pose since the beginning, as its wheels' encoders count it: slip goes unnoticed."""
+    """Odometer: pose of the base since the beginning, by the wheel encoders, which do not notice slip."""
 
     def __init__(self, axle: Axle, now_rad: FloatArray) -> None:
         """The wheels (2,) stand at `now_rad`, the base at the origin."""
@@ -82,12 +82,12 @@ class WheelOdometer(Stateful, saved=("pose", "_last_rad")):
         self.pose = Pose2D(0.0, 0.0, 0.0)
 
     def count(self, now_rad: FloatArray) -> None:
-        """Takes in where the wheels are; the base went along an arc since the last time."""
-        way_m, turn_rad = self._axle.travel(now_rad - self._last_rad)
+        """Adds the arc that the base has driven since the last count; the wheels (2,) stand at `now_rad`."""
+        ahead_m, turn_rad = self._axle.travel(now_rad - self._last_rad)
         self._last_rad = now_rad.copy()
         middle = self.pose.yaw_rad + turn_rad / 2.0
         self.pose = Pose2D(
-            self.pose.x_m + way_m * math.cos(middle),
-            self.pose.y_m + way_m * math.sin(middle),
+            self.pose.x_m + ahead_m * math.cos(middle),
+            self.pose.y_m + ahead_m * math.sin(middle),
             math.remainder(self.pose.yaw_rad + turn_rad, math.tau),
         )

@@ -1,1 +1,1 @@
-"""The simulated Spot behind the Robot protocol."""
+"""The simulated Spot: floating base, legs, arm, gripper and sensors behind the Robot protocol."""

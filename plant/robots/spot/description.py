@@ -1,6 +1,6 @@
-"""Spot's model as URDF text, made of the facts in `spot.yaml` and of primitive shapes.
+"""Spot's URDF text, made from the facts in `spot.yaml` and primitive shapes.
 
-Visual meshes come from a data package, where it is installed; without it the collision shapes are drawn.
+Visual meshes come from a data package if it is installed; else the collision shapes are drawn.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MESH_PREFIX = {"fl": "front_left", "fr": "front_right", "hl": "rear_left", "hr"
 
 @cache
 def spot_facts() -> Mapping[str, Any]:
-    """The facts in `spot.yaml`."""
+    """Facts in `spot.yaml`."""
     facts: Mapping[str, Any] = read_yaml(FACTS).data
     return facts
 
@@ -34,7 +34,7 @@ def spot_facts() -> Mapping[str, Any]:
 def spot_urdf(*, visuals: bool = False) -> str:
     """URDF text of Spot with arm and LiDAR; root link `body`, free.
 
-    With `visuals` they are meshes under `package://spot_visuals/`, else the collision shapes.
+    With `visuals` its appearance is meshes under `package://spot_visuals/`, else the collision shapes.
     """
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="spot")
@@ -65,7 +65,7 @@ def _add_leg(robot: ElementTree.Element, leg: str, facts: Mapping[str, Any], *, 
 
 
 def _mirrored(part: Mapping[str, Any], leg: str, *, flip_x: bool) -> dict[str, Any]:
-    """A left (front) leg's part for another leg."""
+    """Mirrors a part of the front left leg for another leg."""
     x, y = _SIDES[leg]
     signs = (x if flip_x else 1, y, 1)
     mirrored = dict(part)
@@ -98,7 +98,7 @@ def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *,
 
 
 def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], Mapping[str, float]]]:
-    """Each collision shape of a link with its proximity properties."""
+    """Collision shapes of a link with their proximity properties."""
     for shape in part.get("collision", ()):
         yield shape, {}
     if "foot" in part:
@@ -134,10 +134,10 @@ def _add_lidar(robot: ElementTree.Element, lidar: Mapping[str, Any]) -> None:
 
 
 def arm_joint_names() -> Sequence[str]:
-    """The six arm joints from the shoulder on, without the gripper."""
+    """Names of the six arm joints from the shoulder on, without the gripper."""
     return tuple(part["link"] for part in spot_facts()["arm"][:-1])
 
 
 def leg_joint_names(leg: str) -> Sequence[str]:
-    """The three joints of a leg: hip x, hip y, knee."""
+    """Names of the three joints of a leg: hip x, hip y, knee."""
     return tuple(f"{leg}_{joint}" for joint in ("hx", "hy", "kn"))

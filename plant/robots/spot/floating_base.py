@@ -1,4 +1,4 @@
-"""The planar floating base that bears the body until the legs do: five joints with effort limits.
+"""The planar floating base that bears Spot's body in place of the legs: five joints with effort limits.
 
 World -> prismatic x -> prismatic y -> revolute yaw -> prismatic height -> revolute pitch -> weld -> body.
 """
@@ -36,7 +36,7 @@ from skills.robot import FloatArray, Pose2D, quantities
 
 @dataclass(frozen=True)
 class FloatingBaseLimits(LocomotionLimits):
-    """A planar floating base that bears the body: what it can do; forces in N, torques in N m."""
+    """Limits of a planar floating base that bears the body; forces in N, torques in N m."""
 
     speed_m_s: quantities.Speed = 1.6
     turn_rate_rad_s: quantities.TurnRate = 2.0
@@ -58,10 +58,10 @@ _GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3
 
 
 class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
-    """Bears one robot's body and drives it to a velocity and a posture with limited force and acceleration."""
+    """Floating base of one robot: drives the body to a velocity and a posture with limited force and acceleration."""
 
     def __init__(self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits) -> None:
-        """Adds the joints to `plant` (before Finalize) and weld `body` to the last of them."""
+        """Adds the joints to `plant` (before Finalize); the last joint carries `body`."""
         self._plant = plant
         self._limits = limits
         self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
@@ -72,11 +72,19 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
 
     def _add_joints(self, name: str, body: RigidBody) -> Sequence[Joint]:
         directions = {"x": (1, 0, 0), "y": (0, 1, 0), "yaw": (0, 0, 1), "height": (0, 0, 1), "pitch": (0, 1, 0)}
-        efforts = self._efforts()
+        limits, inertia = self._limits, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+        efforts = {
+            "x": limits.force_n,
+            "y": limits.force_n,
+            "yaw": limits.torque_nm,
+            "height": limits.lift_n,
+            "pitch": limits.pitch_torque_nm,
+        }
         parent: RigidBody = self._plant.world_body()
         joints: list[Joint] = []
         for axis in _AXES:
-            child = body if axis == _AXES[-1] else self._add_link(f"{name}_floating_base_{axis}")
+            link = f"{name}_floating_base_{axis}"
+            child = body if axis == _AXES[-1] else self._plant.AddRigidBody(link, self.instance, inertia)
             frames = (
                 self._add_frame(f"{name}_floating_base_{axis}_F", parent),
                 self._add_frame(f"{name}_floating_base_{axis}_M", child),
@@ -90,41 +98,27 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
             parent = child
         return joints
 
-    def _add_link(self, name: str) -> RigidBody:
-        inertia = SpatialInertia.SolidSphereWithMass(0.05, 0.05)
-        return self._plant.AddRigidBody(name, self.instance, inertia)
-
     def _add_frame(self, name: str, body: RigidBody) -> Frame:
         return self._plant.AddFrame(FixedOffsetFrame(name, body.body_frame(), RigidTransform(), self.instance))
 
-    def _efforts(self) -> dict[str, float]:
-        limits = self._limits
-        return {
-            "x": limits.force_n,
-            "y": limits.force_n,
-            "yaw": limits.torque_nm,
-            "height": limits.lift_n,
-            "pitch": limits.pitch_torque_nm,
-        }
-
     @property
     def velocity(self) -> Velocity:
-        """The velocity that is being commanded now, after the acceleration limit."""
+        """Commanded velocity now, after the acceleration limit."""
         return self._velocity
 
     @property
     def posture(self) -> tuple[float, float]:
-        """The height and pitch that are being commanded now, on the way to those wanted."""
+        """Commanded height and pitch now, after the speed limits."""
         return self._posture
 
     def pose(self, positions: FloatArray) -> list[float]:
-        """(x, y, yaw, height, pitch) out of the plant's positions."""
+        """Pose (x, y, yaw, height, pitch) in the plant's positions."""
         values: list[float] = positions[self._places].tolist()
         return values
 
     @cached_property
     def _places(self) -> list[int]:
-        """Where the joints stand in the plant's positions; after Finalize."""
+        """Indices of the joints in the plant's positions; after Finalize."""
         return [joint.position_start() for joint in self._joints]
 
     def place(self, context: Context, pose: Pose2D, height_m: float) -> None:
@@ -147,7 +141,7 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
         *,
         stopping: bool,
     ) -> None:
-        """Command the joints for the next dt_s: ramp to `wanted` (body frame) and to the posture (height, pitch).
+        """Commands the joints for the next dt_s: ramps to `wanted` (body frame) and to the posture (height, pitch).
 
         `state` is (x, y, yaw, height, pitch). A robot that is `stopping` brakes harder than it otherwise changes speed.
         """

@@ -1,4 +1,4 @@
-"""Spot as a kind of robot: what it is and can do."""
+"""Spot as a kind of robot: its capabilities, and how it is built in a plant."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @cache
 def spot_capabilities() -> Capabilities:
-    """The capabilities of Spot with its arm."""
+    """Capabilities of Spot with its arm."""
     facts = spot_facts()
     body, gripper = facts["capabilities"], facts["gripper"]
     arm_names = tuple(part["link"] for part in facts["arm"][:-1])
@@ -50,19 +50,13 @@ def spot_capabilities() -> Capabilities:
             depth_m=gripper["depth"],
             **{f"{name}_m": value for name, value in gripper["in_hand"].items()},
         ),
-        cameras=_cameras(),
+        cameras=tuple(
+            CameraCapabilities(name, spec.X_link_camera(), Mount.BODY if spec.link == "body" else Mount.HAND)
+            for name, spec in load_cameras(CAMERAS).items()
+        ),
         description=spot_urdf(),
         lidar_height_m=body["standing_height"] + facts["lidar"]["xyz"][2],
     )
-
-
-def _cameras() -> tuple[CameraCapabilities, ...]:
-    cameras = load_cameras(CAMERAS).items()
-    return tuple(CameraCapabilities(name, spec.X_link_camera(), _mount(spec.link)) for name, spec in cameras)
-
-
-def _mount(link: str) -> Mount:
-    return Mount.BODY if link == "body" else Mount.HAND
 
 
 def _add(plant: MultibodyPlant, robot: PlacedRobot, visuals: bool) -> RobotBody:

@@ -1,4 +1,4 @@
-"""Spot's legs: the trot says where its feet go, and the servos put them there."""
+"""Spot's legs: the trot plans the feet, leg kinematics and servos move them there."""
 
 from __future__ import annotations
 
@@ -18,16 +18,15 @@ _SIDES = {"fl": (1.0, 1.0), "fr": (1.0, -1.0), "hl": (-1.0, 1.0), "hr": (-1.0, -
 
 
 class UnreachableFootError(ValueError):
-    """The foot's target lies outside the leg's reach."""
+    """A target of a foot outside the reach of its leg."""
 
 
 def nominal_footholds() -> FloatArray:
-    """Resting places of the feet in the body frame, (4, 2), ordered as LEGS."""
+    """Resting positions (4, 2) of the feet in the body frame, ordered as LEGS."""
     facts = spot_facts()["legs"]
     x = facts["hip"]["offset"][0]
     y = facts["hip"]["offset"][1] + facts["upper_leg"]["offset"][1]
-    signs: dict[str, tuple[int, int]] = {"fl": (1, 1), "fr": (1, -1), "hl": (-1, 1), "hr": (-1, -1)}
-    return np.array([[sx * x, sy * y] for sx, sy in (signs[leg] for leg in LEGS)], dtype=np.float64)
+    return np.array([[sx * x, sy * y] for sx, sy in (_SIDES[leg] for leg in LEGS)], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -41,8 +40,8 @@ class LegKinematics:
     shin_m: float
 
     @staticmethod
-    def of(leg: str) -> LegKinematics:
-        """The leg named fl, fr, hl or hr."""
+    def from_facts(leg: str) -> LegKinematics:
+        """Builds the kinematics of the leg fl, fr, hl or hr."""
         facts = spot_facts()["legs"]
         x, y = _SIDES[leg]
         hip = facts["hip"]["offset"]
@@ -61,7 +60,7 @@ class LegKinematics:
         return math.hypot(self.thigh_x_m, self.thigh_z_m), math.atan2(self.thigh_x_m, self.thigh_z_m)
 
     def foot(self, hx_rad: float, hy_rad: float, kn_rad: float) -> FloatArray:
-        """p_BFoot, the foot's centre in the body frame, shape (3,)."""
+        """Centre p_BFoot (3,) of the foot in the body frame."""
         shin_x, shin_z = -self.shin_m * math.sin(kn_rad), -self.shin_m * math.cos(kn_rad)
         u_x, u_z = self.thigh_x_m + shin_x, -self.thigh_z_m + shin_z
         x = u_x * math.cos(hy_rad) + u_z * math.sin(hy_rad)
@@ -71,7 +70,7 @@ class LegKinematics:
         return np.array([x, c * y - s * z, s * y + c * z]) + self.p_BHip
 
     def joints(self, p_BFoot: Sequence[float]) -> tuple[float, float, float]:
-        """Joint angles (hip x, hip y, knee; rad) that put the foot there, knee bent backwards.
+        """Joint angles (hip x, hip y, knee; rad) of a foot position, with the knee bent backwards.
 
         Raises UnreachableFootError when the foot would lie beyond the stretched leg or inside its smallest fold.
         """
@@ -89,23 +88,19 @@ class LegKinematics:
         u_x = self.thigh_x_m - self.shin_m * math.sin(kn)
         u_z = -self.thigh_z_m - self.shin_m * math.cos(kn)
         hy = math.atan2(u_x, -u_z) - math.atan2(x, -drop)
-        return _wrap(hx), hy, kn
-
-
-def _wrap(angle_rad: float) -> float:
-    return math.remainder(angle_rad, 2 * math.pi)
+        return math.remainder(hx, 2 * math.pi), hy, kn
 
 
 _MAX_LEG_RATE_RAD_S = 20.0
 
 
 class LegServos(Stateful, saved=("_last",)):
-    """Joint set points that put the feet where the gait wants them under the body's pose."""
+    """Servos of the legs: joint set points for the feet that the gait plans."""
 
     def __init__(self, index: JointIndex, rest_rad: FloatArray) -> None:
         """`rest_rad`: (4, 3) joint angles at the beginning."""
         self._lower, self._upper = index.lower[index.legs], index.upper[index.legs]
-        self._kinematics = [LegKinematics.of(leg) for leg in LEGS]
+        self._kinematics = [LegKinematics.from_facts(leg) for leg in LEGS]
         self.rest_rad = rest_rad.copy()
         self._last = rest_rad.copy()
 
@@ -133,7 +128,7 @@ _PAIRS = ((0, 3), (1, 2))  # indices into LEGS: fl with hr, fr with hl
 
 @dataclass(frozen=True)
 class TrotParameters:
-    """Shape of the trot: how long a pair swings, how high, and how far off its place a foot may rest."""
+    """Shape of the trot: time and height of a swing, and how far off its place a foot may rest."""
 
     swing_s: float = 0.28
     swing_height_m: float = 0.07
@@ -161,14 +156,14 @@ class BodyMotion:
 
 
 class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_progress_s")):
-    """Where the four feet shall be, step by step. Feet are ordered as `LEGS`.
+    """Trot: plans the positions of the four feet, step by step. Feet are ordered as `LEGS`.
 
     Diagonal pairs of feet swing in turn, and the others stay where they are on the floor. Footholds follow Raibert's
     rule (Legged Robots That Balance, 1986): a foot lands where the hip will be in the middle of its next stance.
     """
 
     def __init__(self, nominal_B: FloatArray, parameters: TrotParameters | None = None) -> None:
-        """`nominal_B`: (4, 2) resting places of the feet in the body frame."""
+        """`nominal_B` has the resting positions (4, 2) of the feet in the body frame."""
         self._nominal_B: list[list[float]] = nominal_B.tolist()
         self._parameters = parameters or TrotParameters()
         self._feet_W = [[0.0, 0.0, 0.0] for _ in LEGS]
@@ -178,19 +173,19 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
         self._progress_s = 0.0
 
     def reset(self, motion: BodyMotion) -> None:
-        """Puts all feet to rest under a body at this pose."""
+        """Sets all feet to rest below a body at a pose."""
         self._feet_W = [[*self._place(foot, motion, 0.0), self._parameters.foot_radius_m] for foot in range(len(LEGS))]
         self._swinging = None
         self._progress_s = 0.0
 
     @property
     def stance(self) -> tuple[bool, ...]:
-        """For each foot whether it stands on the floor."""
+        """Flags of the feet that stand on the floor."""
         lifted = _PAIRS[self._swinging] if self._swinging is not None else ()
         return tuple(foot not in lifted for foot in range(len(LEGS)))
 
     def step(self, motion: BodyMotion, dt_s: float) -> Sequence[Sequence[float]]:
-        """Advance by dt_s; returns the feet's centres (x, y, z) in the world frame, to be read before the next step."""
+        """Advances by dt_s; returns the centres (x, y, z) of the feet in the world, valid until the next step."""
         if self._swinging is None:
             self._maybe_lift(motion)
         if self._swinging is not None:
@@ -207,7 +202,7 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
         self._swinging = self._next_pair
         self._next_pair = 1 - self._next_pair
         self._progress_s = 0.0
-        self._lift_W = _copied(self._feet_W)
+        self._lift_W = [list(foot) for foot in self._feet_W]
 
     def _swing(self, motion: BodyMotion, dt_s: float) -> None:
         assert self._swinging is not None
@@ -224,7 +219,7 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
             self._swinging = None
 
     def _place(self, foot: int, motion: BodyMotion, ahead_s: float) -> tuple[float, float]:
-        """Resting place (x, y) of a foot under the body as it will be so much later."""
+        """Resting position (x, y) of a foot below the body as it will be after ahead_s."""
         x, y, yaw = motion.ahead(ahead_s)
         c, s = math.cos(yaw), math.sin(yaw)
         forward, left = self._nominal_B[foot]
@@ -233,7 +228,3 @@ class Trot(Stateful, saved=("_feet_W", "_lift_W", "_swinging", "_next_pair", "_p
     def _off_place_m(self, foot: int, motion: BodyMotion) -> float:
         (x, y), (foot_x, foot_y, _) = self._place(foot, motion, 0.0), self._feet_W[foot]
         return math.hypot(foot_x - x, foot_y - y)
-
-
-def _copied(rows: Sequence[Sequence[float]]) -> list[list[float]]:
-    return [list(row) for row in rows]

@@ -1,4 +1,4 @@
-"""One Spot inside a MultibodyPlant: the model, its servos' gains, and where its joints stand in the state."""
+"""Spot in a MultibodyPlant: its model, the gains of its servos, and the indices of its joints."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _CELL_M = 0.01
 
 
 def visuals_folder() -> Path | None:
-    """The folder with Spot's simplified meshes, or None where the data package is not installed."""
+    """Folder of Spot's simplified meshes, or None when the data package is not installed."""
     spec = importlib.util.find_spec(_MODULE)
     source = Path(spec.origin).parent / _FOLDER if spec is not None and spec.origin is not None else None
     if source is None or not source.is_dir():
@@ -41,16 +41,16 @@ def visuals_folder() -> Path | None:
 
     def fill(folder: Path) -> None:
         for path in sorted(source.glob("*.obj")):
-            (folder / path.name).write_text(simplified_obj(path.read_text()))
+            (folder / path.name).write_text(simplify_obj(path.read_text()))
 
     return kept_folder(user_cache() / f"spot_visuals_{_FORMAT}", fill)
 
 
-def simplified_obj(text: str, cell_m: float = _CELL_M) -> str:
-    """OBJ text with the vertices of each cell of a grid joined into their mean, and no materials.
+def simplify_obj(text: str, cell_m: float = _CELL_M) -> str:
+    """Simplifies OBJ text: merges the vertices of each grid cell into their mean, and drops the materials.
 
-    That is vertex clustering after Rossignac and Borrel (Multi-resolution 3D approximations for rendering complex
-    scenes, 1993): faces whose corners fall together vanish. Expects triangles written as `f v//n` or `f v/t/n`.
+    Vertex clustering after Rossignac and Borrel (Multi-resolution 3D approximations for rendering complex scenes,
+    1993); faces whose corners merge vanish. Expects triangles written as `f v//n` or `f v/t/n`.
     """
     lines = [line.split() for line in text.splitlines() if line[:2] in ("v ", "vn", "f ")]
     vertices = np.array([line[1:4] for line in lines if line[0] == "v"], dtype=np.float64)
@@ -58,7 +58,7 @@ def simplified_obj(text: str, cell_m: float = _CELL_M) -> str:
     corners = [[corner.split("/") for corner in line[1:4]] for line in lines if line[0] == "f"]
     faces = np.array([[(int(c[0]) - 1, int(c[-1]) - 1) for c in face] for face in corners])  # (F, 3, 2)
     cells, cell_of = np.unique(np.floor(vertices / cell_m), axis=0, return_inverse=True)
-    kept_normals, normal_of = np.unique(np.round(normals, 1), axis=0, return_inverse=True)
+    unique_normals, normal_of = np.unique(np.round(normals, 1), axis=0, return_inverse=True)
     cell_of, normal_of = cell_of.reshape(-1), normal_of.reshape(-1)
     joined = np.zeros((len(cells), 3))
     np.add.at(joined, cell_of, vertices)
@@ -67,7 +67,7 @@ def simplified_obj(text: str, cell_m: float = _CELL_M) -> str:
     _, first = np.unique(np.sort(corner_cells, axis=1), axis=0, return_index=True)
     solid = [face for face in np.sort(first) if len(set(corner_cells[face])) == 3]
     out = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in joined]
-    out += [f"vn {x:.1f} {y:.1f} {z:.1f}" for x, y, z in kept_normals]
+    out += [f"vn {x:.1f} {y:.1f} {z:.1f}" for x, y, z in unique_normals]
     for face in solid:
         pairs = zip(corner_cells[face] + 1, corner_normals[face] + 1, strict=True)
         out.append("f " + " ".join(f"{vertex}//{normal}" for vertex, normal in pairs))
@@ -93,7 +93,7 @@ class OwnLegs(LocomotionLimits):
 
 
 class SpotModel(RobotBody):
-    """Spot's bodies, joints and floating base in a plant."""
+    """Bodies, joints and floating base of Spot in a plant."""
 
     def __init__(
         self,
@@ -111,16 +111,16 @@ class SpotModel(RobotBody):
         self.floating_base = None if own_legs else FloatingBase(plant, robot.name, self.body, limits)
 
     def opening(self, context: Context) -> float:
-        """The gripper's angle (rad), 0 closed."""
+        """Angle of the gripper (rad), 0 closed."""
         joint = self.plant.GetJointByName(GRIPPER_JOINT, self.instance)
         return -float(self.plant.GetPositions(context)[joint.position_start()])
 
     def instances(self) -> tuple[ModelInstanceIndex, ...]:
-        """The model instances that make up this robot."""
+        """Model instances of the robot and its floating base."""
         return super().instances() if self.floating_base is None else (self.instance, self.floating_base.instance)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Lets links of this robot pass each other, and its legs the floor while it is carried."""
+        """Lets links of this robot pass each other, and its legs pass the floor if a floating base bears it."""
         super().filter_collisions(filters, floor)
         if self.floating_base is not None:
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
@@ -140,7 +140,7 @@ class SpotModel(RobotBody):
 
 
 class JointIndex(ActuatedJoints):
-    """Spot's joints: the numbers of arm, gripper and legs (4, 3)."""
+    """Joints of Spot: the numbers of arm, gripper and legs (4, 3)."""
 
     def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
         super().__init__(plant, instance)

@@ -25,10 +25,10 @@ _GRIPPER_MOVES_RAD_S = 0.05
 
 
 class SpotSensors(SensorSuite):
-    """All sensors of one Spot."""
+    """Sensors of one Spot."""
 
     def __init__(self, model: SpotModel, joints: JointIndex, options: SensorOptions) -> None:
-        """`options.context` is the plant's."""
+        """Mounts the sensors on `model`."""
         self._joints = joints
         self._X_BL_mounted = RigidTransform(spot_facts()["lidar"]["xyz"])
         super().__init__(
@@ -41,7 +41,7 @@ class SpotSensors(SensorSuite):
         )
 
     def _gripper_feels(self, positions: FloatArray, rates: FloatArray, efforts: FloatArray) -> tuple[float, float]:
-        """The finger's angle, and the force at its tip from its motor's torque."""
+        """Angle of the finger, and the force at its tip by its motor's torque."""
         gripper = self._joints.gripper
         opening = -float(positions[gripper])
         if abs(float(rates[gripper])) > _GRIPPER_MOVES_RAD_S:
@@ -60,7 +60,7 @@ _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)
 
 
 class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_floating_base")):
-    """One Spot: takes commands under a lease and turns them into set points of the plant's servos."""
+    """One Spot: turns the commands of the lease's holder into set points of the plant's servos."""
 
     _index: JointIndex
 
@@ -149,7 +149,7 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
         return BodyMotion(base[0], base[1], base[2], velocity.vx, velocity.vy, velocity.wz)
 
     def _base(self) -> Sequence[float]:
-        """The floating base's (x, y, yaw, height, pitch)."""
+        """Pose (x, y, yaw, height, pitch) of the floating base."""
         floating_base = self._floating_base
         return (0.0,) * 5 if floating_base is None else floating_base.pose(self._plant.GetPositions(self._context))
 
@@ -157,7 +157,7 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
 def _feet_ahead(
     feet_W: Sequence[Sequence[float]], motion: BodyMotion, X_WB: FloatArray, dt_s: float
 ) -> list[tuple[float, float, float]]:
-    """Feet in the frame of a body that, from X_WB (3, 4), moves on for dt_s at the same height and tilt."""
+    """Positions of the feet in the body frame after dt_s; the body moves on from X_WB (3, 4) at the same tilt."""
     x, y, yaw = motion.ahead(dt_s)
     c, s = math.cos(yaw - motion.yaw_rad), math.sin(yaw - motion.yaw_rad)
     (xx, xy, xz, x0), (yx, yy, yz, y0), (zx, zy, zz, z0) = X_WB.tolist()

@@ -1,4 +1,4 @@
-from plant.robots.spot.model import simplified_obj
+from plant.robots.spot.model import simplify_obj
 
 # A square of two triangles with an edge of 1 m, and a sliver of a tenth of a millimetre at its corner.
 SOUP = """mtllib material.mtl
@@ -19,7 +19,7 @@ f 1/1/1 7/1/1 3/1/1
 
 
 def rows(kind: str) -> list[list[str]]:
-    lines = (line.split() for line in simplified_obj(SOUP, cell_m=0.01).splitlines())
+    lines = (line.split() for line in simplify_obj(SOUP, cell_m=0.01).splitlines())
     return [line[1:] for line in lines if line[0] == kind]
 
 
@@ -41,4 +41,4 @@ def test_normals_stay_with_their_faces():
 
 
 def test_material_files_are_not_named():
-    assert "mtl" not in simplified_obj(SOUP)
+    assert "mtl" not in simplify_obj(SOUP)

@@ -2,15 +2,15 @@
 
 import pytest
 
-from plant.robots.command_table import MOST_KEPT, CommandTable, Part
+from plant.robots.command_table import MOST_STATUSES, CommandTable, Part
 from skills.robot import CommandId, CommandState
 
 
 def test_of_many_commands_the_last_are_known_and_the_old_ones_are_over():
     table = CommandTable()
     arm = table.begin(Part.ARM, None, 0.0, 1e9)
-    ids = [table.begin(Part.VELOCITY, None, 0.05 * n, 0.05 * n + 0.5) for n in range(10 * MOST_KEPT)]
-    assert len(table._statuses) <= MOST_KEPT + 2
+    ids = [table.begin(Part.VELOCITY, None, 0.05 * n, 0.05 * n + 0.5) for n in range(10 * MOST_STATUSES)]
+    assert len(table._statuses) <= MOST_STATUSES + 2
     assert len(set(ids)) == len(ids)
     assert table.status(arm).state is CommandState.RUNNING
     assert [table.status(each).state for each in ids[-2:]] == [CommandState.STOPPED, CommandState.RUNNING]

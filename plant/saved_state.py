@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any, ClassVar
 
-from skills.files.json_values import packed, unpacked
+from skills.files.json_values import pack, unpack
 
 State = dict[str, Any]
 
@@ -39,7 +39,7 @@ class Stateful:
                 for each, part in value.items():
                     part.restore(state[key][each])
             else:
-                setattr(self, name, unpacked(state[key]))
+                setattr(self, name, unpack(state[key]))
 
     @classmethod
     @cache
@@ -52,7 +52,7 @@ class Stateful:
 def _state(value: Any) -> Any:
     if isinstance(value, Stateful):
         return value.state()
-    return {key: part.state() for key, part in value.items()} if _holds_parts(value) else packed(value)
+    return {key: part.state() for key, part in value.items()} if _holds_parts(value) else pack(value)
 
 
 def _holds_parts(value: Any) -> bool:

@@ -39,7 +39,7 @@ from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.detect.descriptions import distinct_objects
 from skills.files.errors import InputError
 from skills.files.outside import plain_file
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 
 MOST_BYTES = 100_000_000_000
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
@@ -278,7 +278,9 @@ def seen_objects(events: Iterable[Event]) -> tuple[ObjectObservation, ...]:
             open_searches[robot] = len(searches)
             searches.append([])
         elif event.topic == TRACKS and robot in open_searches:
-            sure = [track for track in event.data["tracks"] if track.get("confirmed") and track["class_name"] != THING]
+            sure = [
+                track for track in event.data["tracks"] if track.get("confirmed") and track["class_name"] != ANY_OBJECT
+            ]
             searches[open_searches[robot]] = [_observation(track) for track in sorted(sure, key=itemgetter("number"))]
     return distinct_objects(searches)
 

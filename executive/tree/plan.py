@@ -19,7 +19,7 @@ from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
 from executive.words.slug import slug
 from skills.api import Cause, ObjectKind, Part, Skill, Surface
 from skills.files.errors import InputError, SourceLine, suggestion
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
@@ -226,13 +226,13 @@ class PlanBuilder:
         return item
 
     def search_classes(self, name: str) -> tuple[str, ...]:
-        """Returns the classes to search for an object of that name: its own, or `THING` for any object.
+        """Returns the classes to search for an object of that name: its own, or `ANY_OBJECT` for any object.
 
         A question names the found objects, so it searches for known classes. Raises InputError for an unknown name.
         """
         classes = self.classes(name)
         unnamed = self.knowledge.object_name(name) in (ANYTHING, EVERYTHING)
-        return (THING,) if unnamed and self.command.task is not Task.FIND else classes
+        return (ANY_OBJECT,) if unnamed and self.command.task is not Task.FIND else classes
 
     def error(self, message: str, hint: str) -> InputError:
         """Builds an error at the step's line."""

@@ -13,7 +13,7 @@ from executive.words.robot_config import RobotsFile
 from skills.files.errors import InputError, suggestion
 from skills.files.schema import Name, validate
 from skills.files.yaml_source import YamlSource, read_yaml
-from skills.perception.class_forms import PERSON, THING, class_forms
+from skills.perception.class_forms import ANY_OBJECT, PERSON, class_forms
 from skills.quantities import Angle, Coordinate, Opening, Quantity, TopHeight
 
 ANYTHING: Final = "object"
@@ -23,7 +23,7 @@ EVERYTHING: Final = "everything"
 ANYBODY: Final = PERSON
 """Name that stands for any person."""
 _UNNAMED: Final = {
-    **dict.fromkeys((ANYTHING, THING, "item", "anything", "something"), ANYTHING),
+    **dict.fromkeys((ANYTHING, ANY_OBJECT, "item", "anything", "something"), ANYTHING),
     EVERYTHING: EVERYTHING,
 }
 Corner = tuple[Coordinate, Coordinate]

@@ -1,1 +1,1 @@
-"""Finding objects with the hand camera."""
+"""The detect skill: finds objects with the hand camera."""

@@ -1,4 +1,4 @@
-"""What the detect skill writes to the event log."""
+"""Messages of the detect skill in the event log."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Message = Mapping[str, Any]
 
 
 def detections_message(image: Image, found: Iterable[Detection], placed: Sequence[Detection3D]) -> Message:
-    """All detections of one picture, with boxes (u0, v0, u1, v1) in its pixels, and the picture itself."""
+    """Message of all detections of one picture, with boxes (u0, v0, u1, v1) in its pixels, and the picture."""
     places = {id(detected.detection): detected for detected in placed}
     return {
         "stamp_s": image.stamp_s,
@@ -30,7 +30,7 @@ def detections_message(image: Image, found: Iterable[Detection], placed: Sequenc
 
 
 def _detection(detection: Detection, placed: Detection3D | None) -> Message:
-    told = {
+    message = {
         "class_id": class_id(detection.class_name),
         "class_name": detection.class_name,
         "score": round(detection.score, 3),
@@ -38,24 +38,24 @@ def _detection(detection: Detection, placed: Detection3D | None) -> Message:
         "surface": "",
     }
     if placed is None:
-        return told
+        return message
     place = {
         "surface": placed.surface or "",
         "position_W": _rounded(placed.position_W),
         "sigma_m": _rounded(placed.place_covariance.diagonal() ** 0.5),
         "size_m": _rounded(placed.size_m),
     }
-    return {**told, **place}
+    return {**message, **place}
 
 
 def class_id(class_name: str) -> int:
-    """The number of a class in messages; 0 for one without a form."""
+    """Number of a class in messages; 0 for a class without a form."""
     forms = class_forms()
     return forms[class_name].id if class_name in forms else 0
 
 
 def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> Message:
-    """What is being looked for."""
+    """Message of the wanted classes."""
     return {
         "stamp": context.clock.now(),
         "robot_name": context.robot.name,
@@ -67,7 +67,7 @@ def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> M
 def object_destination_message(
     context: SkillContext, seen: ObjectObservation, image: Image, X_WO: RigidTransform
 ) -> Message:
-    """Where the object is: in the world, and from the camera."""
+    """Message of the object's position in the world and from the camera."""
     p_CO = camera_pose_W(image, X_WO).inverse() @ seen.position_W
     sequence = round(image.stamp_s * 1000)
     return {
@@ -86,9 +86,9 @@ def object_destination_message(
 
 
 def tracks_message(context: SkillContext, tracks: Sequence[Track]) -> Message:
-    """What is known of the objects around."""
-    told = {"stamp": context.clock.now(), "robot_name": context.robot.name}
-    return {**told, "tracks": [_track(track) for track in tracks]}
+    """Message of all tracks."""
+    tracked = [_track(track) for track in tracks]
+    return {"stamp": context.clock.now(), "robot_name": context.robot.name, "tracks": tracked}
 
 
 def _track(track: Track) -> Message:
@@ -108,12 +108,12 @@ def _track(track: Track) -> Message:
 
 
 def coverage_message(context: SkillContext, shares: Mapping[str, SurfaceShares]) -> Message:
-    """How much of each surface was seen."""
-    told = {
+    """Message of the share of each surface that was seen."""
+    surfaces = {
         name: {"seen": round(s.seen, 3), "hidden": round(s.hidden, 3), "out_of_view": round(s.out_of_view, 3)}
         for name, s in shares.items()
     }
-    return {"stamp": context.clock.now(), "surfaces": told}
+    return {"stamp": context.clock.now(), "surfaces": surfaces}
 
 
 def _rounded(values: Iterable[float]) -> list[float]:

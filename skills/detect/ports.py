@@ -1,4 +1,4 @@
-"""What the detect skill takes and gives: all that a tree is compiled from."""
+"""Ports of the detect skill, from which a tree is compiled."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from skills.quantities import Coordinate, Height, Tries
 
 @dataclass(frozen=True)
 class DetectInputs:
-    """What to look for (any of `classes`, with all `attributes`) and on which surfaces.
+    """Wanted objects (any of `classes`, with all `attributes`) and the surfaces to search.
 
-    The class "thing" is any object that stands there, whether the detector has a class for it or not; those where
-    one of `avoid` was seen are the last choice.
+    The class "thing" is any object, whether the detector knows its class or not; objects at the positions of `avoid`
+    are the last choice.
 
     The search ends with the first `count` objects; a count of 0 searches all surfaces and counts all objects. With
-    `expected_W` it searches that place only, and only objects within 0.35 m of it count. With `floor`, objects on the
-    floor beside the surfaces count where they come into view.
+    `expected_W` it searches only that position, and only objects within 0.35 m of it count. With `floor`, visible
+    objects on the floor beside the surfaces count too.
     """
 
     classes: tuple[str, ...]
@@ -38,7 +38,7 @@ class DetectInputs:
 
 
 class DetectPorts(Skill[DetectInputs]):
-    """Searches surfaces for objects from where the robot stands. Stows the arm when it finds nothing."""
+    """Searches surfaces for objects without driving. Stows the arm when it finds too few."""
 
     done_by: ClassVar[str] = "skills.detect.skill:Detect"
     name = "detect"

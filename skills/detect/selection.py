@@ -9,7 +9,7 @@ import numpy as np
 
 from skills.api import FLOOR
 from skills.detect.ports import DetectInputs
-from skills.perception.class_forms import THING, class_forms
+from skills.perception.class_forms import ANY_OBJECT, class_forms
 from skills.perception.detection_3d import has_attribute
 from skills.perception.surface_segmentation import Cluster
 from skills.perception.tracker import Track
@@ -59,7 +59,7 @@ def matching_tracks(
         off = {t.number: level_distance(t.position_W, inputs.expected_W) for t in fitting}
         near = (t for t in fitting if off[t.number] < options.expected_within_m)
         return sorted(near, key=lambda t: off[t.number])
-    if THING not in inputs.classes:
+    if ANY_OBJECT not in inputs.classes:
         return sorted(fitting, key=lambda t: -t.belief * t.best.detection.score)
     avoid = [each.position_W for each in inputs.avoid]
     return sorted(
@@ -70,20 +70,20 @@ def matching_tracks(
 def sure_tracks(matching: Sequence[Track], inputs: DetectInputs) -> list[Track]:
     """Tracks that need no further view, last seen first; in the given order where any object or a place is wanted."""
     sure = [track for track in matching if is_sure(track, inputs)]
-    if inputs.expected_W is not None or THING in inputs.classes:
+    if inputs.expected_W is not None or ANY_OBJECT in inputs.classes:
         return sure
     return sorted(sure, key=lambda track: -track.last_seen_s)
 
 
 def is_wanted(track: Track, inputs: DetectInputs) -> bool:
     """Returns whether the class of a track is wanted."""
-    return THING in inputs.classes or track.class_name in inputs.classes
+    return ANY_OBJECT in inputs.classes or track.class_name in inputs.classes
 
 
 def is_sure(track: Track, inputs: DetectInputs) -> bool:
     """Returns whether a track needs no further view; its class does not matter where any object is wanted."""
     views = 2 if inputs.seen_before is None else 1
-    return track.exists(views) if THING in inputs.classes else track.is_confirmed(views)
+    return track.exists(views) if ANY_OBJECT in inputs.classes else track.is_confirmed(views)
 
 
 def _in_place(track: Track, inputs: DetectInputs, options: DetectOptions, p_WB: FloatArray) -> bool:

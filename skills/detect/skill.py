@@ -41,7 +41,7 @@ from skills.detect.viewpoints import look_targets, surface_boxes
 from skills.geometry import wrap
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
-from skills.perception.class_forms import THING, class_forms, known_attributes
+from skills.perception.class_forms import ANY_OBJECT, class_forms, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
 from skills.perception.surface_segmentation import Cluster, segment_surfaces, segments_3d
@@ -107,7 +107,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
     def _check(self, inputs: DetectInputs) -> None:
         """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, or without surfaces."""
-        knows = set(self.context.detector.class_names) & set(class_forms()) | {THING}
+        knows = set(self.context.detector.class_names) & set(class_forms()) | {ANY_OBJECT}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
         if unknown:
@@ -135,7 +135,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
                 p_BT = self.X_WB().inverse() @ np.array(inputs.expected_W)
                 yield from self._look_and_confirm(inputs, p_BT, [], close=not _fits_near(inputs))
             return
-        if THING in inputs.classes:
+        if ANY_OBJECT in inputs.classes:
             return
         for _ in range(self.options.closer_looks):
             left = unlabelled_clusters(self._clusters, self._tracker.snapshot(), inputs.classes)
@@ -282,7 +282,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
             found = detect_in_image(detector, image, FAINT_SCORE)
             placed = detections_3d(image, place, found, inputs.surfaces)
             views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
-            if THING in inputs.classes:
+            if ANY_OBJECT in inputs.classes:
                 sure = [each for each in placed if each.detection.score >= SURE_SCORE]
                 placed += segments_3d(image, place, views, sure, inputs.surfaces)
             return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
@@ -320,7 +320,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     def _results(self, inputs: DetectInputs) -> list[Track]:
         """Sure tracks in the order of the result; where any object is wanted, those with a fresh picture first."""
         found = self._sure(inputs)
-        if inputs.expected_W is not None or THING not in inputs.classes:
+        if inputs.expected_W is not None or ANY_OBJECT not in inputs.classes:
             return found
         return sorted(found, key=self._is_old)
 
@@ -344,9 +344,9 @@ def _fits_near(inputs: DetectInputs) -> bool:
 
 
 def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
-    """Observation of a track: fused position, the rest from its last detection; `THING` where the class is not sure."""
+    """Observation of a track: fused position, the rest from its last detection; `ANY_OBJECT` for an unsure class."""
     seen = observation(replace(track.latest, position_W=track.position_W), attributes)
-    return seen if track.is_confirmed(1) else replace(seen, kind=ObjectKind(THING, attributes))
+    return seen if track.is_confirmed(1) else replace(seen, kind=ObjectKind(ANY_OBJECT, attributes))
 
 
 def _tries_for(track: Track, shifts: int) -> int:

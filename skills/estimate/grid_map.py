@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict
 from skills.estimate.compiled import distances
 from skills.files.errors import InputError
 from skills.files.outside import file_beside
-from skills.files.picture_files import picture_shares
+from skills.files.picture_files import read_brightness
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Height, Quantity, Share
@@ -139,7 +139,7 @@ def _picture(source: YamlSource, told: _MapFile) -> tuple[NDArray[np.float64], N
     """Brightness and opacity of the map's picture. Raises InputError in the line that names it."""
     try:
         picture = file_beside(source.path, told.image)
-        shares, opacity = picture_shares(picture, most_pixels=MOST_CELLS)
+        shares, opacity = read_brightness(picture, most_pixels=MOST_CELLS)
     except InputError as error:
         what = f"image: {error.message}" if error.file == source.path else f"image: {told.image[:100]}: {error.message}"
         raise source.error(("image",), what, error.hint) from error

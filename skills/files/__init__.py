@@ -1,1 +1,1 @@
-"""Files that a user wrote or brought: one guarded way to open them, one reader of YAML, one error."""
+"""Input of users: guarded reading of files and texts, the YAML reader, the schema check, and the error of bad input."""

@@ -1,4 +1,4 @@
-"""The one error that a user's bad input gives: it names the place and the hint."""
+"""The error of bad user input, with its place and a hint, and the phrases of its messages."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ _MOST_USERS: Final = 3
 
 @dataclass(frozen=True)
 class SourceLine:
-    """A line (from 1) of a file that the user wrote."""
+    """A line (from 1) of a user's file."""
 
     file: Path
     line: int
 
 
 class InputError(Exception):
-    """Something that the user wrote cannot be used.
+    """User input that cannot be used.
 
-    `message` says what is wrong, `hint` what to do about it; `file` and `line` (from 1) name the place where known.
-    A message that repeats something endless is cut off. `others` are more errors that were found at once.
+    `message` says what is wrong, `hint` what to do; `file` and `line` (from 1) name the place where known. A very long
+    message is cut off. `others` are further errors that were found with it.
     """
 
     def __init__(
@@ -64,22 +64,22 @@ class InputError(Exception):
 
     @classmethod
     def at(cls, source: SourceLine | None, message: str, *, hint: str = "") -> InputError:
-        """An error in a line, where that is known."""
+        """Makes an error with its line, if the line is known."""
         if source is None:
             return cls(message, hint=hint)
         return cls(message, hint=hint, file=source.file, line=source.line)
 
     def __str__(self) -> str:
-        """One line: "file:line: what; hint"; of an endless name of a file the beginning."""
+        """Formats one line: "file:line: message; hint"; cuts off a very long file name."""
         file = str(self.file) if len(str(self.file)) <= MOST_LETTERS else f"{str(self.file)[:FEW_LETTERS]}..."
         place = "" if self.file is None else f"{file}: " if self.line is None else f"{file}:{self.line}: "
         hint = self.hint if len(self.hint) <= MOST_LETTERS else f"{self.hint[:MOST_LETTERS]}..."
         return one_line(f"{place}{self.message}{'; ' if hint else ''}{hint}")
 
     def within(self, file: Path, line: int) -> InputError:
-        """The same error, and the line of the file that brought it about by using the file in which it is.
+        """Adds the line of the file that uses the erroneous file.
 
-        An error that names no place gets that line as its own; of a long chain the first files are named.
+        An error without a place gets that line as its own; a long chain names its first files.
         """
         others = [other.within(file, line) for other in self.others]
         if self.file is None:
@@ -97,12 +97,12 @@ def one_line(text: str) -> str:
 
 
 def disk_is_full(error: BaseException) -> bool:
-    """Returns whether it was raised since no space is left."""
+    """Returns whether an error means that the disk is full."""
     return isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 class Problems:
-    """Gathers errors, so that a user sees all at once."""
+    """Collector of errors, so that a user sees all at once."""
 
     def __init__(self) -> None:
         self._errors: list[InputError] = []
@@ -111,25 +111,25 @@ class Problems:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _trace: object) -> bool:
-        """Notes an InputError and goes on; all else passes."""
+        """Adds an InputError and suppresses it; lets other errors pass."""
         if isinstance(error, InputError):
             self.add(error)
             return True
         return False
 
     def add(self, error: InputError) -> None:
-        """Notes an error and those that came with it."""
+        """Adds an error with its `others`."""
         self._errors += [error, *error.others]
 
     def raise_any(self) -> None:
-        """Raises the first, with the others; do nothing when there is none."""
+        """Raises the first error with the others, if there are any."""
         if self._errors:
             first, *others = self._errors
             raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others)
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str | None:
-    """The known word that is spelled most like `word`, or None when none is near."""
+    """Returns the known word with the spelling nearest to `word`, or None when none is near."""
     from rapidfuzz import fuzz, process
 
     by_lower = {name.lower(): name for name in known}
@@ -138,9 +138,9 @@ def did_you_mean(word: str, known: Iterable[str]) -> str | None:
 
 
 def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *, shown: Iterable[str] = ()) -> str:
-    """The hint for a word that is not known: the one that was probably meant, else `otherwise`, else the nearest.
+    """Hint for an unknown word: the word that was probably meant, else `otherwise`, else the nearest known names.
 
-    `shown` are the names to choose the nearest from where `known` holds other spellings, too.
+    `shown` are the names to list where `known` holds other spellings, too.
     """
     names = list(known)
     near = did_you_mean(word, names)
@@ -148,7 +148,7 @@ def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *,
 
 
 def known_names(word: str, known: Iterable[str]) -> str:
-    """All that is known where that is little, else those that are spelled most like `word`."""
+    """Lists the known names if they are few, else those with the spelling nearest to `word`."""
     from rapidfuzz import fuzz, process
 
     names = list(dict.fromkeys(known))
@@ -159,7 +159,7 @@ def known_names(word: str, known: Iterable[str]) -> str:
 
 
 def few(words: Iterable[str]) -> str:
-    """The first words of a list, and how many more there are: "a, b, c and 12 more (see docs/reference)"."""
+    """Lists the first words and counts the others: "a, b, c and 12 more (see docs/reference)"."""
     names = list(words)
     if len(names) <= MOST_LISTED:
         return listing(names)
@@ -167,11 +167,11 @@ def few(words: Iterable[str]) -> str:
 
 
 def count_text(count: int, noun: str) -> str:
-    """Counts with its noun: "1 door", "2 doors"."""
+    """Formats a count with its noun: "1 door", "2 doors"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def listing(words: Iterable[str], *, last: str = "and") -> str:
-    """The words as a sentence lists them: "a, b and c"."""
+    """Lists words as a sentence does: "a, b and c"."""
     *head, tail = [*words] or ["nothing"]
     return f"{', '.join(head)} {last} {tail}" if head else tail

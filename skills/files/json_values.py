@@ -1,7 +1,7 @@
-"""Values as JSON and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
+"""Conversion of values to JSON and back: plain values, tuples, enums, arrays, transforms and frozen dataclasses.
 
-Each value that is no plain JSON carries its kind, so that it comes back equal and of the same type. A class is looked
-up among the modules that are loaded; nothing is imported and nothing is called but a dataclass's constructor.
+A value without a form in JSON carries its kind, so that it is read back equal and with its type. A class is looked up
+among the loaded modules; nothing is imported, and only constructors of dataclasses are called.
 """
 
 from __future__ import annotations
@@ -22,23 +22,20 @@ _KIND: Final = "$kind"
 
 
 def to_text(value: Any) -> str:
-    """The value as JSON text. Raises TypeError: it, or a part of it, is of no kind that can be kept."""
-    return json.dumps(packed(value), separators=(",", ":"))
+    """Converts a value to JSON text. Raises TypeError for a value, or a part of it, that has no stored form."""
+    return json.dumps(pack(value), separators=(",", ":"))
 
 
 def from_text(text: str) -> Any:
-    """The value that `to_text` wrote.
-
-    Raises ValueError: the text is damaged, or names a class that there is no more.
-    """
+    """Converts a text of `to_text` back. Raises ValueError for a damaged text, and for an unknown class."""
     try:
-        return unpacked(json.loads(text))
+        return unpack(json.loads(text))
     except (KeyError, TypeError, AttributeError) as error:
         raise ValueError(f"no value can be read from {text[:80]!r} ({error})") from error
 
 
-def packed(value: Any) -> Any:
-    """The value as JSON has it. Raises TypeError: it, or a part of it, is of no kind that can be kept."""
+def pack(value: Any) -> Any:
+    """Converts a value to plain JSON data. Raises TypeError as `to_text`."""
     of: Any = type(value)
     kind = _kind_of(of)
     return value if kind is None else {_KIND: kind, **_KINDS[kind][1](value)}
@@ -46,17 +43,17 @@ def packed(value: Any) -> Any:
 
 @cache
 def _kind_of(of: Any) -> str | None:
-    """The kind of the values of a type; None for plain ones. Raises TypeError: there is none."""
+    """Kind of the values of a type; None for plain ones. Raises TypeError for a type without a stored form."""
     if issubclass(of, bool | int | float | str | NoneType) and not issubclass(of, enum.Enum):
         return None
     for kind, (fits, _, _) in _KINDS.items():
         if fits(of):
             return kind
-    raise TypeError(f"a {of.__name__} cannot be kept in the store")
+    raise TypeError(f"a {of.__name__} cannot be stored")
 
 
-def unpacked(value: Any) -> Any:
-    """The value that `packed` made. Raises ValueError, KeyError, TypeError or AttributeError: it made none such."""
+def unpack(value: Any) -> Any:
+    """Converts data of `pack` back. Raises ValueError, KeyError, TypeError or AttributeError for any other data."""
     if not isinstance(value, dict):
         if isinstance(value, list):
             raise ValueError("a bare list is no stored value")
@@ -67,7 +64,7 @@ def unpacked(value: Any) -> Any:
 
 
 def _class_of(name: str) -> Any:
-    """The loaded class that is called "module:Class.Inner". Raises ValueError."""
+    """Finds the loaded class "module:Class.Inner". Raises ValueError when there is none."""
     module, _, path = name.partition(":")
     found: Any = sys.modules.get(module)
     for part in path.split("."):
@@ -82,7 +79,7 @@ def _class_name(value: Any) -> str:
 
 
 def _pack_dataclass(value: Any) -> dict[str, Any]:
-    fields = {field.name: packed(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
+    fields = {field.name: pack(getattr(value, field.name)) for field in dataclasses.fields(value) if field.init}
     return {"class": _class_name(value), "fields": fields}
 
 
@@ -91,7 +88,7 @@ def _unpack_dataclass(packed: Mapping[str, Any]) -> Any:
     if not dataclasses.is_dataclass(found):
         raise ValueError(f"{packed['class']} is no dataclass")
     make: Any = found
-    return make(**{name: unpacked(item) for name, item in packed["fields"].items()})
+    return make(**{name: unpack(item) for name, item in packed["fields"].items()})
 
 
 def _unpack_enum(packed: Mapping[str, Any]) -> Any:
@@ -103,7 +100,7 @@ def _unpack_enum(packed: Mapping[str, Any]) -> Any:
 
 def _pack_array(value: Any) -> dict[str, Any]:
     if value.dtype.kind not in "biuf":
-        raise TypeError(f"an array of {value.dtype} cannot be kept in the store")
+        raise TypeError(f"an array of {value.dtype} cannot be stored")
     return {"dtype": value.dtype.str, "shape": list(value.shape), "items": value.ravel().tolist()}
 
 
@@ -128,13 +125,13 @@ _KINDS: Final[Mapping[str, _Kind]] = {
     "dataclass": (dataclasses.is_dataclass, _pack_dataclass, _unpack_dataclass),
     "tuple": (
         lambda of: issubclass(of, tuple),
-        lambda v: {"items": [*map(packed, v)]},
-        lambda p: tuple(map(unpacked, p["items"])),
+        lambda v: {"items": [*map(pack, v)]},
+        lambda p: tuple(map(unpack, p["items"])),
     ),
     "list": (
         lambda of: issubclass(of, list),
-        lambda v: {"items": [*map(packed, v)]},
-        lambda p: [*map(unpacked, p["items"])],
+        lambda v: {"items": [*map(pack, v)]},
+        lambda p: [*map(unpack, p["items"])],
     ),
     "set": (
         lambda of: issubclass(of, frozenset),
@@ -143,7 +140,7 @@ _KINDS: Final[Mapping[str, _Kind]] = {
     ),
     "map": (
         lambda of: issubclass(of, Mapping),
-        lambda v: {"items": [[packed(key), packed(item)] for key, item in v.items()]},
-        lambda p: {unpacked(key): unpacked(item) for key, item in p["items"]},
+        lambda v: {"items": [[pack(key), pack(item)] for key, item in v.items()]},
+        lambda p: {unpack(key): unpack(item) for key, item in p["items"]},
     ),
 }

@@ -1,4 +1,4 @@
-"""Guarded reading of files from outside: plain files below a size, in the folder of the file that names them."""
+"""Guarded reading of foreign input: plain files below a size, texts that a user types or says, and JSON."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from skills.files.errors import InputError
 __all__ = ["file_beside", "is_file", "is_folder", "is_there", "plain_file", "read_bytes", "read_text"]
 
 TEXT_BYTES: Final = 1_000_000
-"""Larger texts are refused, unless a reader says otherwise."""
+"""Most bytes of a text, unless a reader sets another limit."""
 _LARGE_FILE: Final = b"version https://git-lfs.github.com/spec/"
 _ADDRESS: Final = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")
 _UTF16: Final = (b"\xff\xfe", b"\xfe\xff")
 _UTF8_MARK: Final = b"\xef\xbb\xbf"
 _HIDDEN: Final = 100
-"""So many letters of a name are shown."""
+"""Letters of a name that an error shows."""
 
 
 def is_file(path: Path) -> bool:
@@ -35,16 +35,16 @@ def is_folder(path: Path) -> bool:
 
 
 def is_there(path: Path) -> bool:
-    """Returns whether anything is at a path; False as for `is_file`."""
+    """Returns whether a path exists; False as for `is_file`."""
     return os.path.exists(path)  # noqa: PTH110 (Path.exists raises for a name that is too long)
 
 
 def read_bytes(file: Path, *, most_bytes: int, hint: str = "name a file that exists", line: int | None = None) -> bytes:
-    """The content of a plain file. Reads no more than `most_bytes`, and never waits for a pipe or a device.
+    """Reads a plain file of at most `most_bytes`. Never waits for a pipe or a device.
 
     Raises:
-        InputError: the file is missing, no plain file, too large, or a pointer of Git LFS; `hint` is for a missing one,
-            `line` for files that have lines.
+        InputError: the file is missing, no plain file, too large, or a pointer of Git LFS. `hint` is for a missing
+            file, `line` for files that have lines.
     """
     try:
         _refuse_special(file.stat().st_mode, file, line)
@@ -57,7 +57,7 @@ def read_bytes(file: Path, *, most_bytes: int, hint: str = "name a file that exi
 
 
 def plain_file(file: Path, *, most_bytes: int, hint: str = "name a file that exists") -> None:
-    """Checks a file that a library will read. Raises InputError as `read_bytes` does, which see."""
+    """Checks a file that a library will read. Raises InputError as `read_bytes` does."""
     try:
         found = file.stat()
         _refuse_special(found.st_mode, file)
@@ -71,7 +71,7 @@ def plain_file(file: Path, *, most_bytes: int, hint: str = "name a file that exi
 
 
 def read_text(file: Path, *, most_bytes: int = TEXT_BYTES, hint: str = "name a file that exists") -> str:
-    """The text of a UTF-8 file, with or without a byte order mark, its lines ended by line feeds.
+    """Reads a UTF-8 file, with or without a byte order mark; its lines end with line feeds.
 
     Raises:
         InputError: as `read_bytes`, and for other encodings.
@@ -88,9 +88,9 @@ def read_text(file: Path, *, most_bytes: int = TEXT_BYTES, hint: str = "name a f
 
 
 def file_beside(naming: Path, name: str, *, home: Path | None = None) -> Path:
-    """The path of the file `name` that the file `naming` names.
+    """Path of the file `name` that the file `naming` names.
 
-    It lies in the folder `home`, the folder of `naming` unless given, or below.
+    It must lie in the folder `home`, or below; the default is the folder of `naming`.
 
     Raises:
         InputError: the name is an address or no name of a file, or leads out of that folder.
@@ -141,13 +141,13 @@ __all__ = ["LONGEST_ANSWER", "LONGEST_TEXT", "json_object", "plain_text"]
 
 LONGEST_TEXT: Final = 2000
 LONGEST_ANSWER: Final = 300
-"""Letters of an answer, so that a sentence with it can still be said."""
+"""Most letters of an answer, so that a robot can still say a sentence with it."""
 _BLANKS: Final = frozenset("\t\n\r")
 _SHOWN: Final = 40
 
 
 def plain_text(text: str, *, what: str, longest: int = LONGEST_TEXT) -> str:
-    """A text without blanks around it; `what` names it in the error, as in "the answer".
+    """Checks a text and strips its blanks; `what` names it in the error, as in "the answer".
 
     Raises:
         InputError: it is too long, or holds control characters or halves of characters.
@@ -166,10 +166,10 @@ def plain_text(text: str, *, what: str, longest: int = LONGEST_TEXT) -> str:
 
 
 def json_object(content: bytes, *, what: str, hint: str) -> dict[str, Any]:
-    """The object of a JSON text; an empty one of no text. `what` names it in the error, as in "the values".
+    """Parses a JSON object; an empty text is an empty object. `what` names it in the error, as in "the values".
 
     Raises:
-        InputError: it is none, is nested too deep, or holds a number or a text that cannot be used.
+        InputError: it is no object, is nested too deep, or holds a number or a text that cannot be used.
     """
     try:
         values = json.loads(content) if content.strip() else {}

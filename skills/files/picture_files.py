@@ -1,4 +1,4 @@
-"""Picture files from outside: their pixels are counted in the file's head, before anything is decoded."""
+"""Guarded reading of picture files: the header gives the number of pixels before anything is decoded."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from skills.files.errors import InputError
 from skills.files.outside import read_bytes
 
-__all__ = ["MOST_PIXELS", "check_picture", "picture_shares", "read_pixels"]
+__all__ = ["MOST_PIXELS", "check_picture", "read_brightness", "read_pixels"]
 
 MOST_PIXELS: Final = 64_000_000
-"""What is larger is refused before it fills the memory; `executive.cli` tells OpenCV the same limit."""
+"""Limit that keeps a picture from filling the memory; `executive.cli` sets the same limit in OpenCV."""
 MOST_BYTES: Final = 200_000_000
 _PNG: Final = b"\x89PNG\r\n\x1a\n"
 _LIMIT_NAME: Final = "MAX_IMAGE_PIXELS"
@@ -34,7 +34,7 @@ _HINT: Final = "name a file in PNG, JPEG, WebP, TIFF or BMP"
 
 
 def read_pixels(file: Path, *, flags: int = cv2.IMREAD_UNCHANGED, most_pixels: int = MOST_PIXELS) -> NDArray[Any]:
-    """The pixels of a picture file as OpenCV decodes them.
+    """Reads the pixels of a picture file as OpenCV decodes them.
 
     Raises:
         InputError: it cannot be read, is damaged or no picture, or has more than `most_pixels`.
@@ -43,16 +43,16 @@ def read_pixels(file: Path, *, flags: int = cv2.IMREAD_UNCHANGED, most_pixels: i
 
 
 def check_picture(file: Path, *, most_pixels: int = MOST_PIXELS) -> None:
-    """Checks a picture file that a library will read. Raises InputError as `read_pixels` does, but for damage."""
+    """Checks a picture file that a library will read. Raises InputError as `read_pixels`, except for damage."""
     content = _content(file, most_pixels)
     if _size(content) == (0, 0):
         raise _unreadable(file, content)
 
 
-def picture_shares(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Brightness (H, W) of a picture from 0 to 1, its colours averaged, and its opacity (None without transparency).
+def read_brightness(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Reads brightness (H, W) from 0 to 1, the mean of the colours, and opacity (None without transparency).
 
-    Values of a PGM or PPM are shares of the greatest one that its head names.
+    The values of a PGM or PPM are divided by the maximum in its header.
 
     Raises:
         InputError: as `read_pixels`.
@@ -60,7 +60,7 @@ def picture_shares(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64]
     content = _content(file, most_pixels)
     head = _PNM.match(content)
     if head is not None:
-        return _pnm_shares(content, head, file), None
+        return _pnm_brightness(content, head, file), None
     pixels = _decoded(content, file, cv2.IMREAD_UNCHANGED)
     shares = pixels.astype(np.float64) / np.iinfo(pixels.dtype).max
     if shares.ndim == 2:
@@ -68,8 +68,8 @@ def picture_shares(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64]
     return np.asarray(shares[..., :3].mean(axis=2)), shares[..., 3] if shares.shape[2] == 4 else None
 
 
-def _pnm_shares(content: bytes, head: re.Match[bytes], file: Path) -> NDArray[np.float64]:
-    """Brightness of a picture in the form PGM or PPM."""
+def _pnm_brightness(content: bytes, head: re.Match[bytes], file: Path) -> NDArray[np.float64]:
+    """Brightness of a PGM or PPM picture."""
     kind = head[1]
     columns, rows, most = (int(number) for number in head.groups()[1:])
     count = rows * columns * (3 if kind in b"36" else 1)
@@ -84,19 +84,19 @@ def _pnm_shares(content: bytes, head: re.Match[bytes], file: Path) -> NDArray[np
 
 
 def _numbers(body: bytes) -> NDArray[np.float64]:
-    """The numbers of a text; none where it holds anything else."""
+    """Numbers of a text; none where the text holds anything else."""
     text = _COMMENT.sub(b"", body)
     return np.fromstring(text, dtype=np.float64, sep=" ") if _NUMBERS.fullmatch(text) and text.strip() else np.empty(0)
 
 
 def _raw(content: bytes, start: int, count: int, most: int) -> NDArray[np.float64]:
-    """The values of one or two bytes from `start` on; white space may follow them, and nothing else."""
+    """Values of one or two bytes from `start` on, followed by nothing but white space."""
     kind = np.dtype(np.uint8 if most < 256 else ">u2")
     needed = count * kind.itemsize
     if len(content) - start == needed + 1 and content[start - 1 : start + 1] == b"\r\n":
         start += 1
-    kept = needed if content[start + needed :].strip() == b"" else len(content) - start
-    body = content[start : start + kept]
+    length = needed if content[start + needed :].strip() == b"" else len(content) - start
+    body = content[start : start + length]
     return np.frombuffer(body[: len(body) // kind.itemsize * kind.itemsize], kind).astype(np.float64)
 
 
@@ -127,7 +127,7 @@ def _too_large(file: Path, pixels: str, most_pixels: int) -> InputError:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """OpenCV and the libraries below it, which write to the process's stderr, keep their words on damaged files."""
+    """Silences OpenCV and the libraries below it, which write to the process's stderr about damaged files."""
     level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     stderr, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
@@ -149,7 +149,7 @@ def _unreadable(file: Path, content: bytes) -> InputError:
 
 
 def _size(content: bytes) -> tuple[int, int]:
-    """Width and height as the head of a PNG, JPEG, PNM or BMP says; (0, 0) for others, which OpenCV checks itself."""
+    """Width and height in the header of a PNG, JPEG, PNM or BMP; (0, 0) for others, which OpenCV checks itself."""
     if content.startswith(_PNG) and len(content) >= 24:
         width, height = struct.unpack(">II", content[16:24])
         return int(width), int(height)
@@ -163,7 +163,7 @@ def _size(content: bytes) -> tuple[int, int]:
 
 
 def _jpeg_size(content: bytes) -> tuple[int, int]:
-    """Width and height from the first frame's head; segments are marked 0xff, kind, length."""
+    """Width and height in the header of the first frame; segments begin with 0xff, kind, length."""
     place = 2
     while place + 9 <= len(content) and content[place] == 0xFF:
         kind = content[place + 1]

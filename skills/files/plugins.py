@@ -1,4 +1,4 @@
-"""Loads what other distributions register as entry points, in limited time; what they raise becomes one error."""
+"""Loading of entry points of other distributions, with a time limit and one error for all that they raise."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Final, TypeVar
 __all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "installed_plugins", "run_in_thread", "run_plugin"]
 
 OURS: Final = "spot-errand"
-"""The distribution of this project, whose modules need no time limit."""
+"""Distribution of this project, whose modules need no time limit."""
 LIMIT_S: Final = 30.0
 _BAD_INPUT: Final = 2
 _LONGEST: Final = 300
@@ -24,22 +24,22 @@ ResultT = TypeVar("ResultT")
 
 
 class PluginDefect(Exception):  # noqa: N818
-    """What the code of a plug-in raised, whatever that was: its type and its text."""
+    """Any error that the code of a plug-in raised: its type and its text."""
 
 
 def distribution_of(entry: EntryPoint) -> str:
-    """The distribution that registers an entry point."""
+    """Name of the distribution that registers an entry point."""
     return "an unknown distribution" if entry.dist is None else _name_of(entry.dist)
 
 
 @cache
 def _name_of(distribution: Distribution) -> str:
-    """The name of a distribution, which each time is read from its file."""
+    """Caches the name of a distribution, which is read from its file each time."""
     return distribution.name
 
 
 def installed_plugins(group: str) -> EntryPoints:
-    """The entry points of a group. They are read once: each reading opens the files of all distributions."""
+    """Entry points of a group. Reads them once, since each reading opens the files of all distributions."""
     return _all_installed().select(group=group)
 
 
@@ -49,10 +49,10 @@ def _all_installed() -> SelectableGroups:
 
 
 def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float = LIMIT_S) -> ResultT:
-    """The result of a call into the code of an entry point, such as `entry.load`.
+    """Calls the code of an entry point, such as `entry.load`, and returns its result.
 
-    A call that is not over within the limit (s, on the wall's clock) ends the process with one line that names the
-    distribution: an import cannot be broken off. Raises PluginDefect: the code raised anything but a plain
+    A call that exceeds the limit (s of wall-clock time) ends the process with one line that names the distribution,
+    since an import cannot be interrupted. Raises PluginDefect when the code raises anything but a plain
     KeyboardInterrupt, which is the user's.
     """
     try:
@@ -61,14 +61,14 @@ def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float
     except BaseException as defect:
         if type(defect) is KeyboardInterrupt:
             raise
-        raise PluginDefect(_words(defect)) from defect
+        raise PluginDefect(_error_text(defect)) from defect
 
 
 def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
     """Calls the code of a plug-in in a thread, and returns its result.
 
-    Raises PluginDefect: the code raised something, or is not done within the limit (s, on the wall's clock); then its
-    thread is left behind.
+    Raises PluginDefect when the code raises anything, or exceeds the limit (s of wall-clock time); then its thread is
+    left behind.
     """
     result: Future[ResultT] = Future()
 
@@ -76,7 +76,7 @@ def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
         try:
             result.set_result(call())
         except BaseException as defect:
-            result.set_exception(PluginDefect(_words(defect)))
+            result.set_exception(PluginDefect(_error_text(defect)))
 
     threading.Thread(target=run, daemon=True).start()
     try:
@@ -87,7 +87,7 @@ def run_in_thread(call: Callable[[], ResultT], *, limit_s: float) -> ResultT:
 
 @contextmanager
 def _ended_after(entry: EntryPoint, limit_s: float) -> Iterator[None]:
-    """Ends the process when the block takes too long; our own modules are given all the time that they take."""
+    """Ends the process when the block takes too long; has no limit for our own modules."""
     if distribution_of(entry) == OURS:
         yield
         return
@@ -107,8 +107,8 @@ def _end_process(entry: EntryPoint, limit_s: float) -> None:
     os._exit(_BAD_INPUT)
 
 
-def _words(defect: BaseException) -> str:
-    """The type and the text of what was raised; the text may be no text, and endless."""
+def _error_text(defect: BaseException) -> str:
+    """Type and text of an error, whose text may be broken or very long."""
     try:
         text = str(defect)[:_LONGEST]
     except Exception:

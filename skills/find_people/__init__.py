@@ -1,1 +1,1 @@
-"""Looking about for people."""
+"""The find_people skill: looks for people around the robot."""

@@ -1,4 +1,4 @@
-"""What the find_people skill takes and gives: all that a tree is compiled from."""
+"""Ports of the find_people skill, from which a tree is compiled."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from skills.quantities import Coordinate, Tries
 
 @dataclass(frozen=True)
 class FindPeopleInputs:
-    """Where to look: the corners (x, y) of `area_W`, called `place`. `person` is who is looked for; the skill knows
-    nobody by face, so that anybody counts. A `count` of 0 counts all that are seen."""
+    """Area to search: the corners (x, y) of `area_W`, with the name `place`.
+
+    `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
+    counts all people.
+    """
 
     area_W: tuple[tuple[Coordinate, Coordinate], ...]
     place: str
@@ -23,7 +26,7 @@ class FindPeopleInputs:
 
 
 class FindPeoplePorts(Skill[FindPeopleInputs]):
-    """Looks for people with body cameras and LiDAR; with the LiDAR alone where the detector knows no people."""
+    """Looks for people with body cameras and LiDAR; with the LiDAR alone if the detector has no class of people."""
 
     done_by: ClassVar[str] = "skills.find_people.skill:FindPeople"
     name = "find_people"

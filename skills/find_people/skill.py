@@ -1,4 +1,4 @@
-"""The find_people skill: look about from where the robot stands, and say who is in a part of the world."""
+"""The find_people skill: turns in place and looks for people in an area."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
 from skills.routine import Routine, SkillFailure
 
-_SCAN_AGE_S, _AHEAD_RAD = 1.0, 0.2
+_SCAN_AGE_S = 1.0
+_AHEAD_RAD = 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
 
 
 @dataclass(frozen=True)
 class FindPeopleOptions:
-    """How the robot looks: `looks` times, and turns by `turn_rad` in between.
+    """Search in `looks` directions, with turns of `turn_rad` in between.
 
-    Somebody counts once seen twice within `same_m`: in two looks, or in one by both a camera and the LiDAR. A camera
-    must be at least `least_score` sure, and they `reach_m` at most away.
+    A person counts when seen twice within `same_m`: in two directions, or in one by both a camera and the LiDAR. A
+    detection needs `least_score`, within `reach_m` of the camera.
     """
 
     looks: Count = 5
@@ -46,13 +47,13 @@ class FindPeopleOptions:
 
 
 class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
-    """The skill that `FindPeoplePorts` declares."""
+    """Implementation of `FindPeoplePorts`."""
 
     Options: ClassVar[type] = FindPeopleOptions
     options: FindPeopleOptions
 
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
-        """Look, turn, look again, until enough people were seen twice."""
+        """Looks and turns until enough people were seen twice."""
         area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
         seen, echoes, found = tuple[SeenPerson, ...](), list[SeenPerson](), list[SeenPerson]()
         for look in range(self.options.looks):
@@ -73,27 +74,27 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         turn_rad_s, for_s = self.options.turn_rad_s, self.options.turn_rad / self.options.turn_rad_s
         costmap, footprint = self.context.costmap, ArmFootprint(self.context).now()
 
-        def no_room() -> bool:
+        def lacks_clearance() -> bool:
             here = self.context.pose()
             ahead = replace(here, yaw_rad=here.yaw_rad + math.copysign(_AHEAD_RAD, turn_rad_s))
             here_m, ahead_m = footprint_clearance_m(costmap, footprint, pose_array([here, ahead]))
             return bool(ahead_m < min(here_m, SAFE_MARGIN_M))
 
-        rest_s = self.options.settle_s
-        yield from self.move((0.0, 0.0, turn_rad_s), for_s, "turning to see more", settle_s=rest_s, enough=no_room)
+        command, rest_s = (0.0, 0.0, turn_rad_s), self.options.settle_s
+        yield from self.move(command, for_s, "turning to see more", settle_s=rest_s, enough=lacks_clearance)
 
     def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...]) -> Succeeded:
-        """The answer. Raises SkillFailure when there is none, or not enough."""
+        """Returns the result. Raises SkillFailure when too few people were found."""
         if not found or len(found) < inputs.count:
             few = count_sentence(found, ()) if found else f"nobody is seen in the {inputs.place} from here"
             raise SkillFailure(Cause.POSTCONDITION, few)
-        told = _told(found[0]) if inputs.count == 1 else count_sentence(found, ())
-        return Succeeded(told, {"observation": found[0], "observations": found})
+        said = _describe(found[0]) if inputs.count == 1 else count_sentence(found, ())
+        return Succeeded(said, {"observation": found[0], "observations": found})
 
     def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:
-        """Who is in the pictures of the body cameras now; None where the detector knows no people.
+        """Detects people in pictures of the body cameras; None if the detector has no class of people.
 
-        Raises SkillFailure: it is dark.
+        Raises SkillFailure in the dark.
         """
         robot, detector, options = self.context.robot, self.context.detector, self.options
         cameras = robot.capabilities().body_cameras
@@ -118,7 +119,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         )
 
     def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:
-        """Who may be in the newest scan. Raises SkillFailure: there is none."""
+        """Detects people in the newest scan. Raises SkillFailure when there is no new scan."""
         robot, patience = self.context.robot, Patience(self.context.clock)
         while (scan := robot.scan()) is None or scan.stamp_s < self.context.clock.now() - _SCAN_AGE_S:
             if not patience.is_left():
@@ -132,14 +133,14 @@ def _apart_m(one: SeenPerson, other: SeenPerson) -> float:
     return math.dist(one.place_W, other.place_W)
 
 
-def _told(seen: ObjectObservation) -> str:
-    """ "saw Robin in the kitchen"."""
+def _describe(seen: ObjectObservation) -> str:
+    """Describes a person: "saw Robin in the kitchen"."""
     who = "somebody" if seen.kind.name == PERSON else seen.kind.name
     return f"saw {who} in the {seen.surface}"
 
 
 def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservation:
-    """Somebody who was seen, as an observation of what was asked for."""
+    """Observation of a person under the wanted name."""
     x_m, y_m = seen.place_W
     middle_W = (x_m, y_m, _SIZE_M[2] / 2)
     return ObjectObservation(seen.stamp_s, ObjectKind(inputs.person), middle_W, _SIZE_M, 0.0, seen.score, inputs.place)

@@ -1,1 +1,1 @@
-"""What the robot makes of its pictures and scans: objects with a place, surfaces, people."""
+"""Perception from pictures and scans: objects, surfaces, doorways, and people."""

@@ -16,7 +16,7 @@ from skills.files.yaml_source import read_yaml
 
 PERSON: Final = "person"
 """The class of people."""
-THING: Final = "thing"
+ANY_OBJECT: Final = "thing"
 """The class word for any object that stands on a surface, whether the detector knows its class or not."""
 MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(
     dict.fromkeys(("big", "large", "huge"), True) | dict.fromkeys(("small", "little", "tiny"), False)

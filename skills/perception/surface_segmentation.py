@@ -21,7 +21,7 @@ from pydrake.math import RigidTransform
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.detection import box_overlap
 from skills.geometry import inside_polygon
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D, place_covariance
 from skills.perception.fitting import LevelPlane, SeenShape, measure
 from skills.perception.point_cloud import (
@@ -283,7 +283,7 @@ def segments_3d(
     labelled: Sequence[Detection3D],
     surfaces: Sequence[Surface],
 ) -> tuple[Detection3D, ...]:
-    """Detections of `THING` for the objects on some surfaces that none of the `labelled` detections explains.
+    """Detections of `ANY_OBJECT` for the objects on some surfaces that none of the `labelled` detections explains.
 
     Leaves out segments that the picture's edge cuts off, that stand beside the surface, such as a wall, or that are
     longer than 0.6 m.
@@ -321,7 +321,7 @@ def _segment_3d(cluster: Cluster, image: Image, place: LocalisationEstimate) -> 
     covariance = np.diag(np.square(_SIGMA_M))
     return Detection3D(
         stamp_s=image.stamp_s,
-        detection=Detection(THING, _SEGMENT_SCORE, (u0, v0, u1, v1)),
+        detection=Detection(ANY_OBJECT, _SEGMENT_SCORE, (u0, v0, u1, v1)),
         position_W=p_W,
         covariance=covariance,
         place_covariance=covariance + place_covariance(p_W, X_WO.translation(), place.covariance),

@@ -2,8 +2,8 @@
 
 A detection belongs to the track that it fits by position (Mahalanobis distance) and class; positions are fused in
 information form (inverse covariances add). A track that a picture should show and does not loses belief. A faint
-detection begins no track, but supports one. A segment without a label (`THING`) has a position, and no evidence of a
-class.
+detection begins no track, but supports one. A segment without a label (`ANY_OBJECT`) gives a position, and no evidence
+of a class.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.robot import FloatArray
 
@@ -59,12 +59,14 @@ class Track:
 
     @property
     def class_name(self) -> str:
-        """Likeliest class; `THING` where no view had a label."""
-        return THING if self.best.class_name == THING else max(self.classes, key=lambda name: self.classes[name])
+        """Likeliest class; `ANY_OBJECT` where no view had a label."""
+        return (
+            ANY_OBJECT if self.best.class_name == ANY_OBJECT else max(self.classes, key=lambda name: self.classes[name])
+        )
 
     @property
     def class_belief(self) -> float:
-        """Probability of `class_name`; 1 for a `THING`, which every object is."""
+        """Probability of `class_name`; 1 for a `ANY_OBJECT`, which every object is."""
         return self.classes.get(self.class_name, 1.0)
 
     @property
@@ -209,7 +211,7 @@ def _fused(track: Track, detected: Detection3D, names: Sequence[str]) -> Track:
         covariance=covariance,
         eyes_W=_with_eye(track.eyes_W, _point(detected.eye_W)),
         latest=_latest(track, detected),
-        best=max(track.best, detected, key=lambda one: (one.class_name != THING, one.detection.score)),
+        best=max(track.best, detected, key=lambda one: (one.class_name != ANY_OBJECT, one.detection.score)),
     )
 
 
@@ -218,7 +220,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
     A faint detection of the same class, or a segment, only renews the time of the one before.
     """
-    unlabelled = detected.class_name == THING != track.latest.class_name
+    unlabelled = detected.class_name == ANY_OBJECT != track.latest.class_name
     if detected.detection.score >= SURE_SCORE and not unlabelled:
         return detected
     same = unlabelled or detected.class_name == track.latest.class_name
@@ -227,7 +229,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
 def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
     """Class probabilities after a detection; the rest of its scores is spread over the other classes."""
-    if detected.class_name == THING:
+    if detected.class_name == ANY_OBJECT:
         return before
     score = float(np.clip(detected.detection.score, 0.3, 0.97))
     others = (1.0 - score) / max(len(before) - 1, 1)

@@ -60,7 +60,7 @@ from plant.worlds.seeding import place_objects
 from plant.worlds.world import SurfaceTop, World
 from skills.api import Job, Worker
 from skills.files.errors import InputError
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import FloatArray, Picture
 from tests.benchmarks.manipulation_room import SECOND, SURFACES, TAKEN, room
 from tests.benchmarks.shapes import written_shape
@@ -368,7 +368,9 @@ def shape_trials(options: argparse.Namespace, folder: Path) -> Iterator[Trial]:
         seed = options.seed + index
         model = written_shape(seed, folder)
         for number in range(options.trials):
-            yield Trial(THING, surfaces[(index + number) % len(surfaces)], 0, seed + 1000 * number, model, pictured)
+            yield Trial(
+                ANY_OBJECT, surfaces[(index + number) % len(surfaces)], 0, seed + 1000 * number, model, pictured
+            )
 
 
 def own(folder: Path) -> list[tuple[str, Path | None]]:

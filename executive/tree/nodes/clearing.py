@@ -24,7 +24,7 @@ from executive.words.knowledge import EVERYTHING
 from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.detect.descriptions import count_of
 from skills.files.errors import listing
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Robot
 
 SAME_PLACE_M: Final = 0.15
@@ -157,7 +157,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     """
     get, goal = builder.command, bring.goal
     assert get.object is not None
-    item = ObjectKind(THING, get.object.attributes)
+    item = ObjectKind(ANY_OBJECT, get.object.attributes)
     if get.goal is None or goal is None:
         raise builder.error("it is not said from where to where everything is to be taken", "name both places")
     if goal == START or builder.knowledge.person(goal) is not None:

@@ -20,7 +20,7 @@ from executive.tree.context import RunContext
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed, ObjectKind
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.robot import Pose2D
 
 CONTROL_TOPIC = "control"
@@ -110,10 +110,10 @@ class Condition(ABC):
 
 
 def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
-    """Returns whether an object was recognised as one of these classes, or any (`THING`), with these attributes."""
+    """Returns whether an object was recognised as one of these classes, or any (`ANY_OBJECT`), with these attributes."""
     if item is None:
         return False
-    return (THING in classes or item.name in classes) and set(attributes) <= set(item.attributes)
+    return (ANY_OBJECT in classes or item.name in classes) and set(attributes) <= set(item.attributes)
 
 
 @dataclass

@@ -14,7 +14,7 @@ from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.grasp.candidates import Target
 from skills.manipulation.grasp.planning import Obstacle
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.surface_segmentation import (
@@ -71,16 +71,16 @@ def examine(
     view = segment_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
-    own = [each for each in found if seen.kind.name in (THING, each.detection.class_name)]
+    own = [each for each in found if seen.kind.name in (ANY_OBJECT, each.detection.class_name)]
     view = reduce(split_detected, own, view)
-    if seen.kind.name == THING:
+    if seen.kind.name == ANY_OBJECT:
         view, own = split_touching(view, camera_pose_W(image, place.X_WO).translation()), []
     cluster = _same_object(view, seen, own, within_m)
     if cluster is None:
         return None
     names = {id(matching_cluster(view.clusters, each)): each.class_name for each in found}
     others = tuple(
-        Obstacle(_observed(each, names.get(id(each), THING), seen, image), tuple(cluster_boxes([each], X_WB)))
+        Obstacle(_observed(each, names.get(id(each), ANY_OBJECT), seen, image), tuple(cluster_boxes([each], X_WB)))
         for each in view.clusters
         if each is not cluster
     )

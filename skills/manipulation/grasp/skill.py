@@ -31,7 +31,7 @@ from skills.manipulation.grasp.reach import WIDE, body_heights_m, openings, reac
 from skills.manipulation.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
 from skills.manipulation.grasp.servo import Aim, aimed_approach, seen_shift
 from skills.manipulation.grasp.unseen import look_into_unseen
-from skills.perception.class_forms import THING
+from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.quantities import Force, Length, Margin, Turn
@@ -274,7 +274,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
 
         def look() -> CloseView | None:
             found = detect_in_image(detector, image)
-            named = [each for each in found if seen.kind.name in (THING, each.class_name)]
+            named = [each for each in found if seen.kind.name in (ANY_OBJECT, each.class_name)]
             rest = [each for each in found if each not in named]
             placed = tuple(one for some in (named, rest) for one in detections_3d(image, place, some, [surface]))
             return examine(image, X_WB, surface, seen, place, placed, self.options.same_object_m)

@@ -15,7 +15,7 @@ from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Placement, PointRoute, PointStop, Receiving
-from skills.files.json_values import packed, unpacked
+from skills.files.json_values import pack, unpack
 from skills.robot import ArmTrajectory, Pose2D
 
 FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">
@@ -150,7 +150,7 @@ def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(tmp_p
     hall = Hall(tmp_path).until(Phase.PULLING)
     state = hall.kim.state()
     hall.kim.restore(
-        {**state, "p_HO": packed(unpacked(state["p_HO"]) + [0.011, 0.0, 0.0])}
+        {**state, "p_HO": pack(unpack(state["p_HO"]) + [0.011, 0.0, 0.0])}
     )  # as if it had moved 11 mm in the hand
     hall.until(Phase.RECEIVING).until(Phase.PULLING)
     assert hall.robot.gripper().holding
@@ -219,6 +219,6 @@ def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
 def test_what_creeps_in_the_hand_before_anybody_pulls_is_not_let_go_of(tmp_path, moved_m, let_go):
     hall = Hall(tmp_path).until(Phase.BRINGING)
     state = hall.kim.state()
-    hall.kim.restore({**state, "p_HO": packed(unpacked(state["p_HO"]) + [moved_m, 0.0, 0.0])})
+    hall.kim.restore({**state, "p_HO": pack(unpack(state["p_HO"]) + [moved_m, 0.0, 0.0])})
     hall.engine.advance(0.3)
     assert (hall.kim.phase is Phase.RECEIVING) is let_go

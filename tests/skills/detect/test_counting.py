@@ -1,4 +1,4 @@
-"""What several looks saw is counted once."""
+"""Distinct objects of several searches."""
 
 import pytest
 
@@ -22,5 +22,5 @@ def beer(x_m, name="beer"):
     ],
     ids=["apart", "seen twice", "two close together", "one more beside it", "another class", "nothing"],
 )
-def test_each_thing_is_counted_once(looks, places_m):
+def test_each_object_is_counted_once(looks, places_m):
     assert [seen.position_W[0] for seen in distinct_objects(looks)] == places_m

@@ -1,4 +1,4 @@
-"""What was found, in words."""
+"""Descriptions of objects in words."""
 
 import pytest
 
@@ -22,11 +22,11 @@ def seen(name, surface="bench", *attributes):
         ([seen("cube"), seen("cube", "floor")], "there are two cubes on the bench and the floor"),
     ],
 )
-def test_counts_are_told(found, told):
+def test_counts_are_described_in_a_sentence(found, told):
     assert count_sentence(found, [BENCH]) == told
 
 
-def test_plurals():
+def test_plural_of_class_names():
     assert [plural(name) for name in ("wrench", "beer", "person", "extinguisher")] == [
         "wrenches",
         "beers",
@@ -35,5 +35,5 @@ def test_plurals():
     ]
 
 
-def test_what_is_wanted():
+def test_wanted_objects_are_named():
     assert wanted_names(("coke", "beer"), ("red",)) == "red coke or red beer"

@@ -1,4 +1,4 @@
-"""A robot with its camera on its head looks once more from as high as its body goes."""
+"""A robot with a head camera searches once more with its body raised."""
 
 import pytest
 from head_robot import HEAD_CAPABILITIES, HeadRobot
@@ -12,25 +12,25 @@ USUAL_M, TOP_M = HEAD_CAPABILITIES.standing_height_m, HEAD_CAPABILITIES.height_r
 INPUTS = DetectInputs(("coke",), (TABLE,))
 
 
-def test_what_is_not_found_is_looked_for_from_as_high_as_the_body_goes_which_stands_as_usual_afterwards():
+def test_robot_raises_its_body_to_search_and_lowers_it_afterwards():
     robot = HeadRobot(things=())
     failed(Detect(context_of(robot)), INPUTS, Cause.POSTCONDITION, "no coke seen on the table")
     assert max(robot.stood_m) == pytest.approx(TOP_M, abs=0.02)
     assert robot.stood_m[-1] == USUAL_M
 
 
-def test_what_is_found_at_once_is_not_looked_for_from_above():
+def test_robot_does_not_raise_its_body_when_it_finds_the_object_at_once():
     robot = HeadRobot(things=(COKE,))
     assert isinstance(outcome(Detect(context_of(robot)), INPUTS), Succeeded)
     assert max(robot.stood_m, default=0.0) < TOP_M - 0.05
 
 
-def test_what_only_shows_from_above_is_found():
+def test_object_visible_only_from_above_is_found():
     robot = HeadRobot(things=())
     stand = robot.stand
 
     def stand_up(height_m, pitch_rad, **how):
-        """Things come into view from a body that stands high."""
+        """Robot whose objects are visible only from a raised body."""
         robot.things = (COKE,) if height_m > USUAL_M + 0.16 else ()
         return stand(height_m, pitch_rad, **how)
 

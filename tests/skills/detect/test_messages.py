@@ -1,4 +1,4 @@
-"""What is written to the log."""
+"""Messages of the detect skill in the log."""
 
 import json
 
@@ -17,7 +17,7 @@ from skills.perception.visibility import SurfaceShares
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.02**2, 0.02**2, 0.0]), True)
 
 
-def test_all_detections_are_told_those_with_a_place_with_it():
+def test_message_has_all_detections_and_their_positions_if_known():
     image = scene([COKE])
     found = (seen_as("coke", image), Detection("beer", 0.6, (1.0, 1.0, 9.0, 9.0)))
     placed = detections_3d(image, PLACE, found[:1], [TABLE])

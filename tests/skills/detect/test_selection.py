@@ -1,4 +1,4 @@
-"""What is worth a closer look."""
+"""Clusters worth a closer view."""
 
 from dataclasses import replace
 
@@ -25,12 +25,12 @@ def track_at(x, y, **seen):
     return tracker.update([replace(detected_3d(**seen), position_W=np.array([x, y, 0.8]))], lambda track: True)
 
 
-def test_what_has_a_track_is_named():
+def test_clusters_with_a_track_are_not_unlabelled():
     left = unlabelled_clusters(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
     assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
 
 
-def test_what_may_be_meant_though_it_is_likelier_something_else_is_not_named():
+def test_cluster_with_a_track_that_may_be_wanted_stays_unlabelled():
     # what it was taken for, and how many clusters are left of the one that stands there
     rows = [("coke", (), 0), ("beer", (("coke", 0.4),), 1), ("beer", (("hammer", 0.4),), 0), ("beer", (), 0)]
     for name, alternatives, expected in rows:
@@ -38,7 +38,7 @@ def test_what_may_be_meant_though_it_is_likelier_something_else_is_not_named():
         assert len(unlabelled_clusters(clusters(COKE), tracks, ("coke",))) == expected, (name, alternatives)
 
 
-def test_what_is_too_large_or_small_for_the_class_is_passed_over():
+def test_clusters_too_large_or_small_for_the_class_are_ignored():
     tall = Can(1.1, 0.25, 0.06, 0.39, BLUE)
     assert len(unlabelled_clusters(clusters(COKE, tall), (), ("person",))) == 1
     assert len(unlabelled_clusters(clusters(COKE, tall), (), ("person", "coke"))) == 2
@@ -48,5 +48,5 @@ def test_a_place_that_was_seen_twice_counts_once():
     assert len(unlabelled_clusters([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
 
 
-def test_an_empty_table_has_nothing_to_look_at():
+def test_an_empty_table_has_no_unlabelled_clusters():
     assert unlabelled_clusters(clusters(), (), ("coke",)) == []

@@ -1,4 +1,4 @@
-"""What the detect skill finds, what it says when it finds nothing, and what it does when it cannot look."""
+"""The detect skill: results, failures and viewpoints."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ BEER = Can(1.0, 0.1, 0.03, 0.23, BLUE)
 
 
 def found(things, inputs, **options):
-    """The success of a look at a table with things on it, and the log."""
+    """Result and log of a search on a table with objects."""
     log = []
     step = outcome(Detect(context_of(ScriptedRobot(things=things), log, **options)), inputs)
     assert isinstance(step, Succeeded), step
@@ -42,7 +42,7 @@ def test_a_surface_out_of_sight_is_a_failed_precondition():
     failed(skill, DetectInputs(("coke",), (FAR,)), Cause.PRECONDITION, "the shelf is out of sight")
 
 
-def test_a_thing_is_found_where_it_stands_and_seen_from_two_places():
+def test_an_object_is_found_at_its_position_and_seen_from_two_viewpoints():
     step, log = found([COKE], DetectInputs(("coke", "hammer"), (TABLE,)))
     seen = step.outputs["observation"]
     assert (seen.kind.name, seen.surface) == ("coke", "table")
@@ -55,7 +55,7 @@ def test_a_thing_is_found_where_it_stands_and_seen_from_two_places():
     assert (track["views"], track["class_name"]) == (2, "coke")
 
 
-def test_what_is_seen_only_once_does_not_count():
+def test_an_object_seen_only_once_does_not_count():
     class Flickering(Colours):
         pictures = 0
 
@@ -67,38 +67,38 @@ def test_what_is_seen_only_once_does_not_count():
     failed(skill, DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke seen on the table")
 
 
-def test_a_thing_of_another_class_is_not_what_is_looked_for():
+def test_an_object_of_another_class_does_not_count():
     skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(skill, DetectInputs(("beer",), (TABLE,)), Cause.POSTCONDITION, "no beer seen")
 
 
-def test_a_thing_beside_the_surface_is_not_on_it():
+def test_an_object_beside_the_surface_does_not_count():
     half = replace(TABLE, polygon_W=((0.8, 0.1), (1.4, 0.1), (1.4, 0.6), (0.8, 0.6)))
     skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(skill, DetectInputs(("coke",), (half,)), Cause.POSTCONDITION, "no coke seen")
 
 
 @pytest.mark.parametrize(("attribute", "colour"), [("red", RED), ("pink", PINK)])
-def test_the_one_that_shows_the_attribute_is_taken(attribute, colour):
+def test_the_object_with_the_attribute_is_chosen(attribute, colour):
     colours = Colours({"coke": RED, "beer": PINK} if colour == RED else {"coke": PINK, "beer": RED})
     things = [COKE, replace(SECOND, colour=PINK)]
     step, _ = found(things, DetectInputs(("coke",), (TABLE,), (attribute,)), detector=colours)
     assert step.outputs["observation"].kind.attributes == (attribute,)
 
 
-def test_a_thing_without_the_attribute_is_none():
+def test_an_object_without_the_attribute_does_not_count():
     skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(skill, DetectInputs(("coke",), (TABLE,), ("blue",)), Cause.POSTCONDITION, "no blue coke seen")
 
 
-def test_all_things_are_counted_when_asked_for():
+def test_all_objects_are_counted_with_a_count_of_0():
     step, log = found([COKE, SECOND, BEER], DetectInputs(("coke",), (TABLE,), count=0))
     assert step.message == "there are two cokes on the table"
     assert len(step.outputs["observations"]) == 2
     assert sum(topic == "object_destination" for topic, _ in log) == 2
 
 
-def test_an_answer_rests_on_a_fresh_picture():
+def test_a_result_rests_on_a_fresh_picture():
     robot = ScriptedRobot(things=[COKE])
     step = outcome(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,), count=0))
     assert isinstance(step, Succeeded), step
@@ -106,7 +106,7 @@ def test_an_answer_rests_on_a_fresh_picture():
 
 
 class SeenAtAllPicturesBut(Colours):
-    """Is blind at one of its pictures; counts them."""
+    """Detector that finds nothing in one of its pictures; counts them."""
 
     def __init__(self, missed):
         super().__init__()
@@ -120,7 +120,7 @@ class SeenAtAllPicturesBut(Colours):
 
 # picture of the run that is not missed    blind at it              looks once more
 # the last: a fresh one of what was found  nothing is seen there    from where it was seen before
-def test_what_does_not_show_in_the_fresh_picture_is_looked_at_from_where_it_was_seen():
+def test_object_hidden_in_the_fresh_picture_is_viewed_from_its_old_viewpoint():
     asked, seeing = DetectInputs(("coke",), (TABLE,), count=0), SeenAtAllPicturesBut(None)
     found([COKE], asked, detector=seeing)
     missing, robot = SeenAtAllPicturesBut(seeing.pictures), ScriptedRobot(things=[COKE])
@@ -130,19 +130,19 @@ def test_what_does_not_show_in_the_fresh_picture_is_looked_at_from_where_it_was_
     assert robot.now() - step.outputs["observation"].stamp_s < 2.0
 
 
-def test_the_look_ends_with_as_many_as_were_asked_for():
+def test_search_ends_with_the_wanted_number_of_objects():
     step, _ = found([COKE, SECOND], DetectInputs(("coke",), (TABLE,), count=2))
     assert step.message == "there are two cokes on the table"
 
 
-def test_fewer_than_asked_for_is_a_failure_that_tells_how_many():
+def test_too_few_objects_fail_with_their_number():
     skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(
         skill, DetectInputs(("coke",), (TABLE,), count=3), Cause.POSTCONDITION, "there is one coke on the table, and"
     )
 
 
-def test_nothing_seen_is_a_failed_postcondition_that_tells_what_was_seen_and_the_arm_is_stowed():
+def test_search_without_objects_fails_with_the_shares_seen_and_stows_the_arm():
     robot, log = ScriptedRobot(things=[]), []
     skill = Detect(context_of(robot, log))
     failed(skill, DetectInputs(("coke", "beer"), (TABLE,)), Cause.POSTCONDITION, "no coke or beer seen on the table")
@@ -154,7 +154,7 @@ def test_nothing_seen_is_a_failed_postcondition_that_tells_what_was_seen_and_the
     assert sum(shares.values()) == pytest.approx(1.0, abs=0.01)
 
 
-def test_a_hidden_part_of_the_surface_is_told():
+def test_failure_says_how_much_of_the_surface_is_hidden():
     wall = Can(0.95, 0.0, 0.1, 0.4, GREY)
     log = []
     skill = Detect(context_of(ScriptedRobot(things=[wall]), log))
@@ -162,7 +162,7 @@ def test_a_hidden_part_of_the_surface_is_told():
     assert next(m["surfaces"]["table"]["hidden"] for topic, m in log if topic == "surfaces_seen") > 0.02
 
 
-def test_what_something_hides_is_looked_at_from_the_side():
+def test_hidden_areas_are_viewed_from_the_side():
     wall = Can(1.0, 0.0, 0.06, 0.30, GREY)
     hidden = Can(1.17, 0.0, 0.033, 0.115, RED)
     log = []
@@ -173,7 +173,7 @@ def test_what_something_hides_is_looked_at_from_the_side():
     assert step.outputs["observation"].position_W == pytest.approx((hidden.x, hidden.y, 0.8075), abs=0.03)
 
 
-def test_what_is_seen_from_one_side_only_is_confirmed_from_right_beside_there():
+def test_object_visible_from_one_side_is_confirmed_from_a_viewpoint_beside_it():
     wall = [Can(1.0, y, 0.05, 0.32, GREY) for y in (-0.08, 0.0, 0.08)]
     hidden = Can(1.2, 0.05, 0.033, 0.115, RED)
     log = []
@@ -184,13 +184,13 @@ def test_what_is_seen_from_one_side_only_is_confirmed_from_right_beside_there():
     assert [bool(m["detections"]) for topic, m in log if topic == "detections"][-4:] == [True, False, False, True]
 
 
-def test_without_light_and_depth_nothing_was_looked_at():
+def test_search_in_the_dark_fails_as_unseen():
     robot = ScriptedRobot()
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.EXECUTION, "it is dark")
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
 
 
-def test_a_thing_on_the_floor_counts_only_when_the_floor_does():
+def test_an_object_on_the_floor_counts_only_with_floor():
     bottle = Can(1.0, -0.85, 0.04, 0.25, BLUE, base=0.0)
     inputs = DetectInputs(("beer",), (TABLE,))
     failed(Detect(context_of(ScriptedRobot(things=[bottle]))), inputs, Cause.POSTCONDITION, "no beer seen")
@@ -199,7 +199,7 @@ def test_a_thing_on_the_floor_counts_only_when_the_floor_does():
     assert step.outputs["observation"].position_W == pytest.approx((1.0, -0.85, 0.125), abs=0.03)
 
 
-def test_with_an_expected_place_only_what_is_there_counts():
+def test_with_an_expected_position_only_objects_near_it_count():
     near = DetectInputs(("coke",), (TABLE,), expected_W=(SECOND.x, SECOND.y, 0.8))
     step, _ = found([COKE, SECOND], near)
     assert step.outputs["observation"].position_W[1] == pytest.approx(SECOND.y, abs=0.02)
@@ -207,7 +207,7 @@ def test_with_an_expected_place_only_what_is_there_counts():
     failed(skill, replace(near, expected_W=(1.2, 0.5, 0.8)), Cause.POSTCONDITION, "no coke seen")
 
 
-def test_what_is_not_named_from_afar_is_looked_at_from_near():
+def test_unlabelled_cluster_is_viewed_from_near():
     class ShortSighted(Colours):
         def detect(self, pictures):
             large = [[d for d in found if d.box[3] - d.box[1] > 75.0] for found in super().detect(pictures)]
@@ -220,7 +220,7 @@ def test_what_is_not_named_from_afar_is_looked_at_from_near():
     assert seen_in[-1]
 
 
-def test_what_may_be_meant_though_it_is_likelier_something_else_is_looked_at_from_near():
+def test_object_that_may_be_of_the_wanted_class_is_viewed_from_near():
     class ConfusedFromAfar(Colours):
         def detect(self, pictures):
             return [tuple(self.taken(d) for d in found) for found in super().detect(pictures)]
@@ -233,7 +233,7 @@ def test_what_may_be_meant_though_it_is_likelier_something_else_is_looked_at_fro
     assert step.outputs["observation"].kind.name == "coke"
 
 
-def test_the_gripper_is_opened_to_look_and_closed_again():
+def test_the_gripper_opens_for_a_view_and_closes_afterwards():
     robot = ScriptedRobot(things=[])
     failed(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)), Cause.POSTCONDITION, "no coke")
     assert robot.opening == 0.0

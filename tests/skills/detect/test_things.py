@@ -1,4 +1,4 @@
-"""Any object, whether the detector has a class for it or not."""
+"""Search for any object, whether the detector knows its class or not."""
 
 from dataclasses import replace
 
@@ -20,14 +20,14 @@ def seen(things, inputs, **options):
     return step
 
 
-def test_what_has_no_label_is_a_thing_with_pose_and_extent():
+def test_object_without_a_label_is_a_thing_with_pose_and_size():
     (found,) = seen([ODD], ALL).outputs["observations"]
     assert (found.kind.name, found.surface) == ("thing", "table")
     assert found.position_W == pytest.approx((ODD.x, ODD.y, 0.795), abs=0.012)
     assert found.size_m == pytest.approx((0.08, 0.08, 0.09), abs=0.015)
 
 
-def test_a_label_is_joined_to_its_segment():
+def test_a_label_is_matched_to_its_segment():
     step = seen([COKE, ODD], ALL)
     assert sorted(each.kind.name for each in step.outputs["observations"]) == ["coke", "thing"]
     assert sorted(step.message.removeprefix("there are ").removesuffix(" on the table").split(" and ")) == [
@@ -36,7 +36,7 @@ def test_a_label_is_joined_to_its_segment():
     ]
 
 
-def test_things_that_touch_are_two():
+def test_objects_that_touch_are_two():
     pair = [Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, GREEN)]
     found = seen(pair, ALL).outputs["observations"]
     assert sorted(round(each.position_W[1], 2) for each in found) == pytest.approx([0.0, 0.07], abs=0.011)
@@ -50,16 +50,16 @@ def test_the_nearest_and_most_free_is_the_first():
     assert seen([*hemmed, free], ANY).outputs["observation"].position_W[1] == pytest.approx(free.y, abs=0.015)
 
 
-def test_nothing_left_is_a_failed_postcondition_that_says_so():
+def test_search_for_anything_on_an_empty_table_fails():
     failed(Detect(context_of(ScriptedRobot(things=[]))), ANY, Cause.POSTCONDITION, "no thing seen on the table")
 
 
-def test_a_thing_is_seen_again_where_it_is_expected():
+def test_an_object_is_found_again_at_its_expected_position():
     inputs = replace(ANY, expected_W=(ODD.x, ODD.y, 0.795))
     assert seen([COKE, ODD], inputs).outputs["observation"].position_W[1] == pytest.approx(ODD.y, abs=0.015)
 
 
-def test_a_thing_has_colours_and_no_size_among_its_kind():
+def test_an_object_without_a_class_has_colours_and_no_size_attribute():
     red = replace(ODD, colour=RED)
     unknowing = Colours({"coke": BLUE})
     assert seen([red], replace(ANY, attributes=("red",)), detector=unknowing).outputs["observation"].kind.attributes

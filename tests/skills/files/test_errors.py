@@ -10,5 +10,5 @@ def test_a_message_that_repeats_an_endless_name_is_cut_off():
     assert str(error).endswith("...; known are kitchen")
 
 
-def test_a_message_shows_what_a_terminal_would_obey():
+def test_a_message_escapes_control_characters():
     assert str(InputError("no 'a\x1b[31m\u202eb\nc\udcff'", hint="x\x07")) == r"no 'a\x1b[31m\u202eb c\udcff'; x\x07"

@@ -1,4 +1,4 @@
-"""Blackboard values come back from the store equal and of the same type."""
+"""Values are read back from JSON equal and with their types."""
 
 import enum
 from dataclasses import dataclass
@@ -53,8 +53,8 @@ def test_transforms_come_back_to_the_last_bit():
     assert np.array_equal(again.GetAsMatrix34(), X.GetAsMatrix34())
 
 
-def test_what_cannot_be_kept_is_refused():
-    with pytest.raises(TypeError, match="function cannot be kept"):
+def test_values_without_a_stored_form_are_refused():
+    with pytest.raises(TypeError, match="function cannot be stored"):
         to_text((1, lambda: 0))
 
 
@@ -71,7 +71,7 @@ def test_what_cannot_be_kept_is_refused():
         '{"$kind": "enum", "class": "skills.api:ObjectKind", "name": "A"}',
     ],
 )
-def test_damaged_text_and_classes_that_are_gone_are_refused(text):
+def test_damaged_text_and_missing_classes_are_refused(text):
     with pytest.raises(ValueError, match=r".+"):
         from_text(text)
 

@@ -1,4 +1,4 @@
-"""All YAML is read by the one reader."""
+"""The YAML reader is the only one."""
 
 import ast
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ ELSEWHERE = {
 
 
 def calls(source: str) -> Iterator[str]:
-    """The functions of PyYAML that read, as far as a source calls them."""
+    """Reading functions of PyYAML that a source calls."""
     for node in ast.walk(ast.parse(source)):
         called = node.func if isinstance(node, ast.Call) else None
         if isinstance(called, ast.Attribute) and isinstance(called.value, ast.Name) and called.value.id == "yaml":
@@ -27,5 +27,5 @@ def test_no_module_reads_yaml_by_itself():
     assert files and alone <= set(ELSEWHERE)
 
 
-def test_a_module_that_does_is_found():
+def test_a_module_that_reads_yaml_by_itself_is_found():
     assert list(calls("import yaml\nyaml.safe_load('a')\nyaml.safe_dump({})")) == ["safe_load"]

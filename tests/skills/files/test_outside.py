@@ -1,4 +1,4 @@
-"""Files from outside: only plain ones, below a size, in the folder of the file that names them."""
+"""Guarded reading of files, texts and JSON."""
 
 import json
 import os
@@ -44,7 +44,7 @@ def test_only_a_plain_file_below_the_limit_is_read(tmp_path, read):
 
 
 @pytest.mark.parametrize("name", TEXTS, ids=lambda name: repr(name[:12]))
-def test_any_name_of_a_file_is_refused_or_lies_in_the_folder(tmp_path, name):
+def test_any_file_name_is_refused_or_lies_in_the_folder(tmp_path, name):
     (tmp_path / "home").mkdir()
     try:
         found = file_beside(tmp_path / "home/map.yaml", name)
@@ -55,7 +55,7 @@ def test_any_name_of_a_file_is_refused_or_lies_in_the_folder(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["http://x/a.png", "file:///etc/passwd", "/etc/passwd", "../a.png", "link/passwd", ""])
-def test_a_name_that_leads_elsewhere_is_refused(tmp_path, name):
+def test_a_name_that_leaves_the_folder_is_refused(tmp_path, name):
     (tmp_path / "link").symlink_to("/etc")
     with pytest.raises(InputError):
         file_beside(tmp_path / "map.yaml", name)
@@ -66,14 +66,14 @@ def test_a_file_in_a_folder_above_is_read_where_the_home_is_above(tmp_path):
     assert file_beside(tmp_path / "map/m.yaml", "../a.png", home=tmp_path).resolve() == tmp_path / "a.png"
 
 
-def test_utf_16_text_is_told(tmp_path):
+def test_utf_16_text_is_refused_by_name(tmp_path):
     (tmp_path / "a").write_text("a: 1", encoding="utf-16")
     with pytest.raises(InputError, match="UTF-16"):
         read_text(tmp_path / "a")
 
 
 @pytest.mark.parametrize("name", ["", "a\0b", "x" * 300, "x" * 5_000, "none"])
-def test_what_the_system_cannot_look_for_is_not_there(tmp_path, name):
+def test_impossible_file_names_do_not_exist(tmp_path, name):
     assert not is_file(tmp_path / name)
     assert is_there(tmp_path / name) == is_folder(tmp_path / name) == (name == "")
 
@@ -93,7 +93,7 @@ def test_a_text_that_cannot_be_shown_is_refused_with_its_reason(text, words):
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_any_text_is_taken_as_one_that_can_be_written_or_is_refused(text):
+def test_any_text_is_writable_or_refused(text):
     try:
         taken = plain_text(text, what="the text")
     except InputError as error:
@@ -102,7 +102,7 @@ def test_any_text_is_taken_as_one_that_can_be_written_or_is_refused(text):
         assert taken.encode() is not None and len(taken) <= LONGEST_TEXT
 
 
-def test_the_blanks_around_a_text_are_left_out():
+def test_blanks_around_a_text_are_stripped():
     assert plain_text(" the coke\r\n", what="the answer") == "the coke"
 
 
@@ -110,7 +110,7 @@ def test_the_blanks_around_a_text_are_left_out():
     "content",
     [b"[" * 15_000, b"[]", b"{", b"\xff", b'{"a": ' * 15_000, b'{"a": "\\ud800"}', b'{"a": ' + b"9" * 5000 + b"}"],
 )
-def test_what_is_no_json_object_is_refused(content):
+def test_anything_but_a_json_object_is_refused(content):
     with pytest.raises(InputError, match="the values are no JSON object; give one"):
         json_object(content, what="the values", hint="give one")
 

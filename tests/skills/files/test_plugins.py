@@ -1,4 +1,4 @@
-"""Plug-ins: whatever their code raises is one error, and one that hangs ends the process with its name."""
+"""Plug-ins: their errors become one error, and one that hangs ends the process with its name."""
 
 import subprocess
 import sys
@@ -43,12 +43,12 @@ def raising(defect):
         (ValueError("x" * 10_000), "ValueError: x{300}$"),
     ],
 )
-def test_whatever_a_plug_in_raises_is_one_error(defect, words):
+def test_any_error_of_a_plug_in_becomes_one_defect(defect, words):
     with pytest.raises(PluginDefect, match=words):
         run_plugin(ENTRY, raising(defect))
 
 
-def test_ctrl_c_during_an_import_is_the_users():
+def test_ctrl_c_during_an_import_passes_through():
     with pytest.raises(KeyboardInterrupt):
         run_plugin(ENTRY, raising(KeyboardInterrupt()))
 
@@ -62,18 +62,18 @@ def test_an_import_that_hangs_ends_the_process_with_one_line():
     assert time.monotonic() - begun < 40.0
 
 
-def test_a_call_that_is_over_in_time_harms_nobody_later():
+def test_a_call_that_ends_in_time_does_not_end_the_process_later():
     assert run_plugin(ENTRY, lambda: 3, limit_s=0.05) == 3
     time.sleep(0.2)
 
 
-def test_a_call_aside_gives_its_result_or_one_error():
+def test_a_call_in_a_thread_returns_its_result_or_raises_a_defect():
     assert run_in_thread(lambda: 3, limit_s=10.0) == 3
     with pytest.raises(PluginDefect, match="SystemExit: 3"):
         run_in_thread(raising(SystemExit(3)), limit_s=10.0)
 
 
-def test_a_call_aside_that_hangs_is_left_behind():
+def test_a_call_in_a_thread_that_hangs_is_abandoned():
     over = threading.Event()
     with pytest.raises(PluginDefect, match=r"not done within 0\.05 s"):
         run_in_thread(lambda: over.wait(10), limit_s=0.05)

@@ -18,7 +18,7 @@ class Plan(BaseModel):
     events: tuple[Event, ...]
 
 
-def test_a_key_that_is_no_text_in_an_item_of_a_list_is_refused_in_its_line(tmp_path):
+def test_a_key_that_is_no_text_in_a_list_item_is_refused_with_its_line(tmp_path):
     path = tmp_path / "plan.yaml"
     path.write_text("events:\n  - {at: 1}\n  - {null: null}\n", encoding="utf-8")
     with pytest.raises(InputError) as error:

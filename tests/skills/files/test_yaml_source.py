@@ -1,4 +1,4 @@
-"""The reader of YAML files: anchors, lines, and one refusal that shows nothing of a file that nobody wrote as such."""
+"""The YAML reader: scalars, anchors, lines, and refusals that show no content of foreign files."""
 
 import os
 import time
@@ -73,7 +73,7 @@ class Thing(BaseModel):
         ("{name: a, 3: b}", "put the key in quotes"),
     ],
 )
-def test_what_yaml_reads_otherwise_is_refused_with_what_to_write(tmp_path: Path, text: str, says: str) -> None:
+def test_values_that_yaml_misreads_are_refused_with_a_correction(tmp_path: Path, text: str, says: str) -> None:
     file = tmp_path / "thing.yaml"
     file.write_text(text)
     with pytest.raises(InputError) as error:
@@ -84,13 +84,13 @@ def test_what_yaml_reads_otherwise_is_refused_with_what_to_write(tmp_path: Path,
 @pytest.mark.parametrize(
     ("text", "name"), [("name: 007", "007"), ("name: 14:30", "14:30"), ("name: 2026-12-01", "2026-12-01")]
 )
-def test_what_is_a_text_for_people_is_a_text(tmp_path: Path, text: str, name: str) -> None:
+def test_octals_times_and_dates_are_texts(tmp_path: Path, text: str, name: str) -> None:
     file = tmp_path / "thing.yaml"
     file.write_text(f"name: {name}")
     assert validate(Thing, read_yaml(file)).name == name
 
 
-def test_words_of_yes_and_no_are_texts_where_they_are_keys(tmp_path: Path) -> None:
+def test_yes_and_no_are_texts_as_keys(tmp_path: Path) -> None:
     file = tmp_path / "thing.yaml"
     file.write_text("choices: {yes: 1, no: 2, on: 3}")
     assert read_yaml(file).data == {"choices": {"yes": 1, "no": 2, "on": 3}}
@@ -101,7 +101,7 @@ def test_words_of_yes_and_no_are_texts_where_they_are_keys(tmp_path: Path) -> No
 # 1e3     1e3                    1000.0
 # 12      '12'                   "12"
 @pytest.mark.parametrize("text", ["0E0", "1e3", "-.5e-7", "12", "no", "14:30", "010", "beer", "a: b", "ä"])
-def test_a_text_that_looks_like_a_number_is_written_so_that_it_reads_back(text: str) -> None:
+def test_a_text_that_looks_like_a_number_reads_back_as_text(text: str) -> None:
     assert parse_yaml(yaml_of({"answer": text}), Path("m.yaml")).data == {"answer": text}
 
 
@@ -162,14 +162,14 @@ SYSTEM_FILES = {
 
 @pytest.mark.parametrize("load", LOADERS)
 @pytest.mark.parametrize("text", SYSTEM_FILES.values(), ids=SYSTEM_FILES)
-def test_nothing_of_a_file_that_is_none_of_ours_is_shown(tmp_path, load, text):
+def test_errors_show_no_content_of_foreign_files(tmp_path, load, text):
     (tmp_path / "file").write_text(text)
     error = refused(load, tmp_path / "file")
     assert not [one for one in (error, *error.others) if SECRET in str(one)]
 
 
 @pytest.mark.parametrize("name", [r'"a\0b"', '"   "', r'"\t"', r'"\u200b"', r'"a\x1bb"', r'"a\nb"', '""'])
-def test_a_name_that_cannot_be_seen_is_refused_at_its_line(tmp_path, name):
+def test_an_invisible_name_is_refused_at_its_line(tmp_path, name):
     for key in ("name", "robot", "world"):
         values = {"name": "m", key: name}
         keys = "".join(f"{one}: {value}\n" for one, value in values.items())
@@ -179,7 +179,7 @@ def test_a_name_that_cannot_be_seen_is_refused_at_its_line(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", ["kitchen", "Küche 2", "厨房", "a-b_c.d"])
-def test_a_name_in_any_writing_is_taken(tmp_path, name):
+def test_a_name_in_any_script_is_accepted(tmp_path, name):
     (tmp_path / "m.yaml").write_text(f"name: {name}\nsteps: [{{say: 'go to\n  the hall'}}]\n", encoding="utf-8")
     assert isinstance(load_mission(tmp_path / "m.yaml"), Mission)
 
@@ -206,12 +206,12 @@ def test_any_bytes_are_read_or_refused_at_a_line(tmp_path, raw):
         assert len(str(error)) < 500
 
 
-def test_merge_keys_bring_what_is_not_written(tmp_path):
+def test_merge_keys_add_missing_keys(tmp_path):
     source = source_of(tmp_path, "a: &a {x: 1, y: 2}\nb: &b\n  y: 3\nc:\n  <<: [*a, *b]\n  x: 5\nd: {<<: *b}\n")
     assert (source.data["c"], source.data["d"]) == ({"x": 5, "y": 2}, {"y": 3})
 
 
-def test_what_an_alias_brings_has_the_line_of_its_anchor(tmp_path):
+def test_aliased_values_have_the_line_of_their_anchor(tmp_path):
     source = source_of(tmp_path, "a: &a\n  x: 1\nb:\n  <<: *a\n  z: 1\nc:\n- *a\n")
     lines = [source.line(path) for path in (("b", "x"), ("b", "z"), ("c", 0, "x"))]
     assert lines == [2, 5, 2]
@@ -253,7 +253,7 @@ def test_many_merges_of_a_large_mapping_are_refused(tmp_path):
         (b"a: 1\nb: caf\xe9\n", "UTF-8", 2),
     ],
 )
-def test_what_a_file_cannot_hold_is_refused_at_its_line(tmp_path, text, said, line):
+def test_invalid_yaml_is_refused_at_its_line(tmp_path, text, said, line):
     error = refusal_of(tmp_path, text)
     assert said in str(error)
     assert error.line == line
@@ -263,7 +263,7 @@ def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path):
     assert source_of(tmp_path, b"\xef\xbb\xbfa: 1\r\nb: 2\r\n").data == {"a": 1, "b": 2}
 
 
-def test_tags_that_a_format_has_are_read_where_it_says_so(tmp_path):
+def test_allowed_tags_are_read(tmp_path):
     (tmp_path / "f.yaml").write_text("a: !Rpy {deg: [0, 0, 90]}\n")
     assert read_yaml(tmp_path / "f.yaml", frozenset({"!Rpy"})).data == {"a": {"deg": [0, 0, 90]}}
 

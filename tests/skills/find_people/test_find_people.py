@@ -1,4 +1,4 @@
-"""Where find_people says that somebody is."""
+"""The find_people skill: turns and observations."""
 
 import math
 
@@ -14,7 +14,7 @@ ROOM = tuple((x, y) for x, y in ((0.2, 0.2), (4.8, 0.2), (4.8, 3.8), (0.2, 3.8))
 CORRIDOR = (Box(-4.0, -0.1, 4.0, 0.0), Box(-4.0, 1.2, 4.0, 1.3), Box(-4.1, -0.1, -4.0, 1.3), Box(4.0, -0.1, 4.1, 1.3))
 
 
-def test_in_a_narrow_corridor_the_robot_turns_no_further_than_it_has_room():
+def test_in_a_narrow_corridor_the_robot_turns_no_further_than_is_clear():
     bench = Bench(Pose2D(0.0, 0.6, 0.0), surveyed=CORRIDOR, cameras=False)
     for _ in range(10):
         bench.tick()
@@ -27,7 +27,7 @@ def test_in_a_narrow_corridor_the_robot_turns_no_further_than_it_has_room():
     assert abs(bench.robot.pose.yaw_rad) < 0.9  # 1.1 m long and 0.5 m wide, it would touch the walls at about 1.2
 
 
-def test_the_observation_is_where_somebody_stands():
+def test_the_observation_is_at_the_persons_position():
     # a body 0.4 m wide at (3.0, 2.0), seen by the LiDAR from (1.5, 2.0)
     bench = Bench(Pose2D(1.5, 2.0, 0.0), unmapped=(Box(2.8, 1.8, 3.2, 2.2),), surveyed=TWO_ROOMS, cameras=False)
     for _ in range(10):

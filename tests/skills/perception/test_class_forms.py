@@ -1,4 +1,4 @@
-"""The forms of the classes."""
+"""Knowledge of object classes and attributes."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from skills.perception.class_forms import class_forms, known_attributes
 from skills.perception.detection_3d import has_attribute
 
 
-def test_the_skills_and_the_models_number_the_classes_alike():
+def test_skills_and_models_use_the_same_class_ids():
     catalogue = {name: entry.id for name, entry in load_catalogue().items()}
     assert catalogue.items() <= {name: form.id for name, form in class_forms().items()}.items()
 
@@ -53,7 +53,7 @@ def coloured(*colours):
         ((130, 130, 132), "grey"),
     ],
 )
-def test_a_thing_shows_its_colour_and_no_opposite(colour, word):
+def test_an_object_has_its_colour_and_not_the_opposite(colour, word):
     assert has_attribute(coloured(colour), word)
     assert not has_attribute(coloured(colour), "green" if word != "green" else "red")
 
@@ -63,11 +63,11 @@ def test_a_third_of_the_pixels_is_enough():
     assert not has_attribute(coloured((190, 20, 25), *[(120, 120, 125)] * 6), "red")
 
 
-def test_a_thing_in_a_grey_picture_shows_no_colour():
+def test_an_object_in_a_grey_picture_has_no_colour():
     assert not has_attribute(detected_3d(), "red")
 
 
-def test_big_and_small_go_by_what_is_usual_in_the_class():
+def test_big_and_small_are_relative_to_the_class():
     big = replace(detected_3d(name="hammer"), size_m=(0.8, 0.2, 0.06))
     small = replace(detected_3d(name="hammer"), size_m=(0.25, 0.1, 0.03))
     assert [

@@ -1,4 +1,4 @@
-"""Detections with a place in the world."""
+"""Detections in 3D."""
 
 import numpy as np
 import pytest
@@ -18,14 +18,14 @@ def only(image, place=SURE, surfaces=(TABLE,), name="coke"):
     return found
 
 
-def test_a_detection_gets_place_size_surface_and_colours():
+def test_a_detection_gets_position_size_surface_and_colours():
     found = only(scene([COKE]))
     assert found.position_W == pytest.approx(COKE_W, abs=0.006)
     assert (found.surface, found.class_name, found.stamp_s) == ("table", "coke", 1.5)
     assert np.all(np.median(found.colours, axis=0) == RED)
 
 
-def test_the_place_follows_the_localisation():
+def test_the_position_follows_the_localisation():
     turned = RigidTransform(RollPitchYaw(0.0, 0.0, 0.5), [1.0, 2.0, 0.0])
     place = LocalisationEstimate(0.0, turned, np.zeros((3, 3)), True)
     found = only(scene([COKE]), place, ())
@@ -33,14 +33,14 @@ def test_the_place_follows_the_localisation():
     assert found.yaw_rad == pytest.approx(0.5)
 
 
-def test_the_localisations_uncertainty_is_added_to_the_place_in_the_world():
+def test_the_localisations_uncertainty_is_added_to_the_position_in_the_world():
     unsure = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.03**2, 0.01**2, 0.0]), True)
     found = only(scene([COKE]), unsure)
     added = found.place_covariance - found.covariance
     assert np.diag(added) == pytest.approx([0.03**2, 0.01**2, 0.0])
 
 
-def test_an_uncertain_heading_moves_what_is_far_sideways():
+def test_an_uncertain_heading_adds_sideways_uncertainty_to_far_points():
     added = place_covariance(np.array([2.0, 0.0, 0.8]), np.zeros(3), np.diag([0.0, 0.0, 0.01**2]))
     assert np.sqrt(np.diag(added)) == pytest.approx([0.0, 0.02, 0.0])
 
@@ -54,7 +54,7 @@ def test_a_detection_without_depth_or_of_a_class_without_form_is_left_out():
 
 # class -> whether it can span 0.6 m, where the longest are (class_forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long
 @pytest.mark.parametrize(("name", "possible"), [("coke", False), ("beer", False), ("wrench", True), ("hammer", True)])
-def test_what_spans_far_more_than_such_things_do_is_left_out(name, possible):
+def test_a_box_far_too_large_for_its_class_is_left_out(name, possible):
     image = scene([COKE])
     u0, v0, u1, v1 = seen_as("coke", image).box
     half_px = 0.3 * LENS.fx / float(np.linalg.norm(COKE_W - CAMERA))
@@ -77,18 +77,18 @@ SHELF = Surface("shelf", TABLE.polygon_W, 0.40)
         ((0.5, 0.0, 0.1), 0.02, "floor"),
     ],
 )
-def test_what_a_thing_rests_on(p_W, base_m, name):
+def test_surface_below_an_object(p_W, base_m, name):
     assert surface_below(np.array(p_W), base_m, (TABLE, SHELF)) == name
 
 
-def test_an_observation_tells_what_was_seen():
+def test_an_observation_has_the_data_of_its_detection():
     seen = observation(only(scene([COKE])), ("red",))
     assert str(seen.kind) == "red coke"
     assert seen.position_W == pytest.approx(tuple(COKE_W), abs=0.006)
     assert (seen.score, seen.surface) == (0.9, "table")
 
 
-def test_depth_ahead_is_that_of_the_points_and_of_what_is_there():
+def test_depth_at_points_is_theirs_and_that_of_the_picture():
     image = scene([COKE], noise_m=0.0)
     points = np.array([[1.2, 0.3, 0.75], [COKE.x + 0.2, COKE.y, 0.76], [-1.0, 0.0, 0.75]])
     depth, seen = depth_at_points(image, RigidTransform(), points)
@@ -97,7 +97,7 @@ def test_depth_ahead_is_that_of_the_points_and_of_what_is_there():
     assert np.isnan(seen[2])
 
 
-def test_a_thing_in_plain_view_should_be_seen_and_one_behind_another_should_not():
+def test_an_object_behind_another_is_not_in_plain_view():
     tall = Can(COKE.x, COKE.y, 0.05, 0.3, BLUE)
     image = scene([tall])
     assert in_plain_view(image, RigidTransform(), np.array([1.2, 0.3, 0.8]))
@@ -105,7 +105,7 @@ def test_a_thing_in_plain_view_should_be_seen_and_one_behind_another_should_not(
     assert not in_plain_view(image, RigidTransform(), np.array([-1.0, 0.0, 0.8]))
 
 
-def test_a_long_thing_beside_another_is_not_taken_for_it():
+def test_a_long_object_beside_another_does_not_take_its_points():
     disk = Can(1.02, 0.16, 0.06, 0.012, RED)  # as flat as a wrench
     before = Can(0.94, 0.115, 0.03, 0.10, BLUE)
     image = scene([disk, before])

@@ -1,4 +1,4 @@
-"""What moves is told from what stands."""
+"""Moving objects and still ones."""
 
 import math
 
@@ -11,7 +11,7 @@ SCAN_S = 0.1
 
 
 def side_of(x, y, *, seen_from=(0.0, 0.0), radius_m=0.2, noise_m=0.02, rng=None):
-    """Returns on the side of an upright cylinder that is seen from a place."""
+    """Returns on the visible side of an upright cylinder."""
     rng = rng or np.random.default_rng(0)
     towards = math.atan2(seen_from[1] - y, seen_from[0] - x)
     turn = towards + np.linspace(-1.4, 1.4, 40)
@@ -29,28 +29,28 @@ def watch(place, scans=12, seen_from=lambda time_s: (0.0, 0.0), **options):
 
 
 @pytest.mark.parametrize("speed", [0.6, 1.2, 2.0])
-def test_who_walks_is_told_with_speed_and_direction_within_three_scans(speed):
+def test_a_walking_person_has_speed_and_direction_within_three_scans(speed):
     told = watch(lambda time_s: (2.0, -1.0 + speed * time_s))
     assert told[3] and told[-1]
     vx, vy = told[-1][0].velocity_W
     assert vy == pytest.approx(speed, abs=0.35) and abs(vx) < 0.3
 
 
-def test_who_stands_does_not_move():
+def test_a_standing_person_does_not_move():
     assert not any(watch(lambda time_s: (2.0, 0.5), scans=40))
 
 
-def test_who_stands_does_not_move_when_seen_from_a_robot_that_drives_by():
+def test_a_standing_person_does_not_move_as_the_robot_drives_by():
     told = watch(lambda time_s: (2.0, 0.8), scans=40, seen_from=lambda time_s: (1.0 * time_s, 0.0), radius_m=0.3)
     assert not any(told)
 
 
-def test_who_stops_moves_no_more():
+def test_a_person_who_stops_does_not_move():
     told = watch(lambda time_s: (2.0, min(0.0, -1.0 + 1.2 * time_s)), scans=20)
     assert told[6] and not told[-1]
 
 
-def test_a_wall_that_is_revealed_bit_by_bit_does_not_move():
+def test_a_wall_that_appears_bit_by_bit_does_not_move():
     watched, rng = MovingWatch(), np.random.default_rng(2)
     for n in range(20):
         x = np.linspace(0.0, 0.2 + 0.1 * n, 40)
@@ -65,14 +65,14 @@ def test_the_same_scan_again_changes_nothing():
     assert told and watched.update(4 * SCAN_S, side_of(9.0, 9.0)) == told
 
 
-def test_where_it_will_be():
+def test_a_moving_object_is_predicted_at_constant_velocity():
     (one,) = watch(lambda time_s: (2.0, 1.0 * time_s))[-1]
     ahead = one.places_W(np.array([0.0, 1.0]), one.stamp_s + 0.5)
     assert ahead[1] - ahead[0] == pytest.approx(one.velocity_W)
     assert ahead[0] == pytest.approx(np.array(one.place_W) + 0.5 * np.array(one.velocity_W))
 
 
-def test_clusters_are_told_apart_and_small_and_wide_ones_left_out():
+def test_clusters_are_separated_and_small_and_wide_ones_left_out():
     rng = np.random.default_rng(3)
     wall = np.column_stack([np.linspace(0.0, 3.0, 200), np.full(200, 5.0)])
     points = np.concatenate([side_of(1.0, 1.0, rng=rng), side_of(2.0, 1.0, rng=rng), wall, [[8.0, 8.0]]])

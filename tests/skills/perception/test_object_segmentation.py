@@ -1,4 +1,4 @@
-"""The points of a thing among those of its box."""
+"""Segmentation of an object in its box."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ def window_of(image):
     return window
 
 
-def test_the_table_and_the_floor_are_planes_about_a_thing_at_the_tables_edge():
+def test_table_and_floor_are_planes_about_an_object_at_the_tables_edge():
     image = scene([Can(1.36, 0.0, 0.033, 0.115, COKE.colour)])
     heights = sorted(plane.height_m for plane in level_planes(window_of(image)))
     assert heights == pytest.approx([0.0, TABLE.height_m], abs=0.01)
 
 
-def test_the_things_points_are_those_of_the_thing():
+def test_the_segment_has_only_points_of_the_object():
     image = scene([COKE])
     found = segment_object(window_of(image), FORM)
     off = np.linalg.norm(found.points_O[:, :2] - [COKE.x, COKE.y], axis=1)
@@ -33,7 +33,7 @@ def test_the_things_points_are_those_of_the_thing():
     assert found.covered > 0.8
 
 
-def test_most_of_what_is_seen_of_the_thing_is_taken():
+def test_the_segment_has_most_visible_points_of_the_object():
     image = scene([COKE])
     window = window_of(image)
     red = np.all(image.colour == COKE.colour, axis=-1)
@@ -42,7 +42,7 @@ def test_most_of_what_is_seen_of_the_thing_is_taken():
     assert np.count_nonzero(found.mask & of_thing) > 0.85 * np.count_nonzero(of_thing)
 
 
-def test_another_thing_in_the_box_is_left_out():
+def test_another_object_in_the_box_is_left_out():
     before = Can(COKE.x - 0.10, COKE.y - 0.05, 0.03, 0.08, BLUE)
     image = scene([COKE, before])
     window = window_of(image)
@@ -50,7 +50,7 @@ def test_another_thing_in_the_box_is_left_out():
     assert np.count_nonzero(segment_object(window, FORM).mask & blue) < 20
 
 
-def test_a_wall_behind_two_parts_of_a_thing_is_left_out():
+def test_a_wall_behind_two_parts_of_an_object_is_left_out():
     tank, hose = Can(1.0, -0.1, 0.06, 0.30, COKE.colour), Can(1.0, 0.08, 0.012, 0.28, COKE.colour)
     image = scene([tank, hose, Can(1.85, 0.0, 0.55, 1.2, BLUE)])
     window = window_of(image)
@@ -60,7 +60,7 @@ def test_a_wall_behind_two_parts_of_a_thing_is_left_out():
         assert low <= np.count_nonzero(mask & its) / np.count_nonzero(its & window.inside) <= high
 
 
-def test_large_boxes_are_looked_at_with_fewer_pixels():
+def test_large_boxes_are_subsampled():
     image = scene([Can(0.75, 0.0, 0.12, 0.3, COKE.colour)])
     window = window_of(image)
     assert max(window.z.shape) <= 150
@@ -90,7 +90,7 @@ def test_a_point_outside_of_the_picture_is_beyond_its_border():
     assert window.border_px(np.array([-1.0, 0.0, 0.8])) < 0.0
 
 
-def test_a_grey_picture_will_do():
+def test_a_grey_picture_is_enough():
     image = replace(scene([COKE]), colour=None)
     box = seen_as("coke", scene([COKE])).box
     assert segment_object(window_about(image, box), FORM).covered > 0.8

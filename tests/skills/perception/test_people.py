@@ -1,4 +1,4 @@
-"""Persons in analytic LiDAR scans."""
+"""People in analytic LiDAR scans."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def people_seen(scan, X_WB=None):
     return people_in_scan(scan, X_WB or RigidTransform(), OUTLINE)
 
 
-def test_a_person_is_found_where_they_stand():
+def test_a_person_is_found_at_their_position():
     (person,) = people_seen(scan_of([(1.8, 0.4, 0.2)]))
     assert person.place_W == pytest.approx((1.8, 0.4), abs=0.12)
 
@@ -25,38 +25,38 @@ def test_the_nearest_of_two_comes_first():
     assert [round(person.place_W[1], 1) > 0 for person in people] == [True, False]
 
 
-def test_a_person_before_a_wall_stands_alone_still():
+def test_a_person_in_front_of_a_wall_is_found():
     people = people_seen(scan_of([(1.6, 0.0, 0.2)], wall_x=2.6))
     assert len(people) == 1
 
 
-def test_a_wall_is_nobody():
+def test_a_wall_is_no_person():
     assert people_seen(scan_of(wall_x=2.0)) == []
 
 
-def test_a_thin_post_is_nobody():
+def test_a_thin_post_is_no_person():
     assert people_seen(scan_of([(1.5, 0.0, 0.03)])) == []
 
 
-def test_somebody_leaning_on_a_wall_is_not_told_from_it():
+def test_a_person_who_leans_on_a_wall_is_not_found():
     assert people_seen(scan_of([(2.4, 0.0, 0.2)], wall_x=2.5)) == []
 
 
-def test_somebody_far_away_does_not_count():
+def test_a_person_far_away_does_not_count():
     assert people_seen(scan_of([(5.0, 0.0, 0.2)])) == []
 
 
-def test_what_the_robot_holds_before_itself_is_nobody():
+def test_the_held_object_is_no_person():
     assert people_seen(scan_of([(0.55, 0.0, 0.1)])) == []
 
 
-def test_the_place_is_one_in_the_world():
+def test_the_position_is_in_the_world_frame():
     (person,) = people_seen(scan_of([(1.8, 0.0, 0.2)]), Pose2D(5.0, 2.0, 1.5708).transform())
     assert person.place_W == pytest.approx((5.0, 3.8), abs=0.12)
     assert person.distance_m == pytest.approx(1.8, abs=0.12)
 
 
-def test_a_pair_of_legs_that_stands_alone_is_a_person_to_a_lidar_of_one_ring():
+def test_a_pair_of_legs_is_a_person_for_a_lidar_of_one_ring():
     angles = np.linspace(-0.5, 0.5, 200)
     x, y = 1.5 * np.ones(200), 1.5 * np.tan(angles)
     legs = np.abs(np.abs(y) - 0.12) < 0.06

@@ -1,4 +1,4 @@
-"""Who is near, by the body cameras."""
+"""People near the robot, by the body cameras."""
 
 import math
 from dataclasses import replace
@@ -18,7 +18,7 @@ STILL = np.zeros(3)
 
 
 def looking(heading_rad):
-    """A level camera that looks that far to the left of ahead."""
+    """Level camera with a heading to the left of ahead."""
     ahead = RotationMatrix(RollPitchYaw(-math.pi / 2, 0.0, -math.pi / 2))
     return RigidTransform(RotationMatrix.MakeZRotation(heading_rad) @ ahead)
 
@@ -28,7 +28,7 @@ BODY = tuple(CameraCapabilities(name, looking(heading)) for name, heading in HEA
 
 
 def watched(*people, detector_changes=None, seconds=2.0, cameras=True):
-    """A bench, its detector and a watch that has been looking for so long."""
+    """Bench, detector and watch after some seconds."""
     bench = Bench(START, unmapped=people, cameras=cameras)
     detector = PeopleDetector(bench, list(people), **(detector_changes or {}))
     watch = PeopleWatch(replace(bench.context(), detector=detector))
@@ -43,7 +43,7 @@ def look(bench, watch, seconds):
 
 
 @pytest.mark.parametrize("distance_m", [1.5, 2.0, 3.0, 3.5])
-def test_a_person_is_placed_in_the_world(distance_m):
+def test_a_person_in_a_picture_is_located_in_the_world(distance_m):
     _, _, watch = watched(person_at(1.5 + distance_m, 5.5))
     (person,) = watch.people()
     assert person.place_W == pytest.approx((1.5 + distance_m, 5.5), abs=0.2)
@@ -60,7 +60,7 @@ def test_a_person_is_placed_in_the_world(distance_m):
     ],
     ids=["nothing", "something ahead", "something behind"],
 )
-def test_cameras_look_more_often_while_they_show_something_unexplained(unmapped, least, most):
+def test_cameras_take_more_pictures_while_an_unexplained_obstacle_is_in_view(unmapped, least, most):
     bench = Bench(START, unmapped=unmapped)
     detector = PeopleDetector(bench, [])
     look(bench, PeopleWatch(replace(bench.context(), detector=detector)), 4.0)
@@ -70,7 +70,7 @@ def test_cameras_look_more_often_while_they_show_something_unexplained(unmapped,
 
 
 def depths_asked_for(people, *, with_lidar):
-    """Whether each picture of some seconds was taken with depth."""
+    """Returns for each picture of some seconds whether it has depth."""
     bench, asked = Bench(START, unmapped=people), []
     take = bench.robot.image
     bench.robot.image = lambda source, **wanted: asked.append(wanted["depth"]) or take(source, **wanted)
@@ -81,27 +81,27 @@ def depths_asked_for(people, *, with_lidar):
     return asked, watch.people()
 
 
-def test_depth_is_taken_only_where_somebody_may_be_near():
+def test_depth_is_taken_only_where_a_person_may_be_near():
     asked, _ = depths_asked_for([], with_lidar=True)
     assert set(asked) == {False}
     asked, people = depths_asked_for([person_at(3.5, 5.5)], with_lidar=True)
     assert (asked[-1], len(people)) == (True, 1)
 
 
-def test_who_is_suspected_without_depth_is_looked_at_with_depth_at_once():
+def test_a_person_in_a_picture_without_depth_is_viewed_with_depth_at_once():
     asked, people = depths_asked_for([person_at(3.5, 5.5)], with_lidar=False)
     assert asked[:4] == [False, False, True, True]
     assert len(people) == 1
 
 
-def test_a_person_counts_when_seen_twice_and_the_second_look_comes_soon():
+def test_a_person_counts_when_seen_twice_and_the_second_view_comes_soon():
     bench, _, watch = watched(person_at(3.5, 5.5), seconds=0.3)
     assert watch.people() == ()
     look(bench, watch, 0.4)
     assert len(watch.people()) == 1
 
 
-def test_who_has_gone_is_forgotten():
+def test_a_person_who_has_gone_is_forgotten():
     bench, detector, watch = watched(person_at(3.5, 5.5))
     bench.robot.boxes.remove(detector.people[0])
     look(bench, watch, 0.5)
@@ -111,7 +111,7 @@ def test_who_has_gone_is_forgotten():
 
 
 @pytest.mark.parametrize(("stays", "remembered_s"), [(True, PeopleOptions().beside_s), (False, 2.0)])
-def test_who_is_out_of_sight_is_remembered_while_something_stands_there(stays, remembered_s):
+def test_a_person_out_of_view_is_remembered_while_an_obstacle_is_there(stays, remembered_s):
     bench, detector, watch = watched(person_at(3.5, 5.5))
     bench.robot.push(0.0, 0.0, math.pi)
     if not stays:
@@ -123,7 +123,7 @@ def test_who_is_out_of_sight_is_remembered_while_something_stands_there(stays, r
     assert watch.people() == ()
 
 
-def test_what_is_seen_is_published_and_also_that_nobody_is_left():
+def test_people_are_published_and_also_when_none_is_left():
     bench, detector, watch = watched(person_at(3.5, 5.5))
     topic, message = bench.published[-1]
     assert topic == "people"
@@ -137,12 +137,12 @@ def test_what_is_seen_is_published_and_also_that_nobody_is_left():
     assert len(bench.published) == count
 
 
-def test_the_unsure_do_not_count():
+def test_faint_detections_do_not_count():
     _, _, watch = watched(person_at(3.5, 5.5), detector_changes={"score": 0.4})
     assert watch.people() == ()
 
 
-def test_where_the_detector_knows_no_people_no_picture_is_taken():
+def test_a_detector_without_a_class_of_people_gets_no_pictures():
     bench, detector, watch = watched(person_at(3.5, 5.5), detector_changes={"class_names": ("cube",)})
     assert (watch.people(), detector.pictures, bench.robot.images_taken) == ((), [], 0)
 
@@ -155,7 +155,7 @@ def test_without_a_detector_or_cameras_no_picture_is_taken():
     assert (watch.people(), detector.pictures) == ((), [])
 
 
-def test_what_goes_wrong_with_the_pictures_is_not_hidden():
+def test_errors_of_the_detector_are_raised():
     bench = Bench(START)
 
     class Broken(PeopleDetector):
@@ -178,11 +178,11 @@ def test_what_goes_wrong_with_the_pictures_is_not_hidden():
         ((-0.1, -0.3, 0.0), ("right",)),
     ],
 )
-def test_cameras_look_where_the_robot_goes(velocity, expected):
+def test_cameras_face_the_direction_of_motion(velocity, expected):
     assert tuple(camera.source for camera in cameras_towards(np.array(velocity), BODY)) == expected
 
 
-def test_cameras_that_are_not_there_are_not_asked():
+def test_missing_cameras_are_not_used():
     assert cameras_towards(np.array([-0.3, 0.0, 0.0]), BODY[:1]) == ()
 
 
@@ -190,17 +190,17 @@ def seen(x, y, stamp_s, looks=1):
     return SeenPerson((x, y), np.eye(2) * 0.01, 0.9, stamp_s, START, looks)
 
 
-def test_somebody_seen_again_is_the_same_at_the_newer_place():
+def test_a_person_seen_again_is_the_same_at_the_newer_position():
     known = (seen(1.0, 1.0, 0.0), seen(3.0, 1.0, 0.0))
     first, second = add_person(known, seen(1.3, 1.0, 0.5), 0.7)
     assert (first.place_W, first.looks) == ((1.3, 1.0), 2)
     assert second is known[1]
 
 
-def test_two_cameras_at_once_are_one_look():
+def test_two_cameras_at_once_are_one_view():
     (one,) = add_person((seen(1.0, 1.0, 0.5),), seen(1.1, 1.0, 0.5), 0.7)
     assert one.looks == 1
 
 
-def test_somebody_elsewhere_is_somebody_else():
+def test_a_person_elsewhere_is_another_person():
     assert len(add_person((seen(1.0, 1.0, 0.0),), seen(2.0, 1.0, 0.5), 0.7)) == 2

@@ -1,4 +1,4 @@
-"""Where things are, from boxes and depth, in analytic scenes."""
+"""Positions of objects, from boxes and depth, in analytic scenes."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def off_m(position, middle=MIDDLE):
     return float(np.linalg.norm(position.p_OT - np.array(middle)))
 
 
-def test_a_can_is_where_its_axis_is_and_not_its_front():
+def test_a_can_is_at_its_axis_and_not_its_front():
     image = scene([COKE])
     position = locate(image, seen_as("coke", image))
     assert off_m(position) < 0.006
@@ -28,7 +28,7 @@ def test_a_can_is_where_its_axis_is_and_not_its_front():
 
 
 @pytest.mark.parametrize("noise_m", [0.0015, 0.004])
-def test_the_error_is_within_what_the_covariance_says(noise_m):
+def test_the_error_agrees_with_the_covariance(noise_m):
     image = scene([COKE], noise_m=noise_m)
     position = locate(image, seen_as("coke", image))
     off = position.p_OT - np.array(MIDDLE)
@@ -36,26 +36,26 @@ def test_the_error_is_within_what_the_covariance_says(noise_m):
     assert np.all(np.linalg.eigvalsh(position.covariance_O) > 0.0)
 
 
-def test_a_thing_close_before_another_is_told_from_it():
+def test_an_object_close_before_another_is_located_alone():
     behind = Can(COKE.x + 0.10, COKE.y, 0.05, 0.20, BLUE)
     image = scene([COKE, behind])
     assert off_m(locate(image, seen_as("coke", image))) < 0.008
 
 
-def test_a_thing_half_hidden_is_found_behind_what_hides_it():
+def test_a_half_hidden_object_is_located_behind_the_other():
     before = Can(COKE.x - 0.12, COKE.y - 0.045, 0.03, 0.06, BLUE)
     image = scene([COKE, before])
     assert off_m(locate(image, seen_as("coke", image))) < 0.02
 
 
-def test_a_thin_thing_on_the_table_is_on_the_table():
+def test_a_thin_object_is_located_on_the_table():
     thin = Can(1.0, 0.1, 0.05, 0.008, RED)  # a disk of 8 mm, as thick as a wrench
     image = scene([thin])
     position = locate(image, seen_as("wrench", image))
     assert off_m(position, (1.0, 0.1, TABLE.height_m + 0.004)) < 0.012
 
 
-def test_a_flat_thing_that_depth_cannot_tell_from_its_table_is_where_its_box_meets_the_table():
+def test_a_flat_object_is_located_where_its_box_meets_the_table():
     image = scene([])
     lens, X_CW = image.intrinsics, image.frames.pose("hand_camera").inverse()
     x, y, z = X_CW @ np.array([1.0, 0.1, TABLE.height_m])
@@ -64,13 +64,13 @@ def test_a_flat_thing_that_depth_cannot_tell_from_its_table_is_where_its_box_mee
     assert off_m(position, (1.0, 0.1, TABLE.height_m)) < 0.015
 
 
-def test_a_thing_at_the_edge_of_the_table_is_not_the_floor_behind():
+def test_an_object_at_the_tables_edge_is_not_located_on_the_floor_behind():
     edge = Can(1.36, 0.2, 0.033, 0.115, RED)
     image = scene([edge])
     assert off_m(locate(image, seen_as("coke", image)), (1.36, 0.2, TABLE.height_m + 0.0575)) < 0.01
 
 
-def test_a_thing_whose_picture_is_cut_is_less_sure():
+def test_an_object_cut_off_by_the_picture_has_a_larger_covariance():
     image = scene([COKE])
     u0, v0, u1, v1 = seen_as("coke", image).box
     whole = locate(image, Detection("coke", 0.9, (u0, v0, u1, v1)))
@@ -86,7 +86,7 @@ def test_a_thing_whose_picture_is_cut_is_less_sure():
     assert part.covariance_O.trace() > 2.0 * whole.covariance_O.trace()
 
 
-def test_depth_of_fewer_pixels_than_the_picture_will_do():
+def test_a_depth_image_of_lower_resolution_is_enough():
     image = scene([COKE])
     half = replace(LENS, width=160, height=120, fx=138.0, fy=138.0, cx=79.75, cy=59.75)
     small = Image(**{**image.__dict__, "depth_intrinsics": half, "depth_m": image.depth_m[::2, ::2].copy()})
@@ -115,14 +115,14 @@ def test_a_box_beside_the_picture_gives_no_position_or_one_that_is_a_number(box)
     assert position is None or np.all(np.isfinite(position.p_OT))
 
 
-def test_half_the_depth_lost_on_the_thing_is_enough():
+def test_half_of_the_objects_depth_is_enough():
     image = scene([COKE])
     lost = np.random.default_rng(3).random(image.depth_m.shape) < 0.5
     holes = replace(image, depth_m=np.where(lost, np.float32(0.0), image.depth_m))
     assert off_m(locate(holes, seen_as("coke", image))) < 0.01
 
 
-def test_of_a_cube_of_which_only_the_top_is_seen_the_height_is_its_width():
+def test_the_height_of_a_cube_seen_from_above_is_its_width():
     eye = np.array([0.5, 0.0, 1.0])
     frames = FrameTree({"hand_camera": ("odom", camera_pose(eye, np.array([0.501, 0.0, 0.0])))})
     depth = np.zeros((LENS.height, LENS.width), dtype=np.float32)
@@ -134,7 +134,7 @@ def test_of_a_cube_of_which_only_the_top_is_seen_the_height_is_its_width():
     assert position.extents.height_m == pytest.approx(0.162, abs=0.01)
 
 
-def test_a_person_is_from_the_floor_to_the_top_of_the_head():
+def test_a_person_reaches_from_the_floor_to_the_top_of_the_head():
     frames = FrameTree({"hand_camera": ("odom", camera_pose(np.array([0.0, 0.0, 0.9]), np.array([2.0, 0.0, 0.9])))})
     depth = np.full((LENS.height, LENS.width), 3.8, dtype=np.float32)
     depth[24:230, 130:190] = 2.0  # a flat man, 1.49 m high and 43 cm wide, who stands 2 m away
@@ -145,7 +145,7 @@ def test_a_person_is_from_the_floor_to_the_top_of_the_head():
     assert position.p_OT == pytest.approx([2.1, 0.0, 0.5 * top_m], abs=0.05)
 
 
-def test_the_camera_may_be_turned_about_its_axis():
+def test_the_camera_may_be_rolled():
     image = scene([COKE])
     turned = np.rot90(image.depth_m, k=-1).copy()
     colour = np.rot90(image.colour, k=-1).copy()

@@ -1,4 +1,4 @@
-"""What is seen of surfaces in analytic scenes."""
+"""Segmentation of surfaces in analytic scenes."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def viewed(image, X_WO=None, surface=TABLE):
     return view
 
 
-def test_a_can_is_one_cluster_where_it_stands():
+def test_a_can_is_one_cluster_at_its_position():
     (cluster,) = viewed(scene([COKE])).clusters
     assert cluster.shape.round
     assert cluster.shape.centre == pytest.approx((0.95, -0.1), abs=0.008)
@@ -92,7 +92,7 @@ def test_a_detection_beside_all_clusters_has_none():
     assert matching_cluster(only_red, detected) is None
 
 
-def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
+def test_a_detected_object_is_split_from_the_object_that_it_touches():
     beside = Can(COKE.x, COKE.y + 0.068, 0.033, 0.115, BLUE)
     image = scene([COKE, beside])
     view = viewed(image)
@@ -103,14 +103,14 @@ def test_a_thing_that_touches_another_is_cut_out_of_their_cluster():
     assert matching_cluster(alone.clusters, detected).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
 
 
-def test_a_thing_for_itself_stays_whole():
+def test_a_single_object_stays_whole():
     image = scene([COKE])
     (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
     view = viewed(image)
     assert split_detected(view, detected) is view
 
 
-def test_a_box_that_leaves_out_the_top_of_a_thing_does_not_part_it():
+def test_a_box_that_leaves_out_the_top_does_not_split_the_object():
     image = scene([Can(0.95, -0.1, 0.033, 0.24, RED)])
     u0, v0, u1, v1 = seen_as("beer", image).box
     low = Detection("beer", 0.8, (u0, v0 + 0.4 * (v1 - v0), u1, v1))
@@ -134,12 +134,12 @@ def test_the_camera_is_where_the_scene_has_it():
     ],
     ids=["what stands", "a board above", "a thing below a board", "a thing whose foot is hidden"],
 )
-def test_what_hangs_over_a_surface_does_not_rest_on_it(heights_m, rest):
+def test_points_above_a_gap_do_not_rest_on_the_surface(heights_m, rest):
     xy = np.tile([0.51, 0.31], (len(heights_m), 1))
     assert tuple(may_rest(xy, np.array(heights_m))) == rest
 
 
-def test_columns_beside_each_other_are_judged_alone():
+def test_neighbouring_columns_are_judged_alone():
     xy = np.array([[0.5, 0.3], [0.9, 0.3], [0.5, 0.3], [0.9, 0.3]])
     assert may_rest(xy, np.array([0.39, 0.02, 0.4, 0.06])).tolist() == [False, True, False, True]
 
@@ -167,13 +167,13 @@ def disc(x, y, radius):
         ((box(0.0, 0.0, 0.05, 0.05), box(0.03, 0.05, 0.05, 0.05)), 2),
     ],
 )
-def test_objects_that_touch_are_as_many_as_there_are(objects, count):
+def test_objects_that_touch_are_counted(objects, count):
     labels, found = touching_parts(np.concatenate(objects))
     assert found == count
     assert sorted(np.unique(labels)) == list(range(count))
 
 
-def test_each_point_goes_with_its_object():
+def test_each_point_gets_the_label_of_its_object():
     labels, _ = touching_parts(np.concatenate([disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033)]))
     halves = labels.reshape(2, -1)
     assert all(np.mean(half == np.bincount(half).argmax()) > 0.95 for half in halves)

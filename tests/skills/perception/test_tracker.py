@@ -12,7 +12,7 @@ CLASSES = ("beer", "coke", "hammer")
 
 
 def tracker_of(*pictures, in_view=True):
-    """A tracker that has taken in pictures, each a list of detections."""
+    """Tracker after some pictures, each a list of detections."""
     tracker = Tracker(CLASSES)
     for seen in pictures:
         tracker.update(seen, lambda track: in_view)
@@ -22,29 +22,29 @@ def tracker_of(*pictures, in_view=True):
 LEFT, RIGHT = (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)
 
 
-def test_two_views_from_different_places_confirm_a_track():
+def test_two_views_from_different_viewpoints_confirm_a_track():
     (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(1.01, eye=RIGHT)]).snapshot()
     assert track.is_confirmed()
     assert (track.views, track.class_name) == (2, "coke")
 
 
-def test_two_views_from_one_place_do_not():
+def test_two_views_from_one_viewpoint_do_not_confirm_a_track():
     (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(eye=LEFT)]).snapshot()
     assert (track.views, track.is_confirmed()) == (1, False)
 
 
-def test_places_are_fused_by_how_sure_they_are():
+def test_positions_are_fused_by_their_covariances():
     (track,) = tracker_of([detected_3d(1.00, sigma=0.01)], [detected_3d(1.04, sigma=0.03)]).snapshot()
     assert 1.0 < track.position_W[0] < 1.015
     assert track.covariance[0, 0] < 0.01**2 + 0.012**2
 
 
-def test_more_views_make_a_place_surer():
+def test_more_views_reduce_the_covariance():
     sigmas = [tracker_of(*[[detected_3d()]] * count).snapshot()[0].covariance.trace() for count in (1, 2, 4, 8)]
     assert sigmas == sorted(sigmas, reverse=True)
 
 
-def test_fused_places_err_as_their_covariance_says():
+def test_the_error_of_fused_positions_agrees_with_the_covariance():
     rng = np.random.default_rng(5)
     errors = []
     for _ in range(300):
@@ -55,22 +55,22 @@ def test_fused_places_err_as_their_covariance_says():
     assert 0.8 < np.mean(errors) < 2.2  # two for two dimensions, less for the jitter that is allowed for
 
 
-def test_what_is_far_off_is_another_thing():
+def test_a_far_detection_is_another_object():
     assert len(tracker_of([detected_3d(1.0)], [detected_3d(1.3)]).snapshot()) == 2
 
 
-def test_two_things_in_one_picture_are_never_one_track():
+def test_two_objects_in_one_picture_are_never_one_track():
     close = [detected_3d(1.0), detected_3d(1.03)]
     assert len(tracker_of(close, close).snapshot()) == 2
 
 
-def test_one_thing_that_is_detected_as_two_is_the_surer_one():
+def test_an_object_detected_as_two_classes_is_the_better_one():
     both = [detected_3d(name="beer", score=0.55), detected_3d(1.01, name="coke", score=0.8)]
     (track,) = tracker_of(both, both).snapshot()
     assert track.class_name == "coke"
 
 
-def test_a_thing_of_another_class_is_another_thing_unless_it_is_at_the_very_place():
+def test_a_detection_of_another_class_is_another_object_unless_at_the_same_position():
     sure = [[detected_3d()], [detected_3d()], [detected_3d()]]
     assert len(tracker_of(*sure, [detected_3d(1.04, name="hammer")]).snapshot()) == 2
     assert len(tracker_of(*sure, [detected_3d(1.005, name="hammer")]).snapshot()) == 1
@@ -96,7 +96,7 @@ def test_a_class_that_was_only_likely_at_first_may_win():
     assert track.classes["hammer"] > 0.8
 
 
-def test_what_should_be_seen_again_and_is_not_loses_belief_and_is_forgotten():
+def test_a_missed_track_loses_belief_and_is_forgotten():
     # odds 9 of a score of 0.9, times 0.15 / 0.88 for each picture that should show it
     beliefs = [t.belief for n in range(3) for t in tracker_of([detected_3d(score=0.9)], *[[]] * n).snapshot()]
     assert beliefs == pytest.approx([0.9, 0.605, 0.207], abs=0.001)
@@ -104,23 +104,23 @@ def test_what_should_be_seen_again_and_is_not_loses_belief_and_is_forgotten():
 
 
 @pytest.mark.parametrize("score", [0.5, 0.7, 0.9])
-def test_what_was_seen_once_is_there_as_likely_as_its_score_says(score):
+def test_the_belief_of_a_new_track_is_its_score(score):
     assert tracker_of([detected_3d(score=score)]).snapshot()[0].belief == pytest.approx(score)
 
 
-def test_what_was_seen_very_often_is_never_past_doubt():
+def test_belief_never_reaches_certainty():
     (track,) = tracker_of(*[[detected_3d(score=0.97)]] * 40).snapshot()
     assert track.belief == 0.999
     (track,) = tracker_of(*[[detected_3d(score=0.97)]] * 40, [], []).snapshot()
     assert track.belief < 0.97
 
 
-def test_what_is_out_of_view_keeps_its_belief():
+def test_a_track_out_of_view_keeps_its_belief():
     (track,) = tracker_of([detected_3d()], [], [], in_view=False).snapshot()
     assert (track.belief, track.missed) == (0.9, 0)
 
 
-def test_what_was_taken_for_something_else_when_last_seen_is_not_confirmed():
+def test_a_track_last_seen_as_another_class_is_not_confirmed():
     # twice surely a beer, then a coke: still likelier a beer
     seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
     doubt = [detected_3d(name="coke", score=0.55, eye=LEFT)]
@@ -136,7 +136,7 @@ def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
     assert not tracker_of(*seen, [], []).snapshot()[0].is_confirmed()
 
 
-def test_the_latest_and_the_surest_detection_are_kept():
+def test_a_track_has_its_latest_and_its_best_detection():
     (track,) = tracker_of([detected_3d(score=0.95, stamp=1.0)], [detected_3d(score=0.7, stamp=2.0)]).snapshot()
     assert (track.last_seen_s, track.best.stamp_s) == (2.0, 1.0)
 
@@ -150,7 +150,7 @@ def test_a_snapshot_does_not_change_afterwards():
         before[0].belief = 1.0
 
 
-def test_what_is_seen_faintly_begins_no_track():
+def test_a_faint_detection_begins_no_track():
     assert tracker_of([detected_3d(score=0.45)]).snapshot() == ()
 
 
@@ -174,7 +174,7 @@ def test_a_faint_detection_supports_a_track_a_little(scores, belief, confirmed):
 # of the same class    2 s            what was seen surely
 # of another           1 s            the same
 @pytest.mark.parametrize(("name", "last_seen_s"), [("coke", 2.0), ("beer", 1.0)])
-def test_a_faint_detection_tells_only_that_the_thing_is_still_there(name, last_seen_s):
+def test_a_faint_detection_only_renews_the_time_of_the_track(name, last_seen_s):
     seen = [detected_3d(score=0.8, stamp=1.0)], [detected_3d(name=name, score=0.4, stamp=2.0)]
     (track,) = tracker_of(*seen).snapshot()
     assert (track.last_seen_s, track.missed) == (last_seen_s, 0)
@@ -194,7 +194,7 @@ def test_the_order_of_the_detections_of_a_picture_does_not_matter():
     assert places[0] == pytest.approx(places[1])
 
 
-def test_an_empty_book_has_no_tracks():
+def test_an_empty_tracker_has_no_tracks():
     assert tracker_of([], []).snapshot() == ()
 
 
@@ -208,7 +208,7 @@ def test_an_empty_book_has_no_tracks():
         (("coke", "beer"), "beer", False),
     ],
 )
-def test_a_segment_says_where_something_is_and_nothing_about_its_class(names, class_name, confirmed):
+def test_a_segment_gives_a_position_and_no_class(names, class_name, confirmed):
     scores = [0.7 if name == "thing" else 0.9 for name in names]
     first, second = (detected_3d(name=n, score=s, eye=e) for n, s, e in zip(names, scores, (LEFT, RIGHT), strict=True))
     (track,) = tracker_of([first], [second]).snapshot()

@@ -1,4 +1,4 @@
-"""How much of a surface was seen."""
+"""Coverage of surfaces, and changes between two pictures."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ def shares(*images, surfaces=(TABLE,)):
     return coverage.shares()
 
 
-def test_an_empty_table_is_seen_as_far_as_the_picture_holds_it():
+def test_an_empty_table_is_seen_as_far_as_the_picture_shows_it():
     share = shares(scene([]))["table"]
     assert share.seen > 0.7
     assert share.hidden == 0.0
     assert share.out_of_view == pytest.approx(1.0 - share.seen)
 
 
-def test_what_stands_on_it_hides_a_part():
+def test_an_object_hides_a_part_of_its_surface():
     assert shares(scene([Can(0.9, 0.0, 0.1, 0.3, GREY)]))["table"].hidden > 0.02
 
 
@@ -51,7 +51,7 @@ def test_a_surface_elsewhere_is_out_of_view():
     assert shares(scene([]), surfaces=(TABLE, AWAY))["shelf"].out_of_view == 1.0
 
 
-def test_the_shares_in_words():
+def test_shares_are_described_in_words():
     assert str(SurfaceShares(0.8, 0.15)) == "80 % seen, 15 % hidden, 5 % out of view"
     assert str(SurfaceShares(1.0, 0.0)) == "100 % seen"
 
@@ -81,5 +81,5 @@ def test_an_object_that_is_gone_is_not_at_rest():
     assert not _rests([_can(1.0)], [])
 
 
-def test_what_moves_farther_away_does_not_count():
+def test_changes_farther_away_do_not_count():
     assert _rests([_can(1.0), _can(1.0, 0.4, BLUE)], [_can(1.0), _can(1.0, 0.5, BLUE)])

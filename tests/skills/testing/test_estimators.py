@@ -1,4 +1,4 @@
-"""Estimators that know the scripted world."""
+"""Exact estimators of the scripted robot."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
 
 
-def test_the_place_is_that_of_the_robot():
+def test_the_estimated_pose_is_that_of_the_robot():
     clock, start = VirtualClock(), Pose2D(1.0, -1.0, 0.5)
     robot, place = ScriptedRobot(clock, start=Start(pose=start)), KnownPlace(start)
     lease = robot.acquire_lease("test")
@@ -23,7 +23,7 @@ def test_the_place_is_that_of_the_robot():
     assert place.estimate().stamp_s == 2.0
 
 
-def test_a_lost_place_can_be_searched_and_accepted():
+def test_a_lost_pose_can_be_searched_and_accepted():
     robot, place = ScriptedRobot(VirtualClock()), KnownPlace()
     place.localised = False
     found = place.search(robot.scan(), place.estimate(), None)
@@ -39,11 +39,11 @@ def test_clearance_is_the_distance_to_the_nearest_block():
     assert isinstance(costmap, ForgettingCostmap)
 
 
-def test_without_blocks_all_is_open():
+def test_clearance_without_blocks_is_large():
     assert BlockCostmap().clearance_m(np.zeros((2, 2))) == pytest.approx([9.0, 9.0])
 
 
-def test_a_surveyed_grid_shows_what_stands_in_its_band():
+def test_a_grid_map_shows_the_blocks_in_its_band():
     low, high = grid_of(ROOM, (0.05, 0.6)), grid_of(ROOM, (0.71, 0.74))
     leg, top = np.array([[1.225, -0.575]]), np.array([[1.5, 0.0]])
     assert low.distance_m(leg)[0] < 0.0 < low.distance_m(top)[0]

@@ -1,4 +1,4 @@
-"""The scripted robot keeps the Robot protocol."""
+"""The scripted robot implements the Robot protocol."""
 
 import math
 
@@ -60,7 +60,7 @@ def test_stop_can_be_for_one_command_only(clock, robot):
     assert robot.command_status(second).state is CommandState.STOPPED
 
 
-def test_a_lease_that_was_taken_moves_nothing(clock, robot):
+def test_commands_with_a_lost_lease_are_refused(clock, robot):
     old = robot.acquire_lease("test")
     with pytest.raises(LeaseError, match="test"):
         robot.acquire_lease("other")
@@ -70,7 +70,7 @@ def test_a_lease_that_was_taken_moves_nothing(clock, robot):
     assert robot.command_status(robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=old)).state is CommandState.REFUSED
 
 
-def test_nonsense_is_refused(clock, robot):
+def test_invalid_commands_are_refused(clock, robot):
     lease = robot.acquire_lease("test")
     assert robot.command_status(robot.drive(math.nan, 0.0, 0.0, until_s=9.0, lease=lease)).state is CommandState.REFUSED
     reach = ArmTrajectory(np.array([1.0]), np.zeros((1, 6)))
@@ -78,7 +78,7 @@ def test_nonsense_is_refused(clock, robot):
     assert (refused.state, refused.reason) == (CommandState.REFUSED, "there is no arm")
 
 
-def test_the_body_rises_to_where_it_is_sent(clock, robot):
+def test_the_body_rises_to_the_commanded_height(clock, robot):
     lease = robot.acquire_lease("test")
     command = robot.stand(0.58, 0.0, until_s=3.0, lease=lease)
     clock.advance(0.5)
@@ -86,7 +86,7 @@ def test_the_body_rises_to_where_it_is_sent(clock, robot):
     assert robot.odometry().X_OB.translation()[2] == pytest.approx(0.58)
 
 
-def test_odometry_drifts_where_it_is_told_to(clock, robot):
+def test_odometry_drifts_as_configured(clock, robot):
     lease = robot.acquire_lease("test")
     robot.odometry_scale = 1.1
     robot.drive(0.5, 0.0, 0.0, until_s=2.0, lease=lease)
@@ -102,7 +102,7 @@ def test_the_lidar_sees_the_walls_of_the_room(clock):
     assert wall[:, 0].min() == pytest.approx(-2.0, abs=0.05)
 
 
-def test_pictures_show_depth_and_colour_of_what_is_there(clock):
+def test_pictures_show_depth_and_colour_of_the_blocks(clock):
     red = Block(1.0, -0.5, 1.2, 0.5, 0.0, 1.0, (255, 0, 0))
     robot = ScriptedRobot(clock, blocks=[red])
     image = robot.image("frontleft")
@@ -112,12 +112,12 @@ def test_pictures_show_depth_and_colour_of_what_is_there(clock):
     assert tuple(image.colour[int(lens.cy), int(lens.cx)]) == (255, 0, 0)
 
 
-def test_an_unknown_camera_is_refused_with_those_that_there_are(robot):
+def test_an_unknown_camera_is_refused_with_the_known_ones(robot):
     with pytest.raises(ValueError, match="frontleft"):
         robot.image("tail")
 
 
-def test_the_gripper_stops_at_what_is_in_it(clock, spot):
+def test_the_gripper_stops_at_the_object_in_it(clock, spot):
     robot = ScriptedRobot(clock, capabilities=spot, start=Start(in_gripper_rad=0.4))
     lease = robot.acquire_lease("test")
     robot.set_gripper(1.4, 20.0, until_s=9.0, lease=lease)
@@ -181,7 +181,7 @@ def test_a_block_without_extent_is_refused():
         Block(1.0, 0.0, 1.0, 1.0)
 
 
-def test_it_starts_where_it_is_told(clock):
+def test_the_robot_starts_at_its_start_pose(clock):
     robot = ScriptedRobot(clock, start=Start(pose=Pose2D(1.0, 2.0, 0.5), charge=0.2))
     assert robot.pose == Pose2D(1.0, 2.0, 0.5)
     assert robot.battery().charge == 0.2
@@ -206,7 +206,7 @@ def test_a_head_turns_its_camera(clock):
     assert math.asin(-axes[1][2]) == pytest.approx(0.3)
 
 
-def test_a_head_does_not_turn_beyond_its_range_nor_where_there_is_none(clock, robot):
+def test_a_head_command_beyond_the_range_or_without_a_head_is_refused(clock, robot):
     head = ScriptedRobot(clock, capabilities=fetch_capabilities())
     refused = head.point_head(3.0, 0.0, until_s=2.0, lease=head.acquire_lease("test"))
     assert "cannot turn to pan 3.00" in head.command_status(refused).reason

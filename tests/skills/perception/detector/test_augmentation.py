@@ -1,4 +1,4 @@
-"""Test-time augmentation, with a small network whose pictures tell what it sees there."""
+"""Test-time augmentation, with a small network that reads detections from the pictures."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def seen_in(tmp_path, monkeypatch):
     return look
 
 
-def test_what_all_views_tell_has_their_mean_score_and_place(seen_in):
+def test_detection_in_all_views_has_the_mean_score_and_box(seen_in):
     (found,) = seen_in(
         [Detection("hammer", 0.9, BOX)], [Detection("hammer", 0.6, MIRRORED)], [Detection("hammer", 0.6, SMALL)]
     )
@@ -43,12 +43,12 @@ def test_what_all_views_tell_has_their_mean_score_and_place(seen_in):
 
 
 @pytest.mark.parametrize(("least_score", "told"), [(None, 0), (0.3, 1)])
-def test_what_is_less_sure_is_told_when_asked_for(seen_in, least_score, told):
+def test_faint_detections_are_returned_with_a_lower_least_score(seen_in, least_score, told):
     each = ([Detection("hammer", 0.4, box)] for box in (BOX, MIRRORED, SMALL))
     assert len(seen_in(*each, least_score=least_score)) == told
 
 
-def test_what_most_views_take_for_something_else_is_that(seen_in):
+def test_the_class_of_most_views_wins(seen_in):
     # hammer 0.6, 0.9, 0.9; coke 0.9, 0.3, 0
     both = [Detection("coke", 0.9, BOX, (("hammer", 0.6),))]
     (found,) = seen_in(both, [Detection("hammer", 0.9, MIRRORED, (("coke", 0.3),))], [Detection("hammer", 0.9, SMALL)])
@@ -56,17 +56,17 @@ def test_what_most_views_take_for_something_else_is_that(seen_in):
     assert found.alternatives == (("coke", pytest.approx(0.4)),)
 
 
-def test_what_one_view_alone_tells_is_not_sure(seen_in):
+def test_a_detection_in_one_view_has_a_low_score(seen_in):
     assert seen_in([Detection("hammer", 0.9, BOX)], [], []) == ()
 
 
-def test_a_view_at_which_a_thing_would_be_too_small_does_not_count(seen_in):
+def test_a_view_that_shows_an_object_too_small_does_not_count(seen_in):
     little, mirrored = (100.0, 50.0, 140.0, 70.0), (500.0, 50.0, 540.0, 70.0)
     (found,) = seen_in([Detection("beer", 0.8, little)], [Detection("beer", 0.6, mirrored)], [])
     assert found.score == pytest.approx(0.7)
 
 
-def test_what_is_very_large_is_judged_where_it_is_smaller(seen_in):
+def test_a_very_large_object_is_judged_by_smaller_views(seen_in):
     # 400 pixels long; 200 in the look at half the size
     found = seen_in(
         [Detection("coke", 0.9, (100.0, 50.0, 500.0, 150.0))],
@@ -118,7 +118,7 @@ def test_other_views_are_taken_where_the_proposal_network_leaves_doubt(tmp_path,
     assert len(taken) == views
 
 
-def test_two_things_of_a_class_stay_two(seen_in):
+def test_two_objects_of_a_class_stay_two(seen_in):
     other = (400.0, 300.0, 600.0, 400.0)
     found = seen_in(
         [Detection("beer", 0.8, BOX), Detection("beer", 0.7, other)],
@@ -128,7 +128,7 @@ def test_two_things_of_a_class_stay_two(seen_in):
     assert [one.box for one in found] == [pytest.approx(BOX), pytest.approx(other)]
 
 
-def test_nothing_seen_is_nothing(seen_in):
+def test_an_empty_picture_has_no_detections(seen_in):
     assert seen_in([], [], []) == ()
 
 
@@ -143,7 +143,7 @@ def test_nothing_seen_is_nothing(seen_in):
     ids=str,
 )
 @pytest.mark.parametrize("shape", [(480, 640, 3), (240, 320)], ids=["colour", "grey"])
-def test_a_box_of_a_view_lies_where_the_thing_is_in_the_picture(view, shape):
+def test_a_box_of_a_view_converts_to_the_object_in_the_picture(view, shape):
     picture = np.zeros(shape, dtype=np.uint8)
     picture[50:150, 100:300] = 255
     varied = view.apply(picture)
@@ -158,7 +158,7 @@ def test_a_whole_picture_keeps_its_size(view):
     assert view.apply(np.zeros((240, 320, 3), dtype=np.uint8)).shape == (240, 320, 3)
 
 
-def test_it_is_a_detector_that_views_once_unless_asked(tmp_path):
+def test_augmented_detector_uses_one_view_by_default(tmp_path):
     inner = load_detector(write_model(tmp_path / "tiny.onnx"))
     augmented: Detector = AugmentedDetector(inner)
     picture = picture_of(("hammer", 0.9, (100, 50, 200, 80)))
@@ -171,6 +171,6 @@ def test_it_is_a_detector_that_views_once_unless_asked(tmp_path):
 
 
 @pytest.mark.parametrize("bad", [np.zeros((0, 0, 3), np.uint8), np.zeros((9, 9, 7), np.uint8)], ids=["empty", "seven"])
-def test_what_is_no_picture_is_refused(tmp_path, bad):
+def test_anything_but_a_picture_is_refused(tmp_path, bad):
     with pytest.raises(ValueError, match="picture"):
         AugmentedDetector(load_detector(write_model(tmp_path / "tiny.onnx"))).detect_in_views(bad)

@@ -1,4 +1,4 @@
-"""One picture looked through."""
+"""Detection in camera images: rotation, brightness, darkness."""
 
 from dataclasses import replace
 
@@ -22,13 +22,13 @@ from skills.robot import FrameTree
 from skills.testing.estimators import PlainColours
 
 
-def test_a_turned_picture_begins_with_its_last_pixel():
+def test_a_rotated_picture_begins_with_its_last_pixel():
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
     assert rotate_180(picture)[0, 0].tolist() == [21, 22, 23]
     assert rotate_180(picture).flags.c_contiguous
 
 
-def test_boxes_are_turned_back_to_where_the_picture_was_taken():
+def test_boxes_are_rotated_within_the_picture():
     # in 640 x 480: u 100 to 200 and v 50 to 80 of the turned picture
     (found,) = rotate_boxes_180([Detection("hammer", 0.9, (100.0, 50.0, 200.0, 80.0))], 640, 480)
     assert (found.class_name, found.score, found.box) == ("hammer", 0.9, (440.0, 400.0, 540.0, 430.0))
@@ -38,13 +38,13 @@ COKES = PlainColours({"coke": COKE.colour})
 
 
 def rolled(roll_rad):
-    """The scene from a camera that is turned about its axis."""
+    """Image of the scene from a camera that is rolled about its axis."""
     X_WC = camera_pose(CAMERA, np.array([1.05, 0.0, TABLE.height_m]))
     return scene([COKE], X_WC=X_WC @ RigidTransform(RotationMatrix.MakeZRotation(roll_rad), np.zeros(3)))
 
 
 class Recorder(PlainColours):
-    """Keeps the pictures that it is shown."""
+    """Detector that records its pictures."""
 
     def detect(self, pictures):
         self.__dict__["shown"] = list(pictures)
@@ -54,18 +54,18 @@ class Recorder(PlainColours):
 @pytest.mark.parametrize(
     ("roll_deg", "turned"), [(0, False), (78, False), (-102, False), (172, True), (180, True), (-172, True)]
 )
-def test_a_picture_is_on_its_head_when_its_camera_hangs_upside_down(roll_deg, turned):
+def test_a_picture_is_upside_down_when_its_camera_hangs_upside_down(roll_deg, turned):
     # Spot's cameras: left and back about 0, frontleft -78, frontright -102, right 172 degrees
     assert is_upside_down(rolled(np.radians(roll_deg))) is turned
 
 
-def test_a_picture_that_looks_straight_down_is_left_as_it_is():
+def test_a_picture_that_looks_straight_down_is_not_rotated():
     down = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [1.05, 0.0, 1.6])
     image = rolled(0.0)
     assert not is_upside_down(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
 
 
-def test_boxes_in_a_turned_picture_are_those_of_the_picture_as_it_was_taken():
+def test_boxes_of_a_rotated_picture_fit_the_original_picture():
     image = rolled(np.pi)
     (seen,) = detect_in_image(COKES, image)
     (plain,) = COKES.detect([image.colour])[0]
@@ -82,14 +82,14 @@ def test_the_detector_sees_the_world_upright(roll_rad):
     assert np.nonzero(np.all(image.colour == COKE.colour, axis=2))[0].size == rows.size
 
 
-def test_each_grey_picture_is_turned_as_it_needs_to_be():
+def test_each_grey_picture_is_rotated_upright():
     detector, upright, head = Recorder(), rolled(0.0), rolled(np.pi)
     assert detect_class_in_grey(detector, [upright, head], "coke") == [(), ()]
     assert np.array_equal(detector.shown[0], upright.grey)
     assert np.array_equal(detector.shown[1], head.grey[::-1, ::-1])
 
 
-def test_a_quick_look_is_taken_where_the_detector_has_one():
+def test_the_quick_search_is_used_if_the_detector_has_one():
     class Quick(Recorder):
         def detect_class(self, pictures, class_name):
             self.__dict__["asked"] = class_name
@@ -118,17 +118,17 @@ def test_a_dim_picture_with_something_in_it_is_not_dark():
 # 20     100                five times
 # 5      40                 eight times, and no more
 @pytest.mark.parametrize(("mean", "shown"), [(120, 120), (20, 100), (5, 40)])
-def test_a_dim_picture_is_made_brighter(mean, shown):
+def test_a_dim_picture_is_brightened(mean, shown):
     assert brighten(np.full((4, 4, 3), mean, np.uint8)).mean() == shown
 
 
-def test_what_is_bright_in_a_dim_picture_stays_white():
+def test_bright_pixels_of_a_dim_picture_stay_white():
     picture = np.full((10, 10), 10, np.uint8)
     picture[0, 0] = 200
     assert brighten(picture)[0, 0] == 255
 
 
-def test_the_detector_is_shown_dim_pictures_brighter():
+def test_the_detector_sees_brightened_pictures():
     detector, image = Recorder(), rolled(0.0)
     dim = replace(image, colour=image.colour // 8)
     detect_in_image(detector, dim)

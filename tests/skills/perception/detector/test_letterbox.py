@@ -1,4 +1,4 @@
-"""The letterbox: any picture in 640x480, and boxes there and back."""
+"""The letterbox: pictures of any size in 640x480, boxes there and back, and crops."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_a_picture_of_the_size_is_left_as_it_is():
         ((641, 480), (640, 479)),
     ],
 )
-def test_it_is_scaled_to_fit_and_padded_at_right_and_bottom(size, inside):
+def test_a_picture_is_scaled_to_fit_and_padded_at_right_and_bottom(size, inside):
     width, height = inside
     filled, placed = letterbox(np.full((size[1], size[0], 3), 7, dtype=np.uint8))
     assert placed.inside_px == inside
@@ -64,13 +64,13 @@ def test_one_of_a_batch_is_filled_in_place():
 
 
 @pytest.mark.parametrize("size", [(320, 240), (1920, 1080), (333, 777), (5, 3)])
-def test_boxes_come_back(size):
+def test_boxes_convert_back_to_the_picture(size):
     placed = Letterbox(*size)
     boxes = np.array([[0, 0, *size], [0.2 * size[0], 0.1 * size[1], 0.7 * size[0], 0.9 * size[1]]], dtype=np.float32)
     assert placed.to_picture(boxes * np.array(placed.scale_xy * 2)) == pytest.approx(boxes, abs=1e-3)
 
 
-def test_the_box_of_a_thing_lies_on_it_in_both_pictures():
+def test_the_box_of_an_object_lies_on_it_in_both_pictures():
     picture = np.zeros((200, 1000), dtype=np.uint8)
     picture[50:150, 300:700] = 255
     filled, placed = letterbox(picture)
@@ -99,7 +99,7 @@ def test_no_boxes_stay_no_boxes():
         "picture",
     ],
 )
-def test_what_is_no_picture_is_refused(picture):
+def test_anything_but_a_picture_is_refused(picture):
     with pytest.raises(ValueError, match="a picture is"):
         letterbox(picture)
 
@@ -112,23 +112,23 @@ def scales():
 
 
 def scaled(scale, u, v):
-    """The map that brings the point (u, v) to the middle of a canvas of 64 x 64."""
+    """Affine map of the point (u, v) to the middle of a crop of 64 x 64."""
     return np.array([[scale, 0.0, 32 - scale * u], [0.0, scale, 32 - scale * v]])
 
 
 @pytest.mark.parametrize(("scale", "side"), [(2.0, 64), (1.0, 40), (0.5, 20), (0.25, 10)])
-def test_a_thing_is_as_large_as_the_map_says_and_in_its_place(scales, scale, side):
+def test_a_crop_shows_the_object_at_the_size_and_place_of_the_map(scales, scale, side):
     shown = scales.warp(scaled(scale, 80, 60), (64, 64))[..., 0] > 150
     rows, columns = np.flatnonzero(shown.any(axis=1)), np.flatnonzero(shown.any(axis=0))
     low, high = 32 - side // 2, 31 + side // 2
     assert (rows[0], rows[-1], columns[0], columns[-1]) == (low, high, low, high)
 
 
-def test_beyond_the_picture_is_padding(scales):
+def test_a_crop_has_padding_beyond_the_picture(scales):
     assert (scales.warp(scaled(1.0, -200, -200), (64, 64)) == PADDING).all()
 
 
-def test_what_is_made_small_shows_no_grain():
+def test_a_small_crop_has_no_aliasing():
     grain = np.zeros((128, 128, 3), np.uint8)
     grain[::2, ::2] = grain[1::2, 1::2] = 200
     shown = Scales(grain, halve(grain)).warp(np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]]), (64, 64))

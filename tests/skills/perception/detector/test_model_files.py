@@ -1,4 +1,4 @@
-"""The network's file: what is refused, and how it is told."""
+"""Model files: loading, refusals and their messages."""
 
 import pytest
 from tiny_detector import (
@@ -42,7 +42,7 @@ def test_a_sealed_file_with_one_other_byte_is_damaged(tmp_path):
 
 
 @pytest.mark.parametrize("content", [b"", b"hello\n", model_bytes()[:-200], bytes(1000), model_bytes()[200:]])
-def test_what_is_no_onnx_file_is_refused(tmp_path, content):
+def test_anything_but_an_onnx_file_is_refused(tmp_path, content):
     (tmp_path / "model.onnx").write_bytes(content)
     assert "damaged or no ONNX file" in refused(tmp_path / "model.onnx")
 
@@ -51,17 +51,17 @@ def test_a_missing_file_is_named(tmp_path):
     assert refused(tmp_path / "model.onnx") == "there is no such model of the detector"
 
 
-def test_a_folder_is_no_file(tmp_path):
+def test_a_folder_is_refused(tmp_path):
     assert "it is a folder" in refused(tmp_path)
 
 
-def test_another_version_is_named(tmp_path):
+def test_a_file_of_another_format_is_refused_with_both_formats(tmp_path):
     told = refused(write_model(tmp_path / "model.onnx", form="errand-detector-9"))
     assert "format 'errand-detector-9'" in told
     assert "reads 'errand-detector-1'" in told
 
 
-def test_a_model_of_others_is_refused(tmp_path):
+def test_a_foreign_model_is_refused(tmp_path):
     assert "no model of this detector" in refused(write_model(tmp_path / "model.onnx", metadata={"by": "others"}))
 
 

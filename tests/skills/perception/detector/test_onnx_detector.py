@@ -1,4 +1,4 @@
-"""From pictures to detections, with small networks whose pictures tell what they see."""
+"""The detector, with small networks that read detections from the pictures."""
 
 import threading
 
@@ -26,17 +26,17 @@ def found(*rows, **options):
     return select_proposals(np.array(boxes, np.float32), np.array(scores, np.float32), ProposalOptions(**options))
 
 
-def test_boxes_of_any_class_on_one_place_become_one_with_the_surest_ones_opinion():
+def test_boxes_of_any_class_on_one_object_become_one_proposal_with_the_best_ones_logits():
     regions = found((MOST, (0.3, 0.1)), (WHOLE, (0.2, 0.8)), (BESIDE, (0.4, 0.0)))
     assert regions.boxes.tolist() == [list(WHOLE), list(BESIDE)]
     assert regions.logits == pytest.approx(logits(np.array([[0.2, 0.8], [0.4, 0.0]], np.float32)))
 
 
-def test_the_unsure_and_the_empty_are_no_places():
+def test_faint_and_empty_boxes_are_no_proposals():
     assert len(found((WHOLE, (0.008, 0.002)), (EMPTY, (0.9, 0.0)), ((0, 0, float("nan"), 5), (0.9, 0.0)))) == 0
 
 
-def test_no_more_than_so_many_places_are_looked_at():
+def test_the_number_of_proposals_is_limited():
     assert found((WHOLE, (0.3,)), (BESIDE, (0.4,)), most=1).boxes.tolist() == [list(BESIDE)]
 
 
@@ -49,7 +49,7 @@ def test_no_more_than_so_many_places_are_looked_at():
     ],
     ids=["as large as in the chip", "twice as large", "very small"],
 )
-def test_a_place_is_in_the_middle_of_its_crop_and_fills_two_thirds_of_it(box, expected):
+def test_a_proposal_is_in_the_middle_of_its_crop_and_fills_two_thirds_of_it(box, expected):
     crop = crop_map(np.array(box, np.float32))
     assert transform_boxes(np.array([box]), crop)[0].tolist() == pytest.approx(expected, abs=1e-3)
     assert CROP_PX == 128
@@ -62,7 +62,7 @@ def test_a_mirrored_crop_shows_the_left_at_the_right():
     )
 
 
-def test_boxes_under_a_turn_hold_their_corners():
+def test_boxes_under_a_rotation_hold_their_corners():
     quarter = np.array([[0.0, -1.0, 50.0], [1.0, 0.0, 0.0]])
     assert transform_boxes(np.array([(0, 0, 10, 20)]), quarter)[0].tolist() == [30.0, 0.0, 50.0, 10.0]
 
@@ -87,24 +87,24 @@ def detector(file):
     return load_detector(file)
 
 
-def test_a_thing_is_told_with_class_score_and_box(detector):
+def test_a_detection_has_class_score_and_box(detector):
     (found,) = detector.detect([picture_of(HAMMER)])
     assert found == (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
     assert detector.class_names == CLASSES
 
 
-def test_the_surest_comes_first_and_the_unsure_not_at_all(detector):
+def test_detections_are_sorted_by_score_and_cut_at_the_threshold(detector):
     things = [("beer", 0.6, (0, 0, 50, 50)), ("coke", 0.8, (300, 0, 350, 50)), ("hammer", 0.48, (100, 100, 200, 200))]
     (found,) = detector.detect([picture_of(*things)])
     assert [one.class_name for one in found] == ["coke", "beer"]
 
 
-def test_a_lower_threshold_tells_more(file):
+def test_a_lower_threshold_gives_more_detections(file):
     detector = load_detector(file, DetectorOptions(threshold=0.1))
     assert len(detector.detect([picture_of(("beer", 0.2, (0, 0, 50, 50)))])[0]) == 1
 
 
-def test_what_a_thing_may_be_as_well_is_told_with_it(detector):
+def test_a_detection_has_alternative_classes(detector):
     things = [
         HAMMER,
         ("coke", 0.3, (100, 50, 200, 78)),
@@ -115,7 +115,7 @@ def test_what_a_thing_may_be_as_well_is_told_with_it(detector):
     assert [one.alternatives for one in found] == [(("beer", pytest.approx(0.4)), ("coke", pytest.approx(0.3)))]
 
 
-def test_two_boxes_on_one_thing_become_one(detector):
+def test_two_boxes_on_one_object_become_one_detection(detector):
     double = ("coke", 0.7, (100, 50, 200, 77.5))
     (found,) = detector.detect([picture_of(HAMMER, double)])
     assert [one.class_name for one in found] == ["hammer"]
@@ -127,11 +127,11 @@ def test_boxes_are_in_the_pictures_own_pixels_and_inside_it(detector):
     assert detector.detect([picture])[0][0].box == (300.0, 100.0, 320.0, 200.0)
 
 
-def test_what_lies_in_the_padding_is_nothing(detector):
+def test_boxes_in_the_padding_are_no_detections(detector):
     assert detector.detect([picture_of(("beer", 0.9, (400, 100, 500, 200)), size=(480, 320))]) == [()]
 
 
-def test_grey_pictures_are_taken(detector):
+def test_grey_pictures_are_accepted(detector):
     assert detector.detect([picture_of(HAMMER)[:, :, 0]])[0][0].class_name == "hammer"
 
 
@@ -143,22 +143,22 @@ def test_pictures_of_several_sizes_at_once_are_each_judged_alone(file):
     assert together == [detector.detect([picture])[0] for picture in pictures]
 
 
-def test_one_that_is_no_picture_among_others_is_refused(detector):
+def test_one_invalid_picture_among_others_is_refused(detector):
     with pytest.raises(ValueError, match="a picture is"):
         detector.detect([picture_of(HAMMER), np.zeros((4, 4)), picture_of(HAMMER)])
 
 
-def test_no_pictures_no_detections(detector):
+def test_no_pictures_give_no_detections(detector):
     assert detector.detect([]) == []
 
 
 @pytest.mark.parametrize("picture", [np.zeros((1, 1), np.uint8), np.zeros((480, 640, 3), np.uint8)])
-def test_black_and_tiny_pictures_hold_nothing(detector, picture):
+def test_black_and_tiny_pictures_have_no_detections(detector, picture):
     assert detector.detect([picture]) == [()]
 
 
 @pytest.mark.parametrize("picture", [np.zeros((4, 4, 4), np.uint8), np.zeros((4, 4)), np.empty((0, 5), np.uint8), None])
-def test_what_is_no_picture_is_refused(detector, picture):
+def test_anything_but_a_picture_is_refused(detector, picture):
     with pytest.raises(ValueError, match="a picture is"):
         detector.detect([picture])
 
@@ -181,7 +181,7 @@ def test_the_detector_of_a_missing_file_says_so(tmp_path):
 
 @pytest.fixture(scope="module")
 def looks_again(tmp_path_factory):
-    """Its refinement network tells by the share of red in what it is shown how surely that is a beer."""
+    """A detector whose refinement network scores a beer by the share of red in a crop."""
     return load_detector(write_pair(tmp_path_factory.mktemp("pair") / "tiny.onnx"))
 
 
@@ -191,13 +191,13 @@ def reddened(picture, box):
     return picture
 
 
-def test_a_refinement_network_judges_what_the_proposal_network_is_not_sure_of(looks_again):
+def test_the_refinement_network_judges_uncertain_proposals(looks_again):
     picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250))
     (found,) = looks_again.detect([picture])
     assert [(one.class_name, round(one.score, 2)) for one in found] == [("beer", 1.0)]
 
 
-def test_a_refinement_network_tells_where_it_is_exactly(looks_again):
+def test_the_refinement_network_refines_boxes(looks_again):
     picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
     (found,) = looks_again.detect([picture])
     assert found[0].box == pytest.approx((105.0, 102.5, 195.0, 147.5), abs=0.01)
@@ -208,7 +208,7 @@ def test_a_refinement_network_tells_where_it_is_exactly(looks_again):
 # 0.3             1.0                0.0                   0.5
 @pytest.mark.parametrize(("mirrored_from", "score"), [(None, 1.0), (0.3, 0.5)])
 def test_a_crop_and_its_mirror_image_are_judged_together(tmp_path, mirrored_from, score):
-    """A refinement network that takes the left half of a crop alone for a beer says half of it with both."""
+    """A refinement network that sees red only in the left half gives half the score with the mirror image."""
     file = write_pair(tmp_path / "tiny.onnx", left_only=True)
     picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (0, 2, 150, 400))
     options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=mirrored_from))
@@ -216,18 +216,18 @@ def test_a_crop_and_its_mirror_image_are_judged_together(tmp_path, mirrored_from
     assert round(found[0].score, 1) == score
 
 
-def test_the_mirror_image_of_what_hardly_looks_like_a_thing_is_not_looked_at(tmp_path):
+def test_the_mirror_image_of_a_faint_proposal_is_not_judged(tmp_path):
     file = write_pair(tmp_path / "tiny.onnx", left_only=True)
     picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
     options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=0.3))
     assert load_detector(file, options).detect([picture]) == [()]
 
 
-def test_a_refinement_network_takes_back_what_the_proposal_network_is_sure_of(looks_again):
+def test_the_refinement_network_can_reject_a_sure_proposal(looks_again):
     assert looks_again.detect([picture_of(HAMMER)]) == [()]
 
 
-def test_where_the_proposal_network_sees_nothing_the_refinement_network_is_not_asked(looks_again):
+def test_the_refinement_network_is_not_run_without_proposals(looks_again):
     assert looks_again.detect([reddened(picture_of(), (50, 50, 250, 250))]) == [()]
 
 
@@ -250,7 +250,7 @@ def test_a_classifier_network_judges_what_the_refinement_network_sees(tmp_path):
 
 # each network says boxes a tenth smaller than those that it gets
 # 100 wide, 50 high -> 90, 45 -> 81, 40.5 about the same middle (150, 125)
-def test_a_classifier_network_looks_where_the_refinement_network_says(tmp_path):
+def test_the_classifier_network_sees_crops_about_refined_boxes(tmp_path):
     picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
     (found,) = load_detector(write_cascade(tmp_path / "three.onnx")).detect([picture])
     assert found[0].box == pytest.approx((109.5, 104.75, 190.5, 145.25), abs=0.01)
@@ -260,7 +260,7 @@ def test_a_classifier_network_looks_where_the_refinement_network_says(tmp_path):
 # 0.12                         1.0                        what the classifier network says: nothing
 # 1.1                          1.0                        what the refinement network says
 @pytest.mark.parametrize(("least_score", "told"), [(0.12, []), (1.1, ["beer"])])
-def test_what_the_classifier_does_not_judge_is_what_the_refinement_network_sees(tmp_path, least_score, told):
+def test_unclassified_boxes_keep_the_result_of_the_refinement_network(tmp_path, least_score, told):
     """The classifier network sees red in the left half alone, where there is none."""
     picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
     options = DetectorOptions(0.05, reclassified=ProposalOptions(least_score=least_score, mirrored_from=None))
@@ -270,7 +270,7 @@ def test_what_the_classifier_does_not_judge_is_what_the_refinement_network_sees(
 
 # of two places that the refinement network sees, the third judges so many
 @pytest.mark.parametrize(("most", "told"), [(1, 1), (2, 0)])
-def test_the_surest_places_are_judged(tmp_path, most, told):
+def test_the_best_boxes_are_classified(tmp_path, most, told):
     picture = picture_of(("hammer", 0.6, (100, 100, 200, 200)), ("hammer", 0.6, (400, 100, 500, 200)))
     picture = reddened(reddened(picture, (150, 2, 300, 400)), (450, 2, 600, 400))
     options = DetectorOptions(0.05, reclassified=ProposalOptions(same=1.0, most=most, mirrored_from=None))
@@ -278,7 +278,7 @@ def test_the_surest_places_are_judged(tmp_path, most, told):
     assert len(found) == told
 
 
-def test_a_quick_look_finds_the_objects_of_one_class(detector):
+def test_the_quick_search_finds_the_objects_of_one_class(detector):
     picture = picture_of(HAMMER, ("coke", 0.9, (200, 150, 300, 180)))
     assert detector.detect_class([picture], "hammer") == [
         (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
@@ -290,13 +290,13 @@ def test_a_quick_look_finds_the_objects_of_one_class(detector):
 # hammer      beer        nothing: it is not asked
 # beer 0.2    beer        beer
 @pytest.mark.parametrize(("proposal", "found"), [(("hammer", 0.9), []), (("beer", 0.2), ["beer"])])
-def test_a_quick_look_refines_only_where_the_class_is_proposed(tmp_path, proposal, found):
+def test_the_quick_search_refines_only_proposals_of_the_class(tmp_path, proposal, found):
     picture = reddened(picture_of((*proposal, (100, 100, 200, 200))), (60, 60, 240, 240))
     detector = load_detector(write_pair(tmp_path / "pair.onnx"))
     assert [one.class_name for one in detector.detect_class([picture], "beer")[0]] == found
 
 
-def test_a_quick_look_refuses_what_is_no_picture_and_no_class(detector):
+def test_the_quick_search_refuses_unknown_classes_and_anything_but_pictures(detector):
     with pytest.raises(ValueError, match="picture"):
         detector.detect_class([np.zeros((0, 0, 3), np.uint8)], "beer")
     with pytest.raises(ValueError, match="screwdriver"):

@@ -1,4 +1,4 @@
-"""What the processor tells that it can do."""
+"""Exact byte products of the processor."""
 
 from pathlib import Path
 
@@ -21,17 +21,17 @@ from skills.perception.detector.model_files import MODEL_FILE, has_exact_byte_pr
         ("", False),
     ],
 )
-def test_it_goes_by_the_flags_of_all_cores(tmp_path: Path, told: str, able: bool) -> None:
+def test_exact_byte_products_need_the_flag_of_all_cores(tmp_path: Path, told: str, able: bool) -> None:
     file = tmp_path / "cpuinfo"
     file.write_text(told)
     assert has_exact_byte_products(file) is able
 
 
-def test_where_nothing_is_told_it_does_not_count_on_it(tmp_path: Path) -> None:
+def test_exact_byte_products_are_not_assumed_without_flags(tmp_path: Path) -> None:
     assert not has_exact_byte_products(tmp_path / "none")
 
 
-def test_the_detector_says_here_what_it_says_with_the_exact_sums() -> None:
+def test_detections_here_equal_those_with_exact_sums() -> None:
     exact = SessionOptions()
     exact.add_session_config_entry("session.x64quantprecision", "1")
     given = {"images": np.random.default_rng(3).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}

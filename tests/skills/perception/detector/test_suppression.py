@@ -1,4 +1,4 @@
-"""One box for each thing."""
+"""Non-maximum suppression."""
 
 import numpy as np
 import pytest
@@ -40,17 +40,17 @@ WHOLE, MOST, HALF, BESIDE = (0, 0, 10, 10), (0, 0, 9, 10), (0, 0, 5, 10), (20, 0
     ],
     ids=["duplicate", "half", "beside", "two classes", "two classes, less", "both unsure", "unsure duplicate"],
 )
-def test_which_boxes_stay(rows, expected):
+def test_suppression_keeps_the_best_of_overlapping_boxes(rows, expected):
     assert kept(*rows) == expected
 
 
-def test_what_has_gone_takes_nothing_with_it():
+def test_a_suppressed_box_suppresses_no_other():
     # each overlaps the next by 0.7, the first and the third by 0.4
     rows = [((0, 0, 100, 10), 0.9, 1), ((18, 0, 118, 10), 0.8, 1), ((36, 0, 136, 10), 0.7, 1)]
     assert kept(*rows) == [(0.9, 1), (0.7, 1)]
 
 
-def test_no_more_than_asked_for_are_kept():
+def test_the_number_of_detections_is_limited():
     rows = [((20 * k, 0, 20 * k + 10, 10), 0.9 - 0.1 * k, 1) for k in range(4)]
     assert len(kept(*rows, options=SuppressionOptions(most_kept=2))) == 2
 
@@ -65,17 +65,17 @@ def test_no_more_than_asked_for_are_kept():
     ],
     ids=["two alternatives", "the surer box of one", "its own class", "too little shared"],
 )
-def test_what_a_thing_may_be_as_well(rows, expected):
+def test_alternatives_are_other_classes_on_the_same_object(rows, expected):
     (found,) = alternative_scores(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
     assert found == pytest.approx(expected)
 
 
-def test_nothing_stays_nothing():
+def test_no_candidates_stay_no_candidates():
     nothing = Candidates(np.empty((0, 4), np.float32), np.empty(0, np.float32), np.empty(0, np.int64))
     assert len(suppress(nothing, OPTIONS)) == 0
 
 
-def test_candidates_reach_the_threshold_and_come_by_their_scores():
+def test_candidates_reach_the_threshold_and_are_sorted_by_score():
     boxes = np.array([WHOLE, MOST, HALF], np.float32)
     scores = np.array([[0.5, 0.1], [0.49, 0.9], [0.5, 0.0]], np.float32)
     found = select_candidates(boxes, scores, 0.5, 10)
@@ -84,16 +84,16 @@ def test_candidates_reach_the_threshold_and_come_by_their_scores():
     assert found.boxes.tolist() == [list(MOST), list(WHOLE), list(HALF)]
 
 
-def test_the_surest_candidates_are_taken():
+def test_the_best_candidates_are_selected():
     boxes = np.tile(np.array(WHOLE, np.float32), (50, 1))
     scores = np.linspace(0.5, 0.99, 50, dtype=np.float32).reshape(50, 1)
     assert select_candidates(boxes, scores, 0.5, 3).scores.tolist() == pytest.approx([0.99, 0.98, 0.97])
 
 
 @pytest.mark.parametrize("box", [(np.nan, 0, 1, 1), (0, 0, np.inf, 1), (5, 0, 5, 9), (9, 9, 2, 2)])
-def test_what_is_no_box_is_no_candidate(box):
+def test_invalid_boxes_are_no_candidates(box):
     assert len(select_candidates(np.array([box], np.float32), np.array([[0.9]], np.float32), 0.5, 10)) == 0
 
 
-def test_scores_that_are_no_numbers_are_none():
+def test_scores_that_are_nan_are_no_candidates():
     assert len(select_candidates(np.array([WHOLE], np.float32), np.array([[np.nan]], np.float32), 0.5, 10)) == 0

@@ -20,14 +20,14 @@ LINES = {
     "executive/mission": 1534,
     "executive/tree": 7472,
     "executive/run": 3067,
-    "executive/record": 965,
+    "executive/record": 967,
     "executive/store": 1671,
     "executive/conversation": 591,
     "executive/view": 1383,
     "executive/testing": 812,
     "executive/app": 7419,
     "executive/cli": 3822,
-    "skills": 25002,
+    "skills": 25005,
     "plant": 11658,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 457, 77, 9

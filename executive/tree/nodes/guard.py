@@ -110,7 +110,7 @@ class Condition(ABC):
 
 
 def is_known_as(item: ObjectKind | None, classes: Sequence[str], attributes: Sequence[str] = ()) -> bool:
-    """Returns whether an object was recognised as one of these classes, or any (`ANY_OBJECT`), with these attributes."""
+    """Returns whether an object is of one of these classes, or any (`ANY_OBJECT`), with these attributes."""
     if item is None:
         return False
     return (ANY_OBJECT in classes or item.name in classes) and set(attributes) <= set(item.attributes)

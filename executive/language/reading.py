@@ -75,7 +75,12 @@ class Reader(Row):
         found = self.match(lexicon().verbs) or self._gerund(items)
         if found is not None and self._takes_preposition(found):
             found = found[:-1]
-        if found is None or not self._is_verb(items, len(found)):
+        if found is None:
+            return None
+        token, behind = self.tokens[self.at], self.tokens[self.at + len(found) : self.at + len(found) + 1]
+        inside = any(start < self.at < start + len(p.tokens) for start, p in self.phrases.items())
+        acts = token.pos == "VERB" and token.tag in _VERB_TAGS and not inside
+        if not (acts or (may_begin_command(items) and bool(behind) and behind[0].word not in _SEPARATORS)):
             return None
         self.at += len(found)
         return verb(" ".join(found))
@@ -99,14 +104,6 @@ class Reader(Row):
             return None
         spoken = (first.lemma, *(t.word for t in self.tokens[self.at + 1 : self.at + LONGEST]))
         return next((spoken[:n] for n in range(len(spoken), 0, -1) if spoken[:n] in lexicon().verbs), None)
-
-    def _is_verb(self, items: list[Item], length: int) -> bool:
-        token = self.tokens[self.at]
-        inside = any(start < self.at < start + len(p.tokens) for start, p in self.phrases.items())
-        if token.pos == "VERB" and token.tag in _VERB_TAGS and not inside:
-            return True
-        following = self.tokens[self.at + length : self.at + length + 1]
-        return may_begin_command(items) and bool(following) and following[0].word not in _SEPARATORS
 
     def _being(self, items: list[Item]) -> Item | None:
         token, after = self.tokens[self.at], self.ahead()

@@ -11,26 +11,29 @@ from executive.language.clauses import ACTS, CLAUSES, Clause, Cue, cut, join_cla
 from executive.language.items import verb
 from executive.language.questions import RefusalError
 from executive.language.structure.conditions import parse_condition
-from executive.language.structure.plain import PlainReader, PlainReading, SpokenCondition, State, negate
-from executive.language.structure.requests import Done, escape_braces, parse_speech, wait_steps
-from executive.language.structure.row import (
+from executive.language.structure.plain import (
     LastCheck,
+    PlainReader,
+    PlainReading,
     Rounds,
-    Row,
+    SpokenCondition,
+    State,
+    StepRow,
     ambiguous_cue,
     condition_at_source,
     end_of_scope,
     find_last_check,
     missing_action,
+    negate,
     negate_supposed,
     one_errand,
-    same_check,
     seconds_of_cue,
     state_behind_both,
     statement_of,
     statement_of_check,
     times_of_cue,
 )
+from executive.language.structure.requests import Done, escape_braces, parse_speech, wait_steps
 from executive.words.command import Task
 from executive.words.condition import ValueIs
 from executive.words.leaf_steps import Awaited, Do, Speak, Wait, steps_of_commands
@@ -59,7 +62,7 @@ class DecisionBuilder:
         """Builds the steps of clauses within others."""
         return self.sequence([replace(clauses[0], joint=""), *clauses[1:]], state)
 
-    def flush(self, row: Row) -> None:
+    def flush(self, row: StepRow) -> None:
         """Understands the pending clauses."""
         if not row.plain:
             return
@@ -77,25 +80,25 @@ class DecisionBuilder:
             join_clauses([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead
         )
 
-    def add(self, row: Row, reading: PlainReading) -> None:
+    def add(self, row: StepRow, reading: PlainReading) -> None:
         """Adds the commands of a plain part."""
         self.notes += reading.trace.notes
         row.steps += steps_of_commands(reading.commands)
         before, row.state = row.state, reading.state
         row.asked = find_last_check(reading, before, self.reader)
 
-    def put(self, row: Row, block: Step, state: State) -> None:
+    def put(self, row: StepRow, block: Step, state: State) -> None:
         """Adds a block; `state` is the state behind it."""
         self.put_done(row, ((block,), state, ()))
 
-    def put_done(self, row: Row, done: Done) -> None:
+    def put_done(self, row: StepRow, done: Done) -> None:
         """Adds steps with the state behind them, and notes."""
         steps, row.state, notes = done
         row.steps += steps
         row.asked = None
         self.notes += notes
 
-    def put_always(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def put_always(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Adds steps that run at the end in any case."""
         self.flush(row)
         first = clauses[at]
@@ -109,7 +112,7 @@ class DecisionBuilder:
         row.state, row.asked = state, None
         return len(clauses)
 
-    def decide(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def decide(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """ "If" and "unless"."""
         clause, end = clauses[at], end_of_scope(clauses, at + 1)
         follows = clauses[at + 1 : end]
@@ -127,14 +130,14 @@ class DecisionBuilder:
         supposed, rest = self.split(clause.text, row.state, follows)
         if not rest and not follows:
             raise missing_action(clause.cue, clause.text)
-        if asked is not None and same_check(supposed.condition, asked.supposed.condition):
+        if asked is not None and supposed.condition in (asked.supposed.condition, negate(asked.supposed.condition)):
             row.steps[-asked.steps :] = []
         body = [*cut(rest), *follows]
         return self.choose(
             row, negate_supposed(supposed) if clause.kind is Cue.UNLESS else supposed, body, clauses, end
         )
 
-    def _holds(self, text: str, row: Row) -> bool:
+    def _holds(self, text: str, row: StepRow) -> bool:
         """Returns whether the text is a complete condition."""
         try:
             state = self.read_together(row.plain, row.state).state if row.plain else row.state
@@ -165,7 +168,7 @@ class DecisionBuilder:
         raise refusal
 
     def choose(
-        self, row: Row, supposed: SpokenCondition, body: Sequence[Clause], clauses: Sequence[Clause], end: int
+        self, row: StepRow, supposed: SpokenCondition, body: Sequence[Clause], clauses: Sequence[Clause], end: int
     ) -> int:
         """Adds the steps of both branches; `end` is behind the first, and the result behind the second."""
         then, after = self.branch(body, supposed, supposed.holds)
@@ -204,7 +207,7 @@ class DecisionBuilder:
         self.verb = inner.verb
         return found
 
-    def attach(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def attach(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """ "If so", "otherwise", "if that fails": they refer to the last look or action."""
         clause, end, both = clauses[at], end_of_scope(clauses, at + 1, branch=True), end_of_scope(clauses, at + 1)
         cue, words = clause.kind, [clause.cue]
@@ -247,7 +250,7 @@ class DecisionBuilder:
         self.put(row, attempt, state_behind_both(row.state, state))
         return end
 
-    def wait_for(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def wait_for(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """ "As soon as Robin comes, ..." waits for the condition."""
         self.flush(row)
         end = end_of_scope(clauses, at + 1)
@@ -259,7 +262,7 @@ class DecisionBuilder:
         row.steps += more
         return len(clauses)
 
-    def repeat(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def repeat(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """ "Every ten minutes", "three times", "as long as ..." before an action."""
         clause, end = clauses[at], end_of_scope(clauses, at + 1, rounds=True)
         self.flush(row)
@@ -277,7 +280,7 @@ class DecisionBuilder:
         self.put_rounds(row, rounds, body)
         return end
 
-    def put_rounds(self, row: Row, rounds: Rounds, body: Sequence[Clause]) -> None:
+    def put_rounds(self, row: StepRow, rounds: Rounds, body: Sequence[Clause]) -> None:
         """Adds rounds of the clauses."""
         steps, state = self.nest(body, replace(rounds.state, goal=None, at=None))
         commands = [command for step in steps for each in step.walk() for command in each.commands]
@@ -287,7 +290,7 @@ class DecisionBuilder:
             raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [join_clauses(body)])
         self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
 
-    def _how_often(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
+    def _how_often(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """Splits the rounds from the action behind them."""
         text, state = clause.text, row.state
         if clause.kind is Cue.TIMES:
@@ -330,7 +333,7 @@ class DecisionBuilder:
         rounds = _rounds_by(Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE, supposed)
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
-    def _on_the_way(self, row: Row, clause: Clause, follows: Sequence[Clause]) -> bool:
+    def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
         """ "While driving to the kitchen, say ...": adds both in parallel, where that is simple."""
         text = clause.text
         match = ACTS.under_way.match(text) if clause.kind is Cue.WHILE else None
@@ -343,7 +346,7 @@ class DecisionBuilder:
                 return True
         raise RefusalError(f"I do not understand '{clause.cue} {text}'", [text])
 
-    def put_together(self, row: Row, where: str, body: Sequence[Clause]) -> None:
+    def put_together(self, row: StepRow, where: str, body: Sequence[Clause]) -> None:
         """Adds a speech in parallel to a drive."""
         reading = self.reader.commands_of(where, row.state, (verb("go"),))
         said = parse_speech(body[0].text, self.reader) if len(body) == 1 else None
@@ -352,7 +355,7 @@ class DecisionBuilder:
         both = (Do.from_command(reading.commands[0]), Speak(speak=escape_braces(said.text)))
         self.put(row, Together(steps=both), reading.state)
 
-    def modify(self, row: Row, clause: Clause, found: Clause) -> None:
+    def modify(self, row: StepRow, clause: Clause, found: Clause) -> None:
         """Adds an action with a trailing condition or number of rounds."""
         scope = self._scope(row, clause, found)
         rounds: Rounds | None
@@ -372,7 +375,7 @@ class DecisionBuilder:
             raise RefusalError(f"I do not understand how often: '{found.cue} {found.text}'".strip(), [found.cue])
         self.put_rounds(row, rounds, scope)
 
-    def _rounds_behind(self, row: Row, scope: Sequence[Clause], found: Clause) -> Rounds:
+    def _rounds_behind(self, row: StepRow, scope: Sequence[Clause], found: Clause) -> Rounds:
         """ "... until there are none left", "... until three o'clock"."""
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
@@ -382,7 +385,7 @@ class DecisionBuilder:
         _, state = type(self)(self.reader).sequence(scope, row.state)
         return replace(_rounds_by(found.kind, parse_condition(found.text, state, self.reader)), state=row.state)
 
-    def _scope(self, row: Row, clause: Clause, found: Clause) -> list[Clause]:
+    def _scope(self, row: StepRow, clause: Clause, found: Clause) -> list[Clause]:
         """Clauses to which a trailing cue belongs. Raises RefusalError when they are ambiguous."""
         main = replace(clause, text=found.before)
         alone = clause.begins or (clause.then and not ACTS.comes_back.fullmatch(found.before))
@@ -401,7 +404,7 @@ class DecisionBuilder:
             raise ambiguous_cue(found)
         return scope
 
-    def _guarded(self, row: Row, scope: Sequence[Clause], found: Clause) -> None:
+    def _guarded(self, row: StepRow, scope: Sequence[Clause], found: Clause) -> None:
         """Adds an action with a trailing condition."""
         if not found.text:
             raise RefusalError(f"'{found.cue}' what?", [found.cue])

@@ -19,7 +19,20 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.conditions import parse_condition
 from executive.language.structure.decisions import DecisionBuilder
-from executive.language.structure.plain import PlainReader, State, initial_state, phrase_of_name, with_preposition
+from executive.language.structure.plain import (
+    ATTACHED,
+    LastCheck,
+    PlainReader,
+    State,
+    StepRow,
+    end_of_scope,
+    initial_state,
+    missing_action,
+    phrase_of_name,
+    statement_of,
+    statement_of_check,
+    with_preposition,
+)
 from executive.language.structure.requests import (
     Asked,
     Listener,
@@ -31,15 +44,6 @@ from executive.language.structure.requests import (
     parse_wait,
     search_for,
     steps_for_everyone,
-)
-from executive.language.structure.row import (
-    ATTACHED,
-    LastCheck,
-    Row,
-    end_of_scope,
-    missing_action,
-    statement_of,
-    statement_of_check,
 )
 from executive.words.command import Task
 from executive.words.condition import Look
@@ -54,7 +58,7 @@ class SentenceBuilder(DecisionBuilder):
 
     def sequence(self, clauses: Sequence[Clause], state: State) -> tuple[Steps, State]:
         """Builds the steps of clauses, in order."""
-        row, at = Row(state), 0
+        row, at = StepRow(state), 0
         while at < len(clauses):
             last = row.steps[-1] if row.steps and not row.plain else None
             if isinstance(last, Repeat) and last.loop.is_endless:
@@ -64,7 +68,7 @@ class SentenceBuilder(DecisionBuilder):
         self.flush(row)
         return tuple(row.steps), row.state
 
-    def _next(self, row: Row, clauses: Sequence[Clause], at: int) -> int:
+    def _next(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Builds the clause at `at`, and those that belong to it; returns the index behind them."""
         clause = clauses[at]
         if clause.anyway or clause.ends_anyway:
@@ -84,7 +88,7 @@ class SentenceBuilder(DecisionBuilder):
             clauses = [clause, *clauses[1:]]
         return self._act(row, clause, clauses, at)
 
-    def _act(self, row: Row, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
+    def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
         """Builds the clause at `at`, which begins with an action; returns the index behind it."""
         text = clause.text
         self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
@@ -106,7 +110,7 @@ class SentenceBuilder(DecisionBuilder):
         row.plain.append(clause)
         return at + 1
 
-    def _answered(self, row: Row) -> bool:
+    def _answered(self, row: StepRow) -> bool:
         """Returns whether the robot answers the last look anyway."""
         self.flush(row)
         last = row.steps[-1] if row.steps else None
@@ -115,11 +119,11 @@ class SentenceBuilder(DecisionBuilder):
         self.special = self.special or looked
         return looked
 
-    def _known(self, row: Row) -> State:
+    def _known(self, row: StepRow) -> State:
         """State behind the pending clauses."""
         return self.read_together(row.plain, row.state).state if row.plain else row.state
 
-    def _waits(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+    def _waits(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
         if not ACTS.waits.match(text) or (row.plain and not ACTS.waits_for.search(text)):
             return None
@@ -131,7 +135,7 @@ class SentenceBuilder(DecisionBuilder):
         self.put_done(row, done)
         return at + 1
 
-    def _says(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+    def _says(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         clause = clauses[at]
         if (match := ACTS.tells_when.fullmatch(clause.text)) is not None:
             self._tells_when(row, match)
@@ -158,7 +162,7 @@ class SentenceBuilder(DecisionBuilder):
         self.put(row, Speak(speak=escape_braces(text)), row.state)
         return at + 1
 
-    def _tells_when(self, row: Row, match: re.Match[str]) -> None:
+    def _tells_when(self, row: StepRow, match: re.Match[str]) -> None:
         """ "Tell me when Robin comes" waits for the condition, and then tells it."""
         self.flush(row)
         supposed = parse_condition(match["what"], row.state, self.reader)
@@ -170,7 +174,7 @@ class SentenceBuilder(DecisionBuilder):
         self._to(row, said.to)
         self.put(row, Speak(speak=escape_braces(said.text or statement)), row.state)
 
-    def _to(self, row: Row, to: Listener | None) -> None:
+    def _to(self, row: StepRow, to: Listener | None) -> None:
         """Goes to the listener."""
         if to is None or not (to.who or to.where):
             return
@@ -181,7 +185,7 @@ class SentenceBuilder(DecisionBuilder):
         if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
             self.add(row, reading)
 
-    def _asks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+    def _asks(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         person, text = row.state.memory.person, clauses[at].text
         if person is not None:
             text = re.sub(r"^(ask) (?:him|her)\b", rf"\1 {person.name}", text, flags=re.IGNORECASE)
@@ -233,7 +237,7 @@ class SentenceBuilder(DecisionBuilder):
         memory = replace(state.memory, objects=objects, gathered=objects, where=None, person=person)
         return replace(state, memory=memory, recipient=person)
 
-    def _checks(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+    def _checks(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         """ "Look whether the door is open", "is the battery low": checks that only blocks can do."""
         text = statement_of_check(clauses[at].text)
         if text is None:
@@ -259,7 +263,7 @@ class SentenceBuilder(DecisionBuilder):
         row.asked = LastCheck(supposed, looked=True)
         return at + 1
 
-    def _everyone(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+    def _everyone(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
         if ACTS.gives.match(text) is None or ACTS.everyone.search(text) is None:
             return None
@@ -271,7 +275,7 @@ class SentenceBuilder(DecisionBuilder):
         self.special = True
         return at + 1
 
-    def _rooms(self, row: Row, clauses: Sequence[Clause], at: int) -> int | None:
+    def _rooms(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
         text = clauses[at].text
         if not ACTS.every_room.search(text):
             return None
@@ -293,7 +297,7 @@ class SentenceBuilder(DecisionBuilder):
         self.special = True
         return end
 
-    def _in_each(self, row: Row, says: Clause) -> None:
+    def _in_each(self, row: StepRow, says: Clause) -> None:
         """Speaks in every room."""
         self.flush(row)
         for room in self.reader.knowledge.places:

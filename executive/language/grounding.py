@@ -96,7 +96,7 @@ class _Grounder:
         if target is not None and target.name == ANYTHING and (frame.task is not Task.FIND or frame.goal is None):
             raise RefusalError(f"which object? Known are {listing(self.knowledge.object_names())}", [target.name])
         people = target is not None and frame.task is Task.FIND and self.knowledge.somebody(target.name) is not None
-        goal, goal_at = (None, None) if frame.goal is None else self._kept_goal(frame, frame.goal, people)
+        goal, goal_at = (None, None) if frame.goal is None else self._supported_goal(frame, frame.goal, people)
         if goal is None and target is not None and target.name == EVERYTHING:
             raise RefusalError("everything from where? Name the surface or the room", [target.name])
         if goal is None and target is not None and frame.task in (Task.GRASP, Task.FIND):
@@ -146,7 +146,7 @@ class _Grounder:
             raise RefusalError(what, [phrase.text])
         return None
 
-    def _kept_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
+    def _supported_goal(self, frame: CommandFrame, location: Location, people: bool) -> tuple[str, str | None]:
         """Goal of a frame, whose relation the command keeps, and for a person the place."""
         looks = frame.task in (Task.GRASP, Task.FIND)
         if looks and location == HERE:

@@ -20,7 +20,7 @@ _YOU: Final = frozenset({"you", "yourself"})
 _SOMEBODY: Final = frozenset({"he", "she", "it", "they", "that", "this", "you"})
 _LEADS: Final[Mapping[str, str]] = {"check": "check ", "send": "go "}
 _REFUSED: Final[Mapping[str, str]] = {
-    "not": "say what a robot is to do, and not what it is not to do",
+    "not": "say only what a robot is to do",
     "or": "say which of the robots is meant",
 }
 

@@ -91,7 +91,7 @@ def _negated(done: list[Item], rest: list[Item], mark: Negation) -> tuple[list[I
 def _forbidden(mark: Negation, ahead: Sequence[Item]) -> RefusalError:
     """Refusal of a prohibition."""
     said = spoken_words([mark, *ahead]).replace(" n't", "n't")
-    return RefusalError(f"I cannot keep to {said!r}; say only what I am to do", [said])
+    return RefusalError(f"I cannot follow {said!r}; say only what I am to do", [said])
 
 
 def _done_instead(negated: Verb, done: Sequence[Item], rest: Sequence[Item]) -> bool:

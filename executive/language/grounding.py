@@ -61,7 +61,7 @@ def check_unwanted(unwanted: Sequence[Phrase], commands: Sequence[Command], know
         kinds = {kind for name in names for kind in knowledge.classes(name)}
         taken = (one for command in commands for one in (command.object, command.item) if one is not None)
         if any(not one.attributes and kinds & {*knowledge.classes(one.name)} for one in taken):
-            raise RefusalError(f"I cannot keep to 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
+            raise RefusalError(f"I cannot follow 'not {phrase.spoken}'; name what I am to take", [phrase.spoken])
 
 
 @dataclass

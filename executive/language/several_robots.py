@@ -115,7 +115,7 @@ class _Reader:
             pending, memory = (), one.meaning.memory
             read.append(one)
         if not read:
-            raise RefusalError(f"nothing was said that {self._named(self.robots)} could do")
+            raise RefusalError(f"there is nothing to do for {self._named(self.robots)} in the sentence")
         notes = tuple(dict.fromkeys(note for one in read for note in one.meaning.notes))
         return Understanding(sentence, Status.OK, notes=notes, memory=memory, parts=tuple(self._parts(read, cut)))
 
@@ -162,7 +162,7 @@ class _Reader:
         found = [n for n, who in whose if behind is None or not isinstance(who, tuple) or {*who} & {*behind}]
         if not found:
             who = self._named(part.behind if isinstance(part.behind, tuple) else self.robots)
-            raise RefusalError(f"nothing was said that {who} is to do before", [who])
+            raise RefusalError(f"no earlier task of {who} is in the sentence", [who])
         yield found[-1]
 
     def _check_in_hand(self, before: Understanding, meant: Understanding, who: Addressee | None) -> None:
@@ -177,7 +177,7 @@ class _Reader:
             return
         if last.item is None or last.goal is None or self.knowledge.place(last.goal) is None:
             item = last.item or last.object
-            what = f"the {item} is then not where {self._named(who)} can take it; say on which table it is put before"
+            what = f"{self._named(who)} cannot take the {item} then; say on which table the other robot puts it"
             raise RefusalError(what, [str(item)])
 
     def _check_one_thing(self, part: AddressedText, meant: Understanding) -> None:

@@ -63,7 +63,7 @@ def refuse_certain(condition: Condition, ranges: Ranges) -> None:
     if len(answers) == 1 and cases.reads:
         says = "always holds" if answers == {True} else "cannot hold"
         hint = "correct a comparison, or write true or false where that is meant"
-        raise ExpressionError(f"'{condition}' {says}, whatever is read", hint)
+        raise ExpressionError(f"'{condition}' {says} for every reading", hint)
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ class _Resolver:
     def _steps(self, scope: _Scope, steps: Steps) -> Steps:
         """Resolves steps in order. Raises InputError with all their errors."""
         if self.depth == MAX_NESTING:
-            what = f"steps hold steps more than {MAX_NESTING} deep"
+            what = f"steps are nested more than {MAX_NESTING} deep"
             raise steps[0].error((), what, "write some of them one after the other")
         problems, made = Problems(), []
         self.depth += 1
@@ -209,7 +209,7 @@ class _Resolver:
                 commands = self._meaning(error, (*path, "look"), question).commands
                 if len(commands) != 1 or commands[0].task is not Task.FIND:
                     hint = "ask one thing, as in 'is there a hammer in the workshop'"
-                    raise error((*path, "look"), f"'{question}' is not one question that a look answers", hint)
+                    raise error((*path, "look"), f"'{question}' is no single question that a look can answer", hint)
                 return Look.from_command(commands[0], condition.max_age_s)
             case Look():
                 return Look.from_command(self._command(error, condition, path), condition.max_age_s)
@@ -350,7 +350,7 @@ class _Resolver:
             raise step.error(("use",), what, "break the circle")
         if len(chain) >= MAX_DEPTH:
             what = f"more than {MAX_DEPTH} files use each other in a row"
-            raise step.error(("use",), what, "put what they say into fewer files")
+            raise step.error(("use",), what, "merge some of the files")
         try:
             used = load_mission(used_path, step.values or {})
             _refuse_top_keys(used, scope.file)

@@ -131,7 +131,7 @@ def parse_robots(text: str, kinds: Collection[str]) -> tuple[RobotConfig, ...]:
     for said in _entries(text):
         match = _ASSIGNED.fullmatch(said)
         if match is None:
-            raise InputError(f"'{said.strip()[:60]}' gives no robot with its kind", hint=_FORM)
+            raise InputError(f"'{said.strip()[:60]}' names no robot with its kind", hint=_FORM)
         name, (kind, at, start) = check_name(match[1].strip()), match[2].partition("@")
         if (double := name_clash(name, robots)) is not None:
             raise double

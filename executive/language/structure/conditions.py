@@ -37,7 +37,7 @@ def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondi
     if (found := usual_condition(words, state, reader)) is not None:
         return found
     if (unreal := CLAUSES.unreal.search(words)) is not None:
-        raise RefusalError(f"I can only decide by how things are now, not by '{words}'", [unreal[0]])
+        raise RefusalError(f"I can only decide by what I see now, not by '{words}'", [unreal[0]])
     joined, left_open = _joined(words, state, reader)
     if joined is not None:
         return joined
@@ -126,7 +126,7 @@ def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:
     """
     bare = re.sub(r"^(?:the|that|this|a) ", "", match["door"], flags=re.IGNORECASE)
     if not knowledge.doors:
-        what = f"I know no door here, so '{match['door']}' cannot be looked at"
+        what = f"I know no door here, so I cannot look at '{match['door']}'"
         raise RefusalError(what, [bare], kind=RefusalKind.NO_SUCH_DOOR)
     named = [match[name] for name in ("room", "one", "other", "from", "to", "of") if match[name]]
     rooms = {_room(name.strip(), knowledge) for name in named}
@@ -178,7 +178,7 @@ def presence_condition(
     if place not in ("here", "there") or (place == "there" and state.memory.place != HERE):
         room = reader.room(place if place == "there" else where or "", state)
     if room is None:
-        raise RefusalError(f"in which room is '{words}' to be seen? Name it", [words])
+        raise RefusalError(f"in which room can I see whether '{words}'? Name it", [words])
     nobody = _P.nobody.fullmatch(who) is not None
     look = reader.look("anybody" if nobody or _P.anybody.fullmatch(who) else who, room, words, state)
     return replace(look, condition=Not(part=look.condition) if gone != nobody else look.condition)

@@ -103,7 +103,7 @@ class DecisionBuilder:
         self.flush(row)
         first = clauses[at]
         if not row.steps:
-            raise RefusalError("before what is to be done in every case, say what is to be done first", [first.text])
+            raise RefusalError("say what I am to do first, before what I am to do in any case", [first.text])
         ended = re.sub(rf"[, ]*{CLAUSES.whatever.pattern}$", "", first.text, flags=re.IGNORECASE)
         ended = re.sub(r"[, ]+(?:at the end|in the end)$", "", ended, flags=re.IGNORECASE)
         rest = [replace(first, text=ended), *clauses[at + 1 :]]
@@ -120,7 +120,7 @@ class DecisionBuilder:
         earlier = bool(row.plain or row.steps) and not clause.begins
         if earlier and (not follows or bare_and) and self._holds(clause.text, row):
             if not row.plain:
-                what = f"what is to be done {clause.cue} {clause.text}? Say the condition first"
+                what = f"what am I to do {clause.cue} {clause.text}? Say the condition first"
                 raise RefusalError(what, [clause.text])
             main = row.plain.pop()  # bring me a beer, if there is one
             self.modify(row, main, replace(clause, before=main.text))
@@ -191,7 +191,7 @@ class DecisionBuilder:
             otherwise, other_state = self.branch(rest, negate_supposed(supposed), begun)
             end = stop
         if not (then or otherwise):
-            raise RefusalError("then there is nothing to do", [supposed.said])
+            raise RefusalError("no action is said for either case; name one", [supposed.said])
         condition = supposed.condition if then else negate(supposed.condition)
         block = Choose(condition=condition, then=then or otherwise, otherwise=otherwise if then else ())
         self.put(row, block, state_behind_both(after, other_state))
@@ -217,7 +217,7 @@ class DecisionBuilder:
             supposed = parse_condition(re.sub(r"^if ", "", clause.cue, flags=re.IGNORECASE), row.state, self.reader)
             return self.choose(row, supposed, [*cut(clause.text), *clauses[at + 1 : both]], clauses, both)
         if not row.steps[row.begun :] and not (asked and row.steps):
-            raise RefusalError(f"'{clause.cue}' goes on from nothing that was said before", words)
+            raise RefusalError(f"'{clause.cue}' refers to nothing that was said before", words)
         if asked is not None and asked.looked and cue is not Cue.FAILED:
             row.steps[-asked.steps :] = []
             supposed = asked.supposed if cue is Cue.SO else negate_supposed(asked.supposed)
@@ -229,12 +229,12 @@ class DecisionBuilder:
             self.put(row, last.model_copy(update={"otherwise": otherwise}), state_behind_both(row.state, state))
             return end
         if isinstance(last, Choose | Repeat) and cue is not Cue.FAILED:
-            raise RefusalError(f"I do not understand to what '{clause.cue}' belongs", words)
+            raise RefusalError(f"I do not understand what '{clause.cue}' refers to; say the whole condition", words)
         missing = cue is Cue.NOT and clause.cue.lower() not in ("if not", "if no")
         if cue is not Cue.SO and not body:
             raise missing_action(clause.cue)
         if cue is Cue.SO or (missing and asked is None):
-            raise RefusalError(f"'{clause.cue}' goes on from nothing that was looked at", words)
+            raise RefusalError(f"'{clause.cue}' refers to no earlier look", words)
         if missing and asked is not None:
             otherwise, state = self.branch(body, negate_supposed(asked.supposed), asked.supposed.fails)
             done = tuple(row.steps[-asked.steps :])
@@ -287,7 +287,7 @@ class DecisionBuilder:
         stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
         idle = stays and all(isinstance(step, Do) for step in steps)  # only goes to one place, or charges
         if rounds.loop.times is None and rounds.loop.every_s is None and idle:
-            raise RefusalError("I do not see what is to be repeated; say 'wait there until ...'", [join_clauses(body)])
+            raise RefusalError("I see no action to repeat; say 'wait there until ...'", [join_clauses(body)])
         self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
 
     def _how_often(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
@@ -436,7 +436,7 @@ def _one_repeat(block: Repeat) -> Repeat:
     if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
         return block
     if outer.every_s is not None or outer.times is not None:
-        raise RefusalError("what is repeated without end cannot be repeated again", [])
+        raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
     loop = inner.loop.model_copy(update={"until": outer.until, "while_": outer.while_})
     return inner.model_copy(update={"loop": loop})
 

@@ -189,7 +189,7 @@ class PlainReader:
                 raise
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text]) from None
         if any(action.choices for action in reading.trace.actions):
-            raise RefusalError(f"I cannot tell which of them is meant in '{text}'", [text])
+            raise RefusalError(f"I cannot tell which one '{text}' means; name one", [text])
         if not reading.commands or any(command.task is not Task.FIND for command in reading.commands):
             raise RefusalError(f"I cannot see whether '{text}'; {SEES}", [text])
         there = replace(state, goal=reading.state.goal, at=reading.state.at)
@@ -403,7 +403,7 @@ def statement_of_check(text: str) -> str | None:
 def ambiguous_cue(found: Clause) -> RefusalError:
     """Refusal of a cue that could belong to several actions."""
     said = f"{found.cue} {found.text}".strip()
-    return RefusalError(f"it is not clear to what '{said}' belongs; say it first", [said])
+    return RefusalError(f"it is not clear which action '{said}' belongs to; say it first", [said])
 
 
 def missing_action(cue: str, text: str = "") -> RefusalError:

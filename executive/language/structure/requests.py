@@ -296,7 +296,7 @@ def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[St
         actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
         reading = reader.commands_of_actions(trace, actions, begun)
         if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
-            raise RefusalError(f"there is one of it, and I cannot bring it to {who}", [who])
+            raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
         steps += steps_of_commands(reading.commands)
         begun = replace(reading.state, memory=state.memory)
     return tuple(steps), begun

@@ -62,7 +62,7 @@ class SentenceBuilder(DecisionBuilder):
         while at < len(clauses):
             last = row.steps[-1] if row.steps and not row.plain else None
             if isinstance(last, Repeat) and last.loop.is_endless:
-                what = "nothing can come after what is repeated without end; say how often"
+                what = "nothing can follow an endless repetition; say how often"
                 raise RefusalError(what, [clauses[at].text])
             at = self._next(row, clauses, at)
         self.flush(row)
@@ -218,7 +218,7 @@ class SentenceBuilder(DecisionBuilder):
             found[answer], _ = self.nest(body, self._choosing(asked, 0, state))
             at = end
         if at < len(clauses) and not found["yes"] and ACTS.brings.match(clauses[at].text):
-            raise RefusalError("say 'if yes' before what is to be done then", [clauses[at].text])
+            raise RefusalError("say 'if yes' before the action for that answer", [clauses[at].text])
         return found, at
 
     def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:

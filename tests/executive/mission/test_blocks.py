@@ -242,7 +242,12 @@ REFUSED = [
     ("- if: {button: go, at: kitchen}\n  then: [dock]", 3, "'at' goes with 'object' or 'person'", ""),
     ("- if: {door: [kitchn, hall]}\n  then: [dock]", 3, "unknown room 'kitchn'", "did you mean 'kitchen'?"),
     ("- if: {door: [a, b, c]}\n  then: [dock]", 3, "too many parts", ""),
-    ("- if: {look: go to the kitchen}\n  then: [dock]", 3, "is not one question that a look answers", "ask one thing"),
+    (
+        "- if: {look: go to the kitchen}\n  then: [dock]",
+        3,
+        "is no single question that a look can answer",
+        "ask one thing",
+    ),
     ("- if:\n    all:\n      - {look: blah blah}\n  then: [dock]", 5, "I do not understand", "say it in other words"),
     ("- if:\n    object: unicorn\n  then: [dock]", 4, "unknown object 'unicorn'", "known are"),
     ("- if: {object: beer, at: mars}\n  then: [dock]", 3, "unknown place or person 'mars'", "known are"),

@@ -1,9 +1,9 @@
-"""What a skill is made of. Skills, ours and others', import only this module and `skills.robot`.
+"""Interface of a skill. Skills, ours and others', import only this module and `skills.robot`.
 
 `skills.robot.quantities` are types of ports with ranges.
 
-A skill is a plain object with the life `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks; the
-executive's leaf wraps it once, turns exceptions into failures with cause ERROR and calls `end` on every way out.
+A skill is a plain object with the life `begin -> step, step, ... -> end`. It never blocks, sleeps or ticks. The
+executive's leaf wraps it once, turns exceptions into failures with cause ERROR, and calls `end` on every exit.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ InputsT = TypeVar("InputsT")
 
 
 class Cause(enum.Enum):
-    """Why something failed. The cause selects the recovery."""
+    """Cause of a failure. The cause selects the recovery."""
 
     PRECONDITION = "PRECONDITION"  # it could not begin in the present state
     PLANNING = "PLANNING"  # no path, grasp or plan was found
@@ -69,7 +69,7 @@ class Cause(enum.Enum):
 
 @dataclass(frozen=True)
 class Running:
-    """Not finished: one plain sentence on the present activity, and progress from 0 to 1 where known."""
+    """State of an unfinished skill: one plain sentence on its activity, and progress from 0 to 1 where known."""
 
     message: str
     progress: float | None = None
@@ -87,8 +87,8 @@ class Succeeded:
 class Failed:
     """Failure: the cause and one plain sentence.
 
-    `outputs` may fill some of the skill's output ports, for the next attempt. A failure is `final` where another
-    attempt from here would only end the same way: then the tree tries no recovery and no pose nearby.
+    `outputs` may fill some of the skill's output ports, for the next attempt. A failure is `final` when another attempt
+    from here would only end in the same failure: then the tree tries no recovery and no pose nearby.
     """
 
     cause: Cause
@@ -101,13 +101,13 @@ Step = Running | Succeeded | Failed
 
 
 class Job(Protocol[ResultT_co]):
-    """A job of the Worker."""
+    """Job of the Worker."""
 
     def done(self) -> bool:
-        """True once the result may be read."""
+        """Returns whether the result may be read."""
 
     def result(self) -> ResultT_co:
-        """The result. Raises what the job raised, or RuntimeError before it is done."""
+        """Returns the result. Raises the job's exception, or RuntimeError before the job is done."""
 
     def withdraw(self) -> None:
         """Drops the job: nobody waits for its result. Idempotent."""
@@ -126,16 +126,19 @@ class Worker(Protocol):
     def sense(
         self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
     ) -> Job[ResultT]:
-        """Start `work` on what `read` returns. `read` may block, as `Robot.image` may; in lock-step it runs at once."""
+        """Starts `work` on the value of `read`.
+
+        In lock-step `read` runs at once; it may block, as `Robot.image` may.
+        """
 
 
 @dataclass(frozen=True)
 class Question:
-    """A question to the operator.
+    """Question to the operator.
 
-    `id` is unique among the open ones (a path id); with `options`, nothing else is an answer. `default` counts when
-    nobody answers within `limit_s` of the robot's clock; an empty one says that nobody did. Raises ValueError when the
-    default is none of the options.
+    `id` (a path id) is unique among the open questions. With `options`, nothing else is an answer. `default` counts
+    when nobody answers within `limit_s` of the robot's clock; an empty default means that nobody answered. Raises
+    ValueError when the default is none of the options.
     """
 
     id: str
@@ -150,36 +153,36 @@ class Question:
 
 
 Asked = Job[str]
-"""A question that was put to the operator. `result` is the answer, or the default once its time is over."""
+"""Open question to the operator. Its `result` is the answer, or the default once its time is over."""
 
 
 class Ask(Protocol):
     """Puts questions to the operator."""
 
     def __call__(self, question: Question) -> Asked:
-        """Ask; returns at once. Raises ValueError when a question of that id is open already."""
+        """Asks and returns at once. Raises ValueError when a question with that id is open already."""
 
 
 @dataclass(frozen=True)
 class _Unheard:
-    """A question where there is nobody to ask: its default is the answer."""
+    """Question that nobody hears: its default is the answer."""
 
     question: Question
 
     def done(self) -> bool:
-        """True."""
+        """Returns True."""
         return True
 
     def result(self) -> str:
-        """The default."""
+        """Returns the default."""
         return self.question.default
 
     def withdraw(self) -> None:
-        """Nothing to withdraw."""
+        """Does nothing."""
 
 
 def nobody_to_ask(question: Question) -> Asked:
-    """An `Ask` that takes the default at once."""
+    """Answers a question with its default at once; serves as an `Ask`."""
     return _Unheard(question)
 
 
@@ -187,17 +190,19 @@ class Publish(Protocol):
     """Writes a message to the event log."""
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
-        """Log `message` (JSON-like values; numpy images allowed under key "image") under `topic`."""
+        """Logs `message` (JSON-like values; numpy images allowed under key "image") under `topic`."""
 
 
 @dataclass
 class Payload:
-    """What is in the gripper, noted by the skill that took it: its size as corners (N, 3) in the hand frame (m).
+    """Object in the gripper, noted by the skill that took it: its size as corners (N, 3) in the hand frame (m).
 
-    `R_BH` is how the hand was turned as it took the thing, which stood or lay level then; `thing` is what it was taken
-    for. None while nobody knows, as after a restart. It counts only while the gripper holds something.
+    `R_BH` is the rotation of the hand when it took the object, which stood or lay level then; `kind` is the kind that
+    the skill was to take. Fields are None while they are unknown, as after a restart. The payload counts only while the
+    gripper holds an object.
 
-    While it is `offered`, somebody may pull it out of the closed gripper: the skill that offers it looks who has it.
+    While the payload is `offered`, somebody may pull it out of the closed gripper; the skill that offers it checks who
+    has it.
     """
 
     corners_H: NDArray[np.float64] | None = None
@@ -210,7 +215,7 @@ class Payload:
 class SeenSolid:
     """Solid cells (N, 3) of the world near the robot, from its depth images (`skills.manipulation.arm.solid_cells`).
 
-    `views` are the last depth pictures, thinned out, each with the X_WO of its time.
+    `views` are the last depth pictures at a reduced resolution, each with the X_WO of its time.
     """
 
     cells: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 3), dtype=np.int64))
@@ -219,14 +224,14 @@ class SeenSolid:
 
 @dataclass
 class _LastPose:
-    """The pose that was worked out last, behind the two transforms that it was worked out from."""
+    """Cache of the last pose, with the two transforms that it was computed from."""
 
     known: tuple[RigidTransform, RigidTransform, Pose2D] | None = None
 
 
 @dataclass(frozen=True)
 class SkillContext:
-    """All that a skill may use. `seed` derives from the run's seed and the leaf's path id.
+    """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
     `doors` are those on the robot's map.
     """
@@ -250,11 +255,11 @@ class SkillContext:
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
 
     def X_WB(self) -> RigidTransform:
-        """The body's pose in the world, as estimated."""
+        """Returns the body's estimated pose in the world."""
         return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
 
     def pose(self) -> Pose2D:
-        """The planar part of X_WB, worked out once for each estimate and reading."""
+        """Returns the planar part of X_WB, computed once for each estimate and reading."""
         X_WO, X_OB = self.localiser.estimate().X_WO, self.robot.odometry().X_OB
         last = self._last_pose.known
         if last is None or last[0] is not X_WO or last[1] is not X_OB:
@@ -264,11 +269,11 @@ class SkillContext:
 
 @dataclass(frozen=True)
 class NoOptions:
-    """Nothing can be set."""
+    """Options of a skill without options."""
 
 
 class Part(enum.Enum):
-    """A part of the robot that one skill at a time may use."""
+    """Part of the robot that one skill at a time may use."""
 
     BASE = "base"
     ARM = "arm"
@@ -281,17 +286,20 @@ WHOLE_ROBOT: Final = frozenset({Part.BASE, Part.ARM})
 class Skill(ABC, Generic[InputsT]):
     """Base of all skills.
 
-    `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output
-    ports and their types; `causes` documents the causes of its failures. `default_timeout_s` counts the
-    robot's clock. `checkpoint` holds what a later `resume` needs beyond the inputs, as JSON values; it is kept durably.
+    `Inputs` is a frozen dataclass whose fields are the input ports (defaults allowed); `outputs` names the output ports
+    and their types; `causes` documents the causes of its failures. `default_timeout_s` counts the robot's clock.
+    `checkpoint` holds, as JSON values, what a later `resume` needs beyond the inputs; the store saves it durably.
+
     `changes_world` marks a skill that must not run twice: after a restart it gets `resume`, and checks first.
-    `gripper_before` says whether the gripper has to hold something (False: to be empty) when it begins, `gripper_after`
-    whether it does when it has succeeded; None: it does not matter, and nothing changes.
-    `uses` are the parts of the robot that it uses: skills that share none may run side by side.
-    `Options` is a frozen dataclass of what a stack file may set of the skill, all with defaults.
-    A class that does nothing may declare all this in the module `ports` of a skill's package; the class that does the
-    work derives from it and is named by `done_by` ("module:Class"). Then trees are compiled without its imports.
-    `max_data_age_s` says how old (s) the data may be on which a success rests, by name: a sense verb (not `image`),
+    `gripper_before` says whether the gripper must hold an object (False: must be empty) when the skill begins,
+    `gripper_after` whether it holds one after success; None means that it does not matter, or does not change. `uses`
+    are the parts of the robot that the skill uses: skills that share none may run side by side. `Options` is a frozen
+    dataclass of the skill's settings in a stack file, all with defaults.
+
+    A class without a body may declare all this in the module `ports` of a skill's package; the class that does the work
+    derives from it and is named by `done_by` ("module:Class"). Then trees are compiled without its imports.
+
+    `max_data_age_s` is the largest age (s) of the data on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.
     """
 
@@ -310,12 +318,12 @@ class Skill(ABC, Generic[InputsT]):
     checkpoint: Mapping[str, Any] = MappingProxyType({})
 
     def __new__(cls, *_: Any, **__: Any) -> Self:
-        """A skill; of a class that only declares one, the skill that does the work."""
+        """Creates a skill; for a class that only declares one, the skill that does the work."""
         return object.__new__(cls.loaded())
 
     @classmethod
     def loaded(cls) -> type[Self]:
-        """The class that does the work, itself unless it only declares. Raises TypeError: `done_by` is none of it."""
+        """Returns the class that does the work. Raises TypeError when `done_by` names a class of another base."""
         module, _, name = cls.done_by.partition(":")
         if not (module and inspect.isabstract(cls)):
             return cls
@@ -330,14 +338,14 @@ class Skill(ABC, Generic[InputsT]):
 
     @abstractmethod
     def begin(self, inputs: InputsT) -> None:
-        """Start, and forget any earlier attempt. May not command motion that outlives `end`."""
+        """Starts and forgets any earlier attempt. May not command motion that outlives `end`."""
 
     @abstractmethod
     def step(self) -> Step:
         """Does one tick's work without blocking."""
 
     def end(self) -> None:
-        """Clean up on every exit; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
+        """Cleans up on every exit; idempotent. Stops only this skill's own commands (`Robot.stop(only=...)`)."""
 
     def suspend(self) -> None:
         """Stops this skill's motion for a while and keeps its state. `resume` or `end` follows.
@@ -350,13 +358,14 @@ class Skill(ABC, Generic[InputsT]):
         """Continues after `suspend`. Time has passed, and the robot may have moved.
 
         After a restart of the executive this is called on a new object in place of `begin`, with the last `checkpoint`
-        set. By default the attempt starts again. Override it where that would undo or repeat what is done already.
+        set. By default the attempt starts again. Override it where that would undo or repeat finished work.
         """
         self.begin(inputs)
 
     def undone(self, inputs: InputsT) -> str | None:
-        """After a restart: why the effect of an earlier success no longer holds; None when it holds, or is unknown.
+        """Returns, after a restart, why the effect of an earlier success no longer holds, or None.
 
-        Reads sensors and moves nothing. Returns half a sentence, such as "the gripper is empty".
+        Reads sensors and moves nothing. None means that the effect holds or is unknown. The reason is half a sentence,
+        such as "the gripper is empty".
         """
         return None

@@ -1,4 +1,4 @@
-"""Skills written as a routine: a generator that yields `Running` and returns `Succeeded`."""
+"""Base of skills that are written as a routine: a generator that yields `Running` and returns `Succeeded`."""
 
 from __future__ import annotations
 
@@ -25,22 +25,27 @@ GRIPPER_EXPIRY_S = 4.0
 STAND_EXPIRY_S = 6.0
 HEIGHT_TOLERANCE_M = 0.02
 _PAUSE_S = 10.0
+"""Longest pause after which a routine continues."""
 _STAYED_M = 0.15
+"""Largest motion of the body during such a pause."""
 _STAYED_RAD = 0.2
+"""Largest turn of the body or of an arm joint during such a pause."""
 _RESTART_RAD_S = 0.8
+"""Joint speed towards the rest of a trajectory."""
 _LEAST_S = 0.05
+"""Least duration of that motion."""
 _AGAIN_S = 0.4
-"""What was refused, stopped or lost is given again so much later."""
+"""Pause before a command that was refused, stopped or lost is given again."""
 _OLD_S = 0.45
-"""Readings of the arm that are older are not gone by."""
+"""Age beyond which readings of the arm are not used."""
 _LOST_S = 0.5
-"""A command that is still under way so long after its expiry is lost."""
+"""Time after its expiry from which on a running command counts as lost."""
 _OFF_PATH_RAD = 0.2
-"""An arm that is farther than this from a trajectory does not go on with it."""
+"""Largest distance of an arm from a trajectory that it continues."""
 
 
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
-    """Ends a routine: the cause, one plain sentence, what was learnt, and whether it is final (see `Failed`)."""
+    """Failure of a routine: the cause, one plain sentence, the outputs, and whether it is final (see `Failed`)."""
 
     def __init__(
         self, cause: Cause, message: str, outputs: Mapping[str, Any] | None = None, *, final: bool = False
@@ -53,19 +58,30 @@ class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program er
 
 
 class OffPathError(Exception):
-    """The arm is not where a motion that was broken off can go on."""
+    """Error of an arm that is too far from an interrupted motion to continue it."""
 
 
 class CommandFailure(SkillFailure):
-    """A command was refused, stopped or lost; cause EXECUTION. It may go well when it is given again."""
+    """Failure of a command that was refused, stopped or lost; cause EXECUTION. A repetition may succeed."""
 
     def __init__(self, message: str) -> None:
         super().__init__(Cause.EXECUTION, message)
 
 
+def planning_failure(routine: Routine[object]) -> Routine[SkillFailure | None]:
+    """Runs a routine; returns its failure when no plan was found, None when it is done. Raises other failures."""
+    try:
+        yield from routine
+    except SkillFailure as failure:
+        if failure.cause is not Cause.PLANNING:
+            raise
+        return failure
+    return None
+
+
 @dataclass(frozen=True)
 class _Stance:
-    """How the robot was when its routine was suspended."""
+    """Pose, arm angles and grip of the robot when its routine was suspended."""
 
     since_s: float
     pose: Pose2D
@@ -74,10 +90,10 @@ class _Stance:
 
 
 class RoutineSkill(Skill[InputsT]):
-    """A skill whose attempt is one generator, `run`. Commands given through it are stopped by `end`.
+    """Skill whose attempt is one generator, `run`. `end` stops the commands that it has given.
 
-    After a short pause in which the robot stayed as it was, the routine goes on where it was, and the motion that was
-    stopped is taken up; else `run_again` looks what is done already.
+    After a short pause in which the robot stayed as it was, the routine continues from its last yield, and the stopped
+    motion is resumed. Otherwise `run_again` first checks what is done already.
     """
 
     def __init__(self, context: SkillContext, options: Any = None) -> None:
@@ -91,7 +107,7 @@ class RoutineSkill(Skill[InputsT]):
 
     @abstractmethod
     def run(self, inputs: InputsT) -> Routine[Succeeded]:
-        """One attempt. Raises SkillFailure."""
+        """Makes one attempt. Raises SkillFailure."""
 
     def begin(self, inputs: InputsT) -> None:
         """Forgets an earlier attempt and prepares a new one."""
@@ -99,11 +115,11 @@ class RoutineSkill(Skill[InputsT]):
         self._routine = self.run(inputs)
 
     def run_again(self, inputs: InputsT) -> Routine[Succeeded]:
-        """Goes on from an attempt that was broken off; looks first what is done already. Raises SkillFailure."""
+        """Continues an interrupted attempt; first checks what is done already. Raises SkillFailure."""
         return self.run(inputs)
 
     def suspend(self) -> None:
-        """Stops the motion under way; what was found out and planned so far is kept."""
+        """Stops the present motion; the routine stays where it is."""
         if self._routine is None:
             return
         self._stance = self._stance_now()
@@ -114,7 +130,7 @@ class RoutineSkill(Skill[InputsT]):
         self._interrupted |= set(stopped)
 
     def resume(self, inputs: InputsT) -> None:
-        """Goes on after a pause or a restart."""
+        """Continues after a pause or a restart."""
         if self.can_go_on():
             self._stance = None
             if self._inner is not None:
@@ -124,7 +140,7 @@ class RoutineSkill(Skill[InputsT]):
         self._routine = self.run_again(inputs)
 
     def can_go_on(self) -> bool:
-        """Whether the routine was suspended not long ago, body and arm are where they were, and nothing was lost."""
+        """Returns whether the pause was short, body and arm have not moved, and no held object was lost."""
         before = self._stance
         if self._routine is None or before is None:
             return False
@@ -146,11 +162,11 @@ class RoutineSkill(Skill[InputsT]):
         )
 
     def trouble(self) -> SkillFailure | None:
-        """What the routine must learn of at once, asked for before each step: it is raised where the routine waits."""
+        """Returns a failure to raise where the routine waits; asked for before each step."""
         return None
 
     def step(self) -> Step:
-        """Goes on to the routine's next yield. Raises RuntimeError before `begin`."""
+        """Runs the routine to its next yield. Raises RuntimeError before `begin`."""
         if self._routine is None:
             raise RuntimeError(f"skill {self.name}: step before begin")
         trouble = self.trouble()
@@ -180,7 +196,7 @@ class RoutineSkill(Skill[InputsT]):
         return self.context.robot.command_status(command).state
 
     def issue(self, command: CommandId) -> CommandId:
-        """Remember a command as this attempt's own."""
+        """Notes a command as this attempt's own."""
         self._commands.append(command)
         return command
 
@@ -189,7 +205,7 @@ class RoutineSkill(Skill[InputsT]):
         return (yield from self._awaited(self.context.worker.submit(work, latency_s=latency_s, name=name), message))
 
     def _awaited(self, job: Job[ResultT], message: str) -> Routine[ResultT]:
-        """A job's result; a routine that is left before waits until the job no longer uses what it was given."""
+        """Waits for a job's result; an abandoned routine withdraws the job."""
         try:
             while not job.done():
                 yield Running(message)
@@ -200,9 +216,9 @@ class RoutineSkill(Skill[InputsT]):
             job.withdraw()
 
     def sense(self, read: Callable[[], ResultT], *, latency_s: float, name: str, message: str) -> Routine[ResultT]:
-        """What `read` gives, which may block; while it raises NoImageError it is called again, as patience lasts.
+        """Lets the Worker call `read`, which may block; repeats it while it raises NoImageError and patience lasts.
 
-        Raises SkillFailure with cause EXECUTION: a camera gives no picture.
+        Raises SkillFailure with cause EXECUTION when a camera gives no picture.
         """
         patience = Patience(self.context.clock)
         while True:
@@ -215,9 +231,9 @@ class RoutineSkill(Skill[InputsT]):
                 yield from self.pause(_AGAIN_S, f"{error}; {message}")
 
     def feel_arm(self, message: str) -> Routine[None]:
-        """Wait, as patience lasts, until the readings of the arm's joints and of the gripper are new enough to go by.
+        """Waits, while patience lasts, until the readings of the arm's joints and of the gripper are recent.
 
-        What stays old afterwards is left to the limit on the age of data on which a success rests.
+        Readings that stay old are left to the limit on the age of data on which a success rests.
         """
         robot, clock, patience = self.context.robot, self.context.clock, Patience(self.context.clock)
         while min(robot.joints().stamp_s, robot.gripper().stamp_s) < clock.now() - _OLD_S and patience.is_left():
@@ -226,11 +242,11 @@ class RoutineSkill(Skill[InputsT]):
     def follow(
         self, trajectory: ArmTrajectory, message: str, guard: Callable[[FloatArray], bool] | None = None
     ) -> Routine[bool]:
-        """Moves the arm along a trajectory; whether `guard` stopped it before its end.
+        """Moves the arm along a trajectory; returns whether `guard` stopped it before its end.
 
-        `guard` is asked at each tick with the joint angles that the arm should have then. After a command that was
-        stopped or lost the arm goes on from where it is. Raises SkillFailure with cause EXECUTION when the arm does
-        not get there.
+        `guard` gets, at each tick, the joint angles that the arm should have then. After a command that was stopped or
+        lost the arm continues from where it is. Raises SkillFailure with cause EXECUTION when the arm does not get
+        there.
         """
         context, begun_s = self.context, -math.inf
 
@@ -251,20 +267,20 @@ class RoutineSkill(Skill[InputsT]):
         return (yield from self.persist(attempt, message))
 
     def _left_of(self, trajectory: ArmTrajectory, elapsed_s: float) -> ArmTrajectory:
-        """What is left of a trajectory after a command that went wrong, from where the arm is by now.
+        """Returns the rest of a trajectory after a failed command, from the arm's present angles.
 
-        Raises OffPathError: the arm is not on it.
+        Raises OffPathError when the arm is not on the trajectory.
         """
         q_rad = self._stance_now().arm_rad
-        passed_s, off_rad = passed(trajectory, elapsed_s, q_rad)
+        passed_s, off_rad = nearest_on(trajectory, elapsed_s, q_rad)
         if off_rad > _OFF_PATH_RAD:
             raise OffPathError
         return rest_of(trajectory, passed_s, q_rad)
 
     def persist(self, attempt: Callable[[], Routine[ResultT]], message: str) -> Routine[ResultT]:
-        """What an attempt gives; one whose command is refused, stopped or lost is made again while patience lasts.
+        """Makes an attempt; repeats it, while patience lasts, when its command is refused, stopped or lost.
 
-        Patience begins with the first of them. Raises SkillFailure.
+        Patience begins with the first such failure. Raises SkillFailure.
         """
         patience, before = Patience(self.context.clock), SkillFailure(Cause.EXECUTION, message)
         while True:
@@ -291,7 +307,7 @@ class RoutineSkill(Skill[InputsT]):
         yield from self.persist(attempt, message)
 
     def gripper_command(self, opening: float, force_n: float) -> CommandId:
-        """Gives the gripper its command, and do not wait for it."""
+        """Commands the gripper without waiting for it."""
         context = self.context
         if opening > context.robot.gripper().opening:
             context.payload.corners_H = context.payload.R_BH = context.payload.kind = None
@@ -299,7 +315,7 @@ class RoutineSkill(Skill[InputsT]):
         return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 
     def stand_at(self, height_m: float, message: str) -> Routine[None]:
-        """Brings the body to a height, level; nothing is done where it is there already.
+        """Brings the body to a height, level, unless it is there already.
 
         Raises SkillFailure with cause EXECUTION when the body does not get there.
         """
@@ -337,11 +353,11 @@ class RoutineSkill(Skill[InputsT]):
         *,
         until_s: float,
     ) -> Routine[float | None]:
-        """Waits until a command is done, and gives None; or, when a pause stopped it, the time (s) of its last tick.
+        """Waits until a command is done; returns None, or the last tick's time (s) when a pause stopped the command.
 
-        Once `enough` holds the command is stopped, and the time is given as well. Raises SkillFailure with cause
-        EXECUTION when it expired at `until_s`; CommandFailure when it was stopped otherwise, was refused, or is lost:
-        a robot ends what has expired.
+        Once `enough` holds, stops the command and returns the time as well. Raises SkillFailure with cause EXECUTION
+        when the command expired at `until_s`; CommandFailure when it was stopped otherwise, was refused, or is lost: a
+        robot ends an expired command.
         """
         last_s = self.context.clock.now()
         while (status := self.context.robot.command_status(command)).state is CommandState.RUNNING:
@@ -358,10 +374,10 @@ class RoutineSkill(Skill[InputsT]):
         if command in self._interrupted:
             return last_s
         why = f": {status.reason}" if status.reason else ""
-        told = f"{what} was {status.state.value} while {message}{why}"
+        sentence = f"{what} was {status.state.value} while {message}{why}"
         if status.state is CommandState.STOPPED and self.context.clock.now() >= until_s:
-            raise SkillFailure(Cause.EXECUTION, told)
-        raise CommandFailure(told)
+            raise SkillFailure(Cause.EXECUTION, sentence)
+        raise CommandFailure(sentence)
 
     def pause(self, duration_s: float, message: str) -> Routine[None]:
         """Waits on the robot's clock."""
@@ -371,13 +387,16 @@ class RoutineSkill(Skill[InputsT]):
 
 
 def _meets(guard: Callable[[FloatArray], bool], trajectory: ArmTrajectory, clock: Clock, begun_s: float) -> bool:
-    """Returns whether a guard wants the arm stopped, given where a trajectory has it now."""
+    """Returns whether a guard wants the arm stopped at the angles that a trajectory has now."""
     elapsed_s, times = clock.now() - begun_s, trajectory.times_s
     return guard(np.array([np.interp(elapsed_s, times, joint) for joint in trajectory.positions_rad.T]))
 
 
-def passed(trajectory: ArmTrajectory, within_s: float, q_rad: FloatArray) -> tuple[float, float]:
-    """How far (s) along a trajectory an arm is that has followed it for `within_s`, and how far off it (rad)."""
+def nearest_on(trajectory: ArmTrajectory, within_s: float, q_rad: FloatArray) -> tuple[float, float]:
+    """Returns the time (s) along a trajectory that is nearest to an arm, and the arm's distance from it (rad).
+
+    The arm has followed the trajectory for `within_s`.
+    """
     times_s = np.append(trajectory.times_s[trajectory.times_s < within_s], min(within_s, trajectory.times_s[-1]))
     wanted = np.stack([np.interp(times_s, trajectory.times_s, joint) for joint in trajectory.positions_rad.T], axis=1)
     off_rad = np.max(np.abs(wanted - q_rad), axis=1)
@@ -386,7 +405,7 @@ def passed(trajectory: ArmTrajectory, within_s: float, q_rad: FloatArray) -> tup
 
 
 def rest_of(trajectory: ArmTrajectory, elapsed_s: float, q_rad: FloatArray) -> ArmTrajectory:
-    """What is left of a trajectory that was stopped after elapsed_s, from where the arm is now; it starts slowly."""
+    """Returns the rest of a trajectory after elapsed_s, from the present angles of the arm, with a slow start."""
     times, positions = trajectory.times_s, trajectory.positions_rad
     ahead = times > elapsed_s
     ahead[-1] = True

@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 812,
     "executive/app": 7419,
     "executive/cli": 3822,
-    "skills": 25005,
+    "skills": 25238,
     "plant": 11658,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 456, 77, 9
+MODULES, ONE_IMPORTER, SAME_NAME = 452, 75, 9
 """All modules; those that one other imports; file names that stand more than once."""
 
 

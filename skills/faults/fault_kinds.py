@@ -12,8 +12,8 @@ from typing import Any, Final
 import numpy as np
 from pydrake.math import RigidTransform
 
+from skills.manipulation.arm.forces import levers_m
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.arm.pull import levers_m
 from skills.robot import Capabilities, CommandState, CommandStatus, FrameTree, Image, Joints, NoImageError, Robot
 
 THIEF: Final = "the tablet"

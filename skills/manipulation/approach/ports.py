@@ -1,4 +1,4 @@
-"""What the approach skill takes and gives: all that a tree is compiled from."""
+"""Ports of the approach skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from skills.api import Cause, ObjectObservation, Skill, Surface
 
 @dataclass(frozen=True)
 class ApproachInputs:
-    """The object as it was seen, and the surfaces near it, including the one that it lies on."""
+    """Object as it was seen, and the surfaces near it, including the one that it lies on."""
 
     observation: ObjectObservation
     surfaces: tuple[Surface, ...]
 
 
 class ApproachPorts(Skill[ApproachInputs]):
-    """Drives slowly, arm stowed, to where the arm can grasp an object, and looks at the object again."""
+    """Drives slowly, with the arm stowed, to where the arm can grasp an object, and looks at the object again."""
 
     done_by: ClassVar[str] = "skills.manipulation.approach.skill:Approach"
     name = "approach"

@@ -1,9 +1,10 @@
-"""The approach skill: stand where the object seen can be grasped, then look at it again."""
+"""The approach skill: drives to where the arm can grasp a seen object, and looks at the object again."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -11,12 +12,17 @@ import numpy as np
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
 from skills.detect.ports import DetectInputs
 from skills.detect.skill import Detect
+from skills.manipulation.approach.base_placement import (
+    BasePlacement,
+    free_placements,
+    go_to_one,
+    is_comfortable,
+    reachable_placements,
+)
 from skills.manipulation.approach.ports import ApproachInputs, ApproachPorts
-from skills.manipulation.approach.standing import Standing, free_places, go_to_one, is_comfortable, reachable
 from skills.manipulation.arm.looking_skill import LookingSkill
-from skills.manipulation.grasp.reach import body_heights_m, observed_target, reach_check
-from skills.manipulation.grasp.refusals import without_grasp
-from skills.manipulation.grasp.unseen import look_into_unseen
+from skills.manipulation.grasp.candidates import why_no_candidates
+from skills.manipulation.grasp.reach import body_heights_m, choose_with_look, observed_target, reach_check
 from skills.navigate.footprint import Footprint
 from skills.navigate.ports import NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
@@ -24,14 +30,15 @@ from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
 
 _STILL_BEFORE_M = 1.3
+"""Distance from the object up to which the robot stands before it."""
 
 
 @dataclass(frozen=True)
 class ApproachOptions:
-    """How exactly and how fast the robot goes before the object.
+    """Tolerances and speed of the drive, and when the robot stays where it is.
 
-    It goes to the first of `tries` places to which a path leads. Where the best grasp from here costs no more than
-    `good_grasp` above the best there is, it stays.
+    The robot goes to the first of `tries` places to which a path leads. When the best grasp from here costs no more
+    than `good_grasp` above the cheapest candidate, the robot stays.
     """
 
     position_tolerance_m: Length = 0.06
@@ -48,39 +55,39 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
     options: ApproachOptions
 
     def run(self, inputs: ApproachInputs) -> Routine[Succeeded]:
-        """Choose a place, go, look again."""
+        """Chooses where to stand, drives there and looks at the object again."""
         seen = inputs.observation
-        places = yield from self._places(inputs)
-        if not places:
+        placements = yield from choose_with_look(self, seen, partial(self._choose, inputs))
+        if not placements:
             raise SkillFailure(Cause.PLANNING, self._why_none(seen))
-        if places[0].pose != self.context.pose():
+        if placements[0].pose != self.context.pose():
             yield from self.stow()
             yield from self.stand_as_usual()
             tolerances = (self.options.position_tolerance_m, self.options.yaw_tolerance_rad, self.options.speed_m_s)
-            goals = [NavigateInputs(place.pose, *tolerances) for place in places[: self.options.tries]]
+            goals = [NavigateInputs(each.pose, *tolerances) for each in placements[: self.options.tries]]
             yield from go_to_one(self, goals)
-        return (yield from self._look_again(inputs))
+        surfaces, on_floor = own_surfaces(inputs), seen.surface == FLOOR
+        again = DetectInputs(
+            (seen.kind.name,), surfaces, seen.kind.attributes, seen.position_W, floor=on_floor, seen_before=seen
+        )
+        found = yield from self.perform(Detect(self.context), again)
+        return Succeeded(f"standing before the {seen.kind}", found.outputs)
 
-    def _places(self, inputs: ApproachInputs) -> Routine[list[Standing]]:
-        """Where to stand, best first, once the space where the arm would go from there was looked into."""
-        places, arm_W = yield from self._choose(inputs)
-        if (yield from look_into_unseen(self, inputs.observation, arm_W)):
-            places, _ = yield from self._choose(inputs)
-        return places
+    def _choose(self, inputs: ApproachInputs) -> Routine[tuple[list[BasePlacement], FloatArray]]:
+        """Chooses base placements, best first, and points (N, 3, world) of the arm at the first one.
 
-    def _choose(self, inputs: ApproachInputs) -> Routine[tuple[list[Standing], FloatArray]]:
-        """Where to stand as far as is known, best first, and where (points, world) the arm would be there.
-
-        The first is where the robot stands already, when that is good enough.
+        The first is the present pose when that is good enough.
         """
-        seen, here, enough = inputs.observation, self.context.pose(), self.options.good_grasp
-        comfortable = is_comfortable(here, (seen.position_W[0], seen.position_W[1]), self.arm)
-        free, off_m = self._free_places(seen), math.hypot(seen.position_W[0] - here.x_m, seen.position_W[1] - here.y_m)
-        heights_m = body_heights_m(seen.position_W[2] - 0.5 * seen.size_m[2], self.context.robot.capabilities())
+        context, seen = self.context, inputs.observation
+        here, point_W = context.pose(), (seen.position_W[0], seen.position_W[1])
+        comfortable, enough = is_comfortable(here, point_W, self.arm), self.options.good_grasp
+        footprint, distances_m = Footprint.of(context.robot.capabilities()), self.arm.standing_m
+        free = free_placements(point_W, here, context.costmap, footprint, distances_m, distances_m[0])
+        off_m = math.hypot(point_W[0] - here.x_m, point_W[1] - here.y_m)
+        heights_m = body_heights_m(seen.position_W[2] - 0.5 * seen.size_m[2], context.robot.capabilities())
         check_now = reach_check(self, seen, own_surfaces(inputs), beyond_m=off_m)
 
-        def choose() -> tuple[list[Standing], FloatArray]:
-            """The places and the arm there, by one collision scene for all poses."""
+        def choose() -> tuple[list[BasePlacement], FloatArray]:
             check = check_now()
 
             def cost_at(pose: Pose2D) -> float | None:
@@ -89,48 +96,27 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
 
             from_here = cost_at(here) if comfortable else None
             well_here = from_here is not None and from_here <= enough
-            places = [Standing(here, 0.0)] if well_here else reachable(free, cost_at)
-            return places, check.arm_W(places[0].pose.transform, heights_m) if places else np.empty((0, 3))
+            placements = [BasePlacement(here, 0.0)] if well_here else reachable_placements(free, cost_at)
+            arm_W = check.arm_W(placements[0].pose.transform, heights_m) if placements else np.empty((0, 3))
+            return placements, arm_W
 
-        return (
-            yield from self.compute(choose, latency_s=0.2, name="choose a place", message="choosing where to stand")
-        )
+        message = "choosing where to stand"
+        return (yield from self.compute(choose, latency_s=0.2, name="choose a place", message=message))
+
+    def _why_none(self, seen: ObjectObservation) -> str:
+        """Returns why there is no placement: the gripper cannot grasp the object, or no free pose is near enough."""
+        target, p_BS = observed_target(seen, self.X_WB()), self.model.p_BS
+        if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
+            return f"there is no free place to stand from which the {seen.kind} is within reach"
+        return why_no_candidates(target, p_BS, self.gripper, str(seen.kind))
 
     def undone(self, inputs: ApproachInputs) -> str | None:
-        """Judged by the robot's pose."""
+        """Returns a reason when the robot is far from the object."""
         (x, y, _), pose = inputs.observation.position_W, self.context.pose()
         off_m = math.hypot(x - pose.x_m, y - pose.y_m)
         return None if off_m < _STILL_BEFORE_M else f"the robot is {off_m:.1f} m from the {inputs.observation.kind}"
 
-    def _look_again(self, inputs: ApproachInputs) -> Routine[Succeeded]:
-        seen = inputs.observation
-        surfaces, on_floor = own_surfaces(inputs), seen.surface == FLOOR
-        again = DetectInputs(
-            (seen.kind.name,),
-            surfaces,
-            seen.kind.attributes,
-            seen.position_W,
-            floor=on_floor,
-            seen_before=seen,
-        )
-        found = yield from self.perform(Detect(self.context), again)
-        return Succeeded(f"standing before the {seen.kind}", found.outputs)
-
-    def _free_places(self, seen: ObjectObservation) -> list[Standing]:
-        context = self.context
-        point_W = (seen.position_W[0], seen.position_W[1])
-        footprint = Footprint.of(context.robot.capabilities())
-        distances_m = self.arm.standing_m
-        return free_places(point_W, context.pose(), context.costmap, footprint, distances_m, distances_m[0])
-
-    def _why_none(self, seen: ObjectObservation) -> str:
-        """Returns whether the object itself is beyond the gripper, or only the places about it are."""
-        target, p_BS = observed_target(seen, self.X_WB()), self.model.p_BS
-        if self.context.stack.grasp_planner.candidates(target, p_BS=p_BS, gripper=self.gripper):
-            return f"there is no free place to stand from which the {seen.kind} is within reach"
-        return without_grasp(target, p_BS, self.gripper, str(seen.kind))
-
 
 def own_surfaces(inputs: ApproachInputs) -> tuple[Surface, ...]:
-    """The surface that the object lies on, or all that are given where it is not among them."""
+    """Returns the surface that the object lies on, or all given ones when it is not among them."""
     return tuple(s for s in inputs.surfaces if s.name == inputs.observation.surface) or inputs.surfaces

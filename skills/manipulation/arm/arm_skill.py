@@ -1,104 +1,111 @@
-"""Base of the skills that move the arm: planned motions, holding, letting go, stowing."""
+"""Base of the skills that move the arm: planned motions, contact, weighing, carrying, letting go, stowing."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, InputsT, Running, SkillContext
 from skills.estimate.scan_points import segment_distance
 from skills.manipulation.arm.collision import ArmScene, Box
+from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
-from skills.manipulation.arm.poses import UP_B, towards_shoulder
+from skills.manipulation.arm.poses import UP_B, carry_configuration, towards_shoulder
 from skills.manipulation.arm.solid_cells import Outline, solid_boxes
-from skills.robot import (
-    ArmCapabilities,
-    ArmTrajectory,
-    CommandId,
-    FloatArray,
-    GripperCapabilities,
-    GripperKind,
-)
-from skills.routine import Routine, RoutineSkill, SkillFailure
+from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities, GripperKind
+from skills.routine import Routine, RoutineSkill, SkillFailure, planning_failure
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
+"""Chooses the goal configuration (J,) of a motion, given the scene and the present configuration (J,)."""
 PlannedT = TypeVar("PlannedT")
 
 PLANNING_LATENCY_S = 0.3
 LINE_SPEED_RAD_S = 0.6
+CARRY_SPEED_RAD_S = 0.9
 GRIPPER_FORCE_N = 20.0
+"""Force with which an empty gripper opens and closes."""
 CONTACT_LAG_M = 0.006
 """A hand that moves slowly and freely lags by 2 mm at most (measured in the plant); in contact it lags more at once."""
 WEIGHING_S = 0.3
-_STEP_RAD, _GRAVITY_M_S2 = 1e-4, 9.81
-_TURNS_WITHIN_S, _TURN_CHECKED = 1.6, 3
-"""The gripper has turned within so long (s); each such sample of the arm's trajectory is checked meanwhile."""
+"""Time over which weighing averages the noise of the readings."""
+_PADDING_M = 0.01
+"""Distance that the arm keeps from boxes."""
+_GRIPPER_TURN_S = 1.6
+"""Time in which the gripper has turned."""
+_CHECKED_SAMPLE = 3
+"""Each so many samples of the arm's trajectory one is checked while the gripper turns."""
 _RELEASE_RAD = 0.4
-"""The finger opens so far to let go, and no farther: wide open it would reach what stands beside."""
-_ASIDE_M, _LEVEL = 0.018, 0.5
-"""Fixed finger and palm leave the object by so much before the hand is drawn back, or it would drag it along."""
+"""The finger opens so far to let go, and no farther: wide open it would reach neighbours."""
+_WIDEST_RELEASE = 0.75
+"""Largest opening of a hinged gripper that lets go, as a part of its widest."""
+_ASIDE_M = 0.018
+"""Fixed finger and palm leave the object by so much before the hand is drawn back, or they would drag it along."""
+_LEVEL = 0.5
+"""A closing direction with a smaller vertical share is level."""
 _BACK_M = (0.16, 0.12, 0.08, 0.05)
+"""Distances by which the hand is drawn back, the best first."""
 _AT_ARM_M = 0.12
+"""Solid cells nearer to the arm's axis than this are the arm itself."""
 _BEYOND_M = 0.5
-
-
-def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
-    """The mass (kg) at p_HO of the hand that explains efforts `extra_nm` (J,) best, by least squares."""
-    steps = _STEP_RAD * np.eye(len(q_rad))
-    rises = [(model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO)[2] for step in steps]
-    lever_nm = _GRAVITY_M_S2 * np.array(rises) / (2.0 * _STEP_RAD)
-    return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
+"""Length by which the hand and the held object reach farther than the arm."""
+_OUTLINE_MARGIN_M = 0.05
+_STOWED_RAD = 0.05
+"""Joints no farther from the stowed configuration than this are stowed."""
+_OPEN_RAD = 0.05
+"""An opening beyond this is closed before the arm is stowed."""
 
 
 @dataclass(frozen=True)
 class GripperTurn:
-    """The gripper turns from one opening to another (rad) while the arm moves."""
+    """Motion of the gripper from one opening to another while the arm moves."""
 
-    from_rad: float
-    to_rad: float
+    start: float
+    end: float
 
     @property
     def closes(self) -> bool:
-        """Returns whether it ends narrower than it began."""
-        return self.to_rad < self.from_rad
+        """Returns whether the gripper ends narrower than it began."""
+        return self.end < self.start
 
     @property
-    def narrow_rad(self) -> float:
+    def narrow(self) -> float:
         """The narrower opening, for which the arm's motion is planned."""
-        return max(0.0, min(self.from_rad, self.to_rad))
+        return max(0.0, min(self.start, self.end))
 
     def begins_s(self, scene: ArmScene, trajectory: ArmTrajectory) -> float | None:
-        """When on a trajectory the gripper may begin to turn: as long as it is wide it touches nothing.
-
-        None where there is no room for it on the way.
-        """
-        scene.set_opening(max(self.from_rad, self.to_rad))
+        """Time on a trajectory (s) from which on the wide gripper touches nothing, None when there is none."""
+        scene.set_opening(max(self.start, self.end))
         times_s = trajectory.times_s
         if self.closes:
-            wide = trajectory.positions_rad[times_s <= _TURNS_WITHIN_S]
-            return 0.0 if scene.path_free(wide[::_TURN_CHECKED]) else None
+            wide = trajectory.positions_rad[times_s <= _GRIPPER_TURN_S]
+            return 0.0 if scene.path_free(wide[::_CHECKED_SAMPLE]) else None
         begin_s = None
-        for time_s, q_rad in zip(times_s[::-_TURN_CHECKED], trajectory.positions_rad[::-_TURN_CHECKED], strict=True):
-            if times_s[-1] - time_s > _TURNS_WITHIN_S or not scene.free(q_rad):
+        for time_s, q_rad in zip(
+            times_s[::-_CHECKED_SAMPLE], trajectory.positions_rad[::-_CHECKED_SAMPLE], strict=True
+        ):
+            if times_s[-1] - time_s > _GRIPPER_TURN_S or not scene.free(q_rad):
                 break
             begin_s = float(time_s)
         return begin_s
 
 
 class ArmSkill(RoutineSkill[InputsT]):
-    """A routine with an arm. `boxes` stand around it (frame B), `held` is in the hand (frame H).
+    """Routine that moves the arm.
 
-    Around it stands also what the hand camera has seen so far, but in `known_W` (least and greatest corners, world)
-    what `boxes` say.
+    `boxes` (frame B) are obstacles, `held` (frame H) are in the hand. The cells that the camera has seen are obstacles
+    too, except within `known_W` (least and greatest corners, world), where `boxes` say what is there. While `_watch` is
+    set, the loss of the held object fails the skill with `lost_message`.
     """
+
+    lost_message: ClassVar[str] = "the object was lost"
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)
@@ -107,15 +114,19 @@ class ArmSkill(RoutineSkill[InputsT]):
         self.known_W: Sequence[tuple[FloatArray, FloatArray]] = ()
         self._scene: ArmScene | None = None
         self._model: ArmModel | None = None
+        self._watch: HoldWatch | None = None
+        self._doubted_s = 0.0
         self._rng = np.random.default_rng(context.seed)
 
     def begin(self, inputs: InputsT) -> None:
-        """Forgets an earlier attempt: what stood around, what was held, the random numbers drawn."""
+        """Forgets the obstacles, the held object and the random numbers of an earlier attempt."""
+        self._watch = None
         self._forget()
         super().begin(inputs)
 
     def resume(self, inputs: InputsT) -> None:
-        """Goes on after a pause or a restart: what stood around may have moved."""
+        """Continues after a pause or a restart, in which obstacles may have moved; a slip in it does not count."""
+        self._watch = None if self._watch is None else self.hold_watch()
         if not self.can_go_on():
             self._forget()
         super().resume(inputs)
@@ -125,11 +136,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         self.boxes, self.held, self.known_W, self._scene = (), (), (), None
         self._rng = np.random.default_rng(self.context.seed)
 
-    _watch: HoldWatch | None = None
-    _doubted_s: float = 0.0
-
-    def lost(self, message: str) -> SkillFailure | None:
-        """A failure of that message when what `_watch` watches is lost; what begins to slip is gripped again."""
+    def trouble(self) -> SkillFailure | None:
+        """Returns a failure when the watched object is lost; grips an object more firmly that begins to slip."""
         if self._watch is None:
             return None
         context = self.context
@@ -139,26 +147,11 @@ class ArmSkill(RoutineSkill[InputsT]):
         if grip is not Grip.LOST:
             return None
         self._watch = None
-        return SkillFailure(Cause.POSTCONDITION, message)
-
-    def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
-        """Returns whether the hand is this near to a point in the world."""
-        p_BP = self.X_WB().inverse() @ np.asarray(p_W)
-        return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
-
-    def try_shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[bool]:
-        """Shifts the hand where a straight way is found; whether there was one. It may have to touch nothing."""
-        try:
-            yield from self.shift_hand(offset_B, message, clear_of_boxes=clear_of_boxes)
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
-            return False
-        return True
+        return SkillFailure(Cause.POSTCONDITION, self.lost_message)
 
     @property
     def model(self) -> ArmModel:
-        """The robot's arm. Raises SkillFailure with cause PRECONDITION when it has none that we can move."""
+        """Kinematics of the robot's arm. Raises SkillFailure with cause PRECONDITION when it has no suitable arm."""
         if self._model is None:
             try:
                 self._model = arm_model(self.context.robot.capabilities())
@@ -166,10 +159,35 @@ class ArmSkill(RoutineSkill[InputsT]):
                 raise SkillFailure(Cause.PRECONDITION, str(error)) from error
         return self._model
 
-    def q_rad(self) -> FloatArray:
-        """Arm angles now, within their limits, beyond which a servo may be by a little; no trajectory may begin there.
+    @property
+    def arm(self) -> ArmCapabilities:
+        """Capabilities of the arm. Raises SkillFailure with cause PRECONDITION when there is none."""
+        arm = self.context.robot.capabilities().arm
+        if arm is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no arm")
+        return arm
 
-        Raises SkillFailure with cause EXECUTION when the robot gives no numbers.
+    @property
+    def gripper(self) -> GripperCapabilities:
+        """Geometry and limits of the gripper. Raises SkillFailure with cause PRECONDITION when there is none."""
+        gripper = self.context.robot.capabilities().gripper
+        if gripper is None:
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no gripper")
+        return gripper
+
+    @property
+    def p_HT(self) -> FloatArray:
+        """Point (3,) of the hand frame at which the gripper holds an object (m)."""
+        return np.array([self.gripper.grip_x_m, 0.0, 0.0])
+
+    def X_WB(self) -> RigidTransform:
+        """The body's estimated pose in the world."""
+        return self.context.X_WB()
+
+    def q_rad(self) -> FloatArray:
+        """Present arm angles (J,), clipped to their limits, because a servo may be slightly beyond them.
+
+        Raises SkillFailure with cause EXECUTION when the robot reports no finite angles.
         """
         positions = self.context.robot.joints().position_rad
         q = np.array([positions[name] for name in self.model.names])
@@ -177,14 +195,25 @@ class ArmSkill(RoutineSkill[InputsT]):
             raise SkillFailure(Cause.EXECUTION, "the robot does not know its arm's angles")
         return np.asarray(np.clip(q, self.model.lower_rad, self.model.upper_rad))
 
-    def X_WB(self) -> RigidTransform:
-        """The body's pose in the world, as estimated."""
-        return self.context.X_WB()
+    def arm_points_B(self) -> FloatArray:
+        """Points (J + 1, 3) of the arm in the body frame: the joints from the shoulder on, and the gripper's tip."""
+        q_rad = self.q_rad()
+        tip_B = self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
+        return np.vstack([self.model.points_B(q_rad), tip_B])
+
+    def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
+        """Returns whether the hand is within a distance of a point in the world."""
+        p_BP = self.X_WB().inverse() @ np.asarray(p_W)
+        return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
+
+    def hold_watch(self) -> HoldWatch:
+        """A new watch of the object in the gripper."""
+        return hold_watch(self.context.robot.capabilities())
 
     def scene_now(self, boxes: Sequence[Box] | None = None) -> Callable[[], ArmScene]:
-        """Gives, inside a Worker job, the collision scene with what stands around and what is held just now.
+        """Returns a function that builds, inside a Worker job, the collision scene of this moment.
 
-        `boxes` (frame B) stand around instead of what is known, where they are given.
+        `boxes` (frame B) replace the known obstacles.
         """
         robot, model, held = self.context.robot, self.model, self.held
         boxes = [*self.boxes, *self.seen_boxes()] if boxes is None else boxes
@@ -196,21 +225,17 @@ class ArmSkill(RoutineSkill[InputsT]):
             scene.set_joints(joints.position_rad)
             scene.set_boxes(boxes)
             scene.hold(held)
-            scene.set_padding(0.01)
+            scene.set_padding(_PADDING_M)
             scene.set_opening(opening)
             return scene
 
         return prepared
 
     def seen_boxes(self, beyond_m: float = 0.0) -> list[Box]:
-        """What the hand camera has seen within reach, but what is known better and what is at the arm itself.
-
-        `beyond_m` is added to the reach.
-        """
-        X_WB, q_rad = self.X_WB(), self.q_rad()
-        arm_W = self.model.points_B(q_rad) @ X_WB.rotation().matrix().T + X_WB.translation()
-        tip_W = X_WB @ self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
-        segments, own = list(pairwise([*arm_W, tip_W])), self._own()
+        """Boxes (B) around the solid cells within the arm's reach and `beyond_m`, without the arm and `known_W`."""
+        X_WB = self.X_WB()
+        arm_W = self.arm_points_B() @ X_WB.rotation().matrix().T + X_WB.translation()
+        segments, own = list(pairwise(arm_W)), self._outline()
 
         def left_out(points_W: FloatArray) -> NDArray[np.bool_]:
             out = np.any([segment_distance(points_W, *each) < _AT_ARM_M for each in segments], axis=0)
@@ -218,24 +243,20 @@ class ArmSkill(RoutineSkill[InputsT]):
                 out |= np.all((points_W > low) & (points_W < high), axis=1)
             return np.asarray(out | own.holds(points_W))
 
-        return solid_boxes(self.context.solid.cells, X_WB, self._reach_m() + beyond_m, left_out)
+        reach_m = _BEYOND_M + self.arm.max_reach_m + beyond_m
+        return solid_boxes(self.context.solid.cells, X_WB, reach_m, left_out)
 
-    def _reach_m(self) -> float:
-        """How far from the body's origin the arm and what it holds may come."""
-        arm = self.context.robot.capabilities().arm
-        return _BEYOND_M + (0.0 if arm is None else arm.max_reach_m)
-
-    def _own(self) -> Outline:
-        """The body's outline, a little wider."""
+    def _outline(self) -> Outline:
+        """The body's outline with a margin."""
         corners = np.array(self.context.robot.capabilities().footprint_m)
-        return Outline(self.X_WB(), corners.min(axis=0) - 0.05, corners.max(axis=0) + 0.05)
+        return Outline(self.X_WB(), corners.min(axis=0) - _OUTLINE_MARGIN_M, corners.max(axis=0) + _OUTLINE_MARGIN_M)
 
     def from_a_height(
         self, heights_m: Sequence[float], message: str, attempt: Callable[[], Routine[PlannedT]]
     ) -> Routine[PlannedT]:
-        """What `attempt` gives with the body at the first of some heights (m) at which it finds a plan.
+        """Runs `attempt` with the body at the first of some heights (m) at which it finds a plan.
 
-        Raises SkillFailure: that of the last height, or the first one that is not for want of a plan.
+        Raises the SkillFailure of the last height, or the first one with another cause than PLANNING.
         """
         *first_m, last_m = heights_m
         for height_m in first_m:
@@ -251,19 +272,19 @@ class ArmSkill(RoutineSkill[InputsT]):
     def move_to(
         self, goal: Goal, message: str, speed_rad_s: float | None = None, opening: float | None = None
     ) -> Routine[FloatArray]:
-        """Plans to the configuration that `goal(scene, q_now)` gives, and goes there; gives that configuration.
+        """Plans to the configuration that `goal(scene, q_now)` gives and moves there; returns that configuration.
 
-        The gripper comes to `opening` on the way, as long as its wider opening is free of contact there; what it
-        cannot do on the way it does before when it closes, afterwards when it opens.
+        The gripper comes to `opening` on the path where its wider opening touches nothing. Otherwise it closes before
+        the motion, or opens after it.
         """
 
-        scene_now, start, now_rad = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening
-        turn = None if opening is None else GripperTurn(now_rad, opening)
+        scene_now, start, opening_now = self.scene_now(), self.q_rad(), self.context.robot.gripper().opening
+        turn = None if opening is None else GripperTurn(opening_now, opening)
 
         def plan() -> tuple[ArmTrajectory, FloatArray, float | None]:
             scene, planner = scene_now(), self.context.stack.arm_planner
             if turn is not None:
-                scene.set_opening(turn.narrow_rad)
+                scene.set_opening(turn.narrow)
             path = planner.path(scene, start, goal(scene, start), self._rng)
             trajectory = planner.timed(path, speed_rad_s=speed_rad_s, scene=scene)
             return trajectory, path[-1], None if turn is None else turn.begins_s(scene, trajectory)
@@ -275,21 +296,26 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield from self.follow(trajectory, message)
             return q_goal_rad
         if turn_s is None and turn.closes:
-            yield from self.move_gripper(turn.to_rad, GRIPPER_FORCE_N, message)
+            yield from self.move_gripper(turn.end, GRIPPER_FORCE_N, message)
         yield from self.follow(trajectory, message, None if turn_s is None else self._turning(turn, turn_s))
-        yield from self.move_gripper(turn.to_rad, GRIPPER_FORCE_N, message)
+        yield from self.move_gripper(turn.end, GRIPPER_FORCE_N, message)
         return q_goal_rad
 
     def _turning(self, turn: GripperTurn, after_s: float) -> Callable[[FloatArray], bool]:
-        """A guard for `follow` that stops nothing: it gives the gripper its command after a while."""
+        """A guard for `follow` that commands the gripper after a while and never stops the arm."""
         begins_s, given = self.context.clock.now() + after_s, list[CommandId]()
 
         def guard(q_wanted_rad: FloatArray) -> bool:
             if not given and self.context.clock.now() >= begins_s:
-                given.append(self.issue(self.gripper_command(turn.to_rad, GRIPPER_FORCE_N)))
+                given.append(self.issue(self.gripper_command(turn.end, GRIPPER_FORCE_N)))
             return False
 
         return guard
+
+    def carry(self, R_BH: RotationMatrix, message: str, speed_rad_s: float | None = CARRY_SPEED_RAD_S) -> Routine[None]:
+        """Draws the hand near the body, turned as in R_BH about the vertical, so that the object stays upright."""
+        arm = self.arm
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s)
 
     def move_straight(
         self,
@@ -300,10 +326,10 @@ class ArmSkill(RoutineSkill[InputsT]):
         clear_of_boxes: bool = False,
         guard: Callable[[FloatArray], bool] | None = None,
     ) -> Routine[bool]:
-        """Moves the hand straight to p_BH with the orientation that it has; whether `guard` stopped it (see `follow`).
+        """Moves the hand straight to p_BH with its present orientation; returns whether `guard` stopped it.
 
-        The line begins at the joint angles of the arm, or at `q_from_rad`, which the arm about has. With
-        `clear_of_boxes` it must not touch what stands around.
+        The line begins at the arm's present angles, or at `q_from_rad`, which the arm is near. With `clear_of_boxes`
+        the arm must touch no obstacle.
         """
 
         q = self.q_rad() if q_from_rad is None else q_from_rad
@@ -320,16 +346,43 @@ class ArmSkill(RoutineSkill[InputsT]):
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
         return (yield from self.follow(trajectory, message, guard))
 
-    def shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[None]:
-        """Moves the hand straight by an offset in the body frame."""
+    def try_shift_hand(self, offset_B: FloatArray, message: str, *, clear_of_boxes: bool = False) -> Routine[bool]:
+        """Moves the hand straight by an offset (3,) in B; returns False when there is no straight path."""
         p_BH = self.model.X_BH(self.q_rad()).translation() + offset_B
-        yield from self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
+        motion = self.move_straight(p_BH, message, clear_of_boxes=clear_of_boxes)
+        return (yield from planning_failure(motion)) is None
+
+    def shift_by_first(
+        self, offsets_B: Iterable[FloatArray], message: str, *, clear_of_boxes: bool = False
+    ) -> Routine[bool]:
+        """Moves the hand by the first of some offsets (3,) that has a straight path; returns False when none has."""
+        for offset_B in offsets_B:
+            if (yield from self.try_shift_hand(offset_B, message, clear_of_boxes=clear_of_boxes)):
+                return True
+        return False
+
+    def press(self, offset_B: FloatArray, direction_B: FloatArray, speed_rad_s: float, message: str) -> Routine[bool]:
+        """Moves the hand slowly by an offset (3,) in B; returns whether contact along a direction stopped it.
+
+        Obstacles are not looked at. Raises PlanningError when the arm cannot follow the line.
+        """
+        X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
+        path = planner.line(self.model, self.q_rad(), RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B))
+        return (
+            yield from self.follow(planner.timed(path, speed_rad_s=speed_rad_s), message, self.held_up(direction_B))
+        )
+
+    def held_up(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
+        """A guard for `follow` that stops a slow hand when it lags along a direction as it does only in contact."""
+
+        def guard(q_wanted_rad: FloatArray) -> bool:
+            lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
+            return float(lag @ direction_B) > lag_m
+
+        return guard
 
     def weigh(self, p_HO: FloatArray, message: str) -> Routine[float]:
-        """The mass (kg) of what the still hand holds at p_HO (3,), from the arm's efforts; body level.
-
-        Noise that one reading has is averaged over `WEIGHING_S`.
-        """
+        """Measures the mass (kg) of the object that a still hand holds at p_HO (3,), with the body level."""
         scene = yield from self.compute(self.scene_now(), latency_s=0.05, name="prepare weighing", message=message)
         end_s, found = self.context.clock.now() + WEIGHING_S, []
         while self.context.clock.now() < end_s:
@@ -340,91 +393,50 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield Running(message)
         return float(np.median(found))
 
-    def held_up(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
-        """A guard for `follow`: whether the hand, which moves slowly that way, lags as far as if something stops it."""
-
-        def guard(q_wanted_rad: FloatArray) -> bool:
-            lag = self.model.X_BH(q_wanted_rad).translation() - self.model.X_BH(self.q_rad()).translation()
-            return float(lag @ direction_B) > lag_m
-
-        return guard
-
-    @property
-    def gripper(self) -> GripperCapabilities:
-        """The gripper's geometry and limits. Raises SkillFailure with cause PRECONDITION when there is none."""
-        gripper = self.context.robot.capabilities().gripper
-        if gripper is None:
-            raise SkillFailure(Cause.PRECONDITION, "the robot has no gripper")
-        return gripper
-
-    @property
-    def arm(self) -> ArmCapabilities:
-        """What the arm can do. Raises SkillFailure with cause PRECONDITION when there is none."""
-        arm = self.context.robot.capabilities().arm
-        if arm is None:
-            raise SkillFailure(Cause.PRECONDITION, "the robot has no arm")
-        return arm
-
-    def hold_watch(self) -> HoldWatch:
-        """A watch over what the gripper holds, from now on."""
-        return hold_watch(self.context.robot.capabilities())
-
-    @property
-    def widest(self) -> float:
-        """How far the gripper opens."""
-        return self.gripper.widest
-
-    @property
-    def p_HT(self) -> FloatArray:
-        """Where the middle of what the gripper holds is in the hand frame (3,), m."""
-        return np.array([self.gripper.grip_x_m, 0.0, 0.0])
-
-    def release_rad(self) -> float:
-        """How far the gripper opens to let go of what it holds."""
-        most = 0.75 if self.gripper.kind is GripperKind.HINGED else 1.0
-        return min(self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD), most * self.widest)
+    def release_opening(self) -> float:
+        """Opening at which the gripper lets go of the object that it holds."""
+        most = _WIDEST_RELEASE if self.gripper.kind is GripperKind.HINGED else 1.0
+        release = self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD)
+        return min(release, most * self.gripper.widest)
 
     def leave_object(self) -> Routine[bool]:
-        """Takes fixed finger and palm off what was let go of, and draws the hand back; whether there was a way.
+        """Takes fixed finger and palm off a released object and draws the hand back; returns whether a path was found.
 
-        Fingers that both open are off it already.
+        Two moving fingers are off the object already.
         """
         X_BH = self.model.X_BH(self.q_rad())
         fingers, _, closing = X_BH.rotation().matrix().T
         if abs(closing[2]) < _LEVEL and self.gripper.kind is GripperKind.HINGED:
             aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
             yield from self.try_shift_hand(aside, "letting go")
-        for shift_B in retreats_B(X_BH, self.model.p_BS):
-            if (yield from self.try_shift_hand(shift_B, "drawing the hand back")):
-                return True
-        return False
+        return (yield from self.shift_by_first(retreats_B(X_BH, self.model.p_BS), "drawing the hand back"))
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
-        """Closes the gripper and fold the arm onto the body; nothing is done where it lies there already."""
+        """Closes the empty gripper and folds the arm onto the body, unless it is stowed already."""
         stowed = self.model.stowed_rad
         gripper = self.context.robot.gripper()
-        closing_rad = 0.0 if not gripper.holding and gripper.opening > self.gripper.like_turn(0.05) else None
-        if self.model.off_rad(self.q_rad(), stowed) > 0.05:
-            yield from self.move_to(lambda scene, q: stowed, message, opening=closing_rad)
-        elif closing_rad is not None:
-            yield from self.move_gripper(closing_rad, GRIPPER_FORCE_N, message)
-
-    def stand_as_usual(self, message: str = "standing as usual") -> Routine[None]:
-        """Brings the body to its usual height."""
-        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
+        closing = 0.0 if not gripper.holding and gripper.opening > self.gripper.like_turn(_OPEN_RAD) else None
+        if self.model.off_rad(self.q_rad(), stowed) > _STOWED_RAD:
+            yield from self.move_to(lambda scene, q: stowed, message, opening=closing)
+        elif closing is not None:
+            yield from self.move_gripper(closing, GRIPPER_FORCE_N, message)
 
     def try_stow(self) -> Routine[None]:
-        """Stows where a way is found; used on the way out of failures."""
+        """Stows the arm after a failure; does nothing when that fails too."""
         try:
             yield from self.stow("stowing the arm after the failure")
         except SkillFailure:
             return
 
+    def stand_as_usual(self, message: str = "standing as usual") -> Routine[None]:
+        """Brings the body to its usual height."""
+        yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
+
 
 def retreats_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
-    """Shifts of the hand away from what it has let go of, the best first: back along the fingers, up, up and back.
+    """Shifts of the hand (B) away from a released object, best first: back along the fingers, up, up and back.
 
-    The last are towards the shoulder at p_BS: an arm that is stretched out has no other.
+    The last ones point towards the shoulder at p_BS: a stretched arm has no others.
     """
     directions_B = (
         -X_BH.rotation().matrix()[:, 0],

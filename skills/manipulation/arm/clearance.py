@@ -1,7 +1,7 @@
 """Clearance of convex shapes from boxes, in compiled loops: the arm's shapes in many configurations among many boxes.
 
-Every gap is the widest along axes that can separate the two, so it is never more than the distance. It is the distance
-itself but where a rim of a cylinder, or a corner or edge of a box, comes nearest to an edge or corner. Shapes are
+Each gap is the widest along axes that can separate the two, so it is never more than the distance. It is less than the
+distance only where a rim of a cylinder, or a corner or edge of a box, is nearest to an edge or corner. Shapes are
 spheres, capsules, cylinders and boxes about the origin of their own frame, the length of round ones along z.
 """
 
@@ -17,11 +17,14 @@ from numpy.typing import NDArray
 from skills.estimate.compiled import compiled
 from skills.robot import FloatArray
 
-_PARALLEL, _HALVINGS = 1e-6, 40
+_PARALLEL = 1e-6
+"""Sine of the angle between two edges below which they are parallel."""
+_HALVINGS = 40
+"""Steps of the search for the nearest point of an axis."""
 
 
 class Kind(enum.IntEnum):
-    """What a shape is. Its half extents (3,) are its radius, its radius, and half its length without round caps."""
+    """Kind of a shape. Its half extents (3,) are its radius, its radius, and half its length without round caps."""
 
     SPHERE = 0
     CAPSULE = 1
@@ -30,7 +33,7 @@ class Kind(enum.IntEnum):
 
 
 FIXED: Final = -1
-"""The joint of what hangs on no joint."""
+"""Joint of a shape that no joint moves."""
 
 
 @compiled
@@ -53,13 +56,13 @@ def touching(
     R_BX: FloatArray,
     p_BX: FloatArray,
 ) -> bool:
-    """Returns whether in any configuration of path_rad (K, J) any of S shapes comes within a padding of any of N boxes.
+    """Returns whether any of S shapes comes within a padding of any of N boxes in a configuration of path_rad (K, J).
 
-    Joint j turns about `axes` (J, 3) in its frame F, which is fixed to the link before it, the body for the first:
-    R_PF (J, 3, 3), p_PF (J, 3). Shapes come in G groups that hang on one link: `group_joints` (G,) move the links, or
-    `FIXED` for the body itself, and `group_ends` (G,) are the numbers of the shapes after the last of each.
-    `group_spheres` (G, 4), centre and radius, hold their shapes; spheres of `radii` (S,) hold one each. The first touch
-    ends it, unless `found` (S,) is to be told of each shape that touches.
+    Joint j turns about `axes` (J, 3) in its frame F, which is fixed to the link before it, the body for the first: R_PF
+    (J, 3, 3), p_PF (J, 3). Shapes come in G groups, one for each link: `group_joints` (G,) move the links, or `FIXED`
+    for the body itself, and `group_ends` (G,) are the numbers after each group's last shape. `group_spheres` (G, 4),
+    centre and radius, hold their shapes; spheres of `radii` (S,) hold one each. The first touch ends the check, unless
+    `found` (S,) is to mark all shapes that touch.
     """
     joints, groups, boxes = path_rad.shape[1], group_joints.shape[0], box_halves.shape[0]
     reach = np.sqrt(box_halves[:, 0] ** 2 + box_halves[:, 1] ** 2 + box_halves[:, 2] ** 2) + padding_m
@@ -100,7 +103,7 @@ def touching(
 def _place_links(
     R: FloatArray, p: FloatArray, q_rad: FloatArray, axes: FloatArray, R_PF: FloatArray, p_PF: FloatArray
 ) -> None:
-    """Puts the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
+    """Writes the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""
     R[0], p[0] = np.eye(3), np.zeros(3)
     for j in range(q_rad.shape[0]):
         _place(R[j + 1], p[j + 1], R[j], p[j], R_PF[j], p_PF[j])
@@ -129,7 +132,7 @@ def box_gaps(
 def _place(
     R_AC: FloatArray, p_AC: FloatArray, R_AB: FloatArray, p_AB: FloatArray, R: FloatArray, p: FloatArray
 ) -> None:
-    """Puts X_AB @ X_BC into R_AC and p_AC."""
+    """Writes X_AB @ X_BC into R_AC and p_AC."""
     for i in range(3):
         p_AC[i] = p_AB[i] + R_AB[i, 0] * p[0] + R_AB[i, 1] * p[1] + R_AB[i, 2] * p[2]
         for j in range(3):
@@ -159,7 +162,7 @@ def _gap(
     R_BX: FloatArray,
     p_BX: FloatArray,
 ) -> float:
-    """The gap (m) between a shape and a box; 0 or less where they touch."""
+    """Gap (m) between a shape and a box; 0 or less where they touch."""
     if kind == Kind.BOX:
         return _box_gap(half, R_BS, p_BS, box_half, R_BX, p_BX)
     dx, dy, dz = p_BS[0] - p_BX[0], p_BS[1] - p_BX[1], p_BS[2] - p_BX[2]
@@ -195,7 +198,7 @@ def _gap(
 
 @compiled
 def _from_box(x: float, y: float, z: float, half: FloatArray) -> float:
-    """The distance (m) of a point from a box about the origin; 0 inside."""
+    """Distance (m) of a point from a box about the origin; 0 inside."""
     x, y, z = max(0.0, abs(x) - half[0]), max(0.0, abs(y) - half[1]), max(0.0, abs(z) - half[2])
     return math.sqrt(x * x + y * y + z * z)
 
@@ -204,7 +207,7 @@ def _from_box(x: float, y: float, z: float, half: FloatArray) -> float:
 def _box_gap(
     half: FloatArray, R_FG: FloatArray, p_FG: FloatArray, other: FloatArray, R_FX: FloatArray, p_FX: FloatArray
 ) -> float:
-    """The gap (m) of two boxes by the fifteen axes that separate boxes; negative where they overlap.
+    """Gap (m) of two boxes by the fifteen axes that separate boxes; negative where they overlap.
 
     Gottschalk, Lin and Manocha, "OBBTree", 1996.
     """

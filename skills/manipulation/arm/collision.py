@@ -24,34 +24,41 @@ if TYPE_CHECKING:
     from pydrake.planning import SceneGraphCollisionChecker
 
 AROUND: Final = "around"
-"""The name of the body that stands for all boxes."""
+"""Name of the body that stands for all boxes."""
 EDGE_STEP_RAD = 0.05
-"""How far apart (rad, all joints together) the configurations of a motion are checked."""
+"""Distance (rad, all joints together) between the configurations of a motion that are checked."""
 _LINK_RADIUS_M = 0.06
+"""Radius of the arm's links."""
 _Arrays = tuple[NDArray[Any], ...]
 _ALL_OR_NONE: Final = np.zeros(0, dtype=np.bool_)
-"""For `touching`, to which it is the same which shape touches."""
+"""Argument of `touching` for a check that need not tell the shapes apart."""
 
 
 @dataclass(frozen=True)
 class Box:
-    """A box: pose of its centre in some frame, full extents in m."""
+    """Box: pose of its centre in some frame, full extents in m."""
 
     X_FG: RigidTransform
     size_m: tuple[float, float, float]
 
 
-def gaps_m(box: Box, boxes: Sequence[Box], moves: FloatArray) -> FloatArray:
-    """How far (m) a box is at least from each of N others after each of K moves (K, 3): (K, N).
+def box_between(low: FloatArray, high: FloatArray, least_m: float = 0.0) -> Box:
+    """Returns the upright box between two corners (3,), each of its sides `least_m` long at least."""
+    x, y, z = np.maximum(high - low, least_m)
+    return Box(RigidTransform(0.5 * (low + high)), (float(x), float(y), float(z)))
 
-    It is negative where they overlap. All are in one frame.
+
+def gaps_m(box: Box, boxes: Sequence[Box], moves: FloatArray) -> FloatArray:
+    """Gaps (K, N) in m of a box, after each of K moves (K, 3), to N others; negative where they overlap.
+
+    All boxes and moves are in one frame.
     """
     (half, *_), (R, *_), (p, *_) = _as_arrays([box])
     return np.asarray(box_gaps(half, R, p, np.asarray(moves, dtype=float), *_as_arrays(boxes)))
 
 
 def _as_arrays(boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> _Arrays:
-    """Half extents (N, 3), rotations (N, 3, 3) and middles (N, 3) of boxes in B, F where X_BF is left out."""
+    """Half extents (N, 3), rotations (N, 3, 3) and centres (N, 3) of boxes in B; without X_BF, in their own frame."""
     X_FG = np.array([box.X_FG.GetAsMatrix34() for box in boxes]).reshape(-1, 3, 4)
     halves_m = 0.5 * np.array([box.size_m for box in boxes]).reshape(-1, 3)
     X = (X_BF or RigidTransform()).GetAsMatrix34()
@@ -60,18 +67,18 @@ def _as_arrays(boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> _Arr
 
 
 def box_corners(box: Box) -> FloatArray:
-    """The eight corners of a box, (8, 3) in the frame in which it is given."""
+    """Returns the eight corners of a box, (8, 3) in its frame."""
     signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
     half = 0.5 * np.array(box.size_m)
     return np.asarray(signs * half @ box.X_FG.rotation().matrix().T + box.X_FG.translation())
 
 
 class ArmScene:
-    """The robot standing still with boxes around it, all in the body frame.
+    """Collision scene of a standing robot with boxes around it, all in the body frame.
 
-    Legs stand at the joint angles given; the gripper's angle and a thing in the hand may change between checks. Drake
-    checks the robot against itself and what it holds; both are checked against the boxes by `clearance`, where meshes
-    and other shapes of the robot stand in by their oriented bounding boxes.
+    Legs stand at the given joint angles; the gripper's opening and the object in the hand may change between checks.
+    Drake checks the robot against itself and the held object. `clearance` checks both against the boxes; oriented
+    bounding boxes stand in for meshes and other shapes of the robot.
     """
 
     def __init__(
@@ -82,7 +89,7 @@ class ArmScene:
         padding_m: float = 0.01,
         work: WorkCounter = NO_WORK_COUNTER,
     ) -> None:
-        """`work` counts the checks."""
+        """Builds the scene; `work` counts the checks."""
         self.model, self._work = model, work
         self._capabilities, self._gripper = capabilities, capabilities.gripper
         fingers = () if self._gripper is None else tuple(self._gripper.finger_positions(0.0))
@@ -94,13 +101,13 @@ class ArmScene:
         self.set_joints(joint_positions_rad)
 
     def set_boxes(self, boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> None:
-        """Replaces the boxes around the robot, given in frame F, the body's own where X_BF is left out."""
+        """Replaces the boxes around the robot, given in frame F; without X_BF, in the body frame."""
         self._boxes, self._X_BF = tuple(boxes), RigidTransform() if X_BF is None else X_BF
         self._obstacles = None
 
     @contextmanager
     def with_only(self, boxes: Sequence[Box], opening: float) -> Iterator[None]:
-        """For a while other boxes (frame B) stand around, and the gripper is open so far."""
+        """Replaces the boxes (frame B) and the gripper's opening for the duration of a context."""
         before, X_BF, opening_before = self._boxes, self._X_BF, self._opening
         self.set_boxes(boxes)
         self.set_opening(opening)
@@ -111,24 +118,24 @@ class ArmScene:
             self.set_opening(opening_before)
 
     def beyond_body_m(self, q_rad: FloatArray) -> tuple[float, float]:
-        """How far the arm sticks out of the body's footprint ahead and to a side (m); 0 where it does not."""
+        """Lengths (m) by which the arm sticks out of the body's footprint ahead and to a side; 0 where it does not."""
         most_m = np.max(np.abs(np.asarray(self._capabilities.footprint_m)), axis=0)
         x, y, _ = self.model.points_B(q_rad).T
         ahead_m, beside_m = float(np.max(x) - most_m[0]), float(np.max(np.abs(y)) - most_m[1])
         return max(0.0, ahead_m + _LINK_RADIUS_M), max(0.0, beside_m + _LINK_RADIUS_M)
 
     def hold(self, boxes: Sequence[Box]) -> None:
-        """Replaces the boxes fixed to the hand (frame H), for a thing held."""
+        """Replaces the boxes fixed to the hand (frame H), for a held object."""
         self._robot.hold(tuple(boxes))
         self._obstacles = None
 
     def set_opening(self, opening: float) -> None:
-        """Opening of the gripper in later checks, 0 closed."""
+        """Sets the gripper's opening for later checks, 0 closed."""
         self._opening = opening
         self._obstacles = None
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
-        """Where the robot's other joints are in later checks: legs, lift, head."""
+        """Sets the robot's other joints for later checks: legs, lift, head."""
         self._turn_joints(dict(joint_positions))
         self._robot.allow_stowed_contacts()
 
@@ -138,7 +145,7 @@ class ArmScene:
         self._obstacles = None
 
     def set_padding(self, padding_m: float) -> None:
-        """Distance that the robot keeps from boxes in later checks."""
+        """Sets the distance (m) that the robot keeps from boxes in later checks."""
         self._padding_m = padding_m
         self._obstacles = None
 
@@ -150,7 +157,7 @@ class ArmScene:
         return bool(self._robot.checker.CheckConfigCollisionFree(self._full(q_rad)))
 
     def free_as_usual(self, q_rad: FloatArray) -> bool:
-        """Whether arm angles q_rad (J,) collide with nothing once a torso on a lift is at its usual height again.
+        """Returns whether arm angles q_rad (J,) are free with the lift of the torso at its usual height.
 
         True on robots without a lift.
         """
@@ -186,12 +193,12 @@ class ArmScene:
         return held
 
     def contacts(self, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
-        """Names of the links that touch or come closer than the padding, for messages; boxes are `AROUND`."""
+        """Names of the links in contact or closer than the padding, for messages; boxes are `AROUND`."""
         links = self._around().touched(np.asarray(q_rad, dtype=float))
         return *_contacts(self._robot.checker, self._full(q_rad)), *((link, AROUND) for link in links)
 
     def _around(self) -> _Obstacles:
-        """The boxes and the robot's shapes as they are now."""
+        """The present obstacles: boxes and the robot's shapes."""
         if self._obstacles is None:
             shapes = self._robot.shapes(self._full(np.zeros(len(self.model.joints))))
             self._obstacles = _Obstacles(self.model, shapes, _as_arrays(self._boxes, self._X_BF), self._padding_m)
@@ -204,9 +211,9 @@ class ArmScene:
 
 @dataclass(frozen=True)
 class _Shape:
-    """A collision shape of the robot: the link that bears it, and the arm joint that moves it, `FIXED` for none.
+    """Collision shape of the robot: its link, and the arm joint that moves it, `FIXED` for none.
 
-    X_LS is its frame in the link of that joint, the body for `FIXED`.
+    X_LS is its frame in the link of that joint; in the body for `FIXED`.
     """
 
     link: str
@@ -217,7 +224,7 @@ class _Shape:
 
     @property
     def radius_m(self) -> float:
-        """Of a sphere about it."""
+        """Radius of a sphere around the shape."""
         radius, other, length = self.half_m
         if self.kind is Kind.BOX:
             return math.hypot(radius, other, length)
@@ -234,7 +241,7 @@ class _Obstacles:
         boxes: _Arrays,
         padding_m: float,
     ) -> None:
-        """`boxes` are half extents (N, 3), rotations (N, 3, 3) and middles (N, 3) in the body frame."""
+        """Stores boxes as half extents (N, 3), rotations (N, 3, 3) and centres (N, 3) in the body frame."""
         X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in model.joints])
         axes = np.array([joint.axis for joint in model.joints], dtype=float)
         self._padding_m, self._boxes = padding_m, boxes
@@ -245,11 +252,11 @@ class _Obstacles:
         self._any_fixed = self._touch(_ALL_OR_NONE, np.zeros((1, len(axes))), _rows(self._fixed))
 
     def meet(self, path_rad: FloatArray) -> bool:
-        """Returns whether the robot comes within the padding of a box, the arm in any of the configurations (K, J)."""
+        """Returns whether the robot comes within the padding of a box at any of the arm's configurations (K, J)."""
         return self._any_fixed or self._touch(_ALL_OR_NONE, path_rad, self._moved_rows)
 
     def touched(self, q_rad: FloatArray) -> list[str]:
-        """The links that come within the padding of a box, the arm at q_rad (J,)."""
+        """Names of the links that come within the padding of a box, the arm at q_rad (J,)."""
         links: dict[str, None] = {}
         for shapes in (self._fixed, self._moved):
             found = np.zeros(len(shapes), dtype=np.bool_)
@@ -263,7 +270,7 @@ class _Obstacles:
 
 
 def _rows(shapes: Sequence[_Shape]) -> _Arrays:
-    """Shapes, those of one joint together, as `touching` takes them: groups first."""
+    """Arrays of shapes, those of one joint together, in the order of the arguments of `touching`."""
     joints, ends, spheres = [], [], []
     X_LS = np.array([shape.X_LS.GetAsMatrix34() for shape in shapes]).reshape(-1, 3, 4)
     radii_m = np.array([shape.radius_m for shape in shapes])
@@ -286,7 +293,7 @@ def _rows(shapes: Sequence[_Shape]) -> _Arrays:
 
 
 class _Robot:
-    """Drake's collision checker of the robot alone, welded by its body, and its shapes."""
+    """Drake's collision checker of the robot alone, welded by its body, and the robot's shapes."""
 
     def __init__(self, description: str, model: ArmModel, fingers: Sequence[str]) -> None:
         from pydrake.multibody.parsing import Parser
@@ -315,12 +322,12 @@ class _Robot:
             self.checker.SetCollisionFilteredBetween(one, other, True)
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
-        """Where all joints are that are not given with each check; 0 where nothing is said."""
+        """Sets all joints that are not given with each check; 0 for joints without a position."""
         for name, start in self._positions.items():
             self._q[start] = joint_positions.get(name, 0.0)
 
     def positions(self, q_rad: FloatArray, fingers: Mapping[str, float]) -> FloatArray:
-        """All positions of the model with the arm at q_rad (J,) and the gripper's joints there, by name."""
+        """Positions of the whole model with the arm at q_rad (J,) and the gripper's joints at `fingers`."""
         q = self._q.copy()
         q[self._arm] = q_rad
         for name, position in fingers.items():
@@ -328,7 +335,7 @@ class _Robot:
         return q
 
     def hold(self, boxes: tuple[Box, ...]) -> None:
-        """Puts boxes into the hand (frame H) instead of those of before."""
+        """Replaces the boxes in the hand (frame H)."""
         from pydrake.geometry import Box as BoxShape
         from pydrake.planning import BodyShapeDescription
 
@@ -340,7 +347,7 @@ class _Robot:
             self._held = boxes
 
     def shapes(self, positions: FloatArray) -> list[_Shape]:
-        """All shapes and what is held, by the joints that move them; `positions` are those of the whole model."""
+        """All shapes and the held boxes, with the joints that move them; `positions` are those of the whole model."""
         plant, inspector = self.plant, self.checker.model().scene_graph().model_inspector()
         context = self.checker.UpdatePositions(positions)
         chain = [plant.GetBodyByName(joint.child) for joint in self._model.joints]
@@ -358,7 +365,7 @@ class _Robot:
         return sorted(shapes, key=lambda shape: shape.joint)
 
     def allow_stowed_contacts(self) -> None:
-        """Allows the contacts that there are when the arm is stowed: resting there is what stowing means."""
+        """Allows the contacts of the stowed arm, which rests on the body."""
         for a, b in _contacts(self.checker, self.positions(self._model.stowed_rad, {})):
             one, other = self.plant.GetBodyByName(a), self.plant.GetBodyByName(b)
             self.checker.SetCollisionFilteredBetween(one, other, True)
@@ -389,7 +396,7 @@ def _measured(
 
 
 def _contacts(checker: SceneGraphCollisionChecker, q_rad: FloatArray) -> tuple[tuple[str, str], ...]:
-    """Names of the links that touch or come closer than the padding at all positions q_rad of the model."""
+    """Names of the links in contact or closer than the padding, at positions q_rad of the whole model."""
     clearance = checker.CalcRobotClearance(q_rad, 0.0)
     bodies = [
         (checker.get_body(a).name(), checker.get_body(b).name())
@@ -399,5 +406,5 @@ def _contacts(checker: SceneGraphCollisionChecker, q_rad: FloatArray) -> tuple[t
 
 
 def _without_visuals(description: str) -> str:
-    """URDF text without its visual elements, whose mesh files a skill does not need."""
+    """Returns URDF text without its visual elements, whose mesh files a skill does not need."""
     return re.sub(r"<visual\b.*?</visual>", "", description, flags=re.DOTALL)

@@ -1,4 +1,4 @@
-"""Whether what the gripper holds stays in it: a loss and a slip are told from the gripper's readings, within 0.3 s."""
+"""Watch over the object in the gripper: recognises a loss and a slip from the gripper's readings, within 0.3 s."""
 
 from __future__ import annotations
 
@@ -9,12 +9,16 @@ from typing import Final
 from skills.robot import Capabilities, Clock, CommandId, Gripper, Lease, Robot
 
 GRIP_AGAIN_S: Final = 4.0
-_FIRMER, _MOST_OF_FORCE = 1.5, 0.95
+"""Expiry of a firmer grip."""
+_FIRMER = 1.5
+"""Factor by which a firmer grip is stronger."""
+_MOST_OF_FORCE = 0.95
+"""Largest force of a grip, as a part of the gripper's limit."""
 _TOLERANCE_S = 1e-6
 
 
 class Grip(enum.Enum):
-    """What becomes of the object in the gripper."""
+    """State of the object in the gripper."""
 
     EMPTY = "empty"  # nothing has been held since the watch began
     HELD = "held"  # it stays where it is, as far as can be told
@@ -26,13 +30,13 @@ class Grip(enum.Enum):
 
 @dataclass
 class HoldWatch:
-    """Judges readings of a gripper that holds something.
+    """Judge of the readings of a gripper that holds an object.
 
-    The robot's belief to hold nothing counts once it has lasted for `patience_s`. An object slips when the gripper has
-    closed by more than `slip_rad` about it, or when its force has been below `slip_force` of what it was for `slip_s`.
-    What was gripped again slips on when the gripper closes about it, judged anew from `settle_s` later on; fingers that
-    stay apart have `regrip_s` to feel it again before it counts as lost. A gripper that has opened by `released_rad`
-    lets go on purpose.
+    The robot's belief that it holds nothing counts once it has lasted for `patience_s`. An object slips when the
+    gripper has closed by more than `slip_rad` about it, or when its force has been below the part `slip_force` of its
+    first value for `slip_s`. An object that was gripped again slips on when the gripper closes about it, judged from
+    `settle_s` later on; fingers that stay apart have `regrip_s` to feel it again before it counts as lost. A gripper
+    that has opened by `released_rad` lets go on purpose.
     """
 
     patience_s: float = 0.05
@@ -51,7 +55,10 @@ class HoldWatch:
     _released: bool = field(default=False, init=False)
 
     def judge(self, reading: Gripper, now_s: float) -> Grip:
-        """What the newest reading means at a time on the robot's clock (s); `force_n` is the force when it held."""
+        """Judges the newest reading at a time on the robot's clock (s).
+
+        `force_n` is the force at the first reading with an object, or after it was gripped again.
+        """
         if self._opening is None:
             if not reading.holding:
                 return Grip.EMPTY
@@ -65,7 +72,7 @@ class HoldWatch:
         return self._held(reading, now_s)
 
     def _missed(self, reading: Gripper, now_s: float) -> Grip:
-        """A reading of a gripper that feels nothing; fingers that stay apart may still have something between them."""
+        """Judges a reading without an object; fingers that stay apart may still have it between them."""
         self._empty_since_s = now_s if self._empty_since_s is None else self._empty_since_s
         assert self._opening is not None
         apart = reading.opening > self._opening - self.slip_rad
@@ -74,7 +81,7 @@ class HoldWatch:
         return Grip.LOST if now_s - self._empty_since_s >= self.patience_s - _TOLERANCE_S else Grip.HELD
 
     def _held(self, reading: Gripper, now_s: float) -> Grip:
-        """A reading with the object between the fingers: as firmly as before?"""
+        """Judges a reading with an object between the fingers."""
         if self._settling and self._gripped_again_s is not None:
             if now_s < self._gripped_again_s + self.settle_s:
                 return Grip.HELD
@@ -94,7 +101,7 @@ class HoldWatch:
 
 
 def hold_watch(capabilities: Capabilities) -> HoldWatch:
-    """A watch with limits that suit a robot's gripper."""
+    """Returns a watch with limits that suit a robot's gripper."""
     usual, gripper = HoldWatch(), capabilities.gripper
     if gripper is None:
         return usual
@@ -102,12 +109,12 @@ def hold_watch(capabilities: Capabilities) -> HoldWatch:
 
 
 def firmer_n(force_n: float, capabilities: Capabilities) -> float:
-    """The force (N) to grip what slips at force_n: half as much again, within what the gripper can."""
+    """Force (N) to grip an object that slips at force_n: half as much again, within the gripper's limit."""
     most_n = 0.0 if capabilities.gripper is None else _MOST_OF_FORCE * capabilities.gripper.max_force_n
     return min(_FIRMER * force_n, most_n)
 
 
 def grip_again(robot: Robot, force_n: float, *, clock: Clock, lease: Lease) -> CommandId:
-    """Closes the gripper about what slips at force_n, more firmly; other motion goes on meanwhile."""
+    """Grips an object that slips at force_n more firmly; other motion continues meanwhile."""
     firmly_n = firmer_n(force_n, robot.capabilities())
     return robot.set_gripper(0.0, firmly_n, until_s=clock.now() + GRIP_AGAIN_S, lease=lease)

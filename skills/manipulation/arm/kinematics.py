@@ -2,8 +2,8 @@
 
 One has a shoulder yaw, two parallel pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see
 `seven_joints`). All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z
-along their closing. The inverse is solved in closed form, every branch and no seeds, or by the solver that the robot's
-capabilities bring.
+along their closing. The inverse is solved in closed form, every branch and no seeds, or by the solver of the robot's
+capabilities.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _EXPECTED_AXES = ((0, 0, 1), (0, 1, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 
 
 @dataclass(frozen=True)
 class ChainJoint:
-    """One revolute joint: X_PF is its frame in the parent link, limits in rad, `child` the link that it moves.
+    """Revolute joint: X_PF is its frame in the parent link, limits in rad, `child` the link that it moves.
 
-    The limits of one that turns without end are infinite.
+    The limits of a joint that turns without end are infinite.
     """
 
     name: str
@@ -50,7 +50,7 @@ class ArmModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Arm joint names from the shoulder on."""
+        """Names of the arm's joints from the shoulder on."""
         return tuple(joint.name for joint in self.joints)
 
     @property
@@ -60,7 +60,7 @@ class ArmModel:
 
     @cached_property
     def lower_rad(self) -> FloatArray:
-        """Lowers joint limits (J,)."""
+        """Lower joint limits (J,)."""
         return np.array([joint.lower_rad for joint in self.joints])
 
     @cached_property
@@ -70,12 +70,12 @@ class ArmModel:
 
     @cached_property
     def endless(self) -> NDArray[np.bool_]:
-        """Which joints turn without end (J,)."""
+        """Mask (J,) of the joints that turn without end."""
         return np.isinf(self.upper_rad)
 
     @property
     def p_BS(self) -> FloatArray:
-        """The shoulder in the body frame (3,), m."""
+        """Shoulder (3,) in the body frame, m."""
         return np.asarray(self.joints[0].X_PF.translation())
 
     def X_BH(self, q_rad: FloatArray) -> RigidTransform:
@@ -84,11 +84,11 @@ class ArmModel:
         return RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotation), positions[-1])
 
     def points_B(self, q_rad: FloatArray) -> FloatArray:
-        """Where the joints are, from the shoulder on, (J, 3) in the body frame."""
+        """Positions (J, 3) of the joints in the body frame, from the shoulder on."""
         return np.array(self._chain(q_rad)[1])
 
     def _chain(self, q_rad: FloatArray) -> tuple[NDArray[np.float64], list[FloatArray]]:
-        """Rotation of the hand, and the place of each joint."""
+        """Rotation of the hand, and the position of each joint."""
         rotation, position, positions = np.eye(3), np.zeros(3), []
         for joint, angle in zip(self.joints, q_rad, strict=True):
             position = position + rotation @ joint.X_PF.translation()
@@ -101,20 +101,20 @@ class ArmModel:
         return bool(np.all(q_rad >= self.lower_rad + margin_rad) and np.all(q_rad <= self.upper_rad - margin_rad))
 
     def turned_near(self, q_rad: FloatArray, q_near_rad: FloatArray) -> FloatArray:
-        """The same posture with joints that turn without end within half a turn of q_near_rad; both (J,)."""
+        """Returns the same posture with endless joints within half a turn of q_near_rad; both (J,)."""
         if not self.endless.any():
             return q_rad
         turned = q_rad + math.tau * np.round((q_near_rad - q_rad) / math.tau)
         return np.where(self.endless, turned, q_rad)
 
     def off_rad(self, q_rad: FloatArray, q_other_rad: FloatArray) -> float:
-        """The largest turn of a joint between two postures; whole turns do not count where they change nothing."""
+        """Largest turn of a joint between two postures; whole turns of endless joints do not count."""
         return float(np.max(np.abs(self.turned_near(q_rad, q_other_rad) - q_other_rad)))
 
     def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> tuple[FloatArray, ...]:
-        """Joint angles that put the hand at X_BH and keep margin_rad from the limits; empty when out of reach.
+        """Returns joint angles that put the hand at X_BH and keep margin_rad from the limits; empty when out of reach.
 
-        Six joints give all that there are, seven a choice.
+        For six joints these are all solutions, for seven a choice.
         """
         if self._seven is not None:
             return tuple(self._seven.solutions(X_BH, margin_rad))
@@ -129,7 +129,7 @@ class ArmModel:
 
     @cached_property
     def _seven(self) -> SevenJoints | None:
-        """The solver of an arm with seven joints."""
+        """Solver of an arm with seven joints."""
         if self.solver is not None or len(self.joints) != JOINTS:
             return None
         x, _, z = np.array([joint.X_PF.translation() for joint in self.joints]).T
@@ -143,7 +143,7 @@ class ArmModel:
         )
 
     def _closed_form(self, X_BH: RigidTransform) -> list[FloatArray]:
-        """Every branch of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
+        """Returns every branch of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
         solutions = []
         for q_arm in self._arm_branches(X_BH.translation() - self.p_BS):
             R_BE = _axis_rotation((0, 0, 1), q_arm[0]) @ _axis_rotation((0, 1, 0), q_arm[1] + q_arm[2])
@@ -154,7 +154,7 @@ class ArmModel:
     def nearest_inverse(
         self, X_BH: RigidTransform, q_near_rad: FloatArray, margin_rad: float = 0.03
     ) -> FloatArray | None:
-        """The inverse solution nearest to q_near_rad, or None when out of reach."""
+        """Returns the inverse solution nearest to q_near_rad, or None when out of reach."""
         if self._seven is not None:
             return self._seven.nearest(X_BH, q_near_rad, margin_rad)
         solutions = self.inverse(X_BH, margin_rad)
@@ -205,7 +205,7 @@ def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
 
 
 def _roll(R: RotationMatrix) -> float:
-    """The angle of a turn about x."""
+    """Angle of a turn about x."""
     return math.atan2(R.matrix()[2, 1], R.matrix()[1, 1])
 
 
@@ -215,7 +215,7 @@ def _floats(text: str) -> tuple[float, float, float]:
 
 
 def _read_joint(element: ElementTree.Element) -> ChainJoint:
-    """A ChainJoint from a URDF joint element."""
+    """Reads a ChainJoint from a URDF joint element."""
     origin, limit, child, axis = (element.find(tag) for tag in ("origin", "limit", "child", "axis"))
     xyz = _floats(origin.get("xyz", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
     rpy = _floats(origin.get("rpy", "0 0 0")) if origin is not None else (0.0, 0.0, 0.0)
@@ -275,9 +275,9 @@ def _read_model(
 
 
 def arm_model(capabilities: Capabilities) -> ArmModel:
-    """The arm described by a robot's capabilities.
+    """Returns the arm described by a robot's capabilities.
 
-    Raises ValueError when it has none, or one of another structure that brings no solver of its own.
+    Raises ValueError when there is none, or one of another structure without a solver of its own.
     """
     if capabilities.arm is None or capabilities.gripper is None:
         raise ValueError("the robot has no arm with a gripper")

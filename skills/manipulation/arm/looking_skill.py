@@ -1,32 +1,51 @@
-"""Base of the skills that take pictures with the hand camera or the head camera."""
+"""Base of the skills that take pictures with the camera on the hand or the head."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from skills.api import Cause, InputsT, PlanningError
+from skills.estimate.scan_points import segment_distance
 from skills.manipulation.arm.arm_skill import ArmSkill, Goal
 from skills.manipulation.arm.collision import ArmScene
-from skills.manipulation.arm.gaze import head_angles, without_arm
 from skills.manipulation.arm.poses import look_configuration
 from skills.manipulation.arm.solid_cells import with_picture, with_view
 from skills.patience import PATIENCE_S
 from skills.perception.detector.camera_images import is_dark, lacks_depth
 from skills.perception.visibility import APART_S, is_at_rest
-from skills.robot import CameraCapabilities, FloatArray, Image, NoImageError
+from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, NoImageError
 from skills.routine import Routine, SkillFailure
 
 PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15
+"""Pause before a picture, in which the camera comes to rest."""
 OLDEST_PICTURE_S = 0.5
-_HEAD_EXPIRY_S, _HELD_RADIUS_M = 5.0, 0.2
+_HEAD_EXPIRY_S = 5.0
 _ASK_AGAIN_S = 0.3
+"""Pause after a dark picture or one without depth."""
+_OPEN_WIDE = 0.98
+"""Part of the widest opening to which a gripper opens that hides the view."""
+_OPEN_ENOUGH = 0.9
+"""Part of the widest opening from which on the gripper hides nothing."""
+_HEAD_TURNS = 6
+"""Steps of the iteration for the head's angles."""
+_OFF_AXIS_RAD = 0.2
+"""Largest angle between the optical axis and the point to look at."""
+_NEAREST_M = 0.25
+"""Least distance from the head's camera to the point to look at."""
+_ARM_WITHIN_M = 1.6
+"""Distance from the camera beyond which no part of the arm is."""
+_ARM_RADIUS_M = 0.1
+_HELD_RADIUS_M = 0.2
 
 
 class LookingSkill(ArmSkill[InputsT]):
-    """A routine that looks at objects: it points the camera, takes pictures, and compares them."""
+    """Routine that points the object camera, takes pictures and compares them."""
 
     @property
     def object_camera(self) -> CameraCapabilities:
@@ -44,10 +63,10 @@ class LookingSkill(ArmSkill[InputsT]):
         speed_rad_s: float | None = None,
         raised_m: float | None = None,
     ) -> Routine[None]:
-        """Points the camera that looks for objects at p_BT.
+        """Points the object camera at p_BT.
 
-        One on the hand goes to the first possible of some viewpoints; one on the head turns there, from a body that is
-        raised by so much where that is given, and the arm is out of its view. Raises SkillFailure.
+        A hand camera goes to the first viewpoint that is within reach and free. For a head camera the arm leaves the
+        view, and the body rises by `raised_m` where that is given. Raises SkillFailure.
         """
         camera, head = self.object_camera, self.context.robot.capabilities().head
         if camera.on_hand or head is None:
@@ -76,17 +95,17 @@ class LookingSkill(ArmSkill[InputsT]):
         yield from self.persist(attempt, message)
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
-        """Goes where `goal` says to take a picture; an empty gripper, which else stands before the camera, opens."""
-        gripper = self.context.robot.gripper()
-        opens = not gripper.holding and gripper.opening < 0.9 * self.widest
-        yield from self.move_to(goal, message, speed_rad_s, opening=0.98 * self.widest if opens else None)
+        """Moves the hand camera to the configuration of `goal`; opens an empty gripper that would hide the view."""
+        gripper, widest = self.context.robot.gripper(), self.gripper.widest
+        opens = not gripper.holding and gripper.opening < _OPEN_ENOUGH * widest
+        yield from self.move_to(goal, message, speed_rad_s, opening=_OPEN_WIDE * widest if opens else None)
 
     def picture(self, message: str, settle_s: float = SETTLE_S) -> Routine[Image]:
-        """A new picture of the camera that looks for objects, once it is still; one on the head leaves out the arm.
+        """Takes a picture with the object camera at rest; a head camera's picture has no depth on the robot's own arm.
 
-        A camera that gives none, an old one, a dark one, or one without depth is asked again for a while; in all, an
-        attempt waits `PATIENCE_S` for light and depth, which may be missing for good. Raises SkillFailure with cause
-        EXECUTION when the camera gives none, or an old one.
+        Asks again for a while when the picture is missing, old, dark or without depth; one attempt of a skill waits
+        `PATIENCE_S` in all for light and depth. Raises SkillFailure with cause EXECUTION when the camera gives no
+        picture or an old one.
         """
         yield from self.pause(settle_s, message)
         robot, camera = self.context.robot, self.object_camera
@@ -98,17 +117,14 @@ class LookingSkill(ArmSkill[InputsT]):
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
             self._doubted_s += self.context.clock.now() - begun_s
         if not camera.on_hand:
-            held_m = _HELD_RADIUS_M if robot.gripper().holding else None
-            image = without_arm(image, self._arm_points_B(), held_m)
+            image = without_arm(image, self.arm_points_B(), _HELD_RADIUS_M if robot.gripper().holding else None)
         solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
-        solid.cells, solid.views = (
-            with_picture(solid.cells, image, X_WO, self._own()),
-            with_view(solid.views, image, X_WO),
-        )
+        solid.cells = with_picture(solid.cells, image, X_WO, self._outline())
+        solid.views = with_view(solid.views, image, X_WO)
         return image
 
     def _picture_now(self, camera: CameraCapabilities, message: str) -> Routine[Image]:
-        """What a camera gives now. Raises SkillFailure with cause EXECUTION when it gives none, or an old one."""
+        """Takes one picture. Raises SkillFailure with cause EXECUTION when there is none, or an old one."""
         robot, clock, source, name = self.context.robot, self.context.clock, camera.source, camera.mount.value
 
         def taken() -> Image:
@@ -121,9 +137,9 @@ class LookingSkill(ArmSkill[InputsT]):
         return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
     def at_rest_since(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
-        """Returns whether more depth pictures, each a moment after the one before, show the same as `image` about p_W.
+        """Returns whether later depth pictures show the same as `image` within a distance of p_W.
 
-        Their intervals differ: what rolls to and fro may be back at one time, and not at the next.
+        The intervals between them differ, because a rolling object may be back after one interval and not after two.
         """
         robot, source, before = self.context.robot, self.object_camera.source, image
         X_WO = self.context.localiser.estimate().X_WO
@@ -137,7 +153,44 @@ class LookingSkill(ArmSkill[InputsT]):
             before = later
         return True
 
-    def _arm_points_B(self) -> list[FloatArray]:
-        """The arm as it is now, from the shoulder to the tip beyond the hand: points (3,) in B."""
-        q_rad = self.q_rad()
-        return [*self.model.points_B(q_rad), self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])]
+
+def head_angles(head: HeadCapabilities, camera: CameraCapabilities, p_BT: FloatArray) -> tuple[float, float]:
+    """Returns pan and tilt (rad) that point the head's camera at p_BT (3,), roughly at the ends of their ranges.
+
+    Raises PlanningError when the head does not turn far enough, or the point is too near the head.
+    """
+    pan_rad = math.atan2(p_BT[1] - head.p_BP_m[1], p_BT[0] - head.p_BP_m[0])
+    tilt_rad = 0.0
+    for _ in range(_HEAD_TURNS):
+        pan_rad, tilt_rad = (_within(pan_rad, head.pan_range_rad), _within(tilt_rad, head.tilt_range_rad))
+        x, y, z = (head.X_BF(pan_rad, tilt_rad) @ camera.X_FC).inverse() @ p_BT
+        off_rad = math.atan2(math.hypot(x, y), z)
+        pan_rad, tilt_rad = pan_rad - math.atan2(x, max(z, _NEAREST_M)), tilt_rad + math.atan2(y, max(z, _NEAREST_M))
+    if off_rad > _OFF_AXIS_RAD or math.hypot(x, y, z) < _NEAREST_M:
+        raise PlanningError(f"the head does not turn to the point {np.round(p_BT, 2).tolist()} of the body")
+    return _within(pan_rad, head.pan_range_rad), _within(tilt_rad, head.tilt_range_rad)
+
+
+def _within(angle_rad: float, range_rad: tuple[float, float]) -> float:
+    return min(max(angle_rad, range_rad[0]), range_rad[1])
+
+
+def without_arm(image: Image, arm_B: FloatArray, held_radius_m: float | None = None) -> Image:
+    """Returns the picture without depth on the robot's own arm, a line of points (N, 3) in the body frame.
+
+    `held_radius_m` is the radius around the last segment of the line, where an object is held.
+    """
+    lens, depth = image.depth_intrinsics, image.depth_m
+    v, u = np.nonzero((depth > 0.0) & (depth < _ARM_WITHIN_M))
+    z = depth[v, u].astype(np.float64)
+    points_C = np.column_stack([(u - lens.cx) / lens.fx * z, (v - lens.cy) / lens.fy * z, z])
+    X_BC = image.frames.pose(image.camera_frame, "body")
+    points_B = points_C @ X_BC.rotation().matrix().T + X_BC.translation()
+    segments = list(pairwise(arm_B))
+    radii_m = [_ARM_RADIUS_M] * (len(segments) - 1) + [held_radius_m or _ARM_RADIUS_M]
+    own = np.zeros(len(points_B), dtype=bool)
+    for (start, end), radius_m in zip(segments, radii_m, strict=True):
+        own |= segment_distance(points_B, start, end) < radius_m
+    masked = depth.copy()
+    masked[v[own], u[own]] = 0.0
+    return replace(image, depth_m=masked)

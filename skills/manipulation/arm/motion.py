@@ -1,4 +1,4 @@
-"""Collision-checked arm paths and their timing.
+"""Collision-free arm paths and their timing.
 
 A path is an array (K, J) of joint angles. Joint motions are straight where that is free, else planned by a
 bidirectional rapidly exploring random tree of OMPL and shortened; straight lines of the hand go through the inverse
@@ -23,10 +23,16 @@ from skills.quantities import Count, Duration, Length, Tries, Turn, TurnAccelera
 from skills.robot import ArmTrajectory, FloatArray
 from skills.world_model import PlanningError
 
-_FEWEST_POINTS, _ESCAPE_TRIES = 9, 40
-_ESCAPES, _PARTS_OF_ESCAPE = (1.0, 2.0, 4.0, 8.0), (0.25, 0.5, 0.75)
+_FEWEST_POINTS = 9
+"""Least number of steps of a resampled path."""
+_ESCAPE_TRIES = 40
+"""Number of random turns that are tried at each growth of the turns."""
+_ESCAPES = (1.0, 2.0, 4.0, 8.0)
+"""Factors by which the turns out of contact grow."""
+_PARTS_OF_ESCAPE = (0.25, 0.5, 0.75)
+"""Parts of such a turn at which contact is checked."""
 _ONE_AT_A_TIME: Final = threading.Lock()
-"""OMPL's random generator is one per process, so plans of several threads take turns."""
+"""Lock of OMPL's random generator, which all threads of the process share."""
 
 
 class ArmPlanner(Protocol):
@@ -35,28 +41,33 @@ class ArmPlanner(Protocol):
     def path(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
     ) -> FloatArray:
-        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found."""
+        """Returns a free path from start to goal. Raises PlanningError when an end is blocked or no path was found."""
 
     def line(
         self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
     ) -> FloatArray:
-        """Joint path along which the hand moves straight to X_BH_to, with its orientation. Raises PlanningError."""
+        """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation.
+
+        Raises PlanningError.
+        """
 
     def timed(
         self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
     ) -> ArmTrajectory:
-        """Time a path from rest to rest, at its usual speed unless said; corners are rounded where `scene` is given."""
+        """Times a path from rest to rest; rounds corners where `scene` is given.
+
+        `speed_rad_s` replaces the usual speed.
+        """
 
 
 @dataclass(frozen=True)
 class RrtConnect:
-    """Two rapidly exploring random trees that grow towards each other, then shortcuts; timed at trapezoidal speeds.
+    """RRT-Connect: two rapidly exploring random trees that grow towards each other, then shortcuts; trapezoidal speeds.
 
     A start in contact is left by turns of up to `escape_rad`, up to eight times that where need be. The trees grow by
-    `step_rad`, `iterations` times at most; `shortcuts` are tried on what they find. Straight lines of the hand are
-    checked each `line_step_m`, at which no joint may turn by more than `line_jump_rad`. Trajectories keep
-    `speed_rad_s`, or a slower one where a skill asks for it, and `acceleration_rad_s2`, in samples of `sample_s`, from
-    points `dense_rad` apart.
+    `step_rad`, `iterations` times at most; `shortcuts` are tried on their path. Straight lines of the hand are checked
+    each `line_step_m`, at which no joint may turn by more than `line_jump_rad`. Trajectories keep `speed_rad_s`, or the
+    speed that a skill asks for, and `acceleration_rad_s2`, in samples of `sample_s`, from points `dense_rad` apart.
     """
 
     step_rad: Turn = 0.25
@@ -73,10 +84,10 @@ class RrtConnect:
     def path(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
     ) -> FloatArray:
-        """A free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
+        """Returns a free path from start to goal. Raises PlanningError when an end is blocked or no path was found.
 
-        Joints that turn without end take the shorter way. A start that is in contact by what the arm's servos are off
-        is left by the least turn that frees it.
+        Endless joints take the shorter turn. A start that the servos' error puts in contact is left by the smallest
+        turn that frees it.
         """
         q_goal_rad = scene.model.turned_near(q_goal_rad, q_start_rad)
         if not scene.free(q_goal_rad):
@@ -89,7 +100,10 @@ class RrtConnect:
         return self._connected(scene, q_start_rad, q_goal_rad, rng)
 
     def _freed(self, scene: ArmScene, q_rad: FloatArray, rng: np.random.Generator) -> FloatArray:
-        """A free configuration near one in contact, on a way that touches nothing else. Raises PlanningError."""
+        """Returns a free configuration near one in contact, with no further contact in between.
+
+        Raises PlanningError.
+        """
         touched = set(scene.contacts(q_rad))
         for growth in _ESCAPES:
             turns = rng.uniform(-1.0, 1.0, (_ESCAPE_TRIES, len(q_rad))) * growth * self.escape_rad
@@ -103,9 +117,9 @@ class RrtConnect:
     def line(
         self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
     ) -> FloatArray:
-        """Joint path along which the hand moves straight to X_BH_to, with its orientation.
+        """Returns the joint path of a straight motion of the hand to X_BH_to, with that rotation.
 
-        `scene` None leaves out the collision checks. Raises PlanningError when it leaves the reach, jumps or hits.
+        Without `scene`, collisions are not checked. Raises PlanningError when the line leaves the reach, jumps or hits.
         """
         X_start = model.X_BH(q_start_rad)
         start, offset = X_start.translation(), X_BH_to.translation() - X_start.translation()
@@ -123,9 +137,9 @@ class RrtConnect:
     def timed(
         self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
     ) -> ArmTrajectory:
-        """Time a path from rest to rest, at the usual speed unless said.
+        """Times a path from rest to rest, at the usual speed without `speed_rad_s`.
 
-        Corners are rounded where the rounded path is free in `scene`; they are kept when `scene` is None.
+        Corners are rounded where the rounded path is free in `scene`, and stay without `scene`.
         """
         dense = _resampled(path_rad, self.dense_rad)
         if scene is not None and len(path_rad) > 2:
@@ -143,7 +157,7 @@ class RrtConnect:
     def _connected(
         self, scene: ArmScene, q_start_rad: FloatArray, q_goal_rad: FloatArray, rng: np.random.Generator
     ) -> FloatArray:
-        """RRT-Connect (Kuffner and LaValle, ICRA 2000), then OMPL's shortcuts. Raises PlanningError.
+        """Plans with RRT-Connect (Kuffner and LaValle, ICRA 2000), then OMPL's shortcuts. Raises PlanningError.
 
         Bounds count steps, not seconds, and the seed comes from `rng`: equal problems give equal paths.
         """
@@ -185,7 +199,7 @@ class RrtConnect:
 
 
 def _after(count: int) -> Callable[[], bool]:
-    """A condition that holds once it was asked so often."""
+    """Returns a condition that holds from its call number `count` on."""
     left = itertools.count(count, -1)
     return lambda: next(left) <= 0
 
@@ -196,7 +210,7 @@ def _pairs(scene: ArmScene, q_rad: FloatArray) -> str:
 
 
 def _resampled(path_rad: FloatArray, apart_rad: float) -> FloatArray:
-    """The same path with points at most apart_rad apart."""
+    """Returns the path with points at most apart_rad apart."""
     lengths = np.linalg.norm(np.diff(path_rad, axis=0), axis=1)
     keep = np.concatenate([[True], lengths > 1e-9])
     path_rad = path_rad[keep]
@@ -209,7 +223,7 @@ def _resampled(path_rad: FloatArray, apart_rad: float) -> FloatArray:
 
 
 def _rounded(dense_rad: FloatArray, half_window: int = 8) -> FloatArray:
-    """Moving average that keeps the ends."""
+    """Moving average of a path that keeps the ends."""
     if len(dense_rad) < 4 * half_window:
         return dense_rad
     padded = np.concatenate(

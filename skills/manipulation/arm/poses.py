@@ -1,4 +1,4 @@
-"""Named arm poses: looking at a point with the hand camera, carrying a thing near the body."""
+"""Arm poses: looking at a point with the hand camera, carrying an object near the body."""
 
 from __future__ import annotations
 
@@ -14,11 +14,24 @@ from skills.robot import ArmCapabilities, FloatArray
 from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
+_JOINT_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
+"""Cost of each joint's turn among configurations that look at a point."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
+"""Pitches of the hand that carries when it cannot keep the object upright, in groups, the best first."""
+_CLOSE_BELOW_RAD = tuple(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]))
+"""Angles below level at which a close view looks down, the best first."""
+_CLOSE_M = (0.42, 0.36, 0.48)
+"""Distances of a close view, the best first."""
+_NEAR_M = (0.33, 0.5)
+"""Range of distances of a view that counts as close."""
+_BELOW_RAD = (0.45, 1.05)
+"""Range of angles below level of a view that counts as close."""
+_OFF_AXIS_RAD = 0.12
+"""Largest angle off the optical axis in a view that counts as close."""
 
 
 def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
-    """X_BC of a camera at p_BC that looks at p_BT with the picture upright."""
+    """Returns X_BC of a camera at p_BC that looks at p_BT with the picture upright."""
     forward = (p_BT - p_BC) / np.linalg.norm(p_BT - p_BC)
     right = np.cross(forward, UP_B)
     right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-6 else np.array([0.0, -1.0, 0.0])
@@ -28,23 +41,20 @@ def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
 def look_configuration(
     scene: ArmScene, X_HC: RigidTransform, viewpoints_B: Iterable[FloatArray], p_BT: FloatArray, q_near_rad: FloatArray
 ) -> FloatArray:
-    """Arm angles with the hand camera (X_HC) at the first possible viewpoint, looking at p_BT.
+    """Returns arm angles (J,) with the hand camera (X_HC) at the first feasible viewpoint, looking at p_BT.
 
-    Raises PlanningError when no viewpoint can be taken.
+    Raises PlanningError when no viewpoint is feasible.
     """
     for p_BC in viewpoints_B:
         solutions = scene.model.inverse(camera_pose(p_BC, p_BT) @ X_HC.inverse())
         free = [q for q in solutions if scene.free(q)]
         if free:
-            return min(free, key=lambda q: float(np.abs(q - q_near_rad) @ _COMFORT))
+            return min(free, key=lambda q: float(np.abs(q - q_near_rad) @ _JOINT_WEIGHTS))
     raise PlanningError(f"no arm pose looks at the point {np.round(p_BT, 2).tolist()} ahead of the body")
 
 
-_COMFORT = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
-
-
 def overview_viewpoints(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
-    """Camera places above the shoulder on p_BT's side, high ones first; shift_rad turns them about the shoulder."""
+    """Camera positions above the shoulder towards p_BT, high ones first, turned about the shoulder by shift_rad."""
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
     heading = np.array([np.cos(direction), np.sin(direction), 0.0])
     return [
@@ -53,33 +63,35 @@ def overview_viewpoints(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.
     ]
 
 
-def close_viewpoints(p_BS: FloatArray, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
-    """Camera places 0.35 to 0.5 m from p_BT, on the shoulder's side of it and looking down at it."""
-    direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + shift_rad
+def close_viewpoints(
+    p_BS: FloatArray,
+    p_BT: FloatArray,
+    aside_rad: float = 0.0,
+    below_rad: Sequence[float] = _CLOSE_BELOW_RAD,
+    distances_m: Sequence[float] = _CLOSE_M,
+) -> list[FloatArray]:
+    """Camera positions near p_BT that look down at it from the shoulder's side, turned about it by aside_rad."""
+    direction = np.arctan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0]) + aside_rad
     return [
         p_BT + distance * np.array([-np.cos(tilt) * np.cos(direction), -np.cos(tilt) * np.sin(direction), np.sin(tilt)])
-        for tilt, distance in itertools.product(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]), (0.42, 0.36, 0.48))
+        for tilt, distance in itertools.product(below_rad, distances_m)
     ]
 
 
 def sees_closely(X_BC: RigidTransform, p_BT: FloatArray) -> bool:
-    """Whether a camera at X_BC looks at p_BT about as from one of the `close_viewpoints` that are not turned aside."""
+    """Returns whether a camera at X_BC views p_BT about as from one of the `close_viewpoints`."""
     offset = p_BT - X_BC.translation()
     distance_m = float(np.linalg.norm(offset))
     off_axis_rad = np.arccos(np.clip(X_BC.rotation().matrix()[:, 2] @ offset / distance_m, -1.0, 1.0))
     below_rad = np.arcsin(-offset[2] / distance_m)
-    near = _CLOSE_M[0] < distance_m < _CLOSE_M[1] and _CLOSE_BELOW_RAD[0] < below_rad < _CLOSE_BELOW_RAD[1]
-    return bool(near and off_axis_rad < _CLOSE_OFF_AXIS_RAD)
-
-
-_CLOSE_M, _CLOSE_BELOW_RAD, _CLOSE_OFF_AXIS_RAD = (0.33, 0.5), (0.45, 1.05), 0.12
+    near = _NEAR_M[0] < distance_m < _NEAR_M[1] and _BELOW_RAD[0] < below_rad < _BELOW_RAD[1]
+    return bool(near and off_axis_rad < _OFF_AXIS_RAD)
 
 
 def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, aside_m: float = 0.06) -> list[FloatArray]:
-    """Camera places beside and above p_BC, as seen when looking from there at p_BT.
+    """Camera positions beside and above p_BC, from which p_BT may be hidden.
 
-    First those on the side on which p_BC is already, seen from the shoulder at p_BS towards p_BT: away from what hides
-    p_BT from there.
+    The first ones are on the side of p_BC as the shoulder at p_BS sees p_BT, away from what hides p_BT.
     """
     left, left_of_shoulder = _left_of(p_BC, p_BT), _left_of(p_BS, p_BT)
     outwards = left if (p_BC - p_BS) @ left_of_shoulder >= 0.0 else -left
@@ -87,13 +99,13 @@ def viewpoints_beside(p_BS: FloatArray, p_BC: FloatArray, p_BT: FloatArray, asid
 
 
 def _left_of(p_B: FloatArray, p_BT: FloatArray) -> FloatArray:
-    """The level unit vector to the left when looking from one point to another."""
+    """Level unit vector to the left of the line of sight from one point to another."""
     ahead = (p_BT - p_B)[:2] / max(float(np.linalg.norm((p_BT - p_B)[:2])), 1e-6)
     return np.array([-ahead[1], ahead[0], 0.0])
 
 
 def towards_shoulder(p_BS: FloatArray, p_B: FloatArray) -> FloatArray:
-    """The level unit vector from a point towards the shoulder at p_BS; zero straight above or below it."""
+    """Level unit vector from a point towards the shoulder at p_BS; zero straight above or below the shoulder."""
     home_B = (p_BS - p_B) * [1.0, 1.0, 0.0]
     return np.asarray(home_B / max(float(np.linalg.norm(home_B)), 1e-6))
 
@@ -101,10 +113,10 @@ def towards_shoulder(p_BS: FloatArray, p_B: FloatArray) -> FloatArray:
 def carry_configuration(
     scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray
 ) -> FloatArray:
-    """Arm angles that hold the hand low near the body, the thing as upright as in R_BH, turned to the front.
+    """Returns arm angles (J,) with the hand near the body, the object as upright as in R_BH.
 
-    Where that tilt cannot be kept, the hand points forward and a little up, so that the object lies on a finger and
-    leans to the palm; else level, or down. Raises PlanningError when no pose is free.
+    Where the object cannot stay upright, the hand points forward and slightly up, so that the object rests on a finger
+    and leans on the palm; else level, or down. Raises PlanningError when no pose is free.
     """
     points_down = R_BH.matrix()[2, 0] < -0.8
     upright = [] if points_down else _turned(R_BH, (0.0, 0.4, -0.4))
@@ -112,20 +124,20 @@ def carry_configuration(
         q = _best_free(scene, rotations, arm.carry_x_m, arm.carry_z_m, arm.carry_best_x_m, q_near_rad)
         if q is not None:
             return q
-    raise PlanningError("no pose to carry the thing near the body is free of contact")
+    raise PlanningError("no pose to carry the object near the body is free of contact")
 
 
 def tucked_configuration(
     scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray
 ) -> FloatArray:
-    """Arm angles with the hand close to the body and turned to either side, the thing as upright as in R_BH.
+    """Returns arm angles (J,) with the hand close to the body and turned to a side, the object as upright as in R_BH.
 
     Raises PlanningError when no such pose is free.
     """
     beside = _turned(R_BH, (0.5 * np.pi, -0.5 * np.pi))
     q = _best_free(scene, beside, arm.tuck_x_m, arm.carry_z_m, arm.tuck_x_m[0], q_near_rad)
     if q is None:
-        raise PlanningError("the thing cannot be drawn in to the body")
+        raise PlanningError("the object cannot be drawn in to the body")
     return q
 
 
@@ -137,9 +149,9 @@ def _best_free(
     best_x_m: float,
     q_near_rad: FloatArray,
 ) -> FloatArray | None:
-    """The cheapest arm angles, free of contact, with the hand turned so at one of the places before B; None: none.
+    """Returns the cheapest free arm angles with the hand at one of the rotations and positions ahead of the body.
 
-    One drives along walls and up to furniture with them, so the arm is to stick out of the body as little as may be.
+    Driving along walls and up to furniture needs an arm that sticks out of the body as little as possible.
     """
     candidates = [
         (_carry_cost(x - best_x_m, z, q, q_near_rad) + sum(scene.beyond_body_m(q)), q)
@@ -156,15 +168,23 @@ def _carry_cost(off_x_m: float, z_m: float, q_rad: FloatArray, q_near_rad: Float
 
 
 def _turned(R_BH: RotationMatrix, turns_rad: Sequence[float]) -> list[RotationMatrix]:
-    """R_BH turned about the vertical so that the hand points ahead, and further by each of the angles."""
+    """Returns R_BH turned about the vertical so that the hand points ahead, plus each of the angles."""
     x_axis = R_BH.matrix()[:, 0]
     ahead = -float(np.arctan2(x_axis[1], x_axis[0]))
     return [RotationMatrix.MakeZRotation(ahead + turn) @ R_BH for turn in turns_rad]
 
 
 def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:
-    """Hands that point ahead, down by an angle."""
+    """Rotations of hands that point ahead and down by an angle."""
     return [
         RollPitchYaw(roll, pitch, 0.0).ToRotationMatrix()
         for roll, pitch in itertools.product((0.0, np.pi), pitches_rad)
     ]
+
+
+def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
+    """R_BH of a hand whose fingers point tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
+    c, s, ahead, down = np.cos(azimuth_rad), np.sin(azimuth_rad), np.cos(tilt_rad), np.sin(tilt_rad)
+    x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
+    y_axis = [-side * down * c, -side * down * s, -side * ahead]
+    return RotationMatrix(np.array([x_axis, y_axis, z_axis]).T)

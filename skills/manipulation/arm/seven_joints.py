@@ -1,8 +1,9 @@
 """Inverse kinematics of an arm with seven joints: shoulder pan and lift, then roll and flex three times over.
 
-The shoulder pan stands for the seventh degree of freedom: it is tried at angles all over its range, and all else
-follows in closed form. A roll by half a turn before and after a flex joint that bends the other way leaves the links
-where they are: solutions come with elbow and wrist bent to the positive side, but for those that are to be near others.
+The shoulder pan stands for the seventh degree of freedom: it is tried at angles all over its range, and the other
+joints follow in closed form. Half a turn of roll before and after a flex joint that bends to the other side leaves the
+links where they are. Therefore solutions have elbow and wrist bent to the positive side, except those that must be near
+a given one.
 """
 
 from __future__ import annotations
@@ -19,14 +20,21 @@ from skills.robot import FloatArray
 
 JOINTS = 7
 AXES = ((0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0), (0, 1, 0), (1, 0, 0))
-_PANS, _FOR_REACH = 17, 9
+_PANS = 17
+"""Number of pan angles that are tried."""
+_PANS_FOR_REACH = 9
+"""Number of pan angles that are tried first where any solution will do."""
 _BESIDE_RAD = np.array([0.0, 0.03, -0.03, 0.08, -0.08, 0.16, -0.16, 0.3, -0.3, 0.5, -0.5])
+"""Differences of the pan angle from a near solution's."""
+_SINGULAR = 1e-9
+"""Sine of the wrist's flex below which only the sum of its rolls counts."""
 _MOST = 4 * 2 * _PANS
+"""Largest number of solutions."""
 
 
 @dataclass(frozen=True)
 class SevenJoints:
-    """The arm's lengths (m): the pan joint in B, from there to the lift joint (ahead, up), upper arm, forearm, wrist.
+    """Lengths of the arm (m): the pan joint in B, from there to the lift joint (ahead, up), upper arm, forearm, wrist.
 
     `wrist_m` is from the wrist's flex joint, where its three axes meet, to the last joint, whose frame is turned by
     `roll_rad` about its axis. Limits (7,) in rad.
@@ -43,7 +51,7 @@ class SevenJoints:
     upper_rad: FloatArray
 
     def solutions(self, X_BL: RigidTransform, margin_rad: float) -> FloatArray:
-        """Joint angles (N, 7) that put the last link at X_BL, those far from the limits first; N may be 0."""
+        """Returns joint angles (N, 7) that put the last link at X_BL, those far from the limits first; N may be 0."""
         found, count = np.empty((_MOST, JOINTS)), 0
         count = _solve(*self._pose(X_BL), self._pans(_PANS, margin_rad), *self._limits(margin_rad), False, False, found)
         found = found[:count]
@@ -55,13 +63,13 @@ class SevenJoints:
     def reaches(self, X_BL: RigidTransform, margin_rad: float) -> bool:
         """Returns whether there are joint angles that put the last link at X_BL."""
         found, pose, limits = np.empty((1, JOINTS)), self._pose(X_BL), self._limits(margin_rad)
-        for pans in (self._pans(_FOR_REACH, margin_rad), self._pans(2 * _PANS, margin_rad)):
+        for pans in (self._pans(_PANS_FOR_REACH, margin_rad), self._pans(2 * _PANS, margin_rad)):
             if _solve(*pose, pans, *limits, False, True, found):
                 return True
         return False
 
     def nearest(self, X_BL: RigidTransform, q_near_rad: FloatArray, margin_rad: float) -> FloatArray | None:
-        """The joint angles (7,) nearest to others, with the pan about as there; None: there are none."""
+        """Returns the joint angles (7,) nearest to given ones, preferring a similar pan; None when there are none."""
         found = np.empty((_MOST, JOINTS))
         low, high = self.lower_rad[0] + margin_rad, self.upper_rad[0] - margin_rad
         pans = np.clip(q_near_rad[0] + _BESIDE_RAD, low, high)
@@ -83,7 +91,7 @@ class SevenJoints:
         return np.array(lengths), self.lower_rad + margin_rad, self.upper_rad - margin_rad
 
     def _pose(self, X_BL: RigidTransform) -> tuple[FloatArray, FloatArray]:
-        """The last link's rotation, and the wrist's middle from the pan joint."""
+        """Rotation of the last link, and the wrist's centre from the pan joint."""
         R = np.ascontiguousarray((X_BL.rotation() @ RotationMatrix.MakeXRotation(-self.roll_rad)).matrix())
         return R, np.asarray(X_BL.translation() - self.wrist_m * R[:, 0] - self.p_BS)
 
@@ -100,7 +108,7 @@ def _solve(
     first_only: bool,
     found: NDArray[np.float64],
 ) -> int:
-    """Writes solutions into the rows of `found` (N, 7), within limits; how many there are."""
+    """Writes solutions that are within the limits into the rows of `found` (N, 7); returns their number."""
     ahead, up, a, f = lengths
     count = 0
     for k in range(len(pans)):
@@ -118,50 +126,64 @@ def _solve(
         for side in range(2):
             q3 = math.asin(s3) if side == 0 else math.pi - math.asin(s3)
             c3 = math.cos(q3)
-            q2 = math.atan2(-f * s4 * c3, a + f * c4) - math.atan2(z, x)
-            q2 -= 2.0 * math.pi * math.floor(q2 / (2.0 * math.pi) + 0.5)
+            q2 = _wrapped(math.atan2(-f * s4 * c3, a + f * c4) - math.atan2(z, x))
             if q2 < lower[1] or q2 > upper[1]:
                 continue
-            c2, s2 = math.cos(q2), math.sin(q2)
-            # Columns of Rz(q1) Ry(q2) Rx(q3) Ry(q4), first in the panned frame.
-            y0, y1, y2 = s2 * s3, c3, c2 * s3
-            u0, u1, u2 = s2 * c3, -s3, c2 * c3
-            x0, x1, x2 = c4 * c2 - s4 * u0, -s4 * u1, -c4 * s2 - s4 * u2
-            z0, z1, z2 = s4 * c2 + c4 * u0, c4 * u1, -s4 * s2 + c4 * u2
-            ax, bx = c1 * x0 - s1 * x1, s1 * x0 + c1 * x1
-            ay, by = c1 * y0 - s1 * y1, s1 * y0 + c1 * y1
-            az, bz = c1 * z0 - s1 * z1, s1 * z0 + c1 * z1
-            m00 = ax * R[0, 0] + bx * R[1, 0] + x2 * R[2, 0]
-            m01 = ax * R[0, 1] + bx * R[1, 1] + x2 * R[2, 1]
-            m02 = ax * R[0, 2] + bx * R[1, 2] + x2 * R[2, 2]
-            m10 = ay * R[0, 0] + by * R[1, 0] + y2 * R[2, 0]
-            m20 = az * R[0, 0] + bz * R[1, 0] + z2 * R[2, 0]
-            sine = math.hypot(m01, m02)
-            q6 = math.atan2(sine, m00)
+            q5, q6, q7 = _wrist(R, c1, s1, math.cos(q2), math.sin(q2), c3, s3, c4, s4)
             if q6 > max(upper[5], -lower[5]):
                 continue
-            if sine < 1e-9:
-                m11 = ay * R[0, 1] + by * R[1, 1] + y2 * R[2, 1]
-                m21 = az * R[0, 1] + bz * R[1, 1] + z2 * R[2, 1]
-                q5, q7 = 0.0, math.atan2(m21, m11)
-            else:
-                q5, q7 = math.atan2(m10, -m20), math.atan2(m01, m02)
-            for way in range(4):
-                elbow, wrist = way % 2, way // 2
-                if way > 0 and not bent_both_ways:
-                    break
-                t4, t6 = (-q4 if elbow else q4), (-q6 if wrist else q6)
-                if t4 < lower[3] or t4 > upper[3] or t6 < lower[5] or t6 > upper[5]:
-                    continue
-                t3, t5, t7 = q3 + math.pi * elbow, q5 + math.pi * (elbow + wrist), q7 + math.pi * wrist
-                t3 -= 2.0 * math.pi * math.floor(t3 / (2.0 * math.pi) + 0.5)
-                t5 -= 2.0 * math.pi * math.floor(t5 / (2.0 * math.pi) + 0.5)
-                t7 -= 2.0 * math.pi * math.floor(t7 / (2.0 * math.pi) + 0.5)
-                if t3 < lower[2] or t3 > upper[2] or t5 < lower[4] or t5 > upper[4] or t7 < lower[6] or t7 > upper[6]:
-                    continue
+            for bend in range(4 if bent_both_ways else 1):
+                elbow, wrist = bend % 2, bend // 2
                 row = found[count]
-                row[0], row[1], row[2], row[3], row[4], row[5], row[6] = q1, q2, t3, t4, t5, t6, t7
+                row[0], row[1], row[2] = q1, q2, _wrapped(q3 + math.pi * elbow)
+                row[3], row[4] = -q4 if elbow else q4, _wrapped(q5 + math.pi * (elbow + wrist))
+                row[5], row[6] = -q6 if wrist else q6, _wrapped(q7 + math.pi * wrist)
+                within = True
+                for j in range(2, JOINTS):
+                    within &= lower[j] <= row[j] <= upper[j]
+                if not within:
+                    continue
                 count += 1
                 if first_only or count == len(found):
                     return count
     return count
+
+
+@compiled
+def _wrist(
+    R: NDArray[np.float64],
+    c1: float,
+    s1: float,
+    c2: float,
+    s2: float,
+    c3: float,
+    s3: float,
+    c4: float,
+    s4: float,
+) -> tuple[float, float, float]:
+    """Returns the last three angles, by the cosines and sines of the first four, for the last link's rotation R."""
+    # Columns of Rz(q1) Ry(q2) Rx(q3) Ry(q4), first in the panned frame.
+    y0, y1, y2 = s2 * s3, c3, c2 * s3
+    u0, u1, u2 = s2 * c3, -s3, c2 * c3
+    x0, x1, x2 = c4 * c2 - s4 * u0, -s4 * u1, -c4 * s2 - s4 * u2
+    z0, z1, z2 = s4 * c2 + c4 * u0, c4 * u1, -s4 * s2 + c4 * u2
+    ax, bx = c1 * x0 - s1 * x1, s1 * x0 + c1 * x1
+    ay, by = c1 * y0 - s1 * y1, s1 * y0 + c1 * y1
+    az, bz = c1 * z0 - s1 * z1, s1 * z0 + c1 * z1
+    m00 = ax * R[0, 0] + bx * R[1, 0] + x2 * R[2, 0]
+    m01 = ax * R[0, 1] + bx * R[1, 1] + x2 * R[2, 1]
+    m02 = ax * R[0, 2] + bx * R[1, 2] + x2 * R[2, 2]
+    sine = math.hypot(m01, m02)
+    if sine < _SINGULAR:
+        m11 = ay * R[0, 1] + by * R[1, 1] + y2 * R[2, 1]
+        m21 = az * R[0, 1] + bz * R[1, 1] + z2 * R[2, 1]
+        return 0.0, math.atan2(sine, m00), math.atan2(m21, m11)
+    m10 = ay * R[0, 0] + by * R[1, 0] + y2 * R[2, 0]
+    m20 = az * R[0, 0] + bz * R[1, 0] + z2 * R[2, 0]
+    return math.atan2(m10, -m20), math.atan2(sine, m00), math.atan2(m01, m02)
+
+
+@compiled
+def _wrapped(angle_rad: float) -> float:
+    """Returns an angle within half a turn of zero."""
+    return angle_rad - 2.0 * math.pi * math.floor(angle_rad / (2.0 * math.pi) + 0.5)

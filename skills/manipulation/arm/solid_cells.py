@@ -1,4 +1,4 @@
-"""What stands within the arm's reach, as depth pictures show it: solid cells of the world, given as boxes."""
+"""Solid cells of the world within the arm's reach, from depth pictures, and boxes around them."""
 
 from __future__ import annotations
 
@@ -17,45 +17,57 @@ from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, lens_rays
 from skills.robot import FloatArray, Image, Intrinsics
 
 CELL_M: Final = 0.04
-_NEAREST_M, _FURTHEST_M = 0.28, 2.5
+"""Side of a cell."""
+_NEAREST_M = 0.28
+"""Distance from the camera below which depth is not used."""
+_FURTHEST_M = 2.5
+"""Depth beyond which points are not used."""
 _FEWEST_POINTS = 4
+"""Number of points from which on a cell is solid."""
 _SEEN_PAST_M = 0.08
+"""Depth behind a cell at which a picture shows that the cell is empty."""
 _SHADOW_CELLS = 8
+"""Number of cells behind a seen one that count as solid."""
 _FLOOR_M = 0.05
+"""Height up to which points belong to the floor."""
 _SPAN = 1 << 20
+"""Number of cells along each axis that a key can tell apart."""
 _OFFSET = _SPAN // 2
 _STRIDES = np.array([_SPAN**2, _SPAN, 1])
-_THINNED, _VIEWS_KEPT = 8, 32
+_STRIDE_PX = 8
+"""Distance in pixels between the rows and columns of a stored view."""
+_MOST_VIEWS = 32
+"""Number of views that are stored."""
 
 Cells = NDArray[np.int64]
 View = tuple[Image, RigidTransform]
-"""A depth picture and the X_WO of its time."""
+"""Depth picture, and the X_WO of its time."""
 
 
 @dataclass(frozen=True)
 class Outline:
-    """What is the robot's own, from above: all between two corners (2,) of the body frame at a pose X_WB."""
+    """Outline of the robot from above: the rectangle between two corners (2,) of the body frame at a pose X_WB."""
 
     X_WB: RigidTransform
     low_m: FloatArray
     high_m: FloatArray
 
     def holds(self, points_W: FloatArray) -> NDArray[np.bool_]:
-        """Which world points (N, 3) lie within."""
+        """Mask (N,) of the world points within the outline."""
         points_B = (points_W - self.X_WB.translation()) @ self.X_WB.rotation().matrix()[:, :2]
         return np.asarray(np.all((points_B > self.low_m) & (points_B < self.high_m), axis=1))
 
 
 def with_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
-    """The cells (N, 3) of before without those that a depth picture sees past, and those in which it has points.
+    """Returns the cells (N, 3) with those in which a depth picture has points, without those that it sees past.
 
-    Points of the robot's own are passed over.
+    Points within the outline `own` are ignored.
     """
     X_WC, (x_C, y_C) = camera_pose_W(image, X_WO), lens_rays(image.depth_intrinsics)
     eye, body = X_WC.GetAsMatrix34(), own.X_WB.GetAsMatrix34()
     keys, counts = np.unique(_keys(image.depth_m, x_C, y_C, eye, body, own.low_m, own.high_m), return_counts=True)
-    kept = cells[~_seen_past(cells, image, X_WO)]
-    return _unique(np.vstack([kept, _cells(keys[counts >= _FEWEST_POINTS])]))
+    still = cells[~_seen_past(cells, image, X_WO)]
+    return _unique(np.vstack([still, _cells(keys[counts >= _FEWEST_POINTS])]))
 
 
 @compiled
@@ -68,7 +80,7 @@ def _keys(
     low_B: FloatArray,
     high_B: FloatArray,
 ) -> NDArray[np.int64]:
-    """The keys of the cells of all points of a depth picture but the robot's own; poses are (3, 4) matrices.
+    """Keys of the cells of all points of a depth picture except the robot's own; poses are (3, 4) matrices.
 
     `x_C` and `y_C` are x/z of each column and y/z of each row.
     """
@@ -99,12 +111,12 @@ def _keys(
 def solid_boxes(
     cells: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
 ) -> list[Box]:
-    """Boxes in the body frame about the cells within a reach, but those whose middles p_W (N, 3) are `left_out`.
+    """Boxes in the body frame around the cells within a reach, except those whose centres p_W (N, 3) are `left_out`.
 
-    What is behind a cell, up to 32 cm and within the reach, is unknown and counts as solid, too: of a board only the
-    edge is seen.
+    Space behind a cell, up to 32 cm and within the reach, is unknown and counts as solid too: of a board only the edge
+    is seen.
     """
-    middles, origin_W = _middles(cells), X_WB.translation()
+    middles, origin_W = cell_centres(cells), X_WB.translation()
     middles = middles[np.linalg.norm((middles - origin_W)[:, :2], axis=1) < reach_m]
     middles = middles[~left_out(middles)]
     if len(middles) == 0:
@@ -119,31 +131,31 @@ def solid_boxes(
 
 
 def boxes_of(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
-    """Boxes in the body frame about those cells alone whose middles p_W (N, 3) are `chosen`."""
+    """Boxes in the body frame around the cells whose centres p_W (N, 3) are `chosen`."""
     X_BW = X_WB.inverse()
-    return [_box(low, high, X_BW) for low, high in merged(cells[chosen(_middles(cells))])]
+    return [_box(low, high, X_BW) for low, high in merged(cells[chosen(cell_centres(cells))])]
 
 
-def _middles(cells: Cells) -> FloatArray:
-    """The middles (N, 3) of cells, m."""
+def cell_centres(cells: Cells) -> FloatArray:
+    """Centres (N, 3) of cells (m)."""
     return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)
 
 
 def _unique(cells: Cells) -> Cells:
-    """Each cell once, in order."""
+    """Returns each cell once, in order."""
     return _cells(np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1)))
 
 
 def _cells(keys: NDArray[np.int64]) -> Cells:
-    """The cells (N, 3) of keys (N,)."""
+    """Returns the cells (N, 3) of keys (N,)."""
     return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET
 
 
 def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
-    """The last views with one more, of which each eighth row and column of the depth is kept."""
-    lens, thin = image.depth_intrinsics, _THINNED
+    """Returns the last views with one more, of which each eighth row and column of the depth is stored."""
+    lens, thin = image.depth_intrinsics, _STRIDE_PX
     depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
-    kept = Intrinsics(
+    lens = Intrinsics(
         width=depth_m.shape[1],
         height=depth_m.shape[0],
         fx=lens.fx / thin,
@@ -152,12 +164,15 @@ def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tupl
         cy=(lens.cy - thin // 2) / thin,
     )
     nothing = np.empty((0, 0), dtype=np.uint8)
-    thinned = replace(image, colour=None, grey=nothing, depth_m=depth_m, depth_intrinsics=kept)
-    return (*views[1 - _VIEWS_KEPT :], (thinned, X_WO))
+    thinned = replace(image, colour=None, grey=nothing, depth_m=depth_m, depth_intrinsics=lens)
+    return (*views[1 - _MOST_VIEWS :], (thinned, X_WO))
 
 
 def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]:
-    """Which world points (N, 3) lie in no view, or far behind what it shows: just behind it all counts as solid."""
+    """Mask (N,) of the world points that no view shows.
+
+    A point just behind a view's depth counts as shown, because all space there counts as solid.
+    """
     unseen = np.ones(len(points_W), dtype=np.bool_)
     for image, X_WO in views:
         inside, z, depth = _at_pixels(points_W, image, X_WO)
@@ -166,15 +181,15 @@ def never_seen(points_W: FloatArray, views: Iterable[View]) -> NDArray[np.bool_]
 
 
 def _seen_past(cells: Cells, image: Image, X_WO: RigidTransform) -> NDArray[np.bool_]:
-    """Which cells lie clearly before what the picture shows at their pixel."""
-    inside, z, depth = _at_pixels(_middles(cells), image, X_WO)
+    """Mask (N,) of the cells that lie clearly before the depth of the picture at their pixel."""
+    inside, z, depth = _at_pixels(cell_centres(cells), image, X_WO)
     return np.asarray(inside & (depth > z + _SEEN_PAST_M))
 
 
 def _at_pixels(
     points_W: FloatArray, image: Image, X_WO: RigidTransform
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-    """Which points (N, 3) a depth picture covers, how far ahead of the camera they are, and its depth there (m)."""
+    """Mask (N,) of the points that a depth picture covers, their depth, and the picture's depth at their pixel (m)."""
     X_CW = camera_pose_W(image, X_WO).inverse()
     p_C = points_W @ X_CW.rotation().matrix().T + X_CW.translation()
     lens = image.depth_intrinsics
@@ -188,7 +203,7 @@ def _at_pixels(
 
 
 def merged(cells: Cells) -> list[tuple[Cells, Cells]]:
-    """Few boxes (first cell, cell after the last) that cover exactly these cells: runs, joined where they are equal."""
+    """Returns few boxes (first cell, cell after the last) that cover exactly these cells: runs, joined where equal."""
     boxes = np.concatenate([cells, cells + 1], axis=1)
     for axis, others in ((2, (0, 1, 3, 4)), (1, (0, 2, 3, 5)), (0, (1, 4, 2, 5))):
         boxes = _joined(boxes, axis, others)
@@ -196,7 +211,7 @@ def merged(cells: Cells) -> list[tuple[Cells, Cells]]:
 
 
 def _joined(boxes: Cells, axis: int, others: Sequence[int]) -> Cells:
-    """Boxes (N, 6) joined along an axis where one begins in the other's last cell or after it and `others` are equal.
+    """Joins boxes (N, 6) along an axis where one begins in another's last cell or after it and `others` are equal.
 
     They come in the order of the columns `others`, then along the axis.
     """
@@ -210,6 +225,5 @@ def _joined(boxes: Cells, axis: int, others: Sequence[int]) -> Cells:
 
 
 def _box(low: Cells, high: Cells, X_BW: RigidTransform) -> Box:
-    size = (high - low) * CELL_M
-    middle = 0.5 * (low + high) * CELL_M
-    return Box(X_BW @ RigidTransform(middle), (float(size[0]), float(size[1]), float(size[2])))
+    x, y, z = (high - low) * CELL_M
+    return Box(X_BW @ RigidTransform(0.5 * (low + high) * CELL_M), (float(x), float(y), float(z)))

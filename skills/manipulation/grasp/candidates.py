@@ -1,7 +1,7 @@
-"""Grasp candidates from the shape of what is seen, and which of them the arm can carry out.
+"""Grasp candidates from the shape of a seen object, and the reasons why there are none.
 
-The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for what stands,
-from above for what lies. Along a long object the local width counts, so that a hammer is taken by its handle.
+The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for upright
+objects, from above for low ones. Along a long object the local width counts, so that a hammer is taken by its handle.
 """
 
 from __future__ import annotations
@@ -15,22 +15,60 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.geometry import wrap
+from skills.manipulation.arm.poses import hand_rotation
+from skills.perception.class_forms import class_forms
 from skills.robot import FloatArray, GripperCapabilities, GripperKind
+from skills.world_model import ObjectObservation
 
-_ABOVE_SURFACE_M, _LEAST_ABOVE_SURFACE_M, _THIN_ABOVE_M = 0.004, 0.003, 0.001
-_LEAST_GRIP_M, THIN_M, _LEAST_OF_THIN = 0.008, 0.020, 0.35
-_BIN_M, _BREADTH_M = 0.01, 0.036
-_LEAST_BEYOND, _BESIDE_THIN_M = 0.25, 0.012
-_ENDING_LEVEL_M, _BEVEL_M, _SHORTER_CLOSED_M = 0.017, 0.003, 0.004
-_YIELD_M, _LEAST_TOUCHING, _LOOSE_COST = 0.006, 0.55, 1.5
+THIN_M = 0.020
+"""Objects lower than this count as thin."""
+_UPRIGHT_M = 0.075
+"""An object higher than this is grasped from the side."""
+_ABOVE_SURFACE_M = 0.004
+"""Usual distance of the fingertips from the surface."""
+_LEAST_ABOVE_SURFACE_M = 0.003
+"""Least distance of the fingertips from the surface."""
+_THIN_ABOVE_M = 0.001
+"""The same for a thin object."""
+_LEAST_GRIP_M = 0.008
+"""Least height that the fingers must cover of a low object."""
+_LEAST_OF_THIN = 0.35
+"""The same for a thin object, as a part of its height."""
+_BIN_M = 0.01
+"""Length of the slices of an outline."""
+_BREADTH_M = 0.036
+"""Half the length of an outline within which its local width is measured."""
+_LEAST_BEYOND = 0.25
+"""Part of a flat object's height by which the fingers may end above its middle."""
+_BESIDE_THIN_M = 0.012
+"""Gap between the fixed finger and a thin object."""
+_ENDING_LEVEL_M = 0.017
+"""Gap between fingers and object at the lean with which fingers of different length end level."""
+_BEVEL_M = 0.003
+"""Distance by which the back of a fingertip ends behind its tip."""
+_SHORTER_CLOSED_M = 0.004
+"""Length by which the moving finger reaches less far when closed than half open."""
+_YIELD_M = 0.006
+"""Depth by which a finger yields to an outline that it touches."""
+_LEAST_TOUCHING = 0.55
+"""Least part of a finger's breadth that must touch the outline."""
+_LOOSE_COST = 1.5
+"""Cost of a finger that touches the outline nowhere."""
 _FROM_ABOVE_RAD = np.radians(50.0)
+"""Fingers that are tilted more grasp an upright object from above."""
 _HIGHEST_FLAT_MM = 40
-_BELOW_PALM_M, _OVER_TOP_M, _TIPS_UP_M = 0.05, 0.01, 0.012
+"""Height up to which an object may be refused as too flat."""
+_BELOW_PALM_M = 0.05
+"""Distance of the grip from the palm when an upright object is grasped from above."""
+_OVER_TOP_M = 0.01
+"""Distance of the palm over the top of an upright object that is grasped from above."""
+_TIPS_UP_M = 0.012
+"""Least height of the fingertips over the surface when an upright object is grasped from above."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """An object to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
+    """Object to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
 
     points_B: FloatArray
     centre_B: tuple[float, float]
@@ -43,15 +81,15 @@ class Target:
 
     @property
     def upright(self) -> bool:
-        """Returns whether it stands high enough to be taken from the side."""
-        return self.height_m > 0.075
+        """Returns whether the object is high enough to be grasped from the side."""
+        return self.height_m > _UPRIGHT_M
 
 
 @dataclass(frozen=True)
 class GraspCandidate:
-    """A hand pose about an object, the width between the fingers (m), its cost, its tilt (rad, 0 level).
+    """Hand pose about an object, the width between the fingers (m), its cost, and its tilt (rad, 0 level).
 
-    `lever_m` is how far beside the grip the object's centre of mass seems to be, level and across the fingers.
+    `lever_m` is the estimated level distance of the object's centre of mass from the grip, across the fingers.
     """
 
     X_BH: RigidTransform
@@ -61,13 +99,13 @@ class GraspCandidate:
     lever_m: float = 0.0
 
     def retreated(self, distance_m: float) -> RigidTransform:
-        """The hand pose drawn back along the fingers."""
+        """Returns the hand pose drawn back along the fingers."""
         return self.X_BH @ RigidTransform([-distance_m, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
 class _Placement:
-    """A place to grasp along an object: point (x, y), direction of the approach seen from above, local width, cost."""
+    """Position of a grasp along an object: point (x, y), azimuth of the approach, local width and depth (m), cost."""
 
     xy: FloatArray
     azimuth_rad: float
@@ -80,9 +118,9 @@ class _Placement:
 def grasp_candidates(
     target: Target, p_BS: FloatArray, gripper: GripperCapabilities, beside_m: tuple[float, float] = (0.010, 0.017)
 ) -> list[GraspCandidate]:
-    """Candidates, the best first; empty when it is too wide or too flat. p_BS is the shoulder.
+    """Returns candidates, the best first; an empty list when the object is too wide or too flat. p_BS is the shoulder.
 
-    `beside_m` is left beside the fixed finger, about what stands and about what lies low.
+    `beside_m` are the gaps beside the fixed finger, for an upright object and for a low one.
     """
     ahead, placements = _placements(target, p_BS)
     tried = [
@@ -98,13 +136,13 @@ def grasp_candidates(
     return sorted(found, key=lambda candidate: candidate.cost)
 
 
-def narrowest_m(target: Target, p_BS: FloatArray) -> float | None:
-    """The least width (m) over which fingers could close on an object; None where they find no place along it."""
+def _narrowest_m(target: Target, p_BS: FloatArray) -> float | None:
+    """Least width (m) over which fingers could close on an object; None when its outline has no place for them."""
     return min((placement.width_m for placement in _placements(target, p_BS)[1]), default=None)
 
 
-def least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> float | None:
-    """How high (m, in whole mm) an object without grasps had to be for one; None where its height is not the reason."""
+def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> float | None:
+    """Least height (m, in whole mm) that would give an object candidates; None when its height is not the reason."""
     for height_mm in range(int(1000 * target.height_m) + 1, _HIGHEST_FLAT_MM):
         if grasp_candidates(replace(target, height_m=0.001 * height_mm), p_BS, gripper):
             return 0.001 * height_mm
@@ -112,15 +150,15 @@ def least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilitie
 
 
 def _placements(target: Target, p_BS: FloatArray) -> tuple[float, list[_Placement]]:
-    """The direction from the shoulder (rad), and the places to grasp along an object."""
+    """Returns the direction from the shoulder (rad), and the positions of grasps along an object."""
     ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
     return ahead, _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
 
 
 def _attitudes(target: Target, width_m: float, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
-    """Tilts of the fingers below level and, for what is taken from above, leans about its long axis; rad.
+    """Tilts of the fingers below level and, for grasps from above, leans about the object's long axis (rad).
 
-    With the first lean fingers of different length end level on both sides of something of a width.
+    With the first lean, fingers of different length end level on both sides of an object of that width.
     """
     if target.upright:
         return [(float(np.radians(tilt)), 0.0) for tilt in (0.0, 10.0, 20.0, 32.0, 45.0, 60.0, 75.0, 90.0)]
@@ -131,7 +169,7 @@ def _attitudes(target: Target, width_m: float, gripper: GripperCapabilities) -> 
 
 
 def _round_placements(target: Target, ahead_rad: float) -> list[_Placement]:
-    """A round object can be approached from any side; from the shoulder's is best."""
+    """Approaches of a round object from several sides, the shoulder's side the cheapest."""
     centre = np.array(target.centre_B)
     return [
         _Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
@@ -140,7 +178,7 @@ def _round_placements(target: Target, ahead_rad: float) -> list[_Placement]:
 
 
 def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
-    """Places along a box's axes with the local width there; both axes for one that is nearly square."""
+    """Yields positions along a box's axes with the local width there; both axes of a box that is nearly square."""
     square = target.length_m < 1.4 * target.width_m
     for turn in (0.0, 0.5 * np.pi) if square else (0.0,):
         yaw = target.yaw_rad + turn
@@ -166,10 +204,11 @@ def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
 
 
 def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> float:
-    """Over which part of its breadth a finger that closes at edge_m touches an outline (s along, t across, m).
+    """Part of a finger's breadth that touches an outline (s along, t across, m) when it closes at edge_m.
 
     A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it; so
-    does one that is half beyond the end of a handle. What is shorter (length_m) than the finger is broad has no more.
+    does a finger half beyond the end of a handle. For an object shorter (length_m) than the finger's breadth, the
+    object's length counts.
     """
     bins = np.round(s / _BIN_M).astype(int)
     touched = [np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]
@@ -177,7 +216,7 @@ def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> f
 
 
 def _balance(s: FloatArray, t: FloatArray) -> float:
-    """Where along a long object (s along, t across, m) its centre of mass is, taken as a solid of revolution.
+    """Position along a long object (s along, t across, m) of its centre of mass, taken as a solid of revolution.
 
     A hammer is heavy at its head: held by the far end of its handle it would turn in the gripper.
     """
@@ -221,26 +260,18 @@ def _candidate(
 
 
 def _top_grip(half_depth_m: float, tilt_rad: float, gripper: GripperCapabilities) -> tuple[float, float]:
-    """How far below its top what stands is taken from above, and how far before the hand that is."""
+    """Depths of a grasp from above (m): of the grip below the top, and of the object's centre ahead of the hand."""
     ahead_m = _BELOW_PALM_M + half_depth_m * np.cos(tilt_rad)
     return ahead_m * float(np.sin(tilt_rad)) - _OVER_TOP_M, gripper.palm_x_m + ahead_m
-
-
-def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
-    """R_BH of a hand whose fingers point tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
-    c, s, ahead, down = np.cos(azimuth_rad), np.sin(azimuth_rad), np.cos(tilt_rad), np.sin(tilt_rad)
-    x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
-    y_axis = [-side * down * c, -side * down * s, -side * ahead]
-    return RotationMatrix(np.array([x_axis, y_axis, z_axis]).T)
 
 
 def _low_grip(
     R_BH: RotationMatrix, height_m: float, width_m: float, gripper: GripperCapabilities, beside_m: float
 ) -> tuple[float, float] | None:
-    """How far before the hand it holds the middle of what lies, and how far its fingers reach past that; m.
+    """Depths of a grasp of a low object (m): of its middle ahead of the hand, and of the fingers beyond that middle.
 
-    The lowest corner of the closed fingers stays just above the surface; the finger that ends higher counts for what
-    they hold. None where that is too little.
+    The lowest corner of the closed fingers stays just above the surface, and the finger that ends higher limits the
+    grip. None when the fingers cover too little of the object.
     """
     up_H, inner_z = R_BH.matrix()[2], gripper.fixed_z_m
     if not _hinged(gripper):  # the fingers close on both sides alike
@@ -262,7 +293,7 @@ def _low_grip(
 
 
 def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
-    """Where the moving finger ends when it holds something narrow: it turns, and reaches farthest half open."""
+    """Position (m) of the moving finger's tip along the hand on a narrow object: it reaches farthest half open."""
     return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
 
 
@@ -271,7 +302,38 @@ def _hinged(gripper: GripperCapabilities) -> bool:
 
 
 def _above_surface(height_m: float, spare_m: float) -> float:
-    """How far the fingertips stay above the surface (m): more for what is high, less for what is flat."""
+    """Distance of the fingertips from the surface (m): more for a high object, less for a flat one."""
     usual = _ABOVE_SURFACE_M + 0.4 * max(0.0, height_m - 0.03)
     least = _THIN_ABOVE_M if height_m < THIN_M else _LEAST_ABOVE_SURFACE_M
     return float(np.clip(spare_m - 1e-6, least, usual))
+
+
+def least_mass_kg(seen: ObjectObservation) -> float:
+    """Least mass of an object by its class and seen size, 0.0 when nothing is known of its class."""
+    form = class_forms().get(seen.kind.name)
+    return 0.0 if form is None else form.least_mass_kg(seen.size_m)
+
+
+def known_too_heavy(seen: ObjectObservation, max_payload_kg: float) -> str | None:
+    """Returns why an object is surely too heavy for the arm; None when it is not, or only weighing can decide."""
+    mass_kg = least_mass_kg(seen)
+    if mass_kg <= max_payload_kg:
+        return None
+    return f"the {seen.kind} weighs {mass_kg:.1f} kg at least, and the arm carries {max_payload_kg:.1f} kg at most"
+
+
+def why_no_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabilities, name: str) -> str:
+    """Returns why an object has no candidates: too wide, too flat, or no straight outline. p_BS is the shoulder."""
+    width_m = _narrowest_m(target, p_BS)
+    if width_m is not None and width_m >= gripper.max_grasp_m:
+        return (
+            f"the {name} is too wide for the gripper: {1000 * width_m:.0f} mm where it is narrowest, "
+            f"and the gripper takes less than {1000 * gripper.max_grasp_m:.0f} mm"
+        )
+    least_m = _least_height_m(target, p_BS, gripper)
+    if least_m is not None:
+        return (
+            f"the {name} is too flat for the gripper: {1000 * target.height_m:.0f} mm high, "
+            f"and the fingers need {1000 * least_m:.0f} mm"
+        )
+    return f"the fingers find no hold on the {name}: no part of its outline is straight over their breadth"

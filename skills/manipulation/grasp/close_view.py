@@ -1,4 +1,4 @@
-"""What a picture from near shows of the object to grasp, and of what is around it."""
+"""Close view of the object to grasp and of its neighbours."""
 
 from __future__ import annotations
 
@@ -27,13 +27,17 @@ from skills.perception.surface_segmentation import (
 )
 from skills.robot import FloatArray, Image
 
-LOOK_HALF_SIDE_M, SURFACE_AROUND_M = 0.4, 0.2
+LOOK_HALF_SIDE_M = 0.4
+"""Half side of the patch of surface that is viewed."""
+SURFACE_AROUND_M = 0.2
+"""Half side of the patch around the object that counts as surface although its edge may be unseen."""
 _SURFACE_YIELDS_M = 0.003
+"""Depth by which the surface is taken lower than it was seen."""
 
 
 @dataclass(frozen=True)
 class CloseView:
-    """The object and what is around it, seen closely; X_WB at that time. `others` are objects among the boxes."""
+    """Close view of an object and its obstacles, with X_WB at that time. `others` are objects among the boxes."""
 
     target: Target
     boxes: tuple[Box, ...]
@@ -42,7 +46,7 @@ class CloseView:
     others: tuple[Obstacle, ...] = ()
 
     def moved(self, offset_B: FloatArray) -> CloseView:
-        """The same with the object offset_B (3,), level, beside where it was."""
+        """Returns the view with the object shifted level by offset_B (3,)."""
         x, y = np.array(self.target.centre_B) + offset_B[:2]
         target = replace(self.target, points_B=self.target.points_B + offset_B, centre_B=(float(x), float(y)))
         box = Box(RigidTransform(offset_B) @ self.target_box.X_FG, self.target_box.size_m)
@@ -52,7 +56,7 @@ class CloseView:
 def square(
     position_W: tuple[float, float, float], height_m: float, name: str, half: float = LOOK_HALF_SIDE_M
 ) -> Surface:
-    """A square patch about a point."""
+    """Returns a square patch around a point."""
     x, y, _ = position_W
     corners = ((x - half, y - half), (x + half, y - half), (x + half, y + half), (x - half, y + half))
     return Surface(name, corners, height_m)
@@ -67,7 +71,7 @@ def examine(
     found: tuple[Detection3D, ...],
     within_m: float,
 ) -> CloseView | None:
-    """The object of a class, looked for within a distance (m) of where it was seen; None: it is not there."""
+    """Looks for the object within a distance (m) of where it was seen; None when it is not there."""
     view = segment_surface(image, place.X_WO, surface, margin_m=0.0)
     if view is None:
         return None
@@ -90,9 +94,9 @@ def examine(
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:
-    """The surface as far as its own points show it, and as much all around the object, since its edge may be unseen.
+    """Returns the surface as far as its points show it, extended around the object, since its edge may be unseen.
 
-    It lies a little low: fingers that take something thin come within a millimetre of it, and feel for it.
+    It lies a little low: fingers that take a thin object come within a millimetre of the surface and feel for it.
     """
     xy = view.plane_points.p_W[:, :2]
     low, high = np.percentile(xy, [0.2, 99.8], axis=0)
@@ -108,7 +112,7 @@ def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, floa
 def _same_object(
     view: SurfaceView, seen: ObjectObservation, found: Sequence[Detection3D], within_m: float
 ) -> Cluster | None:
-    """The cluster that is the object: detected as of its class and nearest, else nearest of all; None: all are far."""
+    """Returns the nearest cluster of the object's class, else the nearest of all; None when all are far."""
     expected = np.array(seen.position_W[:2])
 
     def off(cluster: Cluster) -> float:
@@ -123,7 +127,7 @@ def _same_object(
 
 
 def _observed(cluster: Cluster, name: str, beside: ObjectObservation, image: Image) -> ObjectObservation:
-    """Another object than the one looked at, as it was seen; it rests on the same surface."""
+    """Returns an observation of another object on the same surface."""
     (x, y), shape = cluster.shape.centre, cluster.shape
     return ObjectObservation(
         stamp_s=image.stamp_s,

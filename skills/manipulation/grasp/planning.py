@@ -1,4 +1,4 @@
-"""From candidates to motions: the first grasp that the arm can reach, approach and lift."""
+"""Grasp planning: the first candidate that the arm can reach, approach and lift."""
 
 from __future__ import annotations
 
@@ -18,19 +18,31 @@ from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
 from skills.world_model import IN_THE_WAY, ObjectObservation, PlanningError
 
 PREGRASPS_M = (0.12, 0.07, 0.045)
-"""How far before the grasp the straight approach begins, the best first."""
+"""Distances from the grasp at which the straight approach begins, the best first."""
 LIFTS_M = ((0.12, 0.0), (0.1, 0.08), (0.07, 0.0), (0.06, 0.08), (0.05, 0.12), (0.045, 0.0), (0.03, 0.0))
-"""Ways to lift, up and back towards the shoulder, the best first."""
-_SLOW_POINTS, _OTHERS_TRIED, _ASKED, _OUT_OF_REACH = 3, 3, 40, "out of reach"
-_OFF_M, _LIFT_STEP_M, _LIFT_MARGIN_M = 0.015, 0.01, 0.002
+"""Lifts: distances up and back towards the shoulder, the best first."""
+_SLOW_POINTS = 3
+"""Number of points of the approach that the hand passes slowly."""
+_OTHERS_TRIED = 3
+"""Number of near objects that are checked for being in the way."""
+_MOST_CANDIDATES = 40
+"""Number of candidates that are checked again without such objects."""
+_OUT_OF_REACH = "out of reach"
+_OFF_M = 0.015
+"""Margin by which the object is taken smaller than its box while it is lifted."""
+_LIFT_STEP_M = 0.01
+"""Distance between the checks of a lift."""
+_LIFT_MARGIN_M = 0.002
+"""Least gap between the lifted object and an obstacle."""
 _LEVEL = 0.5
+"""Level share of the fingers' direction below which they point down."""
 _ALIKE_RAD = 0.3
-"""What cannot be lifted from one posture of an arm with a joint to spare cannot be from one so near to it."""
+"""Arm postures that differ by less are alike: a lift that fails from one fails from the other."""
 
 
 @dataclass(frozen=True)
 class GraspPlan:
-    """A grasp with the motions to its pre-grasp and from there to the grasp, the last bit slowly; how to lift (B)."""
+    """Grasp with the motions to its pre-grasp and to the grasp, the last bit slowly, and the lift (B)."""
 
     candidate: GraspCandidate
     to_pregrasp: ArmTrajectory
@@ -41,23 +53,23 @@ class GraspPlan:
 
 @dataclass(frozen=True)
 class Obstacle:
-    """An object beside the one to grasp, as it was seen, its class or "thing", and its boxes in B."""
+    """Object beside the one to grasp: its observation and its boxes in B."""
 
     seen: ObjectObservation
     boxes: tuple[Box, ...]
 
     @property
     def centre_B(self) -> FloatArray:
-        """The middle of its boxes."""
+        """Centre (3,) of its boxes."""
         return np.asarray(np.mean([box.X_FG.translation() for box in self.boxes], axis=0))
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What stands around the object, and the object itself, as boxes in B; `up_B` points up in the body frame.
+    """Obstacles around the object, and the object itself, as boxes in B; `up_B` points up in the body frame.
 
-    `others` are the objects among the boxes. `name` and `reach_m`, the arm's furthest reach, serve to say why there is
-    no grasp.
+    `others` are the objects among the boxes. `name` and `reach_m`, the arm's largest reach, serve the message when
+    there is no grasp.
     """
 
     boxes: Sequence[Box]
@@ -68,10 +80,11 @@ class Surroundings:
     reach_m: float = np.inf
 
     def lets_rise(self, lift_B: FloatArray) -> bool:
-        """Returns whether the object meets nothing on a straight way up.
+        """Returns whether the object meets nothing on a straight path up.
 
-        It is taken a little smaller than its box, so that what it stands on and beside is off it. What overlaps it all
-        the same is a part of it: seen from high up, a screwdriver's shaft is an object of its own beside the handle.
+        The object is taken a little smaller than its box, so that its support and neighbours do not touch it. A box
+        that overlaps it all the same is a part of it: seen from high up, a screwdriver's shaft is an object of its own
+        beside the handle.
         """
         steps = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(lift_B) / _LIFT_STEP_M))
         x, y, z = (max(side - 2.0 * _OFF_M, 0.005) for side in self.target.size_m)
@@ -79,18 +92,18 @@ class Surroundings:
         return bool(np.all((gaps > _LIFT_MARGIN_M) | (gaps[0] < 0.0)))
 
     def without(self, others: Sequence[Obstacle]) -> Surroundings:
-        """As if some of the other objects were not there."""
+        """Returns the surroundings without some of the other objects."""
         gone = {id(box) for other in others for box in other.boxes}
         return replace(self, boxes=[box for box in self.boxes if id(box) not in gone])
 
 
 @dataclass(frozen=True)
 class GeometricGraspPlanner:
-    """Grasps from the object's outline, the first that the arm can reach, approach and lift.
+    """Grasp planner by the object's outline: takes the first candidate that the arm can reach, approach and lift.
 
-    The hand keeps `padding_m` from all around on its way and `final_padding_m` on the straight approach, on which no
-    joint is faster than `approach_rad_s`, on its last bit than `last_rad_s`. Beside the fixed finger `beside_fixed_m`
-    are left, `beside_fixed_low_m` about objects that lie low, since a finger that comes down on top of one is stopped.
+    The hand keeps `padding_m` from all obstacles on its path and `final_padding_m` on the straight approach, on which
+    no joint is faster than `approach_rad_s`, on its last bit than `last_rad_s`. The gap beside the fixed finger is
+    `beside_fixed_m`, or `beside_fixed_low_m` for low objects, since a finger that comes down on top of one is stopped.
     """
 
     padding_m: Margin = 0.01
@@ -101,7 +114,10 @@ class GeometricGraspPlanner:
     beside_fixed_low_m: Margin = 0.017
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Grasps, the best first; empty when it is too wide or too flat. p_BS is the shoulder."""
+        """Returns grasps, the best first; an empty list for an object that is too wide or too flat.
+
+        p_BS is the shoulder.
+        """
         return grasp_candidates(target, p_BS, gripper, (self.beside_fixed_m, self.beside_fixed_low_m))
 
     def plan(
@@ -113,7 +129,7 @@ class GeometricGraspPlanner:
         arm_planner: ArmPlanner,
         rng: np.random.Generator,
     ) -> GraspPlan:
-        """The best candidate that can be carried out. Raises PlanningError, which says why, when there is none."""
+        """Plans the best feasible candidate. Raises PlanningError with the reason when there is none."""
         reasons = list[str]()
         for candidate in candidates:
             try:
@@ -144,13 +160,13 @@ class GeometricGraspPlanner:
         around: Surroundings,
         arm_planner: ArmPlanner,
     ) -> tuple[Obstacle, ...]:
-        """The other object, or all that are near, without which there were a grasp; empty: none is in the way.
+        """Returns the object, or all near ones, that block every grasp, the nearest first; empty when none does.
 
-        The nearest come first; only the best candidates are asked again.
+        Only the best candidates are checked again.
         """
 
         def graspable(space: Surroundings) -> bool:
-            for candidate in candidates[:_ASKED]:
+            for candidate in candidates[:_MOST_CANDIDATES]:
                 try:
                     self._reached(scene, q_near_rad, candidate, space, arm_planner)
                 except PlanningError:
@@ -172,7 +188,7 @@ class GeometricGraspPlanner:
         around: Surroundings,
         arm_planner: ArmPlanner,
     ) -> tuple[FloatArray, FloatArray]:
-        """The straight approach path from the pre-grasp, and the lift (frame B). Raises PlanningError."""
+        """Returns the straight approach from the pre-grasp, and the lift (frame B). Raises PlanningError."""
         scene.set_boxes(around.boxes)
         scene.set_padding(self.final_padding_m)
         reason, no_lift_rad = _OUT_OF_REACH, list[FloatArray]()
@@ -202,7 +218,7 @@ def _out_of_reach(model: ArmModel, around: Surroundings) -> str:
 
 
 def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -> str:
-    """Which other objects are in the way: before the object as the shoulder sees it, or close beside it."""
+    """Returns the message on objects in the way: before the object as seen from the shoulder, or close beside it."""
     p_ST = around.target.X_FG.translation() - model.p_BS
     before = any((other.centre_B - model.p_BS) @ p_ST < p_ST @ p_ST for other in others)
     names = " and ".join(f"the {other.seen.kind}" for other in others)
@@ -210,7 +226,7 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
 
 
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
-    """Returns whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not looked at."""
+    """Returns whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not checked."""
     X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
     if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreated(distance), margin_rad)):
         return False
@@ -219,13 +235,13 @@ def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, m
 
 
 def lifts(model: ArmModel, X_BH: RigidTransform, up_B: FloatArray) -> list[FloatArray]:
-    """Ways to lift from a grasp, the best first."""
+    """Returns the lifts from a grasp (B), the best first."""
     back = towards_shoulder(model.p_BS, X_BH.translation())
     return [up_m * up_B + back_m * back for up_m, back_m in LIFTS_M]
 
 
 def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner: ArmPlanner) -> FloatArray:
-    """The first way to lift that the arm can follow, on which neither it nor the object touches anything.
+    """Returns the first lift that the arm can follow without contact of arm or object.
 
     Raises PlanningError.
     """
@@ -243,7 +259,7 @@ def _lift(scene: ArmScene, q_rad: FloatArray, around: Surroundings, arm_planner:
 
 
 def pull_back_B(X_BH: RigidTransform, p_BS: FloatArray) -> FloatArray:
-    """The level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
+    """Level direction out of a grasp: against the fingers, or towards the shoulder where they point down."""
     against = -X_BH.rotation().matrix()[:, 0] * [1.0, 1.0, 0.0]
     if np.linalg.norm(against) < _LEVEL:
         against = (p_BS - X_BH.translation()) * [1.0, 1.0, 0.0]

@@ -1,4 +1,4 @@
-"""What the grasp skill takes and gives: all that a tree is compiled from."""
+"""Ports of the grasp skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from skills.world_model import IN_THE_WAY
 
 @dataclass(frozen=True)
 class TriedGrasp:
-    """A grasp in the world's axes: where the fingers point, how they close, the hand from the object (m)."""
+    """Grasp in the world's axes: directions of the fingers and of their closing, the hand from the object (m)."""
 
     pointing_W: tuple[Cosine, Cosine, Cosine]
     closing_W: tuple[Cosine, Cosine, Cosine]
@@ -22,7 +22,7 @@ class TriedGrasp:
 
 @dataclass(frozen=True)
 class GraspInputs:
-    """The object as it was seen; grasps like those in `avoid` are the last choice."""
+    """Object as it was seen; grasps like those in `avoid` are the last choice."""
 
     observation: ObjectObservation
     avoid: tuple[TriedGrasp, ...] = ()
@@ -31,8 +31,8 @@ class GraspInputs:
 class GraspPorts(Skill[GraspInputs]):
     """Grasps an object and holds it near the body. On failure it opens the gripper and stows the arm.
 
-    The output `tried` is `avoid` and the grasp of this attempt, after a failure, too. After a failure for want of a
-    plan `in_the_way` are the objects without which there were a grasp, the nearest first; else it is empty.
+    The output `tried` is `avoid` and the grasp of this attempt, also after a failure. After a failure for want of a
+    plan, `in_the_way` are the objects that block every grasp, the nearest first; else it is empty.
     """
 
     done_by: ClassVar[str] = "skills.manipulation.grasp.skill:Grasp"

@@ -1,7 +1,7 @@
-"""From where an object is taken: the body heights to choose among, and the grasps that the arm reaches there.
+"""Reach of the arm to an object: body heights to choose among, grasps within reach, and space that no picture shows.
 
-A grasp counts as reached when the arm gets to it, to its pre-grasp and to the end of a lift without touching what is
-known to stand around.
+A grasp is reached when the arm gets to it, to its pre-grasp and to the end of a lift without contact with what is
+known.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import islice, pairwise
-from typing import Any, Final
+from itertools import islice, pairwise, product
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,35 +21,73 @@ from skills.detect.viewpoints import surface_boxes
 from skills.manipulation.arm.arm_skill import ArmSkill
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import ArmModel
-from skills.manipulation.arm.solid_cells import boxes_of
+from skills.manipulation.arm.looking_skill import LookingSkill
+from skills.manipulation.arm.solid_cells import boxes_of, never_seen
 from skills.manipulation.grasp.candidates import GraspCandidate, Target
 from skills.manipulation.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
+from skills.routine import Routine, planning_failure
 
-_LOW_SURFACE_M, _HIGH_SURFACE_M = 0.2, 0.72
+_LOW_SURFACE_M = 0.2
+"""The body goes to its lowest height for an object that stands lower than this."""
+_HIGH_SURFACE_M = 0.72
+"""The body goes to its highest height for an object that stands higher than this."""
 _BELOW_LIMIT_M = 0.005
+"""Distance that the body keeps from the ends of its range of heights."""
+_LIFTS_FAR_M = 0.2
+"""A body with a larger range of heights than this also tries heights in between."""
+_PARTS_OF_LIFT = (0.25, 0.5, 0.75)
 _OTHER_HEIGHT_COST: Final = 0.15
-"""What a body height that is not the usual one costs: the body moves, and is less steady."""
-_PADDING_M, _MARGIN_RAD = -0.002, 0.08
-"""Fingertips end 1 mm above the surface where something thin lies."""
-_LOOKED_AT = 60
-_PARTS, _ABOVE_ARM_M = 9, 0.1
-_BESIDE_COST, _OWN_M, _LOW_M, _LESS_M = 0.8, 0.05, 0.05, 0.01
-_SURFACE_AROUND_M, _SURFACE_BAND_M, _KNOWN_ABOVE_M = 0.2, 0.06, 0.34
+"""Cost of an unusual body height: the body moves, and is less steady."""
+_PADDING_M = -0.002
+"""Padding of the check: fingertips end 1 mm above the surface of a thin object."""
+_MARGIN_RAD = 0.08
+_MOST_CHECKED = 60
+"""Number of grasps within reach that are checked for contact."""
+_PARTS = 9
+"""Points on each segment of the arm."""
+_ABOVE_ARM_M = 0.1
+"""Height of the space above the arm that a picture must have shown."""
+_BESIDE_COST = 0.8
+"""Cost of a grasp that touches cells of a neighbour."""
+_OWN_M = 0.05
+"""Margin around an object within which cells are its own."""
+_LOW_M = 0.05
+"""Height above the surface from which on cells count as a neighbour's."""
+_LESS_M = 0.01
+"""Margin by which a neighbour's boxes are smaller than its cells."""
+_SURFACE_AROUND_M = 0.2
+"""Half side of the square around an object in which the surface is known."""
+_SURFACE_BAND_M = 0.06
+"""Depth below the object's base down to which cells are the surface's own."""
+_KNOWN_ABOVE_M = 0.34
+"""Height above the object's base up to which the space around it is known."""
 WIDE: Final = 0.9
-"""How far the gripper is open, as a part of all that it opens, as it reaches for an object."""
+"""Opening of a hinged gripper that reaches for an object, as a part of its widest."""
 _NARROW: Final = 0.6
 """The same among neighbours."""
 _WIDE_PARALLEL: Final = 0.98
-_LIFTS_FAR_M, _PARTS_OF_LIFT = 0.2, (0.25, 0.5, 0.75)
-_GAP_BESIDE_M, _LESS_OPEN_RAD = 0.045, 0.2
+"""Opening of a parallel gripper that reaches for an object, as a part of its widest."""
+_GAP_BESIDE_M = 0.045
+"""Space left beside an object by a gripper that opens only as far as needed."""
+_LESS_OPEN_RAD = 0.2
+"""A narrower opening must differ at least by this from the wide one."""
+_UNSEEN_NEAR_M = 0.3
+"""Distance from an object within which unseen space matters."""
+_UNSEEN_FURTHEST_M = 1.6
+"""Distance from the shoulder beyond which the hand camera shows too little of a space."""
+_NEAREST_VIEW_M = 0.4
+"""Least distance of a viewpoint from the unseen space."""
+_FEWEST_UNSEEN = 3
+"""Number of unseen points from which on the skill looks."""
 
+ChosenT = TypeVar("ChosenT")
 CandidatesOf = Callable[[Target], list[GraspCandidate]]
 
 
 @dataclass(frozen=True)
 class Reached:
-    """The best grasp that is reached with the body at a height: what it costs beyond the best there is."""
+    """Body height at which a grasp is reached, and the cost of that grasp above the cheapest candidate's."""
 
     cost: float
     height_m: float
@@ -57,10 +95,10 @@ class Reached:
 
 @dataclass(frozen=True)
 class ReachCheck:
-    """What is needed to say how an object is reached from a pose of the body.
+    """Check of how an object is reached from a pose of the body.
 
-    The boxes that stand around, without the object, are given in the body frame of the moment at X_WB; `beside` are
-    those of its neighbours, which cells show larger than they are: a grasp that touches only them is a last choice.
+    `boxes` are the obstacles without the object, in the body frame of the moment at X_WB. `beside` are boxes of its
+    neighbours, which cells show larger than they are: a grasp that touches only those is a last choice.
     """
 
     scene: ArmScene
@@ -73,15 +111,15 @@ class ReachCheck:
     wide: float = WIDE
 
     def best(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> Reached | None:
-        """The best height, the first of which is the usual one; None where no grasp is reached from any.
+        """Returns the cheapest height with its grasp, None when no grasp is reached.
 
-        `at` gives X_WB for a height.
+        `at` gives X_WB for a height; the first of `heights_m` is the usual one.
         """
         found = self.all(at, heights_m)
         return min(found, key=lambda reached: reached.cost, default=None)
 
     def all(self, at: Callable[[float], RigidTransform], heights_m: Sequence[float]) -> list[Reached]:
-        """The best grasp from each height from which one is reached; the usual height alone where that is enough."""
+        """Returns the best grasp from each height; only the usual height's when that grasp is cheap enough."""
         found = []
         for height_m in heights_m:
             cost = self._cost(at(height_m))
@@ -109,7 +147,7 @@ class ReachCheck:
         return None if best is None else beyond
 
     def _best(self, X_WB: RigidTransform) -> tuple[GraspCandidate | None, float]:
-        """The best grasp that is reached from X_WB, and what it costs beyond the best there is."""
+        """Returns the best grasp that is reached from X_WB, and its cost above the cheapest candidate's."""
         reached, least = reached_grasps(self.scene.model, self.candidates_of, X_WB, self.seen)
         self.scene.set_padding(_PADDING_M)
         spaces = [(self.boxes, self.wide, _BESIDE_COST if self.beside else 0.0)]
@@ -127,27 +165,27 @@ class ReachCheck:
 def reached_grasps(
     model: ArmModel, candidates_of: CandidatesOf, X_WB: RigidTransform, seen: ObjectObservation
 ) -> tuple[list[GraspCandidate], float]:
-    """Grasps that the arm reaches with the body at X_WB, best first, and the cost of the best there is.
+    """Returns the grasps within the arm's reach from X_WB, best first, and the cost of the cheapest candidate.
 
-    Contact is not looked at.
+    Contact is not checked.
     """
     candidates = candidates_of(observed_target(seen, X_WB))
     reached = (each for each in candidates if within_reach(model, each, up_B(X_WB), _MARGIN_RAD))
-    return list(islice(reached, _LOOKED_AT)), candidates[0].cost if candidates else np.inf
+    return list(islice(reached, _MOST_CHECKED)), candidates[0].cost if candidates else np.inf
 
 
 def up_B(X_WB: RigidTransform) -> FloatArray:
-    """Up in the body frame."""
+    """Unit vector (3,) that points up, in the body frame."""
     return np.asarray(X_WB.rotation().matrix().T @ np.array([0.0, 0.0, 1.0]))
 
 
 def _postures(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> list[FloatArray]:
-    """Arm angles at a grasp, before it and after a lift at which it touches nothing; empty when there are none."""
+    """Returns free arm angles at a grasp, before it and after a lift; an empty list when one of the three has none."""
     X_BH = candidate.X_BH
-    lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + way_B) for way_B in lifts(scene.model, X_BH, up_B))
+    lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B) for lift_B in lifts(scene.model, X_BH, up_B))
     found = list[FloatArray]()
-    for ways in ([X_BH], map(candidate.retreated, PREGRASPS_M), lifted):
-        q_rad = next((q for X in ways for q in scene.model.inverse(X, _MARGIN_RAD) if scene.free(q)), None)
+    for poses in ([X_BH], map(candidate.retreated, PREGRASPS_M), lifted):
+        q_rad = next((q for X in poses for q in scene.model.inverse(X, _MARGIN_RAD) if scene.free(q)), None)
         if q_rad is None:
             return []
         found.append(q_rad)
@@ -155,18 +193,18 @@ def _postures(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> l
 
 
 def _along(points_B: FloatArray) -> FloatArray:
-    """Points (N, 3) along the segments between points, a few on each."""
+    """Points (N, 3) along the segments between points."""
     parts = np.linspace(0.0, 1.0, _PARTS)[:, None]
     return np.concatenate([a + parts * (b - a) for a, b in pairwise(points_B)])
 
 
 def wide_share(gripper: GripperCapabilities) -> float:
-    """How far a gripper is open, as a part of all that it opens, as it reaches for an object."""
+    """Opening of a gripper that reaches for an object, as a part of its widest."""
     return WIDE if gripper.kind is GripperKind.HINGED else _WIDE_PARALLEL
 
 
 def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities) -> tuple[float, ...]:
-    """Openings of the gripper for the approach: wide and, as neighbours may leave no room for it, as far as needed.
+    """Returns openings for the approach: wide and, because neighbours may leave no space, only as far as needed.
 
     The opening is about proportional to the finger's angle.
     """
@@ -176,7 +214,7 @@ def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities)
 
 
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:
-    """Heights of the body's origin over the floor to take an object that stands base_m over the floor, the usual first.
+    """Body heights (m over the floor) for an object that stands base_m over the floor, the usual one first.
 
     A robot whose body cannot change its height has one.
     """
@@ -189,7 +227,7 @@ def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ..
 
 
 def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
-    """An observation as a grasp target: its box filled with points."""
+    """Returns an observation as a grasp target: its box filled with points."""
     length, width, height = seen.size_m
     X_BW = X_WB.inverse()
     base_m = float((X_BW @ np.array(seen.position_W))[2]) - 0.5 * height
@@ -206,9 +244,9 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
 
 
 def resting_on(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectObservation:
-    """An object where it was seen, but not sunk into the surface that it lies on: then no fingers would get round it.
+    """Returns the observation raised onto its surface, because fingers cannot get around a sunken object.
 
-    From a distance a flat object seems to be lower than it is, by as much as it is high.
+    From a distance a flat object seems lower than it is, by as much as its height.
     """
     x, y, z = seen.position_W
     top_m = max((surface.height_m for surface in surfaces if surface.name == seen.surface), default=-np.inf)
@@ -218,9 +256,9 @@ def resting_on(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectOb
 def space_about(
     seen: ObjectObservation, half_m: float = _SURFACE_AROUND_M
 ) -> tuple[tuple[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-    """Least and greatest corners (world, m) of the space on its surface about an object, and of its own space.
+    """Least and greatest corners (world, m) of the space around an object on its surface, and of its own space.
 
-    What is tall reaches higher than what is known about it: the cells of its own top are no obstacle.
+    The own space of a tall object is higher than the known space: the cells of its top are no obstacle.
     """
     x, y, z = seen.position_W
     length_m, width_m, height_m = seen.size_m
@@ -234,7 +272,7 @@ def space_about(
 
 
 def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
-    """Which points (N, 3) are in the space about an object, but neither its own nor just above its surface."""
+    """Mask (N,) of the points in the space around an object that are neither its own nor just above its surface."""
     base_m = seen.position_W[2] - 0.5 * seen.size_m[2]
     low, high = space_about(seen)[0]
     inside = np.all((p_W > low) & (p_W < high), axis=1) & (p_W[:, 2] > base_m + _LOW_M)
@@ -244,7 +282,7 @@ def _beside(seen: ObjectObservation, p_W: FloatArray) -> NDArray[np.bool_]:
 
 
 def _less(box: Box) -> Box:
-    """A little less of a box, since cells are larger than what is in them."""
+    """Returns the box a little smaller, because cells are larger than their content."""
     x, y, z = (max(side - 2.0 * _LESS_M, 0.01) for side in box.size_m)
     return Box(box.X_FG, (x, y, z))
 
@@ -252,9 +290,10 @@ def _less(box: Box) -> Box:
 def reach_check(
     skill: ArmSkill[Any], seen: ObjectObservation, surfaces: Sequence[Surface], beyond_m: float = 0.0
 ) -> Callable[[], ReachCheck]:
-    """Gives, inside a Worker job, the check of how a skill's arm reaches an object on some surfaces.
+    """Returns a function that builds, inside a Worker job, the check of how a skill's arm reaches an object.
 
-    Around it stands what the hand camera has seen within the arm's reach and `beyond_m`, but just about the object.
+    Obstacles are the surfaces, and what the camera has seen within the arm's reach and `beyond_m`, except just around
+    the object.
     """
     X_WB, known_W = skill.X_WB(), skill.known_W
     seen = resting_on(seen, surfaces)
@@ -264,10 +303,57 @@ def reach_check(
     candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)
     cells = skill.context.solid.cells
     beside = [_less(box) for box in boxes_of(cells, X_WB, partial(_beside, seen))]
-    scene_now, widest, wide = skill.scene_now(boxes), skill.widest, wide_share(skill.gripper)
+    scene_now, widest, wide = skill.scene_now(boxes), skill.gripper.widest, wide_share(skill.gripper)
 
     def check() -> ReachCheck:
         """The check, with a collision scene of its own boxes."""
         return ReachCheck(scene_now(), boxes, X_WB, seen, candidates, widest, beside, wide)
 
     return check
+
+
+def choose_with_look(
+    skill: LookingSkill[Any], seen: ObjectObservation, choose: Callable[[], Routine[tuple[ChosenT, FloatArray]]]
+) -> Routine[ChosenT]:
+    """Returns the choice of `choose`, which also gives the points (N, 3, world) where the arm would be for it.
+
+    Looks once at those points near the object that no picture has shown yet, and then chooses again. The hand camera
+    looks down at objects, so that the board above a shelf is in no picture, and the arm would meet it.
+    """
+    chosen, arm_W = yield from choose()
+    if (yield from look_into_unseen(skill, seen, arm_W)):
+        chosen, _ = yield from choose()
+    return chosen
+
+
+def look_into_unseen(skill: LookingSkill[Any], seen: ObjectObservation, arm_W: FloatArray) -> Routine[bool]:
+    """Looks where the arm (points, world) would be near an object and no picture has looked; returns whether it did.
+
+    Does not look when the object is too far away to show its surroundings, or when the arm has no path to a viewpoint.
+    """
+    if not skill.object_camera.on_hand:  # a head camera views from above what the arm would meet
+        return False
+    offsets = arm_W - np.array(seen.position_W)
+    near_W = arm_W[np.linalg.norm(offsets[:, :2], axis=1) < _UNSEEN_NEAR_M]
+    unseen_W = near_W[never_seen(near_W, skill.context.solid.views)]
+    if len(unseen_W) < _FEWEST_UNSEEN:
+        return False
+    p_BT = skill.X_WB().inverse() @ unseen_W.mean(axis=0)
+    if np.linalg.norm(p_BT - skill.model.p_BS) > _UNSEEN_FURTHEST_M:
+        return False
+    message = f"looking above the {seen.kind}"
+    if (yield from planning_failure(skill.look_at(p_BT, level_viewpoints(skill.model, p_BT), message))):
+        return False
+    yield from skill.picture(message)
+    return True
+
+
+def level_viewpoints(model: ArmModel, p_BT: FloatArray) -> list[FloatArray]:
+    """Camera positions about as high as p_BT on the shoulder's side; low ones first, which see boards from below."""
+    ahead = (p_BT - model.p_BS) * [1.0, 1.0, 0.0]
+    ahead = ahead / max(float(np.linalg.norm(ahead)), 1e-6)
+    places = (
+        [*(model.p_BS + radius * ahead)[:2], p_BT[2] + up_m]
+        for up_m, radius in product((-0.1, -0.2, 0.0, -0.3, 0.1), (0.25, 0.35, 0.15))
+    )
+    return [np.array(place) for place in places if np.linalg.norm(np.array(place) - p_BT) > _NEAREST_VIEW_M]

@@ -1,7 +1,7 @@
-"""Where the object is now, as the hand camera sees it from just before the grasp.
+"""Visual servoing: the shift of an object, as the hand camera sees it from just before the grasp.
 
-The object's points, as seen before, are shifted until their outline fits the picture best (analysis by synthesis). What
-is nearer than the camera's least depth has no depth, and counts as part of what is seen.
+The object's known points are shifted until their outline fits the picture best (analysis by synthesis). Pixels nearer
+than the camera's least depth have no depth, and count as part of the object.
 """
 
 from __future__ import annotations
@@ -23,31 +23,53 @@ from skills.manipulation.grasp.planning import GraspPlan
 from skills.robot import ArmTrajectory, FloatArray, Image, Intrinsics
 
 SEARCHED_M: Final = 0.06
-_WIDTH_PX, _POINTS, _LEVELS = 80, 300, 4
+"""Largest shift that is searched."""
 _STEPS_M: Final = ((0.01, SEARCHED_M), (0.0025, 0.0075))
-_BEHIND_M, _NEAREST_M = 0.03, 0.22
-_OF_HEIGHT, _LEAST_HEIGHT_M, _WINDOW_PX = 0.3, 0.004, 9
-_LOOKS_DOWN, _PER_M = 0.5, 0.5
-"""A camera whose axis is as far below level sees shifts in both level directions, else only those across."""
-_AIMED_M, _FAR_OFF_M, _LEAST_OVERLAP = 0.003, 0.05, 0.5
+"""Step and range of the coarse and of the fine search."""
+_WIDTH_PX = 80
+"""Width of the reduced picture."""
+_POINTS = 300
+"""Number of the object's points that are used."""
+_LEVELS = 4
+"""Number of heights at which points below the seen ones are added."""
+_BEHIND_M = 0.03
+"""Depth behind the object beyond which pixels are not its own."""
+_NEAREST_M = 0.22
+"""Least depth of the camera."""
+_OF_HEIGHT = 0.3
+"""Part of the object's height below which it does not count as seen."""
+_LEAST_HEIGHT_M = 0.004
+"""Least height over the surface from which on the object counts as seen."""
+_WINDOW_PX = 9
+"""Width of the window around the outline in which solid pixels count."""
+_LOOKS_DOWN = 0.5
+"""A camera with a larger vertical share of its axis sees shifts in both level directions, else only across."""
+_PER_M = 0.5
+"""Overlap that a shift of one metre must gain."""
+_AIMED_M = 0.003
+"""Shift below which the hand is not moved."""
+_FAR_OFF_M = 0.05
+"""Shift beyond which the object counts as gone."""
+_LEAST_OVERLAP = 0.5
+"""Overlap below which the object counts as gone."""
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class SeenShift:
-    """How far (3,) in B, level, an object is from where it was; the overlap of its outline with what is seen there."""
+    """Level shift (3,) in B of an object, and the overlap of its shifted outline with the picture."""
 
     offset_B: FloatArray
     overlap: float
 
 
 def seen_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift | None:
-    """How far the object has moved since `target` was seen, by the depth of a picture taken at X_BC.
+    """Returns the shift of the object since `target` was seen, by the depth of a picture taken at X_BC.
 
-    None where the picture does not show its place. The body is level: its z axis points up.
+    None when the picture does not show its position. The body is level: its z axis points up.
     """
-    picture = _Picture.of(target, image, X_BC)
+    picture = _Picture.around(target, image, X_BC)
     if not picture.shows_place:
         return None
     best = SeenShift(np.zeros(3), picture.overlap(np.zeros(3)))
@@ -61,13 +83,13 @@ def seen_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift 
 
 
 Aim = tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None]
-"""The offset (3,) in B by which to shift the hand, and the approach from there, or None where that is not free."""
+"""Offset (3,) in B by which to shift the hand, and the approach from there, or None where that is not free."""
 
 
 def aimed_approach(
     found: SeenShift | None, plan: GraspPlan, model: ArmModel, scene_now: Callable[[], ArmScene]
 ) -> Aim | None:
-    """Aims a grasp across the fingers at where the object was seen now; None when the object is not there any more."""
+    """Aims a grasp across the fingers at the object's present position; None when the object is no longer there."""
     if found is None:
         return np.zeros(3), None
     if found.overlap < _LEAST_OVERLAP or np.linalg.norm(found.offset_B) > _FAR_OFF_M:
@@ -84,7 +106,7 @@ def aimed_approach(
 
 
 def shifted(model: ArmModel, trajectory: ArmTrajectory, offset_B: FloatArray) -> ArmTrajectory | None:
-    """A trajectory with the hand at each time offset_B (3,) beside where it was; None beyond the arm's reach."""
+    """Returns a trajectory with the hand shifted by offset_B (3,) at each time; None beyond the arm's reach."""
     positions = list[FloatArray]()
     for q_rad in trajectory.positions_rad:
         X_BH = model.X_BH(q_rad)
@@ -101,7 +123,7 @@ def _length(offset_B: FloatArray) -> float:
 
 
 def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[FloatArray]:
-    """Level shifts (3,) that a camera can tell, a grid of them in all directions or across where it looks ahead."""
+    """Yields level shifts (3,) that a camera can tell: a grid, or only shifts across for a camera that looks ahead."""
     axis = X_BC.rotation().matrix()[:, 2]
     ahead = np.array([axis[0], axis[1], 0.0])
     ahead = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) > 1e-3 else np.array([1.0, 0.0, 0.0])
@@ -113,7 +135,7 @@ def _offsets(X_BC: RigidTransform, step_m: float, reach_m: float) -> Iterator[Fl
 
 @dataclass(frozen=True)
 class _Picture:
-    """A depth picture made small: what stands at the object's place (`solid`), which pixels tell (`known`)."""
+    """Reduced depth picture: pixels of the object's space (`solid`), and pixels with information (`known`)."""
 
     solid: Mask
     known: Mask
@@ -123,8 +145,8 @@ class _Picture:
     stride: int
 
     @classmethod
-    def of(cls, target: Target, image: Image, X_BC: RigidTransform) -> _Picture:
-        """What a picture shows about a target's place."""
+    def around(cls, target: Target, image: Image, X_BC: RigidTransform) -> _Picture:
+        """Reduces a picture around a target."""
         lens = image.depth_intrinsics
         stride = max(1, lens.width // _WIDTH_PX)
         depth = image.depth_m[::stride, ::stride].astype(np.float64)
@@ -143,12 +165,12 @@ class _Picture:
 
     @property
     def shows_place(self) -> bool:
-        """Returns whether pixels that tell show half of where the object was, at least."""
+        """Returns whether the known pixels show at least half of the object's former outline."""
         outline = self._outline(np.zeros(3))
         return bool(outline.sum() > 0 and (outline & self.known).sum() > 0.5 * outline.sum())
 
     def overlap(self, offset_B: FloatArray) -> float:
-        """Intersection over union of the outline of the shifted object with what is seen about there."""
+        """Intersection over union of the shifted object's outline with the solid pixels around it."""
         outline = self._outline(offset_B)
         about = cv2.dilate(outline.astype(np.uint8), np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8)) > 0
         both = (outline & self.solid & self.known).sum()
@@ -156,7 +178,7 @@ class _Picture:
         return float(both / max(either, 1))
 
     def _outline(self, offset_B: FloatArray) -> Mask:
-        """The pixels that the shifted object covers."""
+        """Mask of the pixels that the shifted object covers."""
         p_C = self.X_CB @ (self.points_B + offset_B).T
         ahead = p_C[:, p_C[2] > 0.02]
         u = np.rint((ahead[0] / ahead[2] * self.lens.fx + self.lens.cx) / self.stride).astype(np.int64)
@@ -168,19 +190,19 @@ class _Picture:
 
 
 def _rays(lens: Intrinsics, stride: int) -> FloatArray:
-    """Directions (H, W, 3) in the camera's frame with z = 1, of each pixel of the small picture."""
+    """Directions (H, W, 3) in the camera's frame with z = 1, of each pixel of the reduced picture."""
     x = (np.arange(0, lens.width, stride) - lens.cx) / lens.fx
     y = (np.arange(0, lens.height, stride) - lens.cy) / lens.fy
     return np.stack([*np.meshgrid(x, y), np.ones((len(y), len(x)))], axis=-1)
 
 
 def _lowest_m(target: Target) -> float:
-    """From what height over its surface on an object counts as seen: below, its surface is too near to tell."""
+    """Height over its surface from which on an object counts as seen: lower parts are too near the surface."""
     return max(_OF_HEIGHT * target.height_m, _LEAST_HEIGHT_M)
 
 
 def _filled(target: Target) -> FloatArray:
-    """Points (N, 3) all over an object: those that were seen, and what is below them as far as it counts as seen."""
+    """Points (N, 3) all over an object: the seen ones, and those below them down to `_lowest_m`."""
     low_m = target.base_m + _lowest_m(target)
     seen = target.points_B[target.points_B[:, 2] > low_m]
     seen = seen[:: max(1, len(seen) // _POINTS)]

@@ -1,4 +1,4 @@
-"""What the hand_over skill takes and gives: all that a tree is compiled from."""
+"""Ports of the hand_over skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class HandOverInputs:
 
 
 class HandOverPorts(Skill[HandOverInputs]):
-    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and looks who has it."""
+    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and checks who has it."""
 
     done_by: ClassVar[str] = "skills.manipulation.hand_over.skill:HandOver"
     name = "hand_over"

@@ -1,11 +1,11 @@
-"""The hand-over skill: hold the object out to a person, and let go when they pull at it or the operator says so."""
+"""The hand-over skill: holds the object out to a person, and lets go when they pull at it or the operator says so."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -13,14 +13,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.geometry import wrap
-from skills.manipulation.approach.standing import go_to_one
+from skills.manipulation.approach.base_placement import go_to_one
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N
 from skills.manipulation.arm.collision import ArmScene, Box
+from skills.manipulation.arm.forces import PullWatch
 from skills.manipulation.arm.hold import Grip
-from skills.manipulation.arm.pull import PullWatch
-from skills.manipulation.hand_over.given import Seen, release_from, release_of
 from skills.manipulation.hand_over.ports import HandOverInputs, HandOverPorts
-from skills.manipulation.hand_over.verification import HandOverVerification
+from skills.manipulation.hand_over.verification import HandOverVerification, Release, Seen, release_of
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.ports import NavigateInputs
@@ -31,24 +30,37 @@ from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
 
 _FACING_RAD = 0.5
+"""Largest bearing of a person who is ahead."""
 _SCANS = 3
-_SCAN_PATIENCE_S, _SCAN_AGE_S = 2.0, 1.0
+"""Number of scans in which the person must be seen."""
+_SCAN_PATIENCE_S = 2.0
+_SCAN_AGE_S = 1.0
+_SAME_PERSON_M = 0.25
 _PERSON_SIZE_M = (0.6, 0.6, 1.8)
 _STILL_S = 0.5
+"""Pause in which hand and object come to rest."""
 _FREE_S = 2.0
-_LETS_GO, _KEEPS = "let go", "hold on"
+"""Time that the open gripper has to become empty."""
+_LETS_GO = "let go"
+_KEEPS = "hold on"
 _POINTS_DOWN = 0.8
+"""Vertical share of the hand's direction from which on the hand points down."""
 _TRIES = 2
-_WIDE, _SHAKE_RAD, _SHAKE_RAD_S = 0.75, (0.35, -0.35, 0.35, -0.35), 3.0
+_WIDE = 0.75
+"""Opening of a gripper that shakes an object off, as a part of its widest."""
+_SHAKE_RAD = (0.35, -0.35, 0.35, -0.35)
+_SHAKE_RAD_S = 3.0
+_HOLD_OUT_RAD_S = 0.8
 
 
 @dataclass(frozen=True)
 class HandOverOptions:
-    """Where the robot stands and holds the object.
+    """Positions of the robot and of the object, and when the gripper lets go.
 
-    The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The object is held out
-    at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, `furthest_m` at most. It lets
-    go when the hand feels a pull beyond `pull_n`, and draws the object in when nobody has taken it within `wait_s`.
+    The robot stands `stand_off_m` from the person's axis, or stays within `stand_off_range_m`. The hand holds the
+    object at `height_m`, at the first of `gaps_m` from the person's axis that the arm can reach, at most `furthest_m`.
+    The gripper lets go when the hand feels a pull beyond `pull_n`; the arm draws the object in when nobody has taken it
+    within `wait_s`.
     """
 
     stand_off_m: Length = 1.5
@@ -66,27 +78,20 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions
 
+    lost_message = "the object was lost before it was held out"
+
     def begin(self, inputs: HandOverInputs) -> None:
         """Forgets an earlier attempt."""
-        self._watch, self.checkpoint = None, {}
+        self.checkpoint = {}
         super().begin(inputs)
-
-    def resume(self, inputs: HandOverInputs) -> None:
-        """Goes on after a pause or a restart; what happened meanwhile is no slip."""
-        self._watch = None if self._watch is None else self.hold_watch()
-        super().resume(inputs)
 
     def end(self) -> None:
         """Withdraws the offer."""
         self.context.payload.offered = False
         super().end()
 
-    def trouble(self) -> SkillFailure | None:
-        """Failure when the object is lost before the offer; grips again what begins to slip."""
-        return self.lost("the object was lost before it was held out")
-
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Find, go, hold out, wait, let go; what the closing gripper feels again is held out once more."""
+        """Finds the person, goes there, holds the object out and lets go; tries again when that fails."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to hand over")
         for _ in range(_TRIES):
@@ -97,7 +102,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return self._given(inputs, seen)
 
     def _give(self, inputs: HandOverInputs) -> Routine[Seen]:
-        """Holds the object out and lets go of it; what became of it."""
+        """Holds the object out and lets go; returns the outcome of the check."""
         self._watch = self.hold_watch()
         person = yield from self._find(inputs.person)
         if not _well_placed(self._ahead(person), self.options.stand_off_range_m):
@@ -109,14 +114,14 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         yield from self.pause(_STILL_S, f"holding the {inputs.thing} out to {inputs.person}")
         held_kg = yield from self.weigh(self.p_HT, f"weighing the {inputs.thing}")
         self._watch, self.context.payload.offered = None, True
-        if not (yield from self._taken(inputs)):
+        if not (yield from self._pulled(inputs)):
             yield from self.move_to(lambda scene, q: q_carrying_rad, f"drawing the {inputs.thing} in")
             why = f"{inputs.person} did not take the {inputs.thing} within {self.options.wait_s:g} s"
             raise SkillFailure(Cause.TIMEOUT, why)
         return (yield from self._let_go(inputs, held_kg))
 
     def run_again(self, inputs: HandOverInputs) -> Routine[Succeeded]:
-        """Goes on from an attempt that was broken off; what was let go of is looked for with the person."""
+        """Continues an interrupted attempt: after the release it looks for the object with the person."""
         self._watch = None
         if not self.checkpoint.get("lets_go"):
             return (yield from self.run(inputs))
@@ -127,22 +132,22 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return (yield from self.run(inputs))
 
     def _given(self, inputs: HandOverInputs, seen: Seen) -> Succeeded:
-        """Success where the person has the object, at rest. Raises SkillFailure with cause POSTCONDITION otherwise."""
-        thing, person = inputs.thing, inputs.person
+        """Returns success when the person has the object at rest. Raises SkillFailure with cause POSTCONDITION."""
+        name, person = inputs.thing, inputs.person
         why = {
-            Seen.IN_GRIPPER: f"the {thing} is still in the gripper",
-            Seen.FELL: f"the {thing} fell to the floor before {person}",
-            Seen.NOT_SEEN: f"the {thing} is not seen where it was let go of before {person}",
-            Seen.MOVES: f"the {thing} still moves where it was let go of before {person}",
+            Seen.IN_GRIPPER: f"the {name} is still in the gripper",
+            Seen.FELL: f"the {name} fell to the floor before {person}",
+            Seen.NOT_SEEN: f"the {name} is not seen where it was let go of before {person}",
+            Seen.MOVES: f"the {name} still moves where it was let go of before {person}",
         }
         if seen in why:
             raise SkillFailure(Cause.POSTCONDITION, why[seen])
-        return Succeeded(f"gave the {thing} to {person}")
+        return Succeeded(f"gave the {name} to {person}")
 
-    def _taken(self, inputs: HandOverInputs) -> Routine[bool]:
-        """Waits for a pull at the object, or for the operator's word; False when the time is over.
+    def _pulled(self, inputs: HandOverInputs) -> Routine[bool]:
+        """Waits for a pull at the object or the operator's answer; returns False when the time is over.
 
-        True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
+        Returns True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
         """
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
         watch, hold = PullWatch(self.model, self.p_HT, self.options.pull_n), self.hold_watch()
@@ -163,27 +168,24 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
             asked.withdraw()
 
     def _let_go(self, inputs: HandOverInputs, held_kg: float | None) -> Routine[Seen]:
-        """Open, wait until the gripper feels nothing, leave the object without dragging it, and see who has it."""
-        thing, message = (
-            inputs.thing,
-            f"giving the {inputs.thing} to {inputs.person}",
-        )
+        """Opens the gripper until it feels nothing, leaves the object without dragging it, and checks who has it."""
+        name, message = inputs.thing, f"giving the {inputs.thing} to {inputs.person}"
         if not self.checkpoint.get("lets_go"):
             corners_H = self.context.payload.corners_H
             release = release_of(self.X_WB() @ self.model.X_BH(self.q_rad()), self.p_HT, corners_H)
-            self.checkpoint = {"lets_go": True, "release": release.state()}
-        yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, message)
+            self.checkpoint = {"lets_go": True, "release": asdict(release)}
+        yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
         free = yield from self._feels_nothing(message)
         yield from self.pause(_STILL_S, message)
         if not free or (yield from self.hangs_on_hand(held_kg, message)):
-            yield from self._shake(f"shaking the {thing} off the fingers")
+            yield from self._shake(f"shaking the {name} off the fingers")
             if not (yield from self._feels_nothing(message)):
-                raise SkillFailure(Cause.POSTCONDITION, f"the {thing} is still in the open gripper")
+                raise SkillFailure(Cause.POSTCONDITION, f"the {name} is still in the open gripper")
         yield from self.leave_object()
-        return (yield from self.verify(thing, inputs.person, release_from(self.checkpoint["release"])))
+        return (yield from self.verify(name, inputs.person, Release(**self.checkpoint["release"])))
 
     def _feels_nothing(self, message: str) -> Routine[bool]:
-        """Waits until the gripper feels nothing; False when it still does after a while."""
+        """Waits until the gripper feels nothing; returns False when it still does after a while."""
         end_s = self.context.clock.now() + _FREE_S
         while self.context.robot.gripper().holding:
             if self.context.clock.now() > end_s:
@@ -192,8 +194,8 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         return True
 
     def _shake(self, message: str) -> Routine[None]:
-        """Opens wide, and turns the hand to and fro: what sticks to a finger comes off."""
-        yield from self.move_gripper(_WIDE * self.widest, GRIPPER_FORCE_N, message)
+        """Opens wide and turns the hand to and fro, so that an object that sticks to a finger comes off."""
+        yield from self.move_gripper(_WIDE * self.gripper.widest, GRIPPER_FORCE_N, message)
         q, wrist = self.q_rad(), np.eye(len(self.model.names))[-1]
         turns = [q + turn_rad * wrist for turn_rad in _SHAKE_RAD]
         inside = [each for each in turns if np.all((each > self.model.lower_rad) & (each < self.model.upper_rad))]
@@ -202,9 +204,9 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         yield from self.pause(_STILL_S, message)
 
     def _find(self, name: str) -> Routine[SeenPerson]:
-        """The nearest person that is seen in several scans, ahead rather than behind; missing scans are waited for.
+        """Finds the nearest person in several scans, preferring people ahead; waits for missing scans.
 
-        Raises SkillFailure: there are no new scans, or nobody is seen in them.
+        Raises SkillFailure when there are no new scans, or nobody is seen in them.
         """
         clock, patience, seen = self.context.clock, Patience(self.context.clock), list[SeenPerson]()
         stamp_s, end_s = -math.inf, clock.now() + _SCAN_PATIENCE_S
@@ -237,12 +239,12 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])
 
     def _hold_out(self, person: SeenPerson, name: str) -> Routine[None]:
-        """Stretch the arm towards the person, with the object as it stood or lay, or else as it is carried.
+        """Stretches the arm towards the person, with the object as it was grasped, or else as it is carried.
 
-        What lies on a finger as it is carried would stay there when the gripper opens.
+        An object that rests on a finger while it is carried would stay there when the gripper opens.
         """
-        taken_R_BH, R_BH = self.context.payload.R_BH, self.model.X_BH(self.q_rad()).rotation()
-        rotations = [R_BH] if taken_R_BH is None else [taken_R_BH, R_BH]
+        grasped_R_BH, R_BH = self.context.payload.R_BH, self.model.X_BH(self.q_rad()).rotation()
+        rotations = [R_BH] if grasped_R_BH is None else [grasped_R_BH, R_BH]
         p_BP = self._ahead(person)
         axis = RigidTransform([*p_BP, 0.5 * _PERSON_SIZE_M[2] - self._height_m()])
         self.boxes = [Box(axis, _PERSON_SIZE_M)]
@@ -251,10 +253,10 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
             return hold_out_configuration(scene, rotations, p_BP, self.p_HT, level_m, self.options.gaps_m, q)
 
-        yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=0.8)
+        yield from self.move_to(goal, f"holding the object out to {name}", speed_rad_s=_HOLD_OUT_RAD_S)
 
     def _check(self, person: SeenPerson, name: str) -> None:
-        """Raises SkillFailure unless the object is held out near the person."""
+        """Raises SkillFailure unless the object is held near the person."""
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the object was lost while it was held out to {name}")
         p_BT = self.model.X_BH(self.q_rad()) @ self.p_HT
@@ -263,12 +265,12 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
             raise SkillFailure(Cause.EXECUTION, f"the object is held {off:.2f} m from {name}, which is too far")
 
     def _ahead(self, person: SeenPerson) -> FloatArray:
-        """The person's axis (x, y) in the body frame."""
+        """Axis (x, y) of the person in the body frame."""
         return np.asarray((self.X_WB().inverse() @ np.array([*person.place_W, 0.0]))[:2])
 
 
 def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
-    """Poses stand_off_m from a point that face it, the ones that cost least to reach first."""
+    """Returns poses at a distance from a point that face it, the nearest first."""
     poses = []
     for k in range(count):
         yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
@@ -286,10 +288,11 @@ def hold_out_configuration(
     gaps_m: Sequence[float],
     q_near_rad: FloatArray,
 ) -> FloatArray:
-    """Arm angles with the object before the person; level_m is its height in B.
+    """Returns arm angles (J,) with the object before the person; level_m is its height in B.
 
-    The hand is turned as in the first R_BH of `rotations` that does, about the vertical towards the person. The
-    person's axis is at p_BP (2,), the middle of the object at p_HT. Raises PlanningError out of the arm's reach.
+    The hand is turned about the vertical towards the person, as in the first of `rotations` (R_BH) that is feasible.
+    The person's axis is at p_BP (2,), the object's centre at p_HT. Raises PlanningError when the person is out of
+    reach.
     """
     direction = math.atan2(p_BP[1], p_BP[0])
     heading = np.array([math.cos(direction), math.sin(direction), 0.0])
@@ -305,7 +308,7 @@ def hold_out_configuration(
 
 
 def _towards(R_BH: RotationMatrix, direction_rad: float) -> list[RotationMatrix]:
-    """The hand turned about the vertical so that it points in a direction; one that points down in any of four."""
+    """Returns rotations of the hand about the vertical towards a direction; four when the hand points down."""
     x_axis = R_BH.matrix()[:, 0]
     ahead = direction_rad - math.atan2(x_axis[1], x_axis[0])
     turns = (0.0, math.pi / 2, -math.pi / 2, math.pi) if x_axis[2] < -_POINTS_DOWN else (0.0,)
@@ -318,6 +321,6 @@ def _well_placed(p_BP: FloatArray, range_m: tuple[float, float]) -> bool:
 
 
 def _same(people: list[SeenPerson], other: SeenPerson) -> list[SeenPerson]:
-    """The person among some who stands where another was seen, if there is one."""
-    near = [p for p in people if math.dist(p.place_W, other.place_W) < 0.25]
+    """Returns the person who stands where another one was seen, as a list; empty when there is none."""
+    near = [p for p in people if math.dist(p.place_W, other.place_W) < _SAME_PERSON_M]
     return near[:1]

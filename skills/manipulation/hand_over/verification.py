@@ -1,94 +1,230 @@
-"""How the hand-over skill knows that the person has the object: by the gripper, the arm's load and the camera."""
+"""Check that a person has the released object, by the gripper, the arm's load and the camera."""
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Sequence
-from functools import partial
+import enum
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
-from skills.api import Cause, InputsT
+from skills.api import Cause, InputsT, Surface
 from skills.back_off.ports import BackOffInputs
 from skills.back_off.skill import BackOff
-from skills.manipulation.arm.collision import ArmScene, Box
+from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.looking_skill import LookingSkill
-from skills.manipulation.arm.poses import UP_B, carry_configuration, overview_viewpoints, towards_shoulder
-from skills.manipulation.hand_over.given import Release, Seen, Sight, names_in, seen_given
-from skills.perception.detection_3d import detections_3d
+from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
+from skills.perception.class_forms import PERSON
+from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
-from skills.robot import ArmCapabilities, FloatArray, Image
+from skills.perception.point_cloud import cloud_from_image
+from skills.perception.surface_segmentation import segment_surface
+from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
 
 LOOKS = 3
+"""Number of views of a head camera of the place where it saw nothing."""
 SETTLES_WITHIN_S = 8.0
-"""What still moves so long after it was let go of does not come to rest."""
-_MOVES_ABOUT_M, _BACK_OFF_M, _FLOOR_AHEAD_M = 0.25, 0.3, 1.2
-_BORNE_M, _DEEP_M, _OVER_M = 0.42, 0.12, 0.005
-"""How far hands or a tray that bear what was let go of may reach: wide, below its lowest point and over that (m)."""
-_FLOOR_FROM_M, _FLOOR_M = 0.07, (1.2, 2.4, 0.1)
-"""The floor, for an arm that goes round: from how far before the body on, and how large (m)."""
-_OWN_M, _OVER_TOP_M = 0.14, 0.03
-"""The object's own space, as it may have turned: wide, and over its highest point (m)."""
-_FROM_M, _BELOW_RAD, _ASIDE_RAD = (0.45, 0.4, 0.5), np.radians([35.0, 45.0, 25.0, 55.0]), (0.0, 0.5, -0.5)
+"""Time after the release within which a borne object must come to rest."""
+_TALL_M = 0.05
+"""Only an object that is taller than this is recognised by its height."""
+_UPPER_PART = 0.5
+"""Part of a tall object's height from which on its points count."""
+_ABOVE_TOP_M = 0.06
+"""Height over a tall object's top up to which its points count."""
+_BESIDE_M = 0.12
+"""Level distance from the release point within which points belong to the object."""
+_LEAST_POINTS = 12
+_TAKEN_WITHIN_M = 0.35
+"""Level distance from the release point within which a detected object is the released one."""
+_LOWER_M = 0.35
+"""Distance below the release point within which somebody bears the object."""
+_FALLEN_M = 0.3
+"""Height over the floor below which an object has fallen."""
+_FELL_WITHIN_M = 1.0
+"""Level distance from the release point within which a fallen object is looked for."""
+_PLATE_M = 0.2
+"""Half side of the square around the object in which a plate that bears it is looked for."""
+_MOVES_ABOUT_M = 0.25
+"""Radius around the object in which motion is looked for."""
+_BACK_OFF_M = 0.3
+_FLOOR_AHEAD_M = 1.2
+"""Least distance ahead of the shoulder at which the hand camera views the floor."""
+_BORNE_M = 0.42
+"""Width of the hands or the tray that bear the object."""
+_DEEP_M = 0.12
+"""Height of the hands or the tray below the object's lowest point."""
+_OVER_M = 0.005
+"""Height of the hands or the tray over the object's lowest point."""
+_OWN_M = 0.14
+"""Width of the object's own space, in which the object may have turned."""
+_OVER_TOP_M = 0.03
+"""Height of the object's own space over its highest point."""
+_FLOOR_FROM_M = 0.07
+"""Distance ahead of the body from which on the floor is an obstacle for the arm."""
+_FLOOR_SIZE_M = (1.2, 2.4, 0.1)
+_FROM_M = (0.45, 0.4, 0.5)
+"""Distances of the hand camera's viewpoints from the object, the best first."""
+_BELOW_RAD = tuple(np.radians([35.0, 45.0, 25.0, 55.0]))
+"""Angles below level at which the hand camera views the object, the best first."""
+_ASIDE_RAD = (0.0, 0.5, -0.5)
+"""Angles about the object at which the hand camera views it, the best first."""
 _HIGHEST_CAMERA_M = 1.4
-"""A hand camera that looks at what a person bears stays lower than their face."""
-_STILL_HELD, _LEAST_KG = 0.5, 0.06
+"""Height of the hand camera below a person's face."""
+_STILL_HELD = 0.5
+"""Part of the object's weight from which on it still hangs on the hand."""
+_LEAST_KG = 0.06
+"""Least mass that weighing can tell from nothing."""
+
+
+class Seen(enum.Enum):
+    """Outcome of the check of a released object."""
+
+    GIVEN = "given"  # it is where it was let go of, or a little lower: somebody bears it
+    FELL = "fell"  # it lies near the floor
+    NOT_SEEN = "not seen"  # neither
+    MOVES = "moves"  # somebody bears it, and it does not come to rest
+    IN_GRIPPER = "in the gripper"  # the closing gripper feels it
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Outcome of one picture, and the point (3,) in the world that it is about (m)."""
+
+    seen: Seen
+    p_W: FloatArray
+
+
+@dataclass(frozen=True)
+class Release:
+    """Point of a release in the world: the object's level centre, its lowest and its highest point (m)."""
+
+    x_m: float
+    y_m: float
+    low_m: float
+    top_m: float
+
+    @property
+    def p_W(self) -> FloatArray:
+        """Centre (3,) of the object."""
+        return np.array([self.x_m, self.y_m, 0.5 * (self.low_m + self.top_m)])
+
+
+def release_of(X_WH: RigidTransform, p_HT: FloatArray, corners_H: FloatArray | None) -> Release:
+    """Returns the release of an object at p_HT (3,) of a hand; corners_H (8, 3) are those of its box, if known."""
+    points_W = X_WH.rotation().matrix() @ (p_HT[None, :] if corners_H is None else corners_H).T
+    heights_m = points_W[2] + X_WH.translation()[2]
+    x_m, y_m, _ = X_WH @ p_HT
+    return Release(float(x_m), float(y_m), float(heights_m.min()), float(heights_m.max()))
+
+
+def seen_given(
+    image: Image, X_WO: RigidTransform, found: Iterable[Detection3D], names: Sequence[str], release: Release
+) -> Sight:
+    """Judges the release from a picture without the robot's arm and the objects detected in it.
+
+    An object counts as given when one of its class is near the release point, when something there is as high as its
+    upper half was, or when something lies there on a level plate. Where `names` is empty, every class except people is
+    its own.
+    """
+    own = [each for each in found if (each.class_name in names if names else each.class_name != PERSON)]
+    own.sort(key=lambda each: _off_m(each, release))
+    lowest_m = max(release.low_m - _LOWER_M, _FALLEN_M)
+    for each in own:
+        if _off_m(each, release) < _TAKEN_WITHIN_M and each.position_W[2] > lowest_m:
+            return Sight(Seen.GIVEN, each.position_W)
+    if stands_at(image, X_WO, release) or lies_at(image, X_WO, release):
+        return Sight(Seen.GIVEN, release.p_W)
+    for each in own:
+        if _off_m(each, release) < _FELL_WITHIN_M and each.position_W[2] <= _FALLEN_M:
+            return Sight(Seen.FELL, each.position_W)
+    return Sight(Seen.NOT_SEEN, release.p_W)
+
+
+def _off_m(found: Detection3D, release: Release) -> float:
+    return float(np.hypot(found.position_W[0] - release.x_m, found.position_W[1] - release.y_m))
+
+
+def lies_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
+    """Returns whether a picture shows something on a level plate at about the height of the release."""
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    square = tuple((release.x_m + _PLATE_M * x, release.y_m + _PLATE_M * y) for x, y in corners)
+    view = segment_surface(image, X_WO, Surface("plate", square, release.low_m))
+    if view is None:
+        return False
+    middles = [np.median(cluster.points.p_W[:, :2], axis=0) for cluster in view.clusters]
+    return any(np.hypot(x - release.x_m, y - release.y_m) < _BESIDE_M for x, y in middles)
+
+
+def stands_at(image: Image, X_WO: RigidTransform, release: Release) -> bool:
+    """Returns whether a picture's depth shows something as high as the upper half of a tall object at the release."""
+    tall_m = release.top_m - release.low_m
+    if tall_m < _TALL_M:
+        return False
+    heights_m = (release.low_m + _UPPER_PART * tall_m, release.top_m + _ABOVE_TOP_M)
+    p_W = cloud_from_image(image, X_WO, heights_m=heights_m).p_W
+    beside_m = np.hypot(p_W[:, 0] - release.x_m, p_W[:, 1] - release.y_m)
+    return int(np.count_nonzero(beside_m < _BESIDE_M)) >= _LEAST_POINTS
+
+
+def names_in(name: str, class_names: Iterable[str]) -> tuple[str, ...]:
+    """Returns the classes that a text such as "red wrench" names."""
+    words = name.split()
+    return tuple(each for each in class_names if each in words)
 
 
 class HandOverVerification(LookingSkill[InputsT]):
-    """Looks whether a person has what was let go of, at rest, and stows the arm around what bears it."""
+    """Routine that looks whether a person has the released object, at rest, and stows the arm around what bears it."""
 
     def hangs_on_hand(self, held_kg: float | None, message: str) -> Routine[bool]:
-        """Whether the arm still bears most of the weight that it bore; False where that was too little to tell."""
+        """Returns whether the arm still bears most of the held weight; False where that weight is too small to tell."""
         if held_kg is None or held_kg < _LEAST_KG:
             return False
         return (yield from self.weigh(self.p_HT, message)) > _STILL_HELD * held_kg
 
-    def verify(self, thing: str, person: str, release: Release) -> Routine[Seen]:
-        """What became of the object, by the camera and by the gripper, which closes meanwhile; the arm is stowed then.
+    def verify(self, name: str, person: str, release: Release) -> Routine[Seen]:
+        """Checks the release by the camera and by the gripper, which closes meanwhile, and stows the arm.
 
-        A camera on the hand looks before the arm is stowed; for one on the head the arm goes out of its view first.
+        A hand camera looks before the arm is stowed; for a head camera the arm leaves the view first.
         """
-        message = f"looking whether {person} has the {thing}"
+        message = f"looking whether {person} has the {name}"
         if self.object_camera.on_hand:
-            seen = yield from self._watched(thing, release, message)
+            seen = yield from self._watched(name, release, message)
             yield from self._stow_beside(release, message)
             return Seen.IN_GRIPPER if self.context.robot.gripper().holding else seen
         yield from self._stow_beside(release, message)
         if self.context.robot.gripper().holding:
             return Seen.IN_GRIPPER
-        return (yield from self._watched(thing, release, message))
+        return (yield from self._watched(name, release, message))
 
-    def _watched(self, thing: str, release: Release, message: str) -> Routine[Seen]:
-        """What is seen of the object: the first look that shows it counts, and it is watched until it is at rest."""
+    def _watched(self, name: str, release: Release, message: str) -> Routine[Seen]:
+        """Looks until the object is seen, and then until it is at rest."""
         for p_WT, viewpoints_B in self._looks(release):
-            yield from self._turn_to(p_WT, viewpoints_B, thing, message)
+            yield from self._turn_to(p_WT, viewpoints_B, name, message)
             end_s, seen = self.context.clock.now() + SETTLES_WITHIN_S, Seen.MOVES
             while seen is Seen.MOVES and self.context.clock.now() < end_s:
-                seen = yield from self._seen(thing, release, message)
+                seen = yield from self._seen(name, release, message)
             if seen is not Seen.NOT_SEEN:
                 return seen
         return Seen.NOT_SEEN
 
-    def _seen(self, thing: str, release: Release, message: str) -> Routine[Seen]:
-        """What pictures taken from here show; of an object that somebody bears, two more tell whether it is at rest."""
+    def _seen(self, name: str, release: Release, message: str) -> Routine[Seen]:
+        """Judges a picture from here; two more pictures tell whether an object that somebody bears is at rest."""
         try:
             image = yield from self.picture(message)
-            sight = yield from self._sight(image, thing, release, message)
+            sight = yield from self._sight(image, name, release, message)
             if sight.seen is not Seen.GIVEN:
                 return sight.seen
             at_rest = yield from self.at_rest_since(image, sight.p_W, _MOVES_ABOUT_M, message)
         except SkillFailure as failure:
-            raise _unseen(thing, failure) from failure
+            raise _unseen(name, failure) from failure
         return Seen.GIVEN if at_rest else Seen.MOVES
 
     def _looks(self, release: Release) -> Sequence[tuple[FloatArray, Sequence[FloatArray]]]:
-        """Which point of the world to look at, and from where (B): where it was let go of, then the floor.
+        """Points of the world to look at, with viewpoints (B): the release, then the floor.
 
-        A hand camera does not look as steeply down as to the floor right before the body.
+        The hand camera cannot look steeply enough to see the floor right before the body.
         """
         p_WT, p_WF = (np.array([release.x_m, release.y_m, level_m]) for level_m in (release.low_m, 0.0))
         if not self.object_camera.on_hand:
@@ -97,34 +233,24 @@ class HandOverVerification(LookingSkill[InputsT]):
         ahead_B = -towards_shoulder(self.model.p_BS, p_BF)
         p_BF = p_BF + max(0.0, _FLOOR_AHEAD_M - float(np.linalg.norm((p_BF - self.model.p_BS)[:2]))) * ahead_B
         highest_m = _HIGHEST_CAMERA_M - self._height_m()
-        near = [self._viewpoints(p_BT, aside_rad, highest_m) for aside_rad in _ASIDE_RAD]
+        around = [close_viewpoints(self.model.p_BS, p_BT, aside_rad, _BELOW_RAD, _FROM_M) for aside_rad in _ASIDE_RAD]
+        near = [[p_BC for p_BC in viewpoints if p_BC[2] < highest_m] for viewpoints in around]
         first = [*near[0], *near[1], *near[2]]
         second = [*near[1], *near[2], *near[0]]
         return [(p_WT, first), (p_WT, second), (self.X_WB() @ p_BF, overview_viewpoints(self.model, p_BF))]
 
-    def _viewpoints(self, p_BT: FloatArray, aside_rad: float, highest_m: float) -> list[FloatArray]:
-        """Camera places (B) on the shoulder's side of a point, looking down at it; none above a height in B (m)."""
-        home_B = towards_shoulder(self.model.p_BS, p_BT)
-        heading_rad = math.atan2(home_B[1], home_B[0]) + aside_rad
-        level_B = np.array([math.cos(heading_rad), math.sin(heading_rad), 0.0])
-        places = (
-            p_BT + distance_m * (math.cos(below_rad) * level_B + math.sin(below_rad) * UP_B)
-            for below_rad, distance_m in itertools.product(_BELOW_RAD, _FROM_M)
-        )
-        return [place for place in places if place[2] < highest_m]
-
-    def _turn_to(self, p_WT: FloatArray, viewpoints_B: Sequence[FloatArray], thing: str, message: str) -> Routine[None]:
-        """Points the camera at a point of the world; a hand that finds no way there looks from where it is."""
+    def _turn_to(self, p_WT: FloatArray, viewpoints_B: Sequence[FloatArray], name: str, message: str) -> Routine[None]:
+        """Points the camera at a point of the world; a hand without a path looks from where it is."""
         try:
             yield from self.look_at(self.X_WB().inverse() @ p_WT, viewpoints_B, message)
         except SkillFailure as failure:
             if not self.object_camera.on_hand or failure.cause is not Cause.PLANNING:
-                raise _unseen(thing, failure) from failure
+                raise _unseen(name, failure) from failure
 
-    def _sight(self, image: Image, thing: str, release: Release, message: str) -> Routine[Sight]:
-        """What a picture shows of the object."""
+    def _sight(self, image: Image, name: str, release: Release, message: str) -> Routine[Sight]:
+        """Judges one picture."""
         context = self.context
-        place, names = context.localiser.estimate(), names_in(thing, context.detector.class_names)
+        place, names = context.localiser.estimate(), names_in(name, context.detector.class_names)
 
         def look() -> Sight:
             found = detections_3d(image, place, detect_in_image(context.detector, image), ())
@@ -135,18 +261,17 @@ class HandOverVerification(LookingSkill[InputsT]):
     def _stow_beside(self, release: Release, message: str) -> Routine[None]:
         """Stows the arm around the hands, or the tray, that bear the object now.
 
-        A hand that comes straight from there first comes near the body: a long way round would swing it through what
-        no camera has seen. Where there is no way, the robot backs off a little first; then any way will do.
+        For a head camera the hand first comes near the body, because a long detour would swing it through unseen space.
+        Where there is no path, the robot backs off a little and tries again.
         """
-        around_person, arm = self.boxes, self.arm
+        around_person = self.boxes
         for backs_off in (False, True):
             try:
                 if backs_off:
                     yield from self.perform(BackOff(self.context), BackOffInputs(_BACK_OFF_M))
                 self.boxes = [*(() if backs_off else around_person), *self._borne(release)]
-                R_BH = self.model.X_BH(self.q_rad()).rotation()
                 if not self.object_camera.on_hand:
-                    yield from self.move_to(partial(_carried, arm, R_BH), message)
+                    yield from self.carry(self.model.X_BH(self.q_rad()).rotation(), message, None)
                 yield from self.stow(message)
                 break
             except SkillFailure:
@@ -157,23 +282,19 @@ class HandOverVerification(LookingSkill[InputsT]):
         self.boxes = around_person
 
     def _borne(self, release: Release) -> list[Box]:
-        """What bears the object, the object as it may have turned, and the floor, as boxes in the body frame."""
+        """Boxes (B) of the hands or the tray, of the object as it may have turned, and of the floor."""
         X_BW, boxes = self.X_WB().inverse(), list[Box]()
         borne = (_BORNE_M, release.low_m - _DEEP_M, release.low_m + _OVER_M)
         for side_m, low_m, high_m in (borne, (_OWN_M, release.low_m, release.top_m + _OVER_TOP_M)):
             X_WG = RigidTransform([release.x_m, release.y_m, 0.5 * (low_m + high_m)])
             boxes.append(Box(X_BW @ X_WG, (side_m, side_m, high_m - low_m)))
         front_m = max(x for x, _ in self.context.robot.capabilities().footprint_m) + _FLOOR_FROM_M
-        X_BG = RigidTransform([front_m + 0.5 * _FLOOR_M[0], 0.0, -self._height_m() - 0.5 * _FLOOR_M[2]])
-        return [*boxes, Box(X_BG, _FLOOR_M)]
+        X_BG = RigidTransform([front_m + 0.5 * _FLOOR_SIZE_M[0], 0.0, -self._height_m() - 0.5 * _FLOOR_SIZE_M[2]])
+        return [*boxes, Box(X_BG, _FLOOR_SIZE_M)]
 
     def _height_m(self) -> float:
         return float(self.context.robot.odometry().X_OB.translation()[2])
 
 
-def _carried(arm: ArmCapabilities, R_BH: RotationMatrix, scene: ArmScene, q_rad: FloatArray) -> FloatArray:
-    return carry_configuration(scene, arm, R_BH, q_rad)
-
-
-def _unseen(thing: str, failure: SkillFailure) -> SkillFailure:
-    return SkillFailure(Cause.POSTCONDITION, f"the {thing} is let go of, but not seen: {failure.message}")
+def _unseen(name: str, failure: SkillFailure) -> SkillFailure:
+    return SkillFailure(Cause.POSTCONDITION, f"the {name} is let go of, but not seen: {failure.message}")

@@ -1,4 +1,4 @@
-"""What the place skill takes and gives: all that a tree is compiled from."""
+"""Ports of the place skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from skills.quantities import Coordinate, Length
 
 @dataclass(frozen=True)
 class PlaceInputs:
-    """The surface to put the object on; its middle comes to rest on none of the circles (x, y, radius) of the world."""
+    """Surface to put the object on.
+
+    The object's centre comes to rest in none of the circles `clear_of` (x, y, radius) of the world.
+    """
 
     surface: Surface
     clear_of: tuple[tuple[Coordinate, Coordinate, Length], ...] = ()
 
 
 class PlacePorts(Skill[PlaceInputs]):
-    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is in reach."""
+    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is within reach."""
 
     done_by: ClassVar[str] = "skills.manipulation.place.skill:Place"
     name = "place"

@@ -1,4 +1,4 @@
-"""The place skill: find a free spot on a surface, lower the object until it stands, let go, check that it is there."""
+"""The place skill: finds a free spot on a surface, lowers the object until it stands, lets go, and checks the spot."""
 
 from __future__ import annotations
 
@@ -16,30 +16,25 @@ from skills.api import Cause, PlanningError, Succeeded, Surface
 from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.estimate.scan_points import SelfFilter
 from skills.geometry import inside_polygon, wrap
-from skills.manipulation.approach.standing import first_reachable_spot, free_places, go_to_one
-from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, Goal
+from skills.manipulation.approach.base_placement import first_reachable_spot, free_placements, go_to_one
+from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N, Goal
 from skills.manipulation.arm.collision import ArmScene, Box, box_corners
+from skills.manipulation.arm.held_object import HeldObject, held_object
 from skills.manipulation.arm.looking_skill import PICTURE_LATENCY_S, LookingSkill
-from skills.manipulation.arm.poses import carry_configuration, overview_viewpoints, tucked_configuration
-from skills.manipulation.arm.solid_cells import CELL_M
-from skills.manipulation.grasp.candidates import hand_rotation
+from skills.manipulation.arm.poses import UP_B, overview_viewpoints, tucked_configuration
+from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
-from skills.manipulation.place.free_spot import (
+from skills.manipulation.place.placement import (
+    PrePlacePose,
+    above_goal,
+    clear_heights,
     clear_spots,
+    clearest_first,
     free_spots,
-    roomiest_first,
+    reaches,
     spaced_spots,
     spots,
     unseen_view,
-)
-from skills.manipulation.place.placement import (
-    LEVEL,
-    HeldObject,
-    PrePlacePose,
-    Release,
-    above_goal,
-    clear_heights,
-    reaches,
     with_held,
 )
 from skills.manipulation.place.ports import PlaceInputs, PlacePorts
@@ -47,33 +42,58 @@ from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.ports import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.quantities import Length, Tries, TurnRate
-from skills.robot import ArmTrajectory, FloatArray, Image, Pose2D
-from skills.routine import Routine, SkillFailure
+from skills.robot import FloatArray, Image, Pose2D
+from skills.routine import Routine, SkillFailure, planning_failure
 
 _SURELY_FREE_M = 0.03
+"""Height down to which the object goes fast: it cannot touch the surface there."""
 _PRESS_M = 0.03
+"""Distance by which the hand goes on below the height of the surface while it feels for contact."""
 _LAG_IN_CONTACT_M = 0.02
-"""A hand that goes down fast lags by so much only in contact: what it holds hangs lower than was thought."""
-_SIDE_DROP_M, _LIFT_AGAIN_M = 0.12, 0.135
-_MOST_SPOTS, _OTHER_SPOTS, _PLACES = 80, 6, 3
+"""Lag of a fast hand in contact: the held object hangs lower than was thought."""
+_LIFT_AGAIN_M = 0.135
+"""Distance by which an object is lifted that was over its spot before a restart."""
+_MOST_SPOTS = 80
+"""Number of free spots that are tried from one place."""
+_OTHER_SPOTS = 6
+"""Number of spots for which a place to stand is looked for."""
+_PLACES = 3
+"""Number of places to stand to which a path is looked for."""
 _OTHER_HEIGHT_COST = 0.05
+"""Cost of a body height for each step from the usual one."""
 _RELAX_M = 0.003
+"""Distance by which the arm is raised after contact."""
 _FEEL_S = 0.4
+"""Pause in which the gripper feels what it holds."""
 _FLOOR_M = 0.06
-_STANDS_OUT_M, _HIGHEST_M = 0.03, 0.5
-_BESIDE, _TUCKED_M, _AHEAD_RAD = 0.6, 0.03, 0.6
-_AT_HAND_M, _HIDDEN = 0.4, 0.5
-"""A picture of which half is nearer than that, or too near to tell, shows what is held and not what lies behind it."""
+"""Surfaces lower than this are seen by the cameras on the body."""
+_STANDS_OUT_M = 0.03
+"""Height over the surface from which on points belong to objects."""
+_HIGHEST_M = 0.5
+"""Height over the surface up to which points belong to objects on it."""
+_BESIDE = 0.6
+"""Share of the hand's direction to a side that a tucked hand exceeds."""
+_TUCKED_M = 0.03
+"""Distance beyond the tucked position at which a hand still counts as tucked."""
+_AHEAD_RAD = 0.6
+"""Largest bearing of a spot that counts as ahead."""
+_AT_HAND_M = 0.4
+"""Depth below which a pixel shows the held object, or something too near to measure."""
+_HIDDEN = 0.5
+"""Part of such pixels from which on the held object hides the surface."""
 _OVER_SPOT_M = 0.45
-_SETTLES_WITHIN_S, _MOVES_ABOUT_M = 5.0, 0.2
+"""Distance of the hand from a spot below which it was putting the object down before a restart."""
+_SETTLES_WITHIN_S = 5.0
+_MOVES_ABOUT_M = 0.2
+"""Radius around a spot in which an object that moves is looked for."""
 
 
 @dataclass(frozen=True)
 class PlaceOptions:
-    """How an object is put down.
+    """Speed of lowering, and limits of the search for a spot.
 
-    No joint is faster than `lower_rad_s` while it is lowered until it stands. It must be seen again within
-    `seen_again_m`. Where no free spot is in reach, the robot moves along the surface `moves` times at most.
+    No joint is faster than `lower_rad_s` while the object is lowered. The object must be seen again within
+    `seen_again_m` of its spot. When no free spot is within reach, the robot moves at most `moves` times.
     """
 
     lower_rad_s: TurnRate = 0.2
@@ -88,7 +108,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
     options: PlaceOptions
 
     def undone(self, inputs: PlaceInputs) -> str | None:
-        """Judged by the gripper."""
+        """Returns a reason when the object is still in the gripper."""
         return "the object is still in the gripper" if self.context.robot.gripper().holding else None
 
     def run(self, inputs: PlaceInputs) -> Routine[Succeeded]:
@@ -100,7 +120,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         if len(self._spots(surface)) == 0:
             raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no room out of the way")
         carried = self._carried()
-        held = self._held(carried)
+        held = held_object(self.context.payload, self.gripper, carried)
         yield from self._go_near(surface, held)
         try:
             yield from self._put_down(surface, held, carried)
@@ -111,7 +131,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return Succeeded(f"put the object down on the {surface.name}")
 
     def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
-        """Finds a spot, lowers the object, lets go, checks, stow."""
+        """Finds a spot, lowers the object, lets go, checks, stows."""
         above = yield from self._find_spot(surface, held, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
         self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
@@ -122,7 +142,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         yield from self.stow()
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
-        """With an empty gripper: draw the hand back, and look whether the object stands where it was to be put."""
+        """Checks, with an empty gripper, whether the object stands on its spot; else starts again."""
         surface = inputs.surface
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         spot = self.checkpoint.get("spot_W")
@@ -130,7 +150,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         over_spot = spot_W is not None and self.hand_near(spot_W, _OVER_SPOT_M)
         if self.context.robot.gripper().holding:
             if over_spot:
-                yield from self.try_shift_hand(np.array([0.0, 0.0, _LIFT_AGAIN_M]), "lifting the object again")
+                yield from self.try_shift_hand(_LIFT_AGAIN_M * UP_B, "lifting the object again")
             return (yield from self.run(inputs))
         if spot_W is None:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper, and it was not yet over its place")
@@ -142,22 +162,25 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return Succeeded(f"the object stood on the {surface.name} already")
 
     def _carried(self) -> RotationMatrix:
-        """How the hand was turned as the object was brought, which an attempt that was broken off has noted."""
+        """Rotation of the hand while the object was carried, as an interrupted attempt noted it."""
         noted = self.checkpoint.get("carried")
         rotation = self.model.X_BH(self.q_rad()).rotation() if noted is None else RotationMatrix(np.array(noted))
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
     def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[PrePlacePose]:
-        """Look, and bring the object over a free spot; out of reach, go before another one that was seen."""
-        spot_W, gone_to, arm = self._nearest_spot(surface), list[FloatArray](), self.arm
+        """Brings the object over a free spot; without one within reach, drives to another seen spot and tries again."""
+        spot_W, gone_to = _by_distance(self._spots(surface), self.X_WB())[0], list[FloatArray]()
         heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
         while True:
             yield from self.stand_at(heights_m[0], standing)
             yield from self._hold_ahead(surface, carried)
             on_floor = surface.height_m < _FLOOR_M and self.object_camera.on_hand
             standing_W = self._standing_W(surface)
-            view = yield from self._look_at_floor(surface) if on_floor else self._look(surface, spot_W)
+            if on_floor:
+                view = yield from self._look_at_floor(surface)
+            else:
+                _, view = yield from self._seen_on(surface, spot_W)
             if view is None or (on_floor and len(free_spots(view, self._spots(surface))) == 0):
                 view = unseen_view(surface, standing_W)
             try:
@@ -166,41 +189,32 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
                 clear_m = clear_heights(heights_m, float(X_WB.translation()[2]), corners_W, surface)
                 return (yield from self.from_a_height(clear_m, standing, above))
             except SkillFailure as failure:
-                others = roomiest_first(free_spots(view, self._spots(surface)), view, [*gone_to, spot_W])
+                others = clearest_first(free_spots(view, self._spots(surface)), view, [*gone_to, spot_W])
                 if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
                     raise
             gone_to.append(spot_W)
             if not (yield from self._draw_in(held)):
-                message = "carrying the object on along the surface"
-                yield from self.move_to(
-                    lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9
-                )
+                yield from self.carry(carried, "carrying the object on along the surface")
             yield from self.stand_as_usual()
             spot_W = yield from self._go_before(spaced_spots(others)[:_OTHER_SPOTS], surface, held)
 
     _clear_of: tuple[tuple[float, float, float], ...] = ()
 
     def _spots(self, surface: Surface) -> FloatArray:
-        """The spots (N, 2) of a surface that the inputs do not rule out."""
+        """Spots (N, 2) of a surface that the inputs do not rule out."""
         return clear_spots(spots(surface), self._clear_of)
 
-    def _nearest_spot(self, surface: Surface) -> FloatArray:
-        """The spot on the surface nearest to the robot."""
-        return np.asarray(_by_distance(self._spots(surface), self.X_WB())[0])
-
     def _standing_W(self, surface: Surface) -> FloatArray:
-        """What the LiDAR and earlier pictures show above a surface, (N, 3) in the world.
+        """Points (N, 3, world) above a surface from the LiDAR and earlier pictures.
 
-        Where a large object in the gripper hides all from the hand camera, nothing else tells what stands there.
+        They stand in for the hand camera when a large object in the gripper hides its view.
         """
         scan, capabilities = self.context.robot.scan(), self.context.robot.capabilities()
-        seen = [(self.context.solid.cells + 0.5) * CELL_M]
+        seen = [cell_centres(self.context.solid.cells)]
         if scan is not None:
             (x0, y0), (x1, y1) = np.min(capabilities.footprint_m, axis=0), np.max(capabilities.footprint_m, axis=0)
-            q, tip_H = self.q_rad(), np.array([self.gripper.length_m, 0.0, 0.0])
-            arm_B = np.vstack([self.model.points_B(q), self.model.X_BH(q) @ tip_H])
             points_B = scan.points_B()
-            foreign_B = points_B[SelfFilter((x0, x1, y0, y1)).foreign(points_B, arm_B, holding=True)]
+            foreign_B = points_B[SelfFilter((x0, x1, y0, y1)).foreign(points_B, self.arm_points_B(), holding=True)]
             X_WB = self.context.localiser.estimate().X_WO @ scan.X_OB
             seen.append(foreign_B @ X_WB.rotation().matrix().T + X_WB.translation())
         points_W = np.vstack(seen)
@@ -209,7 +223,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return points_W[inside_polygon(points_W[:, :2], surface.polygon_W, 0.0)]
 
     def _heights_m(self, surface: Surface) -> tuple[float, ...]:
-        """How high the body may stand to put something down, the usual height first."""
+        """Body heights (m) for putting an object down, the usual one first."""
         return body_heights_m(surface.height_m, self.context.robot.capabilities())
 
     def _go_near(self, surface: Surface, held: HeldObject) -> Routine[None]:
@@ -224,15 +238,15 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         yield from self._go_before(near, surface, held)
 
     def _go_before(self, candidates: Sequence[FloatArray], surface: Surface, held: HeldObject) -> Routine[FloatArray]:
-        """Drives to where the first of some spots that can be is within the arm's reach, or as near as may be.
+        """Drives to where the arm reaches one of some spots, or as near as possible; returns that spot.
 
-        Gives that spot. Raises SkillFailure with cause PLANNING: there is no free place before any of them.
+        Raises SkillFailure with cause PLANNING when there is no free place before any of them.
         """
         yield from self._draw_in(held)
         context, pose, arm = self.context, self.context.pose(), self.arm
         footprint, best_m = ArmFootprint(context).now(), arm.standing_m[0]
         before = [
-            (spot, free_places((float(spot[0]), float(spot[1])), pose, context.costmap, footprint, each, best_m))
+            (spot, free_placements((float(spot[0]), float(spot[1])), pose, context.costmap, footprint, each, best_m))
             for spot, each in itertools.product(candidates, (arm.standing_m, arm.nearer_m))
         ]
         choose = partial(first_reachable_spot, before, partial(self._reach_cost, surface, held))
@@ -251,33 +265,27 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return bool(tuck_x_m) and beside and float(X_BH.translation()[0]) < max(tuck_x_m) + _TUCKED_M
 
     def _draw_in(self, held: HeldObject) -> Routine[bool]:
-        """Draws in what sticks out over the surface while the robot drives up to it; whether the arm can."""
+        """Draws in an object that would stick out over the surface during a drive; returns whether the arm can."""
         arm, R_BH = self.arm, self.model.X_BH(self.q_rad()).rotation()
         if not arm.tuck_x_m or self._tucked():
             return bool(arm.tuck_x_m)
         self.held = [held.box_H]
         try:
-            yield from self.move_to(
-                lambda scene, q: tucked_configuration(scene, arm, R_BH, q), "drawing the object in", speed_rad_s=0.9
+            motion = self.move_to(
+                lambda scene, q: tucked_configuration(scene, arm, R_BH, q), "drawing the object in", CARRY_SPEED_RAD_S
             )
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
-            return False
+            return (yield from planning_failure(motion)) is None
         finally:
             self.held = ()
-        return True
 
     def _hold_ahead(self, surface: Surface, carried: RotationMatrix) -> Routine[None]:
-        """Takes what was drawn in out of the view of a camera on the head."""
-        if not self._tucked():
-            return
-        arm, self.boxes = self.arm, surface_boxes([surface], self.X_WB())
-        message = f"holding the object before the {surface.name}"
-        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, carried, q), message, speed_rad_s=0.9)
+        """Brings a tucked object ahead of the body, out of the view of a head camera."""
+        if self._tucked():
+            self.boxes = surface_boxes([surface], self.X_WB())
+            yield from self.carry(carried, f"holding the object before the {surface.name}")
 
     def _reach_cost(self, surface: Surface, held: HeldObject, spot: FloatArray) -> Callable[[Pose2D], float | None]:
-        """How awkwardly the arm puts the object down on a spot from a pose of the body; None where it does not.
+        """Returns a function for the cost of putting the object down on a spot from a pose; None when out of reach.
 
         The highest approach is left out, because the next one reaches as far.
         """
@@ -293,23 +301,20 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
 
         return cost
 
-    def _look(self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = ()) -> Routine[SurfaceView | None]:
-        """What a picture shows of the surface, None where the object in the gripper hides all that is free."""
-        return (yield from self._seen_on(surface, spot_W, beside))[1]
-
     def _seen_on(
         self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = ()
     ) -> Routine[tuple[Image, SurfaceView | None]]:
-        """A picture and what it shows of the surface, None where the object in the gripper hides all that is free.
+        """Takes a picture and segments the surface; the view is None when the held object hides all free space.
 
-        It hides the picture's lower half at least, so the camera looks low. Raises SkillFailure: there is no surface.
+        The object hides at least the picture's lower half, so the camera looks low. Raises SkillFailure when the
+        picture does not show the surface.
         """
         message = f"looking for a free spot on the {surface.name}"
         X_WB = self.X_WB()
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
         low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
-        yield from self.look_at(low_BT, overview_viewpoints(self.model, low_BT), message, speed_rad_s=0.9)
+        yield from self.look_at(low_BT, overview_viewpoints(self.model, low_BT), message, CARRY_SPEED_RAD_S)
         image = yield from self.picture(message)
         X_WO = self.context.localiser.estimate().X_WO
         view = yield from self.compute(
@@ -323,7 +328,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return image, None if full else view
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
-        """What the cameras at the body's front see of the floor: the object hides it from one on the hand."""
+        """Views the floor with the cameras at the body's front, because the held object hides it from a hand camera."""
         message, robot = f"looking for a free spot on the {surface.name}", self.context.robot
         X_WO, views = self.context.localiser.estimate().X_WO, list[SurfaceView]()
         for camera in robot.capabilities().body_cameras:
@@ -347,14 +352,13 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in near]
         beside = cluster_boxes(view.clusters, X_WB)
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
-        letting_go = Release(beside, self.release_rad())
-        goal = above_goal(on_top, held, self.context.stack.arm_planner, letting_go)
+        goal = above_goal(on_top, held, self.context.stack.arm_planner, beside, self.release_opening())
         q_rad = yield from self._bring(goal, held, f"bringing the object over the {surface.name}")
         X_BH = self.model.X_BH(q_rad)
         return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
 
     def _bring(self, goal: Goal, held: HeldObject, message: str) -> Routine[FloatArray]:
-        """Goes to a goal on a path on which what is held touches nothing; where there is none, the arm at least."""
+        """Moves to a goal on a path without contact of the held object; without such a path, ignores the object."""
         found: list[FloatArray] = []
 
         def noted(scene: ArmScene, q: FloatArray) -> FloatArray:
@@ -369,48 +373,43 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         return (yield from self.move_to(lambda scene, q: found[0], message, speed_rad_s=0.8))
 
     def _lower(self, surface: Surface, above: PrePlacePose) -> Routine[None]:
-        """Goes down slowly until the hand is held up, by contact, or the height is that of the surface.
+        """Lowers the object until contact stops the hand, or the height is that of the surface.
 
-        The path down begins at the angles for which it was found to be possible, and not at those of the arm: they
-        differ a little, and near a singular posture that may make the difference between a path and none.
-        After contact the arm no longer presses, or it would dip onto the surface as the gripper lets go.
+        The path down begins at the angles for which it was planned and not at the arm's present ones: they differ
+        slightly, and near a singular posture that decides whether there is a path. After contact the arm is raised a
+        little, or it would dip onto the surface as the gripper lets go. Raises SkillFailure with cause PLANNING.
         """
         message = f"putting the object down on the {surface.name}"
-        p_BH = self.model.X_BH(above.q_rad).translation() - [0.0, 0.0, above.height_m - _SURELY_FREE_M]
-        down_B = np.array([0.0, 0.0, -1.0])
-        early = self.held_up(down_B, _LAG_IN_CONTACT_M)
+        p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B
+        early = self.held_up(-UP_B, _LAG_IN_CONTACT_M)
         stopped = yield from self.move_straight(p_BH, message, q_from_rad=above.q_rad, guard=early)
         if not stopped:
-            stopped = yield from self.follow(self._way_down(), message, self.held_up(down_B))
+            stopped = yield from self._press_down(message)
         if stopped:
-            yield from self.try_shift_hand(np.array([0.0, 0.0, _RELAX_M]), message)
+            yield from self.try_shift_hand(_RELAX_M * UP_B, message)
 
-    def _way_down(self) -> ArmTrajectory:
-        """Straight down as far as the arm can go, at most into the surface. Raises SkillFailure with cause PLANNING."""
-        planner, X_BH = self.context.stack.arm_planner, self.model.X_BH(self.q_rad())
-        depth_m = _SURELY_FREE_M + _PRESS_M
-        why = PlanningError("the arm cannot go down")
+    def _press_down(self, message: str) -> Routine[bool]:
+        """Presses the object slowly onto the surface; returns whether contact stopped it. Raises SkillFailure."""
+        why: PlanningError | None = None
         for part in (1.0, 0.85, 0.7, 0.5):
-            lowered = RigidTransform(X_BH.rotation(), X_BH.translation() - [0.0, 0.0, part * depth_m])
             try:
-                path = planner.line(self.model, self.q_rad(), lowered)
+                down_B = -part * (_SURELY_FREE_M + _PRESS_M) * UP_B
+                return (yield from self.press(down_B, -UP_B, self.options.lower_rad_s, message))
             except PlanningError as error:
                 why = error
-                continue
-            return planner.timed(path, speed_rad_s=self.options.lower_rad_s)
         raise SkillFailure(Cause.PLANNING, str(why)) from why
 
     def _let_go(self) -> Routine[None]:
-        """Open, and leave the object without dragging it."""
-        yield from self.move_gripper(self.release_rad(), GRIPPER_FORCE_N, "letting go")
+        """Opens the gripper and leaves the object without dragging it."""
+        yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, "letting go")
         yield from self.pause(0.3, "letting go")
         if not (yield from self.leave_object()):
             raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
     def _check(self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box] = ()) -> Routine[None]:
-        """Raises SkillFailure with cause POSTCONDITION unless something stands, at rest, where the object was put.
+        """Raises SkillFailure with cause POSTCONDITION unless an object stands at rest on the spot.
 
-        The arm goes round `put_down`, the object's box (B), on its way.
+        The arm avoids `put_down`, the object's box (B), on its path.
         """
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
@@ -429,17 +428,6 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
             if not at_rest and self.context.clock.now() > end_s:
                 yield from self.try_stow()
                 raise SkillFailure(Cause.POSTCONDITION, f"the object still moves on the {surface.name}")
-
-    def _held(self, carried: RotationMatrix) -> HeldObject:
-        """What is held, as the skill noted that took it, or else as may be guessed from how it was brought."""
-        payload, gripper = self.context.payload, self.gripper
-        if payload.corners_H is not None and payload.R_BH is not None:
-            return HeldObject(payload.R_BH, payload.corners_H)
-        if abs(carried.matrix()[2, 2]) < LEVEL:
-            low_H = carried.matrix().T @ np.array([0.0, 0.0, -_SIDE_DROP_M])
-            return HeldObject(carried, np.array([gripper.grip_x_m, 0.0, 0.0]) + np.array([low_H, -low_H]))
-        tip_H = np.array([gripper.tip_x_m, 0.0, 0.0])
-        return HeldObject(hand_rotation(0.5 * math.pi, 0.0, 1.0), np.array([tip_H, tip_H - [0.06, 0.0, 0.0]]))
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

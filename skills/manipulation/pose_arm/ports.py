@@ -1,4 +1,4 @@
-"""What the pose_arm skill takes and gives: all that a tree is compiled from."""
+"""Ports of the pose_arm skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -12,7 +12,10 @@ from skills.quantities import Angle, Turn
 
 @dataclass(frozen=True)
 class PoseArmInputs:
-    """Joint angles from the shoulder on; the opening (0 closed): None, or something held, leaves it as it is."""
+    """Joint angles from the shoulder on, and an opening (0 closed).
+
+    None, or a held object, leaves the gripper as it is.
+    """
 
     joints_rad: tuple[Angle, ...]
     opening: Turn | None = None

@@ -1,4 +1,4 @@
-"""The pose_arm skill: takes an arm pose given as joint angles, as `errand teleop` saves it."""
+"""The pose_arm skill: moves the arm to joint angles, such as `errand teleop` saves."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from skills.manipulation.pose_arm.ports import PoseArmInputs, PoseArmPorts
 from skills.routine import Routine, SkillFailure
 
 _THERE_RAD = 0.05
+"""Largest difference of a joint angle at which the arm counts as there."""
 
 
 class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
     """The skill that `PoseArmPorts` declares."""
 
     def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
-        """Moves there."""
+        """Moves the arm, then the gripper."""
         goal = np.array(inputs.joints_rad)
         if len(goal) != len(self.model.names):
             text = f"the pose has {len(goal)} joint angles, the arm has {len(self.model.names)} joints"
@@ -28,7 +29,7 @@ class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
         if np.max(np.abs(self.q_rad() - goal)) > _THERE_RAD:
             yield from self.move_to(lambda scene, q: goal, "moving the arm to the pose")
         if opens and inputs.opening is not None:
-            opening = min(inputs.opening, self.widest)
+            opening = min(inputs.opening, self.gripper.widest)
             yield from self.move_gripper(opening, GRIPPER_FORCE_N, "moving the gripper")
         yield from self.feel_arm("moving the arm to the pose")
         return Succeeded("the arm is in the pose")

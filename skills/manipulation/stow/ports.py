@@ -1,4 +1,4 @@
-"""What the stow skill takes and gives: all that a tree is compiled from."""
+"""Ports of the stow skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from skills.api import Cause, Part, Skill
 
 @dataclass(frozen=True)
 class StowInputs:
-    """Nothing is needed."""
+    """No inputs."""
 
 
 class StowPorts(Skill[StowInputs]):

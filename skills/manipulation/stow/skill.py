@@ -1,51 +1,47 @@
-"""The stow skill: the arm folded onto the body, or, with an object in the gripper, the object held near the body."""
+"""The stow skill: folds the arm onto the body, or holds an object in the gripper near the body."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from skills.api import Cause, Succeeded
+from skills.api import Succeeded
 from skills.manipulation.arm.arm_skill import ArmSkill
-from skills.manipulation.arm.poses import carry_configuration
 from skills.manipulation.stow.ports import StowInputs, StowPorts
-from skills.routine import Routine, SkillFailure
+from skills.routine import Routine, planning_failure
 
-_NEAR_X_M, _NEAR_Z_M = 0.05, 0.06
-"""A hand no farther than so beyond where it carries is near the body."""
+_NEAR_X_M = 0.05
+"""Distance ahead of the carrying positions within which the hand is near the body."""
+_NEAR_Y_M = 0.3
+"""Distance to a side within which the hand is near the body."""
+_NEAR_Z_M = 0.06
+"""Height above the carrying positions within which the hand is near the body."""
 _RAISED_M = 0.05
-"""A body no more than so above its usual height is not raised."""
+"""Height above the usual one from which on the body counts as raised."""
 
 
 class Stow(StowPorts, ArmSkill[StowInputs]):
     """The skill that `StowPorts` declares."""
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
-        """Stow, or carry. From a raised body the arm comes near first: lowered, it would press on what is under it."""
+        """Stows or carries.
+
+        The arm of a raised body comes near first, because while the body sinks it would press on what is below.
+        """
         yield from self.feel_arm("stowing the arm")
         usual_m = self.context.robot.capabilities().standing_height_m
         if self.context.robot.odometry().X_OB.translation()[2] > usual_m + _RAISED_M:
-            try:
-                yield from self._come_near()
-            except SkillFailure as failure:
-                if failure.cause is not Cause.PLANNING:
-                    raise
+            yield from planning_failure(self._come_near())
         yield from self.stand_at(usual_m, "standing as usual")
-        how = yield from self._come_near()
+        holding = self.context.robot.gripper().holding
+        yield from self._come_near()
         yield from self.feel_arm("stowing the arm")
-        return Succeeded(how)
+        return Succeeded("the object is held near the body" if holding else "the arm is stowed")
 
-    def _come_near(self) -> Routine[str]:
-        """Fold the empty arm, or draw in what it holds where that is far from the body; says how it is then."""
+    def _come_near(self) -> Routine[None]:
+        """Folds the empty arm, or draws in an object that is far from the body."""
         if not self.context.robot.gripper().holding:
             yield from self.stow()
-            return "the arm is stowed"
-        X_BH = self.model.X_BH(self.q_rad())
-        p_BH = X_BH.translation()
-        arm = self.arm
-        far = p_BH[0] > max(arm.carry_x_m) + _NEAR_X_M or p_BH[2] > max(arm.carry_z_m) + _NEAR_Z_M
-        if far or np.abs(p_BH[1]) > 0.3:
-            rotation = X_BH.rotation()
-            yield from self.move_to(
-                lambda scene, q: carry_configuration(scene, arm, rotation, q), "drawing in the arm", speed_rad_s=0.9
-            )
-        return "the object is held near the body"
+            return
+        X_BH, arm = self.model.X_BH(self.q_rad()), self.arm
+        x_m, y_m, z_m = X_BH.translation()
+        far = x_m > max(arm.carry_x_m) + _NEAR_X_M or z_m > max(arm.carry_z_m) + _NEAR_Z_M
+        if far or abs(y_m) > _NEAR_Y_M:
+            yield from self.carry(X_BH.rotation(), "drawing in the arm")

@@ -8,8 +8,7 @@ from plant.robots.fetch.kind import fetch_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.arm.poses import carry_configuration, tucked_configuration, viewpoints_beside
-from skills.manipulation.grasp.candidates import hand_rotation
+from skills.manipulation.arm.poses import carry_configuration, hand_rotation, tucked_configuration, viewpoints_beside
 
 SHOULDER, TARGET = np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.3])
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from plant.robots.spot.kind import spot_capabilities
-from skills.manipulation.arm.arm_skill import held_mass_kg
 from skills.manipulation.arm.collision import ArmScene
+from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.kinematics import arm_model
 
 CAPABILITIES = spot_capabilities()

@@ -10,8 +10,8 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.manipulation.arm.collision import ArmScene, Box
-from skills.manipulation.grasp.candidates import hand_rotation
-from skills.manipulation.grasp.in_hand import turned_in_hand
+from skills.manipulation.arm.held_object import turned_in_hand
+from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
 from skills.manipulation.grasp.reach import ReachCheck, body_heights_m, resting_on, space_about
 from skills.robot import Pose2D

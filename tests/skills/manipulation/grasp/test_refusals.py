@@ -6,8 +6,13 @@ from scripted_robot import MODEL, ScriptedRobot, context_of, failed
 
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, ObjectKind, ObjectObservation
-from skills.manipulation.grasp.candidates import Target, grasp_candidates
-from skills.manipulation.grasp.refusals import known_too_heavy, least_mass_kg, without_grasp
+from skills.manipulation.grasp.candidates import (
+    Target,
+    grasp_candidates,
+    known_too_heavy,
+    least_mass_kg,
+    why_no_candidates,
+)
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 
 SMALL, LARGE = (0.11, 0.11, 0.38), (0.18, 0.16, 0.52)
@@ -55,4 +60,4 @@ def test_nothing_is_known_of_the_mass_of_what_has_no_class_knowledge(name):
 )
 def test_what_has_no_grasp_says_which_measure_is_at_fault(target, why):
     assert grasp_candidates(target, MODEL.p_BS, GRIPPER) == []
-    assert why in without_grasp(target, MODEL.p_BS, GRIPPER, "plank")
+    assert why in why_no_candidates(target, MODEL.p_BS, GRIPPER, "plank")

@@ -114,7 +114,7 @@ def test_what_the_gripper_has_lost_is_undone():
 class Behind(Grasp):
     """Finds no grasp because of another object."""
 
-    def _plan_from_a_height(self, seen, avoid):
+    def _take_where_it_is(self, inputs):
         def plan():
             raise PlanningError("the coke is behind the beer", {"in_the_way": (BEER,)})
 

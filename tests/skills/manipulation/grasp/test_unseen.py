@@ -6,7 +6,7 @@ from scripted_robot import MODEL, ScriptedRobot, context_of
 
 from skills.api import ObjectKind, ObjectObservation, Succeeded
 from skills.manipulation.arm.looking_skill import LookingSkill
-from skills.manipulation.grasp.unseen import level_viewpoints, look_into_unseen
+from skills.manipulation.grasp.reach import level_viewpoints, look_into_unseen
 
 SEEN = ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "shelf")
 ABOVE_IT = np.tile([0.85, 0.0, 1.0], (5, 1))

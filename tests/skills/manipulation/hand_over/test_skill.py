@@ -1,7 +1,7 @@
 """The hand-over skill with a scripted arm and analytic scans."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -10,9 +10,9 @@ from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 from table_scene import BLUE, GREY, Can
 
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.manipulation.arm.pull import levers_m
-from skills.manipulation.hand_over.given import Release
+from skills.manipulation.arm.forces import levers_m
 from skills.manipulation.hand_over.skill import HandOver, HandOverInputs, facing_poses
+from skills.manipulation.hand_over.verification import Release
 from skills.robot import CommandState, Gripper, Pose2D, Scan
 
 CARRYING = np.array([0.0, -3.0, 2.85, 0.0, 0.1, 1.57])
@@ -235,7 +235,7 @@ def test_paused_at_any_tick_it_goes_on_and_gives_it(every):
 def test_after_a_restart_what_was_let_go_is_given():
     robot = _before_robin(holding=False)
     skill = HandOver(context_of(robot))
-    skill.checkpoint = {"lets_go": True, "release": Release(0.85, 0.0, 0.94, 1.05).state()}
+    skill.checkpoint = {"lets_go": True, "release": asdict(Release(0.85, 0.0, 0.94, 1.05))}
     skill.resume(BEER)
     while isinstance(step := skill.step(), Running):
         robot.advance(0.1)

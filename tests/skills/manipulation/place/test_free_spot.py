@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from skills.api import Surface
-from skills.manipulation.place.free_spot import (
+from skills.manipulation.place.placement import (
     CLEARANCE_M,
     EDGE_M,
     clear_spots,
+    clearest_first,
     free_spots,
-    roomiest_first,
     spaced_spots,
     spots,
     unseen_view,
@@ -75,9 +75,9 @@ def test_a_full_table_has_no_free_spot():
 def test_the_spot_with_the_most_room_comes_first_and_none_near_where_the_robot_was_before():
     free = np.array([[1.2, -0.4], [1.2, 0.0], [1.2, 0.4]])
     view = _view(things=[(1.4, -0.4)])
-    assert roomiest_first(free, view, [])[-1] == pytest.approx(free[0])
-    assert roomiest_first(free, view, [free[2]])[0] == pytest.approx(free[1])
-    assert len(roomiest_first(free[:1], view, [free[0]])) == 0
+    assert clearest_first(free, view, [])[-1] == pytest.approx(free[0])
+    assert clearest_first(free, view, [free[2]])[0] == pytest.approx(free[1])
+    assert len(clearest_first(free[:1], view, [free[0]])) == 0
 
 
 def test_a_surface_that_is_hidden_is_free_but_for_what_is_known_to_stand_there():

@@ -11,7 +11,7 @@ from skills.api import Surface
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.motion import RrtConnect
-from skills.manipulation.place.placement import HeldObject, Release, above_goal, clear_heights, with_held
+from skills.manipulation.place.placement import HeldObject, above_goal, clear_heights, with_held
 
 MODEL = arm_model(spot_capabilities())
 LEVEL_FORWARD = RotationMatrix.MakeXRotation(np.pi / 2)
@@ -42,7 +42,7 @@ def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_
     beside = [] if beside_m is None else [Box(RigidTransform([0.8, beside_m, 0.2]), (0.1, 0.1, 0.3))]
     scene = ArmScene(spot_capabilities(), MODEL, {})
     can_H = np.array([[0.15, -0.05, -0.03], [0.22, 0.06, 0.03]])
-    goal = above_goal(spots_B, HeldObject(LEVEL_FORWARD, can_H), RrtConnect(), Release(beside, 0.7))
+    goal = above_goal(spots_B, HeldObject(LEVEL_FORWARD, can_H), RrtConnect(), beside, 0.7)
     above = MODEL.X_BH(goal(scene, CARRYING)).translation()
     assert int(np.argmin([abs(above[1] - spot[1]) for spot in spots_B])) == taken
 
@@ -76,7 +76,7 @@ def test_only_flat_objects_are_put_down_tilted(held, ways):
 @pytest.mark.parametrize(("ahead_m", "way"), [(0.75, (0.10, 0.0)), (0.82, (0.05, 0.0)), (0.95, (0.05, 0.3))])
 def test_a_far_spot_is_reached_from_lower_and_then_tilted(ahead_m, way):
     scene, spot_B = ArmScene(spot_capabilities(), MODEL, {}), np.array([ahead_m, 0.0, 0.3])
-    q_rad = above_goal([spot_B], HAMMER, RrtConnect(), Release([], 0.7))(scene, CARRYING)
+    q_rad = above_goal([spot_B], HAMMER, RrtConnect(), [], 0.7)(scene, CARRYING)
     X_BH = MODEL.X_BH(q_rad)
     fingers = X_BH.rotation().matrix()[:, 0]
     lowest_m = X_BH.translation()[2] - HAMMER.drop_m(X_BH.rotation()) - spot_B[2]

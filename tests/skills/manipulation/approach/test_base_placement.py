@@ -8,7 +8,13 @@ import pytest
 from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectKind, ObjectObservation
-from skills.manipulation.approach.standing import Standing, first_reachable_spot, free_places, is_comfortable, reachable
+from skills.manipulation.approach.base_placement import (
+    BasePlacement,
+    first_reachable_spot,
+    free_placements,
+    is_comfortable,
+    reachable_placements,
+)
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
 from skills.manipulation.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
@@ -35,15 +41,15 @@ def _grasp_cost(X_WB, seen):
 
 def _poses(reach_cost=lambda pose: 0.0):
     distances_m, here = CAPABILITIES.arm.standing_m, Pose2D(0.5, 0.3, 0.0)
-    free = free_places((2.15, 0.0), here, _Table(), Footprint.of(CAPABILITIES), distances_m, distances_m[0])
-    return reachable(free, reach_cost)
+    free = free_placements((2.15, 0.0), here, _Table(), Footprint.of(CAPABILITIES), distances_m, distances_m[0])
+    return reachable_placements(free, reach_cost)
 
 
 def test_the_body_keeps_off_the_table_and_faces_the_thing():
     found = _poses()
     assert found
-    for standing in found:
-        pose = standing.pose
+    for placement in found:
+        pose = placement.pose
         front = pose.x_m + 0.52 * math.cos(pose.yaw_rad)
         bearing = math.atan2(-pose.y_m, 2.15 - pose.x_m) - pose.yaw_rad
         assert front < 2.0
@@ -51,7 +57,7 @@ def test_the_body_keeps_off_the_table_and_faces_the_thing():
 
 
 def test_the_best_comes_first():
-    costs = [standing.cost for standing in _poses()]
+    costs = [placement.cost for placement in _poses()]
     assert costs == sorted(costs)
 
 
@@ -111,7 +117,7 @@ def test_a_place_is_left_for_a_nearer_one_where_stopping_short_of_it_is_out_of_r
 )
 def test_the_robot_goes_before_the_first_spot_that_it_can_reach_from_a_free_place(free_m, chosen):
     before = [
-        (np.array([spot, 0.0]), [Standing(Pose2D(spot - off_m, 0.0, 0.0), off_m) for off_m in each])
+        (np.array([spot, 0.0]), [BasePlacement(Pose2D(spot - off_m, 0.0, 0.0), off_m) for off_m in each])
         for spot, each in enumerate(free_m)
     ]
     spot, places = first_reachable_spot(before, lambda spot: lambda pose: 0.0 if spot[0] - pose.x_m < 1.2 else None)

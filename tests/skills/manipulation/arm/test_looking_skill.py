@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 
 from plant.robots.fetch.kind import fetch_capabilities
 from skills.api import PlanningError
-from skills.manipulation.arm.gaze import head_angles, without_arm
+from skills.manipulation.arm.looking_skill import head_angles, without_arm
 from skills.robot import FrameTree, Image, Intrinsics
 
 CAPABILITIES = fetch_capabilities()

@@ -1,4 +1,4 @@
-"""The force at the hand, from what the arm's joints do against what they did while nothing pulled."""
+"""Forces at the hand from the efforts of the arm's joints: the mass of a held object, and a pull at the hand."""
 
 from __future__ import annotations
 
@@ -11,27 +11,35 @@ import numpy as np
 from skills.manipulation.arm.kinematics import ArmModel
 from skills.robot import FloatArray
 
+_GRAVITY_M_S2 = 9.81
 _STEP_RAD = 1e-4
+"""Step of the numerical derivative."""
 _DAMPING_M = 0.12
-"""Levers (m) far below this tell nothing of a force: an arm that is stretched out hardly feels a pull along itself."""
+"""Damping of the least squares: a stretched arm hardly feels a pull along itself, so its short levers count little."""
 
 
 def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray:
-    """How far (m, body frame) each joint moves the point p_HO of the hand per radian, (3, J)."""
+    """Translational Jacobian (3, J) of the point p_HO of the hand, in the body frame (m/rad)."""
     steps = _STEP_RAD * np.eye(len(q_rad))
-    ways = [model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO for step in steps]
-    return np.asarray(np.array(ways).T / (2.0 * _STEP_RAD))
+    shifts = [model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO for step in steps]
+    return np.asarray(np.array(shifts).T / (2.0 * _STEP_RAD))
+
+
+def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
+    """Mass (kg) at p_HO of the hand that explains efforts `extra_nm` (J,) best, by least squares."""
+    lever_nm = _GRAVITY_M_S2 * levers_m(model, q_rad, p_HO)[2]
+    return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
 
 
 def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:
-    """The force (3,), N, body frame, at p_HO of the hand against which the joints hold with extra_nm (J,) more."""
+    """Force (3,) at p_HO of the hand that the joints resist with `extra_nm` (J,) more, in the body frame (N)."""
     J = levers_m(model, q_rad, p_HO)
     return np.asarray(-np.linalg.solve(J @ J.T + _DAMPING_M**2 * np.eye(3), J @ extra_nm))
 
 
 @dataclass
 class PullWatch:
-    """Whether somebody pulls at the hand: the mean of the last readings against a baseline that the first ones give.
+    """Detector of a pull at the hand: compares the mean of the last readings with a baseline from the first ones.
 
     A pull is a force beyond `threshold_n` at `ticks` readings in a row.
     """
@@ -49,7 +57,7 @@ class PullWatch:
     _felt: int = field(default=0, init=False)
 
     def felt(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
-        """Takes in a reading, unless it was taken in before; whether somebody pulls."""
+        """Takes in a reading that is newer than the last one; returns whether somebody pulls."""
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s
             self._take(q_rad, efforts_nm)

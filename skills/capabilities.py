@@ -1,0 +1,205 @@
+"""Capabilities: the geometry and the limits of a robot, as a skill sees them through `skills.robot`."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:  # Drake takes a third of a second to import; commands that move nothing do without
+    from pydrake.math import RigidTransform
+
+
+class BaseKind(enum.Enum):
+    """Kind of a base's motion."""
+
+    OMNIDIRECTIONAL = "omnidirectional"  # moves in any direction and turns: legs, mecanum wheels
+    DIFFERENTIAL = "differential"  # drives ahead or back, and turns on the spot: two driven wheels
+
+
+InverseKinematics = Callable[["RigidTransform"], Sequence[NDArray[np.float64]]]
+"""Inverse kinematics of an arm: from X_BH, joint angles (J,) of every branch; the caller checks the joint limits."""
+
+
+@dataclass(frozen=True)
+class ArmCapabilities:
+    """Arm: joint names from the shoulder on, its largest reach from the first joint (m), its payload (kg).
+
+    `standing_m` are distances of the body's origin from an object to grasp or a spot to place on, the best first, and
+    `nearer_m` those for an object that is held from above. `carry_x_m` and `carry_z_m` are positions in B of a hand
+    that carries, best at `carry_best_x_m` and low. An arm that sticks out over furniture while it carries is drawn in
+    to the first of `tuck_x_m` and turned to a side; `tuck_x_m` is empty for an arm that carries within the body's
+    outline.
+
+    Joints without limits are `continuous` in the description. `inverse` solves the inverse kinematics; None for the
+    families whose closed form `skills.manipulation.arm.kinematics` reads from the description.
+    """
+
+    joint_names: tuple[str, ...]
+    max_reach_m: float
+    stowed_rad: tuple[float, ...]
+    max_payload_kg: float
+    inverse: InverseKinematics | None = None
+    standing_m: tuple[float, ...] = (0.90, 0.94, 0.87, 0.84, 0.98, 0.81, 1.02, 1.06)
+    nearer_m: tuple[float, ...] = (0.76, 0.79, 0.72, 0.68, 0.64)
+    carry_x_m: tuple[float, ...] = (0.3, 0.35, 0.4, 0.45, 0.5)
+    carry_z_m: tuple[float, ...] = (0.26, 0.29, 0.32, 0.36, 0.41, 0.46, 0.54)
+    carry_best_x_m: float = 0.35
+    tuck_x_m: tuple[float, ...] = ()
+
+    @property
+    def comfortable_m(self) -> tuple[float, float]:
+        """Range of distances (m) from which the robot need not drive elsewhere."""
+        return min(self.standing_m) - 0.01, max(self.standing_m) - 0.04
+
+
+class GripperKind(enum.Enum):
+    """Kind of a gripper's motion, which sets the unit of its opening."""
+
+    HINGED = "hinged"  # one finger turns against a fixed one; the opening is its angle, rad
+    PARALLEL = "parallel"  # two fingers slide to the middle together; the opening is their distance, m
+
+
+@dataclass(frozen=True)
+class GripperCapabilities:
+    """Gripper. Its opening is 0 closed and `widest` fully open, in the unit of its kind.
+
+    `finger_joints` are the joints of its fingers and how far each goes for an opening of one. Geometry in the hand
+    frame H (x along the fingers, z along the closing, m): the palm at `palm_x_m`, the tip of a moving finger at
+    `tip_x_m` and of the fixed one at `fixed_tip_x_m`, whose inner face is at `fixed_z_m` (for two moving fingers: when
+    closed). Tips are 2 `half_breadth_m` wide and `tip_thickness_m` thick. The middle of a gripped object is about
+    `grip_x_m` ahead of H; an object is at most `max_grasp_m` wide and ends by `length_m`.
+    """
+
+    finger_joints: tuple[tuple[str, float], ...]
+    widest: float
+    max_opening_m: float
+    max_force_n: float
+    depth_m: float
+    palm_x_m: float
+    tip_x_m: float
+    fixed_tip_x_m: float
+    fixed_z_m: float
+    half_breadth_m: float
+    tip_thickness_m: float
+    grip_x_m: float
+    max_grasp_m: float
+    length_m: float
+    kind: GripperKind = GripperKind.HINGED
+
+    def finger_positions(self, opening: float) -> dict[str, float]:
+        """Positions of the finger joints by name, at an opening."""
+        return {name: share * opening for name, share in self.finger_joints}
+
+    def like_turn(self, turn_rad: float) -> float:
+        """Returns the change of the opening that corresponds to a turn of a hinged finger.
+
+        A hinged finger opens to about a right angle.
+        """
+        return turn_rad if self.kind is GripperKind.HINGED else self.widest * turn_rad / (0.5 * math.pi)
+
+    def opening_for(self, gap_m: float) -> float:
+        """Opening at which the tips are about `gap_m` apart."""
+        return self.widest * gap_m / self.max_opening_m
+
+
+class Mount(enum.Enum):
+    """Frame that a camera is fixed to."""
+
+    BODY = "body"
+    HAND = "hand"
+    HEAD = "head"
+
+
+@dataclass(frozen=True)
+class CameraCapabilities:
+    """Camera: its source for `image`, the frame F that it is mounted on, and its pose X_FC in F."""
+
+    source: str
+    X_FC: RigidTransform
+    mount: Mount = Mount.BODY
+
+    @property
+    def on_hand(self) -> bool:
+        """Returns whether the camera is on the hand."""
+        return self.mount is Mount.HAND
+
+    @property
+    def heading_rad(self) -> float:
+        """Direction of the optical axis in its frame, counter-clockwise from ahead."""
+        axis = self.X_FC.rotation().matrix()[:, 2]
+        return math.atan2(axis[1], axis[0])
+
+    def looks_towards(self, heading_rad: float, within_rad: float = math.pi / 4) -> bool:
+        """Returns whether the optical axis is within an angle of a direction in the body frame, with the head ahead."""
+        return abs(math.remainder(self.heading_rad - heading_rad, math.tau)) < within_rad
+
+
+@dataclass(frozen=True)
+class HeadCapabilities:
+    """Head that pans (z up, positive to the left) and then tilts (y, positive looks down), rad.
+
+    p_BP_m is the pan axis in the body frame, p_PT_m the tilt axis in the panned frame; the frame `head` lies on the
+    tilt axis and turns with it. `joint_names` are pan and tilt in the description.
+    """
+
+    joint_names: tuple[str, str]
+    p_BP_m: tuple[float, float, float]
+    p_PT_m: tuple[float, float, float]
+    pan_range_rad: tuple[float, float]
+    tilt_range_rad: tuple[float, float]
+
+    def X_BF(self, pan_rad: float, tilt_rad: float) -> RigidTransform:
+        """Pose of the frame `head` in the body frame at pan and tilt."""
+        from pydrake.math import RigidTransform, RotationMatrix
+
+        X_BP = RigidTransform(RotationMatrix.MakeZRotation(pan_rad), np.array(self.p_BP_m))
+        return X_BP @ RigidTransform(RotationMatrix.MakeYRotation(tilt_rad), np.array(self.p_PT_m))
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """Geometry and limits of a robot; `arm`, `gripper` or `head` is None on a robot without one.
+
+    `lift_joint` is the joint of a torso that slides up from the lowest of `height_range_m` while the base stays.
+    `footprint_m` is the standing outline in the body frame as (x, y) corners. `description` is the robot's URDF text
+    with collision shapes and a free base (link `body`). `height_range_m` is the range of the body origin's height while
+    the robot walks. `lidar_height_m` is the LiDAR's height over the floor while the robot stands as usual: maps differ
+    by it.
+    """
+
+    footprint_m: tuple[tuple[float, float], ...]
+    max_speed_m_s: float
+    max_turn_rate_rad_s: float
+    standing_height_m: float
+    height_range_m: tuple[float, float]
+    pitch_range_rad: tuple[float, float]
+    arm: ArmCapabilities | None
+    gripper: GripperCapabilities | None
+    cameras: tuple[CameraCapabilities, ...]
+    description: str
+    base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL
+    head: HeadCapabilities | None = None
+    lift_joint: str | None = None
+    lidar_height_m: float | None = None
+
+    @property
+    def body_cameras(self) -> tuple[CameraCapabilities, ...]:
+        """Cameras on body and head, which look for people and obstacles."""
+        return tuple(camera for camera in self.cameras if not camera.on_hand)
+
+    @property
+    def hand_camera(self) -> CameraCapabilities | None:
+        """Camera on the hand; None when there is none."""
+        return next((camera for camera in self.cameras if camera.on_hand), None)
+
+    @property
+    def object_camera(self) -> CameraCapabilities | None:
+        """Camera that looks for objects: the one on the hand, else the one on the head; None without either."""
+        on_head = (camera for camera in self.cameras if camera.mount is Mount.HEAD)
+        return self.hand_camera or next(on_head, None)

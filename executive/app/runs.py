@@ -257,12 +257,12 @@ def note_run(missions: MissionStore, mission: StoredMission) -> Iterator[Callabl
     try:
         yield ended
     except OSError as error:
-        raise STORE_FILE.full_disk(missions.path) if disk_is_full(error) else error from error
+        raise STORE_FILE.full_disk_error(missions.path) if disk_is_full(error) else error from error
     except InputError:
         if over:
             raise
         if mission.queued or mission.starts:
-            missions.never_began(mission)
+            missions.undo_begin(mission)
         else:
             missions.remove(mission.id)
         raise
@@ -297,7 +297,7 @@ def _journals(store: MissionStore, mission: StoredMission, prepared: Prepared) -
     """Returns the journals of a mission's robots; a corrected mission is stored in place of the original."""
     bare = replace(prepared, request=replace(mission.request, sentence=None, file=None, text=None))
     return {
-        each.mission.robot_name: store.journal(mission.id, _part_of(each)).replaceable(
+        each.mission.robot_name: store.journal(mission.id, _part_of(each)).allow_replacement(
             each.tree, lambda tree: bare.with_tree(tree).request
         )
         for each in prepared.all
@@ -347,7 +347,7 @@ def resume_mission(store: MissionStore, mission: StoredMission, *, ask: Answerer
     ]
     journals = _journals(store, mission, prepared)
     for each, (tree, recollection) in zip(every, resumed, strict=True):
-        journals[each.mission.robot_name].remembering(recollection, tree)
+        journals[each.mission.robot_name].use_recollection(recollection, tree)
     names = [each.mission.robot_name for each in every]
     poses = {name: memory.pose for name, memory in zip(names, memories, strict=True) if memory.pose is not None}
     label, log = str(mission.id), log_name(mission.starts + 1)

@@ -51,7 +51,7 @@ def run(
     """
     console = console_for(as_json)
     store, tell = _store(queue), plain_lines(console)
-    with MissionStore(store, create=False) as missions, missions.claimed():
+    with MissionStore(store, create=False) as missions, missions.claim():
         from executive.app.dispatch import silence
         from executive.app.fleet import missions_json
         from executive.app.fleet_run import run_fleet, simulated_fleet

@@ -107,7 +107,7 @@ def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
     """Forgets a mission; one that stands can be removed while a server runs."""
     with MissionStore(store or out / STORE_NAME, create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
-        with nullcontext() if stands else missions.claimed():
+        with nullcontext() if stands else missions.claim():
             missions.remove(number)
         wake_server(missions.path)
     console_for(False).print(f"Mission {number} is removed.")
@@ -125,7 +125,7 @@ def run(
     from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)
-    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
+    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claim():
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
         ended = run_in_turn(queued_missions(missions), runs)
         resumable = resumable_line(missions)
@@ -210,7 +210,7 @@ def serve(
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claimed():
+    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claim():
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -237,7 +237,7 @@ def resume(
 ) -> None:
     """Goes on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
     console = console_for(as_json)
-    with MissionStore(store, create=False) as missions, missions.claimed():
+    with MissionStore(store, create=False) as missions, missions.claim():
         from executive.app.runs import MissionRuns, queued_missions, run_in_turn
         from executive.cli.screen import ConsoleScreen
 

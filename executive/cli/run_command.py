@@ -65,7 +65,7 @@ def run(
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view or view_for is not None else None
         screen = ConsoleScreen(console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, profile=timing)
-        with MissionStore(kept_in) as missions, missions.claimed():
+        with MissionStore(kept_in) as missions, missions.claim():
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen).run(mission, prepared)
     if timing is not None:

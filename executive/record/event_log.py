@@ -114,7 +114,7 @@ class EventLog(RunVisitor):
     def _log(self, topic: str, message: Mapping[str, Any]) -> None:
         now_s = self._clock.now()
         robot = str(message.get("robot") or message.get("robot_name") or "") if self._apart else ""
-        for shown_under, shown in drawable(topic, message, now_s):
+        for shown_under, shown in viewer_messages(topic, message, now_s):
             self._write(shown_under, plain_values(shown), now_s, robot)
         if now_s - self._flushed_s >= FLUSH_EVERY_S:
             self.flush()
@@ -164,14 +164,14 @@ def _plain(value: Any) -> Any:
     return dict(value) if isinstance(value, Mapping) else str(value)
 
 
-def drawable(topic: str, message: Message, now_s: float) -> Iterator[tuple[str, Message]]:
+def viewer_messages(topic: str, message: Message, now_s: float) -> Iterator[tuple[str, Message]]:
     """Iterates over the message as it is logged, and additional messages for viewers, each with its topic."""
-    yield topic, with_picture(_path(message, now_s) if topic == PATH else message, now_s)
+    yield topic, compress_picture(_path(message, now_s) if topic == PATH else message, now_s)
     if topic == DETECTIONS and isinstance(message.get("image"), np.ndarray):
-        yield BOXES, boxes(message.get("detections", ()), now_s)
+        yield BOXES, box_annotations(message.get("detections", ()), now_s)
 
 
-def with_picture(message: Message, now_s: float) -> Message:
+def compress_picture(message: Message, now_s: float) -> Message:
     """Compresses the numpy picture (RGB or grey, uint8) under "image" of a message, if there is one."""
     picture = message.get("image")
     if not isinstance(picture, np.ndarray):
@@ -185,7 +185,7 @@ def with_picture(message: Message, now_s: float) -> Message:
     return {**rest, **size, "timestamp": stamp(now_s), "frame_id": frame, "format": "jpeg", "data": encoded}
 
 
-def boxes(detections: Sequence[Message], now_s: float) -> Message:
+def box_annotations(detections: Sequence[Message], now_s: float) -> Message:
     """Converts detections to annotations of the picture: boxes (u0, v0, u1, v1) with class and score."""
     when = stamp(now_s)
     return {

@@ -270,7 +270,7 @@ class Control:
         self._requests = self._lasting
         return requests
 
-    def ticked(self, *, changed: bool) -> None:
+    def note_tick(self, *, changed: bool) -> None:
         """Notes that the trees were ticked, and ends a step that is done; `changed`: a node changed its status."""
         if self._stride is None or (self._stride == 0 and not changed):
             return
@@ -278,13 +278,13 @@ class Control:
         if self._stride is None:
             self._bump()
 
-    def arrived_at(self, path_id: str) -> None:
+    def stop_at_breakpoint(self, path_id: str) -> None:
         """Pauses the run, which has come to a breakpoint."""
         self._holds[None, Mode.PAUSED] = why = f"at the breakpoint {path_id}"
         self._at, self._stride = path_id, None
         self._note("breakpoint", why)
 
-    def lease_lost(self, robot_name: str, why: str | None) -> None:
+    def note_lease(self, robot_name: str, why: str | None) -> None:
         """Notes that a robot's lease was lost, and `why`, or that it is back (None)."""
         self._holds.pop((robot_name, Mode.LEASE_LOST), None)
         if why is not None:
@@ -311,7 +311,7 @@ class Control:
         self._questions.pop(pending.open.id, None)
         self._note(what, f"{pending.open.id}: {message}")
 
-    def held(self, duration_s: float) -> None:
+    def extend_questions(self, duration_s: float) -> None:
         """Extends the time of all questions by the time (s, robot's clock) for which the run was held."""
         for pending in self._questions.values():
             pending.open = replace(pending.open, until_s=pending.open.until_s + duration_s)

@@ -115,6 +115,6 @@ class ControlRequests:
         """Returns whether there are requests to single robots, or robots that must stand still."""
         return bool(self.missions or self.cancels or self.holds) or self.hold is not None
 
-    def held(self, robot_name: str) -> bool:
+    def holds_robot(self, robot_name: str) -> bool:
         """Returns whether a robot must stand still, alone or with all others."""
         return self.hold is not None or robot_name in self.holds

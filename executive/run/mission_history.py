@@ -58,7 +58,7 @@ def is_speech(node: NodeSpec) -> bool:
 class Executions:
     """Record of the executions of a mission's parts and of its speech, on the blackboard, which outlives a restart.
 
-    The run calls `visited` with each node that a tick visits, then `after_tick`. A node that only repeats its result
+    The run calls `note_visit` with each node that a tick visits, then `after_tick`. A node that only repeats its result
     from before a restart keeps its first times.
     """
 
@@ -93,7 +93,7 @@ class Executions:
         """Time (s) when a skill that may drive last ran; None: never."""
         return self._moved_s
 
-    def visited(self, node: Behaviour, stopped: bool) -> None:
+    def note_visit(self, node: Behaviour, stopped: bool) -> None:
         """Notes that a tick has visited a node, which was perhaps `stopped` since its last visit."""
         path = self._paths.get(node)
         if path is None:

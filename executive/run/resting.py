@@ -124,7 +124,7 @@ class Resting:
                 robot.sense_due_s = now_s + _LOOK_S
                 robot.who.sense()
             else:
-                self.table.heard(robot.who.name, robot.who.context.known_pose())
+                self.table.report(robot.who.name, robot.who.context.known_pose())
         if hold:
             robot.aside.end()
         else:

@@ -16,7 +16,7 @@ import numpy as np
 from executive.record.work import CountedDetector
 from executive.run.outcome import RobotStatus
 from executive.run.visitor import RunEntry, RunShared
-from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog, call_aside, hung
+from executive.run.watchdog import IMAGE_LIMIT_S, VERB_LIMIT_S, VerbHung, Watchdog, call_aside, hung_message
 from executive.run.worker import in_lock_step_job
 from executive.tree.board import Board
 from executive.tree.context import RunContext
@@ -118,7 +118,7 @@ class GuardedRobot:
     def _guarded(self, verb: str, call: Callable[..., Any]) -> Callable[..., Any]:
         watchdog, main, check, ident = self._watchdog, self._main, garbage_check(verb), threading.get_ident
         limit_s = self._image_limit_s if verb == "image" else self._limit_s
-        sentence, now_s = hung(verb, limit_s), time.monotonic
+        sentence, now_s = hung_message(verb, limit_s), time.monotonic
         good: Any = _NOTHING_YET
 
         @functools.wraps(call)
@@ -214,7 +214,7 @@ class RunRobot:
         estimate = context.localiser.estimate()
         context.costmap.update(context.robot, estimate)
         self.pose = context.known_pose()
-        self._traffic.heard(self.name, self.pose)
+        self._traffic.report(self.name, self.pose)
 
     def claim(self) -> RunContext:
         """Claims the free lease; returns the context under it. Raises LeaseError."""

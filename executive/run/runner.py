@@ -181,15 +181,15 @@ class _Run:
             return
         self._clock.advance(self._settings.tick_period_s)
         for session in live:
-            session.guarded(session.sense)
+            session.call_guarded(session.sense)
         if self._clock.now() >= self._paths_due_s:
             self._paths_due_s = self._clock.now() + _PATHS_PERIOD_S
             for path in self._traffic.news():
                 self._visitors.publish(RESERVED_PATH, path)
         turn = [session for session in live if session.result is None and session.has_its_turn(self._results)]
-        free = [session for session in turn if session.guarded(session.may_move)]
-        self._rest(live, turn, requests.held)
-        moving = [session for session in free if not requests.held(session.name)]
+        free = [session for session in turn if session.call_guarded(session.may_move)]
+        self._rest(live, turn, requests.holds_robot)
+        moving = [session for session in free if not requests.holds_robot(session.name)]
         began_wall_s = time.perf_counter()
         notes = self._tick(moving, requests.breakpoints)
         tick_wall_s = time.perf_counter() - began_wall_s
@@ -213,15 +213,15 @@ class _Run:
             self._stop(Ending(Outcome.CANCELLED, Cause.CANCELLED, requests.cancel or "cancelled"), requests.insists)
         if requests.of_robots:
             for session in (each for each in live if each.result is None):
-                session.guarded(partial(self._obey, session, requests))
+                session.call_guarded(partial(self._obey, session, requests))
         under_way = [session for session in live if session.result is None]
         if not under_way:
             return requests
-        if any(not requests.held(session.name) for session in under_way):
+        if any(not requests.holds_robot(session.name) for session in under_way):
             self._time.go_on()
         else:
             self._time.stop()
-            self._control.held(self._settings.tick_period_s)
+            self._control.extend_questions(self._settings.tick_period_s)
         if self._time.elapsed_s() >= self._settings.time_limit_s:
             message = f"the mission was not done within {self._settings.time_limit_s:g} s"
             self._stop(Ending(Outcome.FAILURE, Cause.TIMEOUT, message))
@@ -237,7 +237,7 @@ class _Run:
             else:
                 ending = Ending(Outcome.CANCELLED, Cause.CANCELLED, reason)
                 session.cancel(ending, self._settings.endings_limit_s)
-        if session.result is None and requests.held(session.name):
+        if session.result is None and requests.holds_robot(session.name):
             session.hold()
 
     def _stop(self, ending: Ending, at_once: bool = False) -> None:
@@ -263,16 +263,16 @@ class _Run:
         changes: list[bool] = []
         for session in moving:
             with self._watchdog.over_tick(session.name, self._settings.tick_limit_s):
-                changed = session.guarded(partial(session.tick, breakpoints))
+                changed = session.call_guarded(partial(session.tick, breakpoints))
             if changed is not None and session.note is not None:
                 changes.append(changed)
                 notes[session.name] = session.note
         self._ticks += 1
         if moving:
-            self._control.ticked(changed=any(changes))
+            self._control.note_tick(changed=any(changes))
         under_way = (each for each in moving if each.result is None and not each.cancelled)
         for path_id in filter(None, (session.waiting_at for session in under_way)):
-            self._control.arrived_at(path_id)
+            self._control.stop_at_breakpoint(path_id)
         return notes
 
     def _note_ends(self, live: Sequence[Session]) -> None:
@@ -293,7 +293,7 @@ class _Run:
 
     def _look(self, session: Session, *, now: bool = False) -> bool:
         """Reads a robot's status; returns whether the robot still answers."""
-        status = session.guarded(partial(session.status, now=now))
+        status = session.call_guarded(partial(session.status, now=now))
         if status is None:
             return False
         self._seen[session.name] = status

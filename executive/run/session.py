@@ -93,7 +93,7 @@ class Session(RunRobot):
         """Path id of the breakpoint at which the mission under way waits."""
         return self._top.waiting_at
 
-    def guarded(self, call: Callable[[], ResultT]) -> ResultT | None:
+    def call_guarded(self, call: Callable[[], ResultT]) -> ResultT | None:
         """Returns the call's result, or None where it fails, which ends the mission. Raises OSError for a full disk."""
         try:
             return call()
@@ -144,14 +144,14 @@ class Session(RunRobot):
         if self._lost_since_s is None:
             self._lost_since_s = now_s
             self._top.suspend()
-            self._control.lease_lost(self.name, lost)
+            self._control.note_lease(self.name, lost)
         if self._guarded.regain_lease():
             self._lost_since_s = None
-            self._control.lease_lost(self.name, None)
+            self._control.note_lease(self.name, None)
             return True
         if now_s - self._lost_since_s > LEASE_PATIENCE_S:
             message = f"{lost} and did not give it back within {LEASE_PATIENCE_S:g} s"
-            self._control.lease_lost(self.name, None)
+            self._control.note_lease(self.name, None)
             self.gone = message
             self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, message))
         return False

@@ -121,7 +121,7 @@ class TrafficTable:
         """Adds a robot with its discs (x, y, radius in the body frame); a known robot stays as it is."""
         self._robots.setdefault(name, _Robot(self, name, discs))
 
-    def heard(self, name: str, pose: Pose2D | None) -> None:
+    def report(self, name: str, pose: Pose2D | None) -> None:
         """Notes that a robot reports, and its estimated pose (world frame; None: not localised)."""
         robot = self._robots[name]
         robot.stamp_s = self.now()

@@ -134,13 +134,13 @@ class TreeRun:
             suspend(self.root, sparing=due)
         self._observed.tick(due, self._visited)
         if due.status != Status.RUNNING:
-            endings.done()
+            endings.pop()
             if due.status == Status.FAILURE:
                 self._endings.append(f"in the end: {message_of(due)}")
 
     def _visited(self, node: Behaviour, stopped: bool) -> None:
         if not any(gate.waiting and gate.node is node for gate in self._gates.values()):
-            self._executions.visited(node, stopped)
+            self._executions.note_visit(node, stopped)
 
     def end_early(self) -> None:
         """Stops the tree where it is; only its steps under `always` still run."""

@@ -92,7 +92,7 @@ class Watchdog:
             self._before(number, frame)
 
 
-def hung(verb: str, limit_s: float) -> str:
+def hung_message(verb: str, limit_s: float) -> str:
     """Sentence for a verb that did not return in time."""
     return f"the robot did not answer '{verb}' within {limit_s:g} s"
 
@@ -110,4 +110,4 @@ def call_aside(call: Callable[[], ResultT], verb: str, limit_s: float) -> Result
     except TimeoutError:
         if future.done():
             raise
-        raise VerbHung(hung(verb, limit_s)) from None
+        raise VerbHung(hung_message(verb, limit_s)) from None

@@ -41,12 +41,12 @@ class FileKind:
     claimed: str
     go_on: str
 
-    def full_disk(self, path: Path) -> StoreError:
+    def full_disk_error(self, path: Path) -> StoreError:
         """Error for a disk that became full while the file was written."""
         go_on = self.go_on.format(path=path)
         return StoreError("the disk is full", hint=f"what was written is kept: free space, then {go_on}")
 
-    def damaged(self, path: Path, why: object) -> StoreError:
+    def damage_error(self, path: Path, why: object) -> StoreError:
         """Error for a file that cannot be read."""
         hint = f"move it away ({self.lost} are lost), or name another by {self.option}"
         return StoreError(f"the {self.name} is damaged ({why})", hint=hint, file=path)
@@ -59,16 +59,16 @@ class FileKind:
             yield
         except sqlite3.OperationalError as error:
             if "full" in str(error):
-                raise self.full_disk(path) from error
+                raise self.full_disk_error(path) from error
             if "locked" in str(error) or "busy" in str(error):
                 hint = "end the program that keeps it open, then try again"
                 raise StoreError(f"another program has locked the {self.name}", hint=hint, file=path) from error
             raise StoreError(f"{what} ({error})", hint=hint, file=path) from error
         except sqlite3.DatabaseError as error:
-            raise self.damaged(path, error) from error
+            raise self.damage_error(path, error) from error
         except OSError as error:
             if disk_is_full(error):
-                raise self.full_disk(path) from error
+                raise self.full_disk_error(path) from error
             raise StoreError(f"{what} ({error.strerror})", hint=hint, file=path) from error
 
 
@@ -91,7 +91,7 @@ class Database:
         if not create and not path.is_file():
             raise InputError(f"there is no {self.kind.name}", hint=self.kind.absent, file=path)
         if path.is_file() and path.stat().st_size == 0:
-            raise self.kind.damaged(path, "it is empty")
+            raise self.kind.damage_error(path, "it is empty")
         with self.kind.failures(self.path):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._connection = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
@@ -112,7 +112,7 @@ class Database:
         self._connection.close()
 
     @contextmanager
-    def claimed(self) -> Iterator[None]:
+    def claim(self) -> Iterator[None]:
         """Claims the file for this process; the claim ends with the context, or with the process.
 
         Raises InputError when another process has claimed it.

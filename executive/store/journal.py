@@ -56,7 +56,7 @@ class StoreJournal(RunVisitor):
         self.keep_world: Callable[[], None] = lambda: None
         self.troubles: list[str] = []
 
-    def replaceable(self, tree: CompiledTree, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
+    def allow_replacement(self, tree: CompiledTree, request_of: Callable[[CompiledTree], Request]) -> StoreJournal:
         """Allows a correction to replace the mission; `request_of` returns the new mission's request."""
         self._tree, self._request_of = tree, request_of
         return self
@@ -81,7 +81,7 @@ class StoreJournal(RunVisitor):
         except sqlite3.Error as error:
             self._trouble(f"the mission that took this one's place could not be kept ({error})")
 
-    def remembering(self, recollection: Recollection, tree: CompiledTree | None = None) -> StoreJournal:
+    def use_recollection(self, recollection: Recollection, tree: CompiledTree | None = None) -> StoreJournal:
         """Sets the recollection of an interrupted run: its results stay in the store until they have been used."""
         self._recollection, self._tree = recollection, tree
         return self
@@ -110,7 +110,7 @@ class StoreJournal(RunVisitor):
 
     def _take_steps(self, note: TickNote) -> None:
         for change in note.changes:
-            if self._recollection is None or not self._recollection.pending(change.path_id):
+            if self._recollection is None or not self._recollection.is_pending(change.path_id):
                 after = change.after
                 self._checkpoints.pop(change.path_id, None)
                 self._steps[change.path_id] = StepRecord(after.status, after.cause, after.message, note.now_s)

@@ -106,7 +106,7 @@ class MissionStore(Database):
         """Notes a start of the mission."""
         self._change("state = 'running', starts = starts + 1", number)
 
-    def never_began(self, before: StoredMission) -> None:
+    def undo_begin(self, before: StoredMission) -> None:
         """Restores the state of a mission that could not begin."""
         values = (before.state.value, before.message, before.starts)
         self._change("state = ?, message = ?, starts = ?", before.id, *values)
@@ -156,7 +156,7 @@ class MissionStore(Database):
         try:
             mission: StoredMission = form(StoredMission).validate_python(dict(row))
         except ValueError as error:
-            raise STORE_FILE.damaged(self.path, error) from error
+            raise STORE_FILE.damage_error(self.path, error) from error
         return mission
 
 

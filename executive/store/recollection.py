@@ -58,14 +58,14 @@ class Recollection:
         self.dropped: set[str] = set()
         self.log: list[str] = []
 
-    def only(self, path_ids: Sequence[str]) -> Recollection:
+    def restrict(self, path_ids: Sequence[str]) -> Recollection:
         """Drops the results of all other nodes; returns itself."""
         self._ended = {path: step for path, step in self._ended.items() if path in path_ids}
         successes = [path for path, step in self._ended.items() if step.status is Status.SUCCESS]
         self._last = max(successes, key=lambda path: (self._ended[path].clock_s, self._place[path]), default=None)
         return self
 
-    def pending(self, path_id: str) -> bool:
+    def is_pending(self, path_id: str) -> bool:
         """Returns whether a node's result is still unused, so that it must not be overwritten."""
         return path_id in self._ended
 
@@ -77,7 +77,7 @@ class Recollection:
         """Returns whether this was the last success before the restart, whose effect may be gone."""
         return path_id == self._last
 
-    def used(self, path_id: str, sentence: str) -> None:
+    def note_use(self, path_id: str, sentence: str) -> None:
         """Notes that a result was returned instead of work."""
         self._ended.pop(path_id, None)
         self.log.append(f"{path_id}: {sentence}")
@@ -86,7 +86,7 @@ class Recollection:
         """Returns the checkpoint of an attempt that the restart interrupted; empty for another node."""
         return self._checkpoints.get(path_id, {})
 
-    def goes_on(self, path_id: str, sentence: str) -> None:
+    def note_work(self, path_id: str, sentence: str) -> None:
         """Notes that a skill works itself, and drops the results of later skills."""
         later = {path for path in self._ended if self._place[path] > self._place[path_id]}
         for path in {path_id, *later}:
@@ -96,7 +96,7 @@ class Recollection:
             self.log.append(f"{path_id}: {sentence}")
         self._checkpoints.pop(path_id, None)
 
-    def looks_first(self, changes_world: bool) -> bool:
+    def must_check_first(self, changes_world: bool) -> bool:
         """Returns whether a skill that begins must first check what is done already.
 
         That holds until a skill that changes the world has begun, since the journal may miss the last actions.
@@ -104,7 +104,7 @@ class Recollection:
         looks, self._world_untouched = self._world_untouched, self._world_untouched and not changes_world
         return looks
 
-    def awake(self, now_s: float, localised: bool) -> bool:
+    def is_awake(self, now_s: float, localised: bool) -> bool:
         """Returns whether the sensors can be trusted: the robot is localised, and 0.5 s have passed since the restart.
 
         After PATIENCE_S it no longer waits for the localisation.

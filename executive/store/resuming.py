@@ -63,7 +63,7 @@ def resumed_tree(tree: CompiledTree, memory: Memory) -> tuple[ResumedTree, Recol
         if leaf.kind == SkillLeaf.kind and path not in over
         if path in by_status[Status.FAILURE] or all(key in memory.board for key in leaf.options["outputs"].values())
     ]
-    recollection = Recollection(tree.path_ids, memory.steps).only(usable)
+    recollection = Recollection(tree.path_ids, memory.steps).restrict(usable)
     root = _with_resumed_skills(tree.root, specs.keys(), memory, recollection)
     keys = history_keys(tree.robot_name, tree.mission_name)
     asked_again = {path for path, node in specs.items() if node.children}
@@ -284,7 +284,7 @@ class _Resumed(Skill[Any]):
         """Returns the result from before the restart, or begins the skill and returns None."""
         result, context = self._recollection.result(self._path), self.context
         trusted = result is not None and not self._recollection.is_last(self._path)
-        if not trusted and not self._recollection.awake(context.clock.now(), context.localiser.estimate().localised):
+        if not trusted and not self._recollection.is_awake(context.clock.now(), context.localiser.estimate().localised):
             return Running("looks at the state of the world after the restart")
         if result is None:
             self._work("goes on here")
@@ -293,7 +293,7 @@ class _Resumed(Skill[Any]):
         if undone is not None:
             self._work(f"does it again, since {undone}")
             return None
-        self._recollection.used(self._path, f"{result.status.value.lower()} {BEFORE}: {result.message}")
+        self._recollection.note_use(self._path, f"{result.status.value.lower()} {BEFORE}: {result.message}")
         message = _before(result.message)
         if result.status is Status.SUCCESS:
             return Remembered(message, self._ports)
@@ -301,8 +301,8 @@ class _Resumed(Skill[Any]):
 
     def _work(self, sentence: str) -> None:
         self._working, self._inner.checkpoint = True, self.checkpoint
-        self._recollection.goes_on(self._path, sentence)
-        if self._recollection.looks_first(self._inner.changes_world):
+        self._recollection.note_work(self._path, sentence)
+        if self._recollection.must_check_first(self._inner.changes_world):
             self._inner.resume(self._inputs)
         else:
             self._inner.begin(self._inputs)

@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator,
 from executive.testing.bench import SkillBench, SkillRun, scripted_bench
 from executive.testing.small_room import room_knowledge
 from executive.tree.port_values import PortValueError, assign_ports, port_value
-from executive.tree.registry import missing
-from executive.tree.types import describe_type, field_types, required
+from executive.tree.registry import missing_skill
+from executive.tree.types import describe_type, field_types, required_fields
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.fault_words import parse_fault
@@ -161,7 +161,7 @@ class SkillTestFile(_Strict):
         )
         try:
             found = assign_ports(values, skill.Inputs)
-            missing = [name for name in required(skill.Inputs) if name not in found]
+            missing = [name for name in required_fields(skill.Inputs) if name not in found]
             if missing:
                 hint = f"give it a {describe_type(hints[missing[0]])}"
                 raise PortValueError((), f"input port '{missing[0]}' has no value", hint)
@@ -186,7 +186,7 @@ def load_skill_tests(
     file = validate(SkillTestFile, source)
     file._source = source
     if file.skill not in skills:
-        raise source.error(("skill",), *missing(file.skill, skills))
+        raise source.error(("skill",), *missing_skill(file.skill, skills))
     for index, test in enumerate(file.tests):
         file.inputs(index, skills[file.skill])
         for number, words in enumerate(test.faults):

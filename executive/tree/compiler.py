@@ -19,10 +19,10 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.decisions import buttons_of
 from executive.tree.nodes.door_check import doorway
 from executive.tree.nodes.group import mission_plan
-from executive.tree.nodes.interrupts import watched
+from executive.tree.nodes.interrupts import watch_plan
 from executive.tree.nodes.policies import AskOperator, Skip, under_policy
 from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, StepPart, start_key
-from executive.tree.types import assignable, conforms, describe_type, field_types, required
+from executive.tree.types import assignable, conforms, describe_type, field_types, required_fields
 from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import UseMission
@@ -89,7 +89,7 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
     assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0)
     builder, steps = assembler.builder(base, mission.source), mission_plan(assembler, mission, base)
-    root = watched(builder, _whole(mission, builder, steps.nodes))
+    root = watch_plan(builder, _whole(mission, builder, steps.nodes))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
     return CompiledTree(mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps, doors)
@@ -140,7 +140,7 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
     """Iterates over the errors of one skill's ports, with hints."""
     skill, inputs, outputs = (node.options[key] for key in ("skill", "inputs", "outputs"))
     types = field_types(skill.Inputs)
-    for name in required(skill.Inputs):
+    for name in required_fields(skill.Inputs):
         if name not in inputs:
             yield f"input port '{name}' has no value", f"give it a {describe_type(types[name])}"
     for port, binding in inputs.items():

@@ -46,7 +46,7 @@ class Endings:
         """Returns whether a node was taken over and has not ended yet."""
         return any(each is node for each in self._due)
 
-    def done(self) -> None:
+    def pop(self) -> None:
         """Removes the first node, which has ended."""
         self._due.pop(0)
 
@@ -62,7 +62,7 @@ class ArmOrder:
 
     anywhere: bool = False
 
-    def ended(self, skill: type[Skill[Any]], *, succeeded: bool) -> None:
+    def note_end(self, skill: type[Skill[Any]], *, succeeded: bool) -> None:
         """Notes the end of a skill: only a success of a skill for the arm alone leaves the arm in a known pose."""
         if Part.ARM in skill.uses:
             self.anywhere = not succeeded or Part.BASE in skill.uses

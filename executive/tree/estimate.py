@@ -21,7 +21,7 @@ from skills.files.schema import validate
 from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 
-__all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected", "load_estimates"]
+__all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "expected_children", "load_estimates"]
 
 _Mark = tuple[Pose2D, Mapping[str, Pose2D], float]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -173,7 +173,7 @@ def _followed(node: NodeSpec, walk: _Walk, *, first: bool) -> Estimate:
         return Estimate()
 
 
-def expected(node: NodeSpec) -> tuple[NodeSpec, ...]:
+def expected_children(node: NodeSpec) -> tuple[NodeSpec, ...]:
     """Returns the children that run one after the other without failures."""
     follow = _EXPECTED.get(node.kind)
     return node.children if follow is None else follow(node)
@@ -181,13 +181,13 @@ def expected(node: NodeSpec) -> tuple[NodeSpec, ...]:
 
 def _all_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """Estimates the children one after the other."""
-    return sum((_followed(child, walk, first=first) for child in expected(node)), Estimate())
+    return sum((_followed(child, walk, first=first) for child in expected_children(node)), Estimate())
 
 
 def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """Estimates the first possible branch. Raises the first branch's error if there is none."""
     reasons: list[InputError] = []
-    for child in expected(node):
+    for child in expected_children(node):
         tried = _tried(child, walk, reasons)
         if tried is not None:
             return tried
@@ -197,7 +197,7 @@ def _first_of(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 def _all_that_can(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """Estimates all possible branches. Raises the first branch's error if there is none."""
     reasons: list[InputError] = []
-    done = [tried for child in expected(node) if (tried := _tried(child, walk, reasons)) is not None]
+    done = [tried for child in expected_children(node) if (tried := _tried(child, walk, reasons)) is not None]
     if not done:
         raise _CannotError(reasons[0] if reasons else None)
     return sum(done, Estimate())

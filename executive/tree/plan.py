@@ -12,7 +12,7 @@ from executive.mission.gripper import InGripper
 from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
-from executive.tree.registry import missing
+from executive.tree.registry import missing_skill
 from executive.words.command import Command, Task
 from executive.words.goal import GoalCondition
 from executive.words.knowledge import ANYTHING, EVERYTHING, Knowledge, Pose
@@ -41,7 +41,7 @@ def pose_2d(pose: Pose) -> Pose2D:
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
-def after(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trigger:
+def failure_trigger(*causes: Cause, of: NodeSpec | None = None, own: bool = False) -> Trigger:
     """Trigger of a recovery: a failure with one of the causes, of a node (None: of the whole attempt)."""
     return Trigger(frozenset(causes), None if of is None else of.path_id, own)
 
@@ -139,7 +139,7 @@ class PlanBuilder:
         InputError when no skill of that name is registered.
         """
         if name not in self.registry:
-            raise self.error(*missing(name, self.registry))
+            raise self.error(*missing_skill(name, self.registry))
         skill = self.registry[name]
         bound = {port: v if isinstance(v, Constant | FromBoard) else Constant(v) for port, v in (inputs or {}).items()}
         drives = Part.BASE in skill.uses and Part.ARM not in skill.uses
@@ -162,7 +162,7 @@ class PlanBuilder:
         options = {"recoveries": when, "attempts": attempts, "forgets": forgets}
         return self.node("recover", name, attempt, *nodes, part=part, **options)
 
-    def tidied(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
+    def stow_after(self, work: NodeSpec, *, only_after_failure: bool = False) -> NodeSpec:
         """Builds work after which the arm is stowed, whether it succeeds or fails, or `only_after_failure`."""
         name = "stow the arm if it fails" if only_after_failure else "stow the arm in the end"
         return self.node("afterwards", name, work, self.skill(STOW), only_after_failure=only_after_failure)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Union
 
-from executive.tree.types import describe_type, field_types, required
+from executive.tree.types import describe_type, field_types, required_fields
 from executive.words.command import parse_object
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Surface
@@ -163,7 +163,7 @@ def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
             raise PortValueError((*path, str(key)), what, suggestion(str(key), plain))
         read[name] = port_value(item, hints[name], knowledge, (*path, str(key)))
     filled = {**_DEFAULTS.get(record, {}), **read}
-    for name in required(record):
+    for name in required_fields(record):
         if name not in filled:
             raise PortValueError(path, f"'{without_unit(name)}' is missing", f"give {listing(plain)}")
     try:

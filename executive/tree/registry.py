@@ -78,7 +78,7 @@ class SkillRegistry(Mapping[str, SkillClass]):
         return self._loaded.get(name)
 
 
-def missing(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
+def missing_skill(name: str, registry: Mapping[str, SkillClass]) -> tuple[str, str]:
     """Message and hint for a name that is no skill of the registry."""
     broken = registry.why_broken(name) if isinstance(registry, SkillRegistry) else None
     if broken is not None:

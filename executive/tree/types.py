@@ -43,7 +43,7 @@ def assignable(source: Any, target: Any) -> bool:
     return plain and issubclass(source, target)
 
 
-def required(record: type) -> tuple[str, ...]:
+def required_fields(record: type) -> tuple[str, ...]:
     """Returns the names of a dataclass's fields that have no default."""
     missing, fields = dataclasses.MISSING, dataclasses.fields(record)
     return tuple(field.name for field in fields if field.default is missing and field.default_factory is missing)

@@ -522,7 +522,7 @@ def resumed(seed: int, folder: Path) -> Ran | None:
         else:
             return None
         journal = store.journal(mission.id)
-        journal.remembering(recollection)
+        journal.use_recollection(recollection)
         store.begin(mission.id)
         robotics.active.clear()
         robotics.robot.holder, robotics.robot.driving = None, False

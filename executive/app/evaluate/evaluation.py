@@ -73,7 +73,7 @@ def evaluate_runs(
     Raises:
         InputError: `before` refuses the runs, or results cannot be written; stored results stay.
     """
-    with ResultsFile(results, create=True) as stored, stored.claimed():
+    with ResultsFile(results, create=True) as stored, stored.claim():
         stored.begin(evaluation, code=installed_code())
         done = stored.done_ids()
         missing = [run for run in evaluation.runs if run.id not in done]

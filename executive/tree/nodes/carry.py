@@ -26,7 +26,7 @@ from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.pick_up import LOOK_AGAIN_S, go_near_plan, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery, Trigger
-from executive.tree.nodes.search import detect_plan, where
+from executive.tree.nodes.search import detect_plan, place_phrase
 from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import START
 from executive.words.outlines import Point, distance_m, inside
@@ -51,7 +51,7 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
     place = builder.place(goal)
     put, guards = put_down_plan(builder, item, place)
     skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
-    return unless_fallen(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
+    return recover_fallen_plan(builder.at("carry-on"), item, f"to the {place}", put, guards, skills)
 
 
 def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
@@ -62,7 +62,7 @@ def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromB
     hand_over = builder.skill("hand_over", ports)
     give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
     bring = builder.at("bring").sequence(f"bring it to {person}", way, give)
-    return unless_fallen(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
+    return recover_fallen_plan(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
 
 
 def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[NodeSpec, tuple[NodeSpec, ...]]:
@@ -77,7 +77,7 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
         )
     to = f"to the {place}"
     each = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
-    put = builder.node("selector", f"put {item} down {where(builder.knowledge, place)}", *each)
+    put = builder.node("selector", f"put {item} down {place_phrase(builder.knowledge, place)}", *each)
     return put, tuple(guard for plan in each for guard in plan.children)
 
 
@@ -100,7 +100,7 @@ def carried_along_plan(builder: PlanBuilder, drive: NodeSpec, to: str) -> NodeSp
     if builder.carried is None:
         return drive
     guard = _holding(builder.at("carried"), builder.carried, to, drive, until_put_down=True)
-    return unless_fallen(builder.at("carry-on"), builder.carried, to, guard, (guard,))
+    return recover_fallen_plan(builder.at("carry-on"), builder.carried, to, guard, (guard,))
 
 
 def _holding(
@@ -265,7 +265,7 @@ class SurfacesNear(ExplainedLeaf):
         return self.fail(Failed(Cause.POSTCONDITION, what))
 
 
-def unless_fallen(
+def recover_fallen_plan(
     builder: PlanBuilder,
     item: ObjectKind,
     to: str,

@@ -17,7 +17,7 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import put_down_plan
 from executive.tree.nodes.pick_up import pick_up_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
-from executive.tree.nodes.search import detect_plan, look_plans, required_surfaces, where
+from executive.tree.nodes.search import detect_plan, look_plans, place_phrase, required_surfaces
 from executive.tree.plan import PlanBuilder
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import EVERYTHING
@@ -169,11 +169,11 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     key, missed = builder.key("detection"), builder.key("missed")
     extra = {"avoid": FromBoardOr(missed, ())} if builder.has_ports("detect", ("avoid",)) else {}
     looks = (look for _, look in look_plans(builder.at("left"), item, surfaces, key, extra))
-    look = builder.at("left").node("selector", f"is anything left {where(builder.knowledge, place)}?", *looks)
+    look = builder.at("left").node("selector", f"is anything left {place_phrase(builder.knowledge, place)}?", *looks)
     again = detect_plan(builder.at("find"), item, surfaces, key, extra)
     around = tuple(map(builder.surface, surfaces))
     carry = replace(builder.at("bring"), command=bring)
-    put = carry.at("tidy").tidied(put_down_plan(carry, item, to)[0], only_after_failure=True)
+    put = carry.at("tidy").stow_after(put_down_plan(carry, item, to)[0], only_after_failure=True)
     take = pick_up_plan(builder, item, again, key, around, seen=True)
     move = builder.at("move").sequence("move it", take, put)
     return builder.node(
@@ -185,7 +185,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         done=(done := builder.key("moved")),
         missed=missed,
         did=("moved", f"to the {to}"),
-        where=where(builder.knowledge, place),
+        where=place_phrase(builder.knowledge, place),
         limit=MOST_OBJECTS,
         misses=MOST_MISSES,
         forgets=(done, missed),

@@ -16,13 +16,13 @@ from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
 from executive.tree.nodes.pick_up import go_near_plan, held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
-    answering,
     find_plan,
+    place_phrase,
     refuse_several,
     required_surfaces,
     search_plan,
+    set_answer_options,
     surfaces_elsewhere,
-    where,
 )
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import START, TIME_UNITS_S, Command, Task
@@ -102,7 +102,7 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
             raise InputError.at(step.source, f"this step gives {said}, not '{port}'", hint=hint)
         option, kind = _ANSWERS[port]
         keys[option] = assembler.give(name, builder.key(port), kind, builder, COUNTED if port == "count" else None)
-    return answering(node, keys) if keys else node
+    return set_answer_options(node, keys) if keys else node
 
 
 def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
@@ -145,7 +145,7 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
         alone = HoldsNothingElse(str(item), builder.search_classes(item.name), item.attributes)
         get = builder.node("guard", f"get {item} with an empty gripper", get, part="empty-handed", condition=alone)
         have = builder.node("selector", f"have {item}, or get it", held, get, part="have")
-        return builder.sequence(f"get {item} {where(builder.knowledge, place)}", have)
+        return builder.sequence(f"get {item} {place_phrase(builder.knowledge, place)}", have)
     return builder.node("selector", f"have {item}", held_plan(builder, item), builder.at("get").sequence("get it", get))
 
 

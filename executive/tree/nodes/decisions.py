@@ -79,7 +79,7 @@ class View:
         minutes = int((context.day_began_s + context.clock.now()) % DAY_S // 60)
         return f"{minutes // 60:02d}:{minutes % 60:02d}"
 
-    def pressed(self, button: str) -> bool:
+    def is_pressed(self, button: str) -> bool:
         """Returns whether a button has been pressed since the beginning."""
         return self.context.presses().get(button, 0) > self.presses.get(button, 0)
 
@@ -128,7 +128,7 @@ class Decision:
             case ValueIs(expression=expression):
                 return bool(expression.value(view.values(self.keys)))
             case ButtonPressed(button=button):
-                return view.pressed(button)
+                return view.is_pressed(button)
             case Not(part=part):
                 found = self._holds(part, view, answers)
                 return None if found is None else not found
@@ -169,7 +169,7 @@ class MustHold(guard.Condition):
         """Counts time and presses from now on."""
         self._view = View(context)
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns a failure when the decision is false."""
         holds = self._holds(context)
         if isinstance(holds, Failed):
@@ -197,13 +197,13 @@ class MustNotBegin(MustHold):
         super().begin(context)
         self._called = False
 
-    def called(self) -> None:
+    def note_call(self) -> None:
         """Notes that the interrupt has begun."""
         self._called = True
         if self._view is not None:
             self._view.forget_presses()
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns a failure, which calls the interrupt, when the decision has become true."""
         holds = self._holds(context)
         if isinstance(holds, Failed):

@@ -8,7 +8,7 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.goals import command_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery
-from executive.tree.plan import Assembled, PlanBuilder, StepPart, after, pose_2d
+from executive.tree.plan import Assembled, PlanBuilder, StepPart, failure_trigger, pose_2d
 from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
 from skills.api import Cause
@@ -22,7 +22,7 @@ def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
     attempt = builder.at("attempt").sequence(
         "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
     )
-    again = Recovery((after(Cause.POSTCONDITION, of=charge),), uses=2)
+    again = Recovery((failure_trigger(Cause.POSTCONDITION, of=charge),), uses=2)
     return builder.recover("charge at the dock", attempt, (builder.at("again").skill("back_off"), again), attempts=3)
 
 

@@ -69,10 +69,10 @@ class Always(Afterwards):
 def _plan(assembler: Assembler, block: model.Group, builder: PlanBuilder) -> Assembled:
     before = assembler.flow.copy()
     body = assembler.row(block.steps, builder, block.name or "group")
-    return framed(assembler, body, block, builder, before)
+    return frame_plan(assembler, body, block, builder, before)
 
 
-def framed(
+def frame_plan(
     assembler: Assembler, body: Assembled, group: model.Group | Mission, builder: PlanBuilder, before: Flow
 ) -> Assembled:
     """Adds `when`, `while` and `always` to steps; `before` is the flow before them."""
@@ -132,7 +132,7 @@ def mission_plan(assembler: Assembler, mission: Mission, base: str) -> Assembled
     steps = assembler.level(mission.steps, base)
     if mission.is_framed:
         row = replace(steps, nodes=(builder.sequence("steps", *steps.nodes, part="all"),))
-        steps = framed(assembler, row, mission, builder.at("whole"), before)
+        steps = frame_plan(assembler, row, mission, builder.at("whole"), before)
     assembler.values_base, assembler.flow.declared = outer
     assembler.flow.names.update({name: known[name] for name in mission.variables or () if name in known})
     return replace(steps, nodes=(*first, *steps.nodes))

@@ -51,8 +51,8 @@ class Condition(ABC):
 
     | reading | policy | verdict |
     |---|---|---|
-    | fresh | any | as `judged` |
-    | too old | ACCEPT | as `judged` |
+    | fresh | any | as `judge` |
+    | too old | ACCEPT | as `judge` |
     | too old | WAIT | Waiting until the patience is over, then Failed with PRECONDITION |
     | too old | FAIL | Failed with PRECONDITION |
     """
@@ -64,7 +64,7 @@ class Condition(ABC):
     _stale_since_s: float | None = field(default=None, init=False, repr=False, compare=False)
 
     @abstractmethod
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Judges the condition by the readings; None when it holds."""
 
     def stamp_s(self, context: RunContext) -> float:
@@ -84,23 +84,23 @@ class Condition(ABC):
         """Handles a new start of the subtree: clears all durations."""
         self._since_s = self._stale_since_s = None
 
-    def called(self) -> None:  # noqa: B027 - most conditions need not know
+    def note_call(self) -> None:  # noqa: B027 - most conditions need not know
         """Handles the beginning of the interrupt that the condition has called."""
 
-    def violated_at_end(self, context: RunContext) -> Failed | None:
+    def check_end(self, context: RunContext) -> Failed | None:
         """Returns the failure that contradicts a success of the subtree, or None."""
         return None
 
-    def violated(self, context: RunContext) -> Verdict:
+    def check(self, context: RunContext) -> Verdict:
         """Judges the condition before each tick of the subtree, with the policy for old readings; None if it holds."""
         fresh, policy = self.freshness, self.stale or self.freshness.policy
         if policy is StaleData.ACCEPT:
-            return self.judged(context)
+            return self.judge(context)
         now_s = context.clock.now()
         age_s = now_s - self.stamp_s(context)
         if age_s <= fresh.max_age_s:
             self._stale_since_s = None
-            return self.judged(context)
+            return self.judge(context)
         self._stale_since_s = now_s if self._stale_since_s is None else self._stale_since_s
         old = f"the last reading of {self.reading} is {age_s:.1f} s old"
         said = old if math.isfinite(age_s) else f"there is no reading of {self.reading} yet"
@@ -152,7 +152,7 @@ class Holds(Condition):
         super().begin(context)
         self._watch, self._begins = hold_watch(context.robot.capabilities()), True
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Judges the grip; grips a slipping object again."""
         watch, held = self._watch, context.payload.kind
         begins, self._begins = self._begins, False
@@ -175,7 +175,7 @@ class Holds(Condition):
             return Failed(Cause.EXECUTION, f"the {self.item} slips out of the gripper on the way{self._to}")
         return None
 
-    def violated_at_end(self, context: RunContext) -> Failed | None:
+    def check_end(self, context: RunContext) -> Failed | None:
         """Returns a failure when the gripper is empty at the end."""
         if self.until_put_down or context.robot.gripper().holding:
             return None
@@ -205,7 +205,7 @@ class HoldsNothingElse(Condition):
         super().begin(context)
         self._begins = True
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns a failure when the gripper holds another object at the start."""
         begins, self._begins = self._begins, False
         held = context.payload.kind
@@ -228,7 +228,7 @@ class KnowsPlace(Condition):
         """Stamp (s) of the estimate."""
         return context.localiser.estimate().stamp_s
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns a failure when the robot has not been localised for longer than the patience."""
         if context.localiser.estimate().localised:
             self._since_s = None
@@ -252,7 +252,7 @@ class BatteryAtLeast(Condition):
         """Stamp (s) of the battery."""
         return context.robot.battery().stamp_s
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns a failure with PRECONDITION when the charge is below the least one."""
         charge, least = context.robot.battery().charge, self.least(context)
         if charge >= least:
@@ -284,7 +284,7 @@ class BatteryForWork(BatteryAtLeast):
 class NoStopButton(Condition):
     """Condition that no stop button is pressed; the mission stands still while one is."""
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns Waiting while a stop button is pressed."""
         pressed = context.stop_pressed()
         return None if pressed is None else Waiting(pressed)
@@ -294,7 +294,7 @@ class NoStopButton(Condition):
 class OwnLease(Condition):
     """Condition that no other program holds the robot's lease; the mission stands still while one does."""
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns Waiting while another program holds the lease."""
         held = context.robot.lease_holder()
         if held is None or held.holder == context.lease.holder:
@@ -313,7 +313,7 @@ class NotAfter(Condition):
         """Counts from now on."""
         self._begun_s = context.clock.now()
 
-    def judged(self, context: RunContext) -> Verdict:
+    def judge(self, context: RunContext) -> Verdict:
         """Returns a failure when the time is over."""
         if context.clock.now() - self._begun_s <= self.limit_s:
             return None
@@ -328,7 +328,7 @@ class Guard(ExplainedDecorator):
     | violated | halted | FAILURE with the condition's cause |
     | waiting | suspended | RUNNING |
     | holds | RUNNING, FAILURE | as the child |
-    | holds | SUCCESS | SUCCESS, or FAILURE with the condition's cause if it contradicts (`violated_at_end`) |
+    | holds | SUCCESS | SUCCESS, or FAILURE with the condition's cause if it contradicts (`check_end`) |
     | - | halted | INVALID with CANCELLED |
     """
 
@@ -347,7 +347,7 @@ class Guard(ExplainedDecorator):
 
     def _held_back(self) -> Status | None:
         self._looked = True
-        verdict = self.condition.violated(self.context)
+        verdict = self.condition.check(self.context)
         if isinstance(verdict, Waiting):
             suspend(self.decorated)
             return self.say(verdict.message, Status.RUNNING)
@@ -357,5 +357,5 @@ class Guard(ExplainedDecorator):
         """Returns the child's status, unless the condition contradicts its success."""
         status = self.pass_on()
         done, self._looked = self._looked and status == Status.SUCCESS, False
-        contradicts = self.condition.violated_at_end(self.context) if done else None
+        contradicts = self.condition.check_end(self.context) if done else None
         return status if contradicts is None else self.fail(contradicts)

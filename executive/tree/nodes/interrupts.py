@@ -23,7 +23,7 @@ from executive.tree.nodes.dock import dock_plan
 from executive.tree.nodes.guard import BatteryForWork, Condition, KnowsPlace, NoStopButton, OwnLease, Waiting
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.nodes.skill_leaf import SkillLeaf
-from executive.tree.plan import PlanBuilder, after, pose_2d
+from executive.tree.plan import PlanBuilder, failure_trigger, pose_2d
 from executive.words.knowledge import Pose
 from skills.api import Cause, Failed
 
@@ -63,7 +63,7 @@ class Monitor(ExplainedLeaf):
 
     def update(self) -> Status:
         """Judges the condition."""
-        verdict = self.condition.violated(self.context)
+        verdict = self.condition.check(self.context)
         if isinstance(verdict, Failed):
             return self.fail(verdict)
         return self.say("holds") if verdict is None else self.say(verdict.message, Status.RUNNING)
@@ -110,14 +110,14 @@ class Interrupt(ExplainedDecorator):
         self.waiting = ""
         if self.status == Status.RUNNING:
             return True
-        verdict = self.condition.violated(self.context)
+        verdict = self.condition.check(self.context)
         if isinstance(verdict, Waiting):
             self.waiting = verdict.message
         if not isinstance(verdict, Failed):
             return False
         running = (n for n in mission.iterate() if isinstance(n, SkillLeaf) and n.status == Status.RUNNING)
         spared = any(leaf.skill_name in self.spares for leaf in running)
-        if spared and not (self.urgent and isinstance(self.urgent.violated(self.context), Failed)):
+        if spared and not (self.urgent and isinstance(self.urgent.check(self.context), Failed)):
             return False
         self._why = verdict.message
         return True
@@ -125,7 +125,7 @@ class Interrupt(ExplainedDecorator):
     def initialise(self) -> None:
         """Counts a call."""
         self.count += 1
-        self.condition.called()
+        self.condition.note_call()
 
     def _held_back(self) -> Status | None:
         if self.count <= self.uses:
@@ -190,7 +190,7 @@ class Interrupts(MemoryComposite):
         self._go_on(watch.waiting or message_of(watch))
 
 
-def watched(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
+def watch_plan(builder: PlanBuilder, mission: NodeSpec) -> NodeSpec:
     """Builds the root with monitors and interrupts above the mission; `builder` is the mission's own.
 
     Raises InputError when a skill that the interrupts need is not registered.
@@ -229,7 +229,7 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
 
 def _relocalising(builder: PlanBuilder, work: NodeSpec) -> NodeSpec:
     """Recovers work by a relocalisation after a failure with PRECONDITION or EXECUTION."""
-    lost = Recovery((after(Cause.PRECONDITION, Cause.EXECUTION),))
+    lost = Recovery((failure_trigger(Cause.PRECONDITION, Cause.EXECUTION),))
     return builder.recover("know where it is", work, (builder.skill("relocalise"), lost), attempts=2)
 
 

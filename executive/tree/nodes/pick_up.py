@@ -116,7 +116,7 @@ def pick_up_plan(
         part="attempts",
         forgets=(near, tried) if seen else (key, near, tried, blocking),
     )
-    return builder.at("tidy").tidied(attempts, only_after_failure=True)
+    return builder.at("tidy").stow_after(attempts, only_after_failure=True)
 
 
 def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | None) -> NodeSpec:

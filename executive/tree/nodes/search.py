@@ -251,7 +251,7 @@ def search_plan(
     )
     looks = look_plans(builder, item, surfaces, key)
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
-    looked = where(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
+    looked = place_phrase(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
     return builder.node(
         "selector",
         f"find {item}",
@@ -289,7 +289,7 @@ def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None)
     return surfaces
 
 
-def where(knowledge: Knowledge, place: str | None) -> str:
+def place_phrase(knowledge: Knowledge, place: str | None) -> str:
     """Text of a place at the end of a sentence: "in the kitchen", "on the desk"."""
     if place is None:
         return "anywhere"
@@ -321,7 +321,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
     tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
-    spot = where(knowledge, place)
+    spot = place_phrase(knowledge, place)
     denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {asked} {spot}"
     if what == ANYTHING:
         asked, denied = "something", f"nothing {spot}"
@@ -341,7 +341,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         needed=max(1, command.object_count),
         yes_or_no=what != ANYTHING,
     )
-    return builder.at("tidy").tidied(answer)
+    return builder.at("tidy").stow_after(answer)
 
 
 def _asked_for(item: str, count: int) -> str:
@@ -351,11 +351,11 @@ def _asked_for(item: str, count: int) -> str:
     return count_of(count, item) if count else plural(item)
 
 
-def answering(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
+def set_answer_options(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
     """Sets options of the answer node of a status check, such as the key of its answer."""
     if node.kind == Answer.kind:
         return node.with_options(**keys)
-    return replace(node, children=tuple(answering(child, keys) for child in node.children))
+    return replace(node, children=tuple(set_answer_options(child, keys) for child in node.children))
 
 
 def refuse_several(builder: PlanBuilder) -> None:

@@ -17,7 +17,7 @@ from executive.tree.context import RunContext
 from executive.tree.goals import POSE_NEAR_M, square_region, surface_region
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.tree.port_values import FROM_KEY, PortValueError, assign_ports, port_value
-from executive.tree.registry import missing
+from executive.tree.registry import missing_skill
 from executive.tree.types import conforms, describe_type, field_types
 from executive.words.goal import GoalCondition, GoalKind
 from executive.words.knowledge import Knowledge, Pose
@@ -112,7 +112,7 @@ class SkillLeaf(ExplainedLeaf):
             self.message, self.progress = step.message, step.progress
             return Status.RUNNING
         step = self._ended() or self._written(step)
-        self.context.arm_order.ended(self.skill, succeeded=isinstance(step, Succeeded))
+        self.context.arm_order.note_end(self.skill, succeeded=isinstance(step, Succeeded))
         self.message = self.feedback_message = step.message
         self.cause = step.cause if isinstance(step, Failed) else None
         self.final = isinstance(step, Failed) and step.final
@@ -125,7 +125,7 @@ class SkillLeaf(ExplainedLeaf):
         active = self._first or self._skill
         assert active is not None
         self._time.stop()
-        self.context.arm_order.ended(self.skill, succeeded=False)
+        self.context.arm_order.note_end(self.skill, succeeded=False)
         self._false_start = self._guarded(active.suspend) or self._false_start
 
     def terminate(self, new_status: Status) -> None:
@@ -142,7 +142,7 @@ class SkillLeaf(ExplainedLeaf):
         if not self.active:
             return
         defect = self._ended()
-        self.context.arm_order.ended(self.skill, succeeded=False)
+        self.context.arm_order.note_end(self.skill, succeeded=False)
         self.explain_cancelled()
         if defect is not None:
             self.cause, self.message = defect.cause, defect.message
@@ -183,7 +183,7 @@ class SkillLeaf(ExplainedLeaf):
             return step
         self._first = None
         first.end()
-        self.context.arm_order.ended(type(first), succeeded=isinstance(step, Succeeded))
+        self.context.arm_order.note_end(type(first), succeeded=isinstance(step, Succeeded))
         self._time = StoppableTime(self.context.clock)
         skill.begin(self._values)
         return Running("the arm is brought in" if isinstance(step, Succeeded) else f"goes on: {step.message}")
@@ -264,7 +264,7 @@ def _plan(assembler: Assembler, call: CallSkill, builder: PlanBuilder) -> Assemb
     Raises InputError for an unknown skill, port or name, or a value that does not fit its port.
     """
     if call.skill not in builder.registry:
-        raise call.error(("skill",), *missing(call.skill, builder.registry))
+        raise call.error(("skill",), *missing_skill(call.skill, builder.registry))
     flow, path_id, skill = assembler.flow, builder.path_id, builder.registry[call.skill]
     inputs, gives = _inputs(call, skill, builder.knowledge, flow.names), call.gives or {}
     for port in gives:

@@ -69,7 +69,7 @@ class TestMissionRuns:
 
     def test_a_full_disk_ends_the_queue(self, runs, store, mission):
         def fill(prepared, **_):
-            raise STORE_FILE.full_disk(store.path)
+            raise STORE_FILE.full_disk_error(store.path)
 
         with pytest.raises(InputError, match="the disk is full"):
             runs(fill).run(mission)

@@ -358,7 +358,7 @@ def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monke
 
 
 def test_only_one_process_runs_missions_of_a_store(errand, mission, plant, tmp_path):
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claimed():
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claim():
         result = errand("run", mission("alone"), "--quiet")
     assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)
 
@@ -456,7 +456,7 @@ def test_serve_goes_on_with_what_was_killed(errand, mission, plant, states):
 
 def test_only_one_process_serves_a_store(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--every", "1h")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claimed():
+    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claim():
         result = errand("queue", "serve", "--until-idle")
         assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)
         assert errand("queue", "remove", "1").exit_code == 0

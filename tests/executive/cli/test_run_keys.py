@@ -51,7 +51,7 @@ def test_space_pauses_and_goes_on(control):
 def test_s_steps_from_a_running_mission(control):
     assert pressed(control, "s").mode is Mode.PAUSED
     assert control.poll().hold is None
-    control.ticked(changed=True)
+    control.note_tick(changed=True)
     assert control.poll().hold == "stepping"
 
 

@@ -85,7 +85,7 @@ def test_what_takes_a_missions_place_is_kept_in_its_stead(path):
     other = replace(REQUEST, name="go hall", commands=("Go",), fingerprint="other", sentence=None)
     with MissionStore(path) as store:
         mission = store.add(REQUEST, queued=False)
-        journal = store.journal(mission.id).replaceable("first", lambda tree: other)
+        journal = store.journal(mission.id).allow_replacement("first", lambda tree: other)
         journal.note(note(changed("a/b", Status.SUCCESS), tree="first", board={"alice/x": Pose2D(1.0, 2.0, 0.5)}))
         journal.note(note(tree="second"))
         assert (store.mission(mission.id).request, store.has_steps(mission.id)) == (other, False)
@@ -170,9 +170,9 @@ def test_an_empty_store_is_damaged(path):
 
 
 def test_what_goes_wrong_while_a_store_is_claimed_is_not_the_stores(path):
-    with MissionStore(path) as store, pytest.raises(OSError, match="elsewhere"), store.claimed():
+    with MissionStore(path) as store, pytest.raises(OSError, match="elsewhere"), store.claim():
         raise OSError("elsewhere")
-    with MissionStore(path) as store, store.claimed():
+    with MissionStore(path) as store, store.claim():
         pass
 
 
@@ -274,7 +274,7 @@ import sys
 from pathlib import Path
 from executive.store.missions import MissionStore
 
-with MissionStore(Path(sys.argv[1])) as store, store.claimed():
+with MissionStore(Path(sys.argv[1])) as store, store.claim():
     sys.stdout.write("held\\n")
     sys.stdout.flush()
     sys.stdin.read()
@@ -290,11 +290,11 @@ def test_two_processes_do_not_run_missions_of_one_store(path):
         with (
             MissionStore(path) as store,
             pytest.raises(InputError, match=f"process {holder.pid} runs a mission"),
-            store.claimed(),
+            store.claim(),
         ):
             pass
     finally:
         holder.kill()
         holder.communicate()
-    with MissionStore(path) as store, store.claimed():
+    with MissionStore(path) as store, store.claim():
         pass

@@ -147,7 +147,7 @@ def live(store, clock, robot, make, world, script, handling, knowledge):
         journal, recollection = store.journal(mission.id), None
         if missions:
             tree, recollection = resumed_tree(tree, store.memory(mission.id))
-            journal.remembering(recollection)
+            journal.use_recollection(recollection)
         store.begin(mission.id)
         ticks = Ticks(journal, kill_after, kill_when, lag)
         script.begun.clear()

@@ -192,7 +192,7 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
             journal = store.journal(mission.id)
             if missions:
                 tree, recollection = resumed_tree(tree, store.memory(mission.id))
-                journal.remembering(recollection)
+                journal.use_recollection(recollection)
             store.begin(mission.id)
             robot.holder = None
             entry = RunEntry(tree, robot, make.StillLocaliser(), make.EmptyCostmap())

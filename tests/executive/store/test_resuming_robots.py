@@ -134,7 +134,7 @@ def live(store, clock, robots, make, handling, knowledge):
         if mission.starts:
             memory = store.memory(mission.id, name)
             tree, recollection = ended_tree(tree, memory) or resumed_tree(tree, memory)
-            journal.remembering(recollection)
+            journal.use_recollection(recollection)
         entry = RunEntry(tree, robots[name], make.StillLocaliser(), make.EmptyCostmap(), after=after)
         return entry, Killing(name, journal, made, kill_after)
 

@@ -8,7 +8,7 @@ from executive.tree import nodes
 from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import FromBoard
 from executive.tree.compiler import KINDS, build, compile_mission, writes
-from executive.tree.estimate import expected
+from executive.tree.estimate import expected_children
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.policies import Timeout
@@ -29,7 +29,7 @@ def skills_of(tree):
 
 def followed(node):
     yield node
-    for child in expected(node):
+    for child in expected_children(node):
         yield from followed(child)
 
 

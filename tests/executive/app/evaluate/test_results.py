@@ -41,8 +41,8 @@ def test_results_of_another_scenario_or_version_are_refused(tmp_path):
 def test_only_one_process_writes(tmp_path):
     path = tmp_path / "r.sqlite"
     own = ResultsFile(path, create=True)
-    with own, own.claimed(), ResultsFile(path) as other, pytest.raises(InputError, match="just now"):
-        other.claimed().__enter__()
+    with own, own.claim(), ResultsFile(path) as other, pytest.raises(InputError, match="just now"):
+        other.claim().__enter__()
 
 
 def test_what_is_no_results_file_is_refused(tmp_path):

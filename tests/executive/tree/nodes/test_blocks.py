@@ -513,7 +513,7 @@ class Switch:
     def begin(self, context):
         pass
 
-    def violated(self, context):
+    def check(self, context):
         return self.verdict
 
 

@@ -372,21 +372,21 @@ def test_set_fails_at_the_first_without_a_value_and_keeps_those_before(run_conte
 def test_must_hold(run_context, robot):
     watch = MustHold(value("battery > 0.5"), "it is full").for_run(run_context)
     watch.begin(run_context)
-    assert watch.violated(run_context) is None
+    assert watch.check(run_context) is None
     robot.charge = 0.4
-    verdict = watch.violated(run_context)
+    verdict = watch.check(run_context)
     assert isinstance(verdict, Failed)
     assert (verdict.cause, verdict.message) == (Cause.PRECONDITION, "it does not hold any more that it is full")
 
 
 def test_must_hold_without_a_value(run_context):
-    verdict = MustHold(value("n > 1", n="alice/n"), "n").for_run(run_context).violated(run_context)
+    verdict = MustHold(value("n > 1", n="alice/n"), "n").for_run(run_context).check(run_context)
     assert isinstance(verdict, Failed)
     assert verdict.cause is Cause.ERROR
 
 
 def test_must_hold_waits_for_what_is_not_known_yet(run_context):
-    assert isinstance(MustHold(decision(LOOK, FIRST), "so").for_run(run_context).violated(run_context), Waiting)
+    assert isinstance(MustHold(decision(LOOK, FIRST), "so").for_run(run_context).check(run_context), Waiting)
 
 
 def test_must_not_begin_calls_once_until_it_was_false_in_between(run_context, robot):
@@ -395,9 +395,9 @@ def test_must_not_begin_calls_once_until_it_was_false_in_between(run_context, ro
     found = []
     for holding in (False, True, True, False, True):
         robot.holding = holding
-        found.append(isinstance(watch.violated(run_context), Failed))
+        found.append(isinstance(watch.check(run_context), Failed))
         if found[-1]:
-            watch.called()
+            watch.note_call()
     assert found == [False, True, False, False, True]
 
 
@@ -407,9 +407,9 @@ def test_must_not_begin_is_called_once_by_each_press(run_context, pressed):
     found = []
     for presses in (0, 1, 1, 2, 2):
         pressed["go"] = presses
-        found.append(isinstance(watch.violated(run_context), Failed))
+        found.append(isinstance(watch.check(run_context), Failed))
         if found[-1]:
-            watch.called()
+            watch.note_call()
     assert found == [False, True, False, True, False]
 
 

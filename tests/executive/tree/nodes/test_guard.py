@@ -43,7 +43,7 @@ class Readings(Condition):
     def stamp_s(self, context):
         return self.taken_s
 
-    def judged(self, context):
+    def judge(self, context):
         self.asked += 1
 
     def fresh(self, policy, patience_s=2.0):
@@ -59,19 +59,19 @@ def readings():
 @pytest.mark.parametrize("policy", StaleData)
 def test_fresh_readings_are_judged_under_every_policy(readings, context, clock, policy):
     clock.advance(1.0)
-    assert readings.fresh(policy).violated(context) is None
+    assert readings.fresh(policy).check(context) is None
     assert readings.asked == 1
 
 
 def test_accept_judges_by_what_there_is(readings, context, clock):
     clock.advance(60.0)
-    assert readings.fresh(StaleData.ACCEPT).violated(context) is None
+    assert readings.fresh(StaleData.ACCEPT).check(context) is None
     assert readings.asked == 1
 
 
 def test_fail_counts_an_old_reading_as_violated_at_once(readings, context, clock):
     clock.advance(1.5)
-    verdict = readings.fresh(StaleData.FAIL).violated(context)
+    verdict = readings.fresh(StaleData.FAIL).check(context)
     assert verdict == Failed(Cause.PRECONDITION, "the last reading of the sensor is 1.5 s old")
     assert readings.asked == 0
 
@@ -80,28 +80,28 @@ def test_wait_waits_and_goes_on_with_a_new_reading(readings, context, clock):
     condition = readings.fresh(StaleData.WAIT)
     clock.advance(1.5)
     said = "waits for the sensor: the last reading of the sensor is 1.5 s old"
-    assert condition.violated(context) == Waiting(said)
+    assert condition.check(context) == Waiting(said)
     readings.taken_s = 1.5
-    assert condition.violated(context) is None
+    assert condition.check(context) is None
     clock.advance(3.0)
     readings.taken_s = 4.5
-    assert condition.violated(context) is None
+    assert condition.check(context) is None
 
 
 def test_wait_fails_when_the_patience_is_over_and_begins_anew_with_each_start(readings, context, clock):
     condition = readings.fresh(StaleData.WAIT)
     clock.advance(2.0)
-    assert isinstance(condition.violated(context), Waiting)
+    assert isinstance(condition.check(context), Waiting)
     clock.advance(2.1)
-    assert isinstance(condition.violated(context), Failed)
+    assert isinstance(condition.check(context), Failed)
     condition.begin(context)
-    assert isinstance(condition.violated(context), Waiting)
+    assert isinstance(condition.check(context), Waiting)
     assert readings.begun == 1
 
 
 def test_a_reading_that_never_came_is_named(readings, context):
     readings.taken_s = float("-inf")
-    assert readings.fresh(StaleData.FAIL).violated(context).message == "there is no reading of the sensor yet"
+    assert readings.fresh(StaleData.FAIL).check(context).message == "there is no reading of the sensor yet"
 
 
 def guard_of(context, condition, *script):
@@ -135,23 +135,23 @@ def test_a_guard_may_wait_before_it_begins(readings, context, clock):
 def test_holding_waits_while_the_gripper_tells_nothing_new(context, robot, clock):
     robot.holding = True
     condition, old = Holds("coke"), robot.gripper()
-    assert condition.violated(context) is None
+    assert condition.check(context) is None
     robot.gripper = lambda: old
     clock.advance(2.0)
-    assert isinstance(condition.violated(context), Waiting)
+    assert isinstance(condition.check(context), Waiting)
     clock.advance(6.0)
-    assert condition.violated(context).cause is Cause.PRECONDITION
+    assert condition.check(context).cause is Cause.PRECONDITION
 
 
 def test_holding_lets_a_short_loss_pass_and_tells_a_loss_from_never_held(context, robot, clock):
     condition = Holds("coke")
-    assert condition.violated(context).cause is Cause.PRECONDITION
+    assert condition.check(context).cause is Cause.PRECONDITION
     robot.holding = True
-    assert condition.violated(context) is None
+    assert condition.check(context) is None
     robot.holding = False
-    assert condition.violated(context) is None
+    assert condition.check(context) is None
     clock.advance(0.05)
-    assert condition.violated(context).cause is Cause.EXECUTION
+    assert condition.check(context).cause is Cause.EXECUTION
 
 
 def test_localised_lets_a_short_loss_pass(context, clock):
@@ -159,7 +159,7 @@ def test_localised_lets_a_short_loss_pass(context, clock):
     context.localiser.localised = False
     verdicts = []
     for _ in range(3):
-        verdicts.append(condition.judged(context))
+        verdicts.append(condition.judge(context))
         clock.advance(1.5)
     assert verdicts[:2] == [None, None]
     assert verdicts[2].cause is Cause.PRECONDITION
@@ -167,19 +167,19 @@ def test_localised_lets_a_short_loss_pass(context, clock):
 
 def test_localised_waits_for_scans(context, clock):
     clock.advance(3.0)
-    assert isinstance(KnowsPlace().violated(context), Waiting)
+    assert isinstance(KnowsPlace().check(context), Waiting)
 
 
 @pytest.mark.parametrize(("charge", "holds"), [(0.5, True), (0.3, True), (0.29, False)])
 def test_the_battery_is_above_a_level_or_not(context, robot, charge, holds):
     robot.charge = charge
-    assert (BatteryAtLeast(0.3).violated(context) is None) == holds
+    assert (BatteryAtLeast(0.3).check(context) is None) == holds
 
 
 def test_the_reserve_grows_with_the_way_to_the_dock(context, robot):
     robot.charge = 0.2
-    assert BatteryForWork(0.15, Pose2D(5.0, 0.0, 0.0)).violated(context) is None
-    far = BatteryForWork(0.15, Pose2D(300.0, 0.0, 0.0)).violated(context)
+    assert BatteryForWork(0.15, Pose2D(5.0, 0.0, 0.0)).check(context) is None
+    far = BatteryForWork(0.15, Pose2D(300.0, 0.0, 0.0)).check(context)
     assert far == Failed(Cause.PRECONDITION, "the battery is at 20%, less than 48%")
 
 
@@ -187,21 +187,21 @@ def test_an_old_battery_reading_will_do(context, robot, clock):
     old = robot.battery()
     robot.battery = lambda: old
     clock.advance(100.0)
-    assert BatteryForWork(0.15, Pose2D(0.0, 0.0, 0.0)).violated(context) is None
+    assert BatteryForWork(0.15, Pose2D(0.0, 0.0, 0.0)).check(context) is None
 
 
 def test_the_mission_stands_while_the_stop_button_is_pressed(context):
-    assert NoStopButton().violated(context) is None
+    assert NoStopButton().check(context) is None
     pressed = dataclasses.replace(context, stop_pressed=lambda: "somebody pressed it")
-    assert NoStopButton().violated(pressed) == Waiting("somebody pressed it")
+    assert NoStopButton().check(pressed) == Waiting("somebody pressed it")
 
 
 def test_the_mission_stands_while_another_holds_the_lease(context, robot):
-    assert OwnLease().violated(context) is None
+    assert OwnLease().check(context) is None
     robot.lease = Lease("Alice", context.lease.holder, 5)
-    assert OwnLease().violated(context) is None
+    assert OwnLease().check(context) is None
     robot.lease = Lease("Alice", "the tablet", 6)
-    assert OwnLease().violated(context) == Waiting("the tablet holds the lease of Alice")
+    assert OwnLease().check(context) == Waiting("the tablet holds the lease of Alice")
 
 
 class Flag:
@@ -217,7 +217,7 @@ class Flag:
     def begin(self, context) -> None:
         self.begun += 1
 
-    def violated(self, context):
+    def check(self, context):
         return Failed(Cause.EXECUTION, "the flag fell") if self.bad else None
 
 
@@ -250,13 +250,13 @@ def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robo
     condition = Holds("coke")
     condition.begin(context)
     robot.holding = True
-    assert condition.violated(context) is None
+    assert condition.check(context) is None
     for dt_s, held in ((0.05, False), (0.05, True), (0.6, False)):
         clock.advance(dt_s)
         robot.holding = held
-        assert condition.violated(context) is None
+        assert condition.check(context) is None
     clock.advance(0.05)
-    failure = condition.violated(context)
+    failure = condition.check(context)
     assert failure is not None
     assert (failure.cause, failure.message) == (Cause.EXECUTION, "the coke was lost on the way")
 
@@ -264,7 +264,7 @@ def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robo
 def test_holding_nothing_at_the_start_is_a_precondition(context, robot):
     condition = Holds("coke")
     condition.begin(context)
-    failure = condition.violated(context)
+    failure = condition.check(context)
     assert failure is not None
     assert failure.cause is Cause.PRECONDITION
 

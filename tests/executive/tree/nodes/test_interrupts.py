@@ -27,10 +27,10 @@ class Switch:
     def begin(self, context):
         self.begun += 1
 
-    def called(self):
+    def note_call(self):
         pass
 
-    def violated(self, context):
+    def check(self, context):
         return self.verdict
 
 

@@ -9,7 +9,7 @@ import pytest
 from mcap.reader import make_reader
 
 from executive.record.announce import map_message
-from executive.record.event_log import EventLog, boxes, drawable, with_picture
+from executive.record.event_log import EventLog, box_annotations, compress_picture, viewer_messages
 from executive.record.history import read_events
 from skills.estimate.grid_map import GridMap
 
@@ -17,14 +17,16 @@ SEEN = {"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 40]}
 
 
 def test_a_path_becomes_poses_in_a_frame():
-    ((topic, message),) = drawable("path", {"robot": "Alice", "frame": "world", "poses": [[1, 2, math.pi / 2]]}, 3.5)
+    ((topic, message),) = viewer_messages(
+        "path", {"robot": "Alice", "frame": "world", "poses": [[1, 2, math.pi / 2]]}, 3.5
+    )
     assert (topic, message["frame_id"], message["timestamp"]) == ("path", "world", {"sec": 3, "nsec": 500000000})
     assert message["poses"][0]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
     assert message["poses"][0]["orientation"]["z"] == pytest.approx(math.sqrt(0.5))
 
 
 def test_boxes_become_closed_lines_and_captions():
-    message = boxes([SEEN], 1.0)
+    message = box_annotations([SEEN], 1.0)
     assert message["points"][0]["type"] == 2
     assert [(p["x"], p["y"]) for p in message["points"][0]["points"]] == [(10, 20), (30, 20), (30, 40), (10, 40)]
     assert message["texts"][0]["text"] == "coke 0.90"
@@ -32,7 +34,7 @@ def test_boxes_become_closed_lines_and_captions():
 
 def test_a_message_without_a_picture_is_left_alone():
     message = {"image": None, "x": 1}
-    assert with_picture(message, 0.0) is message
+    assert compress_picture(message, 0.0) is message
 
 
 def test_a_picture_is_small(tmp_path, clock):

@@ -84,7 +84,11 @@ def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> 
     if isinstance(hint, type) and issubclass(hint, enum.Enum):
         return _word(value, hint, path)
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        return _mapping(value, arguments, knowledge, path)
+        if not isinstance(value, dict):
+            raise _refusal(value, "a mapping of keys to values", path)
+        kind = arguments[1] if len(arguments) == 2 else Any
+        items = {str(key): port_value(item, kind, knowledge, (*path, str(key))) for key, item in value.items()}
+        return MappingProxyType(items)
     return _plain(value, hint, path)
 
 
@@ -138,15 +142,6 @@ def _tuple(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path: P
         raise _refusal(value, f"a list of {len(kinds)} values", path)
     pairs = zip(value, kinds or (Any,) * len(value), strict=True)
     return tuple(port_value(item, kind, knowledge, (*path, n)) for n, (item, kind) in enumerate(pairs))
-
-
-def _mapping(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path: Path) -> Mapping[str, Any]:
-    if not isinstance(value, dict):
-        raise _refusal(value, "a mapping of keys to values", path)
-    kind = arguments[1] if len(arguments) == 2 else Any
-    return MappingProxyType(
-        {str(key): port_value(item, kind, knowledge, (*path, str(key))) for key, item in value.items()}
-    )
 
 
 def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:

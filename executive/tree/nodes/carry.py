@@ -305,33 +305,18 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
         ahead_m=AHEAD_M,
         half_m=HALF_M,
     )
-    look = _look_plan(builder, item, keys)
-    take = builder.at("take").sequence(
-        f"take {item} from where it lies",
-        _stand_back_plan(builder.at("back")),
-        pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"])),
-    )
-    return builder.sequence(
-        f"pick {item} up again",
-        fell,
-        _free_gripper_plan(builder.at("first"), item, keys["set-down"]),
-        builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have"),
-    )
-
-
-def _free_gripper_plan(builder: PlanBuilder, item: ObjectKind, set_down_key: str) -> NodeSpec:
-    """Sets down an object that is still held; stows the arm if that fails, or if it is empty."""
-    below = builder.at("set-down")
-    set_down = below.skill("place", {"surface": FromBoard(set_down_key)})
-    held = below.node("only if holding", f"set the {item} down", set_down)
-    return builder.node("selector", "free the gripper", held, builder.skill("stow"))
-
-
-def _stand_back_plan(builder: PlanBuilder) -> NodeSpec:
-    """Backs off to see the floor before the feet; stays if there is no space."""
+    first, below, back = builder.at("first"), builder.at("first").at("set-down"), builder.at("back")
+    set_down = below.skill("place", {"surface": FromBoard(keys["set-down"])})
+    still_held = below.node("only if holding", f"set the {item} down", set_down)
+    free = first.node("selector", "free the gripper", still_held, first.skill("stow"))
     ports = {"distance_m": BACK_M} if builder.has_ports("back_off", ("distance_m",)) else {}
-    stay = builder.pause("stay", "look from here", LOOK_AGAIN_S)
-    return builder.node("selector", "stand back", builder.skill("back_off", ports), stay)
+    stay = back.pause("stay", "look from here", LOOK_AGAIN_S)
+    stand_back = back.node("selector", "stand back", back.skill("back_off", ports), stay)
+    look = _look_plan(builder, item, keys)
+    pick_up = pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"]))
+    take = builder.at("take").sequence(f"take {item} from where it lies", stand_back, pick_up)
+    have = builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have")
+    return builder.sequence(f"pick {item} up again", fell, free, have)
 
 
 def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> NodeSpec:

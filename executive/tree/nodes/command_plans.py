@@ -27,7 +27,6 @@ from executive.tree.nodes.search import (
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.goal import GoalCondition, When
-from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
 from skills.files.errors import InputError, listing
 from skills.quantities import Quantity
@@ -56,9 +55,10 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
     if following is not None and (are_trips(command, following) or is_clearing(command, following)):
         return _pair_plan(assembler, builder, following)
     held, opening = flow.held, flow.opening
+    goal_of_next = None if following is None or following.goal is None else knowledge.place(following.goal)
     builder = replace(
         builder,
-        avoided=_goals(following, knowledge),
+        avoided=frozenset() if goal_of_next is None else frozenset(knowledge.surfaces_in(goal_of_next)),
         in_gripper=is_same(held, command.object, knowledge),
         carried=None if held is None else held.kind,
     )
@@ -103,12 +103,6 @@ def _giving(assembler: Assembler, step: Do | Say, node: NodeSpec, builder: PlanB
         option, kind = _ANSWERS[port]
         keys[option] = assembler.give(name, builder.key(port), kind, builder, COUNTED if port == "count" else None)
     return set_answer_options(node, keys) if keys else node
-
-
-def _goals(command: Command | None, knowledge: Knowledge) -> frozenset[str]:
-    """Returns the surfaces to which a command brings the object of the command before."""
-    place = None if command is None or command.goal is None else knowledge.place(command.goal)
-    return frozenset() if place is None else frozenset(knowledge.surfaces_in(place))
 
 
 def _elsewhere(builder: PlanBuilder) -> tuple[str, ...]:
@@ -211,16 +205,13 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         raise builder.error(
             f"{several} that lie in the {get.goal} already cannot be told from those brought there", hint
         )
-    trips = tuple(_trip(builder, bring, number) for number in range(1, count + 1))
+    trips = []
+    for number in range(1, count + 1):
+        trip = builder.at(f"trip-{number}")
+        get_one = replace(trip.at("get"), command=replace(get, object_count=1))
+        bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
+        trips.append(trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one)))
     return builder.sequence(f"bring {count} {item} to {goal}, one at a time", *trips)
-
-
-def _trip(builder: PlanBuilder, bring: Command, number: int) -> NodeSpec:
-    """Gets one object and brings it to the goal."""
-    trip = builder.at(f"trip-{number}")
-    get_one = replace(trip.at("get"), command=replace(builder.command, object_count=1))
-    bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
-    return trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one))
 
 
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 from py_trees.behaviour import Behaviour
@@ -60,19 +59,15 @@ class MemorySelector(MemoryComposite):
         failed = [one for one in self.children if one.status == Status.FAILURE]
         if not failed:
             return self.exhausted_cause or Cause.PRECONDITION, self.exhausted_message or "nothing of it applies"
-        cause = self._decisive_cause([cause_of(one) for one in failed])
+        causes = [cause_of(one) for one in failed]
+        obstacles = [each for each in causes if each not in _MERELY_NOT_SO]
+        cause = Cause.ERROR if Cause.ERROR in obstacles else next(iter(obstacles), self.exhausted_cause or causes[-1])
         tried = [one for one in failed if cause_of(one) is not Cause.PRECONDITION] or failed
         tried.sort(key=lambda one: cause_of(one) is not cause)
         sentences = list(dict.fromkeys(map(message_of, tried)))
         more = f"; and {len(sentences) - 4} more" if len(sentences) > 4 else ""
         shown = f"{'; '.join(sentences[:4])}{more}"
         return cause, f"{self.exhausted_message}: {shown}" if self.exhausted_message else shown
-
-    def _decisive_cause(self, causes: Sequence[Cause]) -> Cause:
-        obstacles = [cause for cause in causes if cause not in _MERELY_NOT_SO]
-        if Cause.ERROR in obstacles:
-            return Cause.ERROR
-        return obstacles[0] if obstacles else self.exhausted_cause or causes[-1]
 
 
 class MemoryRound(MemorySelector):

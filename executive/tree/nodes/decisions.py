@@ -268,12 +268,10 @@ class Decide(MemoryComposite):
 
     def _restart(self) -> None:
         super()._restart()
-        self.context.board.forget(key for key, look in self.decision.looks if not self._fresh(key, look.max_age_s))
-
-    def _fresh(self, key: str, max_age_s: float) -> bool:
-        """Returns whether an earlier answer is recent enough."""
-        old_s = self.context.clock.now() - self._given_s.get(key, -math.inf)
-        return max_age_s > 0.0 and old_s <= max_age_s
+        now_s = self.context.clock.now()
+        ages_s = {key: now_s - self._given_s.get(key, -math.inf) for key, _ in self.decision.looks}
+        looks = self.decision.looks
+        self.context.board.forget(k for k, look in looks if look.max_age_s <= 0.0 or ages_s[k] > look.max_age_s)
 
     def _decided(self) -> bool:
         """Decides if possible; returns whether the node has ended."""

@@ -35,7 +35,10 @@ def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeS
 
     Raises InputError when the world has no such door.
     """
-    door = _door(builder, between)
+    door = next((each for each in builder.knowledge.doors if set(each.between) == set(between)), None)
+    if door is None:
+        what = f"there is no door between {between[0]} and {between[1]}"
+        raise InputError.at(builder.source, what, hint="add it under 'doors' in the knowledge file")
     through_rad = _through_rad(builder.knowledge, door)
     sides = sorted(between, key=lambda room: -sum(room in other.between for other in builder.knowledge.doors))
     views = [(room, view) for room in sides if (view := view_of(builder.knowledge, door, room)) is not None]
@@ -101,11 +104,3 @@ def _outline(pose: Pose2D) -> tuple[Point, ...]:
     corners = ((half_x, half_y), (-half_x, half_y), (-half_x, -half_y), (half_x, -half_y))
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return tuple((pose.x_m + c * x - s * y, pose.y_m + s * x + c * y) for x, y in corners)
-
-
-def _door(builder: PlanBuilder, between: tuple[str, str]) -> Door:
-    found = next((door for door in builder.knowledge.doors if set(door.between) == set(between)), None)
-    if found is None:
-        what = f"there is no door between {between[0]} and {between[1]}"
-        raise InputError.at(builder.source, what, hint="add it under 'doors' in the knowledge file")
-    return found

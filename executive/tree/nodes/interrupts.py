@@ -216,21 +216,16 @@ def _battery_plan(builder: PlanBuilder, place: Pose) -> NodeSpec:
         dock_plan(builder.at("dock"), dock, facts.charged),
         builder.at("back").navigate(FromBoard(key), "where it was"),
     )
+    below, lost = builder.at("lost"), Recovery((failure_trigger(Cause.PRECONDITION, Cause.EXECUTION),))
     return builder.node(
         "interrupt",
         "battery low: charge",
-        _relocalising(builder.at("lost"), work),
+        below.recover("know where it is", work, (below.skill("relocalise"), lost), attempts=2),
         spares=HANDLING,
         uses=MOST_CHARGES,
         condition=BatteryForWork(facts.low, dock),
         urgent=BatteryForWork(0.5 * facts.low, dock),
     )
-
-
-def _relocalising(builder: PlanBuilder, work: NodeSpec) -> NodeSpec:
-    """Recovers work by a relocalisation after a failure with PRECONDITION or EXECUTION."""
-    lost = Recovery((failure_trigger(Cause.PRECONDITION, Cause.EXECUTION),))
-    return builder.recover("know where it is", work, (builder.skill("relocalise"), lost), attempts=2)
 
 
 def _lost_plan(builder: PlanBuilder) -> NodeSpec:

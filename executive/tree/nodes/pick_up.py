@@ -86,7 +86,10 @@ def pick_up_plan(
     near, tried, blocking = map(builder.key, ("near-detection", "tried-grasps", "in-the-way"))
     approach = builder.skill("approach", {"observation": FromBoard(key), "surfaces": surfaces}, {"observation": near})
     aside = not seen and can_move_aside(builder)
-    grasp = _grasp_plan(builder, near, tried, blocking if aside else None)
+    memory = builder.has_ports("grasp", ("avoid",), ("tried",))
+    inputs = {"observation": FromBoard(near), **({"avoid": FromBoardOr(tried, ())} if memory else {})}
+    outputs = {**({"tried": tried} if memory else {}), **({"in_the_way": blocking} if aside else {})}
+    grasp = builder.skill("grasp", inputs, outputs)
     tuck = _tucked(builder, item)
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
     attempt = builder.at("pick-up").sequence(f"pick up {item}", *steps)
@@ -117,14 +120,6 @@ def pick_up_plan(
         forgets=(near, tried) if seen else (key, near, tried, blocking),
     )
     return builder.at("tidy").stow_after(attempts, only_after_failure=True)
-
-
-def _grasp_plan(builder: PlanBuilder, near: str, tried: str, blocking: str | None) -> NodeSpec:
-    """Builds the grasp, which avoids grasps that were tried if the skill can; blocking objects go to `blocking`."""
-    memory = builder.has_ports("grasp", ("avoid",), ("tried",))
-    inputs = {"observation": FromBoard(near), **({"avoid": FromBoardOr(tried, ())} if memory else {})}
-    outputs = {"tried": tried} if memory else {}
-    return builder.skill("grasp", inputs, outputs if blocking is None else {**outputs, "in_the_way": blocking})
 
 
 def tuck_plan(builder: PlanBuilder) -> NodeSpec:

@@ -16,7 +16,7 @@ from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import Task
-from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge, Pose
+from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish
 from skills.detect.descriptions import count_of, count_sentence, distinct_objects, plural
@@ -105,7 +105,9 @@ class Answer(ExplainedDecorator):
         return self._answered(enough, f"{count_sentence(found, ())}{limits}" if found else "")
 
     def _not_looked(self, nodes: Mapping[str, Explained], unseen: Sequence[str]) -> Status:
-        return self.fail(Failed(_obstacle(nodes), f"could not look at {', '.join(unseen)}: {self.message}"))
+        causes = (node.cause for node in nodes.values() if node.cause is not Cause.POSTCONDITION)
+        cause = next(filter(None, causes), Cause.EXECUTION)
+        return self.fail(Failed(cause, f"could not look at {', '.join(unseen)}: {self.message}"))
 
     def _answered(self, answer: bool, found: str) -> Status:
         self.answer, self.cause = answer, None
@@ -125,12 +127,6 @@ def _looked(leaves: Sequence[str], nodes: Mapping[str, Explained]) -> bool:
     return all(look and (look.status == Status.SUCCESS or look.cause == Cause.POSTCONDITION) for look in looks)
 
 
-def _obstacle(nodes: Mapping[str, Explained]) -> Cause:
-    """Returns the first cause in the tree other than POSTCONDITION (not found)."""
-    causes = (node.cause for node in nodes.values())
-    return next((cause for cause in causes if cause not in (None, Cause.POSTCONDITION)), None) or Cause.EXECUTION
-
-
 def surfaces_elsewhere(
     knowledge: Knowledge, item: str, place: str | None, avoided: frozenset[str] = frozenset()
 ) -> tuple[str, ...]:
@@ -142,14 +138,10 @@ def surfaces_elsewhere(
     near = knowledge.surfaces_in(knowledge.room(place))
     inside = knowledge.surfaces_in(place)
     here = knowledge.place_pose(place)
-    far = sorted(knowledge.surfaces, key=lambda name: _apart_m(here, knowledge.place_pose(name)))
+    poses = {name: knowledge.place_pose(name) for name in knowledge.surfaces}
+    far = sorted(poses, key=lambda name: math.hypot(here.x - poses[name].x, here.y - poses[name].y))
     others = dict.fromkeys(name for name in (*usual, *near, *far) if name not in {*inside, *avoided})
     return tuple(others)[:MOST_ELSEWHERE]
-
-
-def _apart_m(one: Pose, other: Pose) -> float:
-    """Straight distance (m) between two poses."""
-    return math.hypot(one.x - other.x, one.y - other.y)
 
 
 def look_plans(
@@ -166,25 +158,20 @@ def look_plans(
     The detected object goes to `key`; `extra` are further ports of `detect`. With `tallied`, all objects of a look go
     to a key of its own (see `tally_of`).
     """
-    views = [(name, n) for name in surfaces for n in range(1, len(builder.knowledge.surfaces[name].viewpoints) + 1)]
-    return tuple((name, _look_plan(builder.at(f"{name}-{n}"), item, name, n, key, extra, tallied)) for name, n in views)
+    plans = []
+    for name in surfaces:
+        for number, view in enumerate(builder.knowledge.surfaces[name].viewpoints, start=1):
+            below, title = builder.at(f"{name}-{number}"), f"look at {name}" + (f" ({number})" if number > 1 else "")
+            drive = below.navigate(pose_2d(view), f"the {name}")
+            look = detect_plan(below, item, (name,), key, extra, tallied=tallied)
+            plans.append((name, below.sequence(title, drive, look)))
+    return tuple(plans)
 
 
 def tally_of(leaf: NodeSpec) -> str:
     """Returns the blackboard key to which the leaf of a tallied look writes all found objects."""
     key: str = leaf.options["outputs"][_TALLY]
     return key
-
-
-def _look_plan(
-    builder: PlanBuilder, item: ObjectKind, surface: str, number: int, key: str, extra: Ports, tallied: bool
-) -> NodeSpec:
-    view = builder.knowledge.surfaces[surface].viewpoints[number - 1]
-    return builder.sequence(
-        f"look at {surface}" + (f" ({number})" if number > 1 else ""),
-        builder.navigate(pose_2d(view), f"the {surface}"),
-        detect_plan(builder, item, (surface,), key, extra, tallied=tallied),
-    )
 
 
 def people_looks(
@@ -200,16 +187,15 @@ def people_looks(
     if person in knowledge.people and len(knowledge.people) > 1:
         hint = "ask whether anybody is there"
         raise builder.error(f"the robot knows nobody by face, and {person} may be any of several people", hint)
-    rooms = knowledge.rooms_to_search(person, place)
-    return tuple((room, _look_about_plan(builder.at(room), person, room, key, tallied)) for room in rooms)
-
-
-def _look_about_plan(builder: PlanBuilder, person: str, room: str, key: str, tallied: bool) -> NodeSpec:
-    facts = builder.knowledge.places[room]
-    ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1}
-    tally = {_TALLY: builder.key("all")} if tallied else {}
-    look = builder.skill("find_people", ports, {"observation": key, **tally})
-    return builder.sequence(f"look about the {room}", builder.navigate(pose_2d(facts.pose), f"the {room}"), look)
+    plans = []
+    for room in knowledge.rooms_to_search(person, place):
+        below, facts = builder.at(room), knowledge.places[room]
+        ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1}
+        tally = {_TALLY: below.key("all")} if tallied else {}
+        look = below.skill("find_people", ports, {"observation": key, **tally})
+        drive = below.navigate(pose_2d(facts.pose), f"the {room}")
+        plans.append((room, below.sequence(f"look about the {room}", drive, look)))
+    return tuple(plans)
 
 
 def detect_plan(

@@ -92,7 +92,11 @@ class AskPeople(ExplainedLeaf):
             return self.fail(Failed(Cause.TIMEOUT, f"nobody answered '{self._text}' within {self.limit_s:g} s"))
         answer = self._meant(said)
         if answer is not None:
-            return self._answered(answer)
+            self.context.board.put(self.key, answer)
+            self.cause, self.message = None, f"{self._text}: {answer}"
+            note = {"node": self.path_id, "question": self._text, "answer": answer, "message": self.message}
+            self.context.publish(ANSWER_TOPIC, note)
+            return Status.SUCCESS
         self._put(f"I did not understand '{said[:60]}'. {self._text}")
         return Status.RUNNING
 
@@ -131,13 +135,6 @@ class AskPeople(ExplainedLeaf):
         if not self.names:
             return said.strip() or None
         return self.names.get(plain)
-
-    def _answered(self, answer: Value) -> Status:
-        self.context.board.put(self.key, answer)
-        self.cause, self.message = None, f"{self._text}: {answer}"
-        note = {"node": self.path_id, "question": self._text, "answer": answer, "message": self.message}
-        self.context.publish(ANSWER_TOPIC, note)
-        return Status.SUCCESS
 
 
 def _number(said: str) -> float | None:

@@ -73,7 +73,7 @@ def test_new_sentences_of_running_skills_are_logged_once(telling_run):
     assert [each["message"] for each in told if each["node"] == first] == ["going, 2 m to go"]
 
 
-def test_the_state_at_a_time_tells_what_was_being_done_then(telling_run):
+def test_the_state_at_a_time_has_the_message_of_that_time(telling_run):
     told = next(event.data for event in telling_run.events if event.topic == "activity")
     messages = []
     for time_s in (told["t"] - 0.01, told["t"]):
@@ -89,7 +89,7 @@ def test_the_timeline_lists_messages_of_running_skills(telling_run):
     assert entries[1].state is not None and entries[1].state.status is Status.RUNNING
 
 
-def test_the_timeline_tells_skills_failures_and_the_outcome(failed_run):
+def test_the_timeline_lists_skills_failures_and_the_outcome(failed_run):
     entries = list(timeline(read_history(failed_run[0]).events, leaves_only=True))
     texts = [entry.text for entry in entries]
     assert "TIMEOUT: no room to stand" in texts
@@ -129,7 +129,7 @@ def test_a_log_cut_anywhere_gives_the_tree_as_it_was(failed_run, tmp_path):
     assert readable > 10
 
 
-def test_the_timeline_tells_what_a_robot_says():
+def test_the_timeline_lists_speech():
     events = [Event("speech", 2.0, {"t": 2.0, "robot": "Alice", "text": "Hello"})]
     assert [(entry.t, entry.about, entry.text) for entry in timeline(events)] == [
         (2.0, "speech", 'Alice says: "Hello"')

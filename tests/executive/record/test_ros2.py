@@ -52,7 +52,7 @@ def test_pictures_are_compressed_images(decoded):
     assert (picture.format, bytes(picture.data)[:2]) == ("jpeg", b"\xff\xd8")
 
 
-def test_all_else_is_text_with_its_values_and_times(decoded):
+def test_other_messages_become_text_with_their_values_and_times(decoded):
     events, messages = decoded
     texts = [json.loads(told.data) for _, topic, _, told in messages if topic == "/errand/transitions"]
     assert texts == [event.data for event in events if event.topic == "transitions"]

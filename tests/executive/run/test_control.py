@@ -176,7 +176,9 @@ def test_a_breakpoint_nowhere_is_refused_with_what_was_meant(compiled, run_tree,
         late.set_breakpoint("alice/fetch-drink/1-kitchen/grap")
 
 
-def test_another_mission_first_and_the_old_one_after(compiled, run_tree, make, control, script, published, robot):
+def test_a_preempting_mission_runs_first_and_the_old_one_continues(
+    compiled, run_tree, make, control, script, published, robot
+):
     other = compiled(GO, name="go aside")
     result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks({5: lambda: control.preempt(other)}))
     assert result.outcome is Outcome.SUCCESS
@@ -281,7 +283,7 @@ def test_a_lost_lease_suspends_until_it_is_free_again(compiled, run_tree, make, 
     assert robot.holder is None
 
 
-def test_verbs_are_shown_the_lease_that_counts_now(compiled, run_tree, make, control, robot):
+def test_skills_use_one_token_for_whatever_lease_the_run_has(compiled, run_tree, make, control, robot):
     shown = []
     drive = robot.drive
     robot.drive = lambda *v, until_s, lease: (
@@ -415,7 +417,7 @@ def test_simulated_time_does_not_run_ahead_of_the_people_while_held(compiled, ru
     assert walls[4] - walls[0] >= 4 * 0.05 / 2.0 * 0.9
 
 
-def test_a_control_has_its_hands_on_one_run_only(compiled, run_tree, make, control):
+def test_a_control_controls_one_run_only(compiled, run_tree, make, control):
     run_tree(compiled(GO), control=control)
     with pytest.raises(ValueError, match="one run only"):
         run_tree(compiled(GO), control=control)
@@ -441,7 +443,7 @@ def test_an_untouched_control_changes_no_log(compiled, run_tree, make, robot, cl
     assert logs[0] == logs[1]
 
 
-def test_a_lease_shown_by_another_is_left_as_it_is(robot):
+def test_a_lease_of_another_program_is_passed_on_unchanged(robot):
     guarded = GuardedRobot(robot, Watchdog())
     token, foreign, shown = guarded.claim("errand"), Lease("Alice", "tablet", 99), []
     robot.stop = lambda *, lease: shown.append(lease) or 1
@@ -481,7 +483,7 @@ class Notebook(RunVisitor):
         return [note.tree.mission_name for note in self.notes]
 
 
-def test_notes_are_of_the_mission_that_took_the_place(compiled, run_tree, make, control):
+def test_notes_describe_the_mission_that_took_the_place_of_another(compiled, run_tree, make, control):
     other, notebook = compiled(GO, name="go to the bedroom"), Notebook()
     actions = {4: lambda: control.replace(other)}
     run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), visitors=[notebook])
@@ -489,7 +491,7 @@ def test_notes_are_of_the_mission_that_took_the_place(compiled, run_tree, make, 
     assert len(notebook.notes) > 4
 
 
-def test_notes_tell_of_the_battery_with_each_change_and_once_a_second(compiled, run_tree, make, robot):
+def test_notes_have_the_charge_with_each_change_and_once_a_second(compiled, run_tree, make, robot):
     notebook, robot.charge = Notebook(), 0.5
     run_tree(compiled(*make.FETCH), visitors=[notebook])
     assert all(note.charge is not None for note in notebook.notes if note.changes)
@@ -498,7 +500,7 @@ def test_notes_tell_of_the_battery_with_each_change_and_once_a_second(compiled, 
     assert all(0.4 < charge <= 0.5 for charge in charges)
 
 
-def test_notes_tell_nothing_of_missions_that_come_in_between(compiled, run_tree, make, control):
+def test_notes_leave_out_missions_that_come_in_between(compiled, run_tree, make, control):
     between, other, notebook = compiled(GO, name="between"), compiled(GO, name="other"), Notebook()
     actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
     run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions), visitors=[notebook])
@@ -506,7 +508,7 @@ def test_notes_tell_nothing_of_missions_that_come_in_between(compiled, run_tree,
     assert {change.path_id.split("/")[1] for note in notebook.notes for change in note.changes} == {"fetch-drink"}
 
 
-def test_a_mission_that_came_in_between_is_replaced_and_the_first_taken_up(compiled, run_tree, make, control, script):
+def test_a_preempting_mission_is_replaced_and_the_first_continues(compiled, run_tree, make, control, script):
     between, other = compiled(GO, name="between"), compiled(GO, name="other")
     actions = {2: lambda: control.preempt(between), 4: lambda: control.replace(other)}
     result = run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))

@@ -124,7 +124,7 @@ def test_a_paused_robot_can_be_cancelled(run_pair, control):
     assert run_pair(at(actions)).outcomes()["Bob"] is Outcome.CANCELLED
 
 
-def test_one_that_waits_for_a_robot_that_was_cancelled_does_not_begin(run_pair, control):
+def test_a_robot_does_not_begin_when_the_one_it_waits_for_is_cancelled(run_pair, control):
     pair = run_pair(at({1: lambda: control.cancel("not now", robot="Alice")}), after=("Alice",))
     assert pair.outcomes() == {"Alice": Outcome.CANCELLED, "Bob": Outcome.FAILURE}
 
@@ -157,7 +157,7 @@ def test_what_holds_all_robots_holds_each(control, compiled):
     assert control.state.robots["Alice"].mode is Mode.PAUSED
 
 
-def test_a_stopped_robot_does_not_even_do_what_missions_do_in_the_end(run_pair, control, script):
+def test_a_stopped_robot_does_not_run_the_steps_under_always(run_pair, control, script):
     # Both are on the way when all is cancelled; in the end each goes to the kitchen as well, but Bob is stopped.
     def stop_and_cancel():
         control.stop_button("too near", robot="Bob")

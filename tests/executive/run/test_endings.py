@@ -87,7 +87,7 @@ def test_a_second_cancel_ends_it_at_once(go, control, script):
     assert result.worst.message == "enough; in the end, broken off: relocalise goes on"
 
 
-def test_two_cancels_at_once_leave_it_out(go, control):
+def test_two_cancels_in_one_tick_skip_the_steps_under_always(go, control):
     def act(ticks):
         if ticks == 3:
             control.cancel("enough")
@@ -97,7 +97,7 @@ def test_two_cancels_at_once_leave_it_out(go, control):
     assert (result.outcome, begun) == (Outcome.CANCELLED, [])
 
 
-def test_it_has_its_time(go, control):
+def test_the_steps_under_always_have_a_time_limit(go, control):
     settings = {"endings_limit_s": 5.0}
     result, _ = go(group(LONG, always=[LONG]), act=cancels(control, 3), settings=settings)
     assert result.sim_time_s == pytest.approx(5.2, abs=0.2)
@@ -129,19 +129,19 @@ def test_inner_first(go, control):
     assert begun == ["relocalise", "stow"]
 
 
-def test_its_failure_is_told_and_does_not_change_how_a_cancelled_mission_ended(go, control, script):
+def test_a_failure_under_always_is_reported_and_the_mission_stays_cancelled(go, control, script):
     script.ends["relocalise"] = lambda skill: Failed(Cause.PLANNING, "nowhere")
     result, _ = go(group(LONG, always=[skill("relocalise")]), act=cancels(control, 3))
     assert (result.outcome, result.worst.cause) == (Outcome.CANCELLED, Cause.CANCELLED)
     assert result.worst.message == "enough; in the end: nowhere"
 
 
-def test_that_of_the_whole_mission(go, control):
+def test_the_always_of_a_whole_mission_runs(go, control):
     _, begun = go(LONG, always=(skill("relocalise"),), act=cancels(control, 3))
     assert begun == ["relocalise"]
 
 
-def test_values_and_questions_in_it(go, control):
+def test_steps_under_always_may_set_values_and_ask_questions(go, control):
     ask = Ask(ask="{n}?", choices={"a": (skill("stow"),), "b": ()}, limit_s=2.0, default="a")
     put = Set(set={"n": "n + 1"})
     _, begun = go(group(LONG, always=[put, ask]), act=cancels(control, 3), variables={"n": 1})
@@ -169,9 +169,7 @@ def test_a_run_that_is_held_stands_still_in_its_end_and_goes_on(go, control, rob
     assert driving[23]
 
 
-def test_a_mission_in_between_that_is_cancelled_does_its_own_and_that_of_the_one_before(
-    go, control, knowledge, registry
-):
+def test_a_cancel_runs_always_of_a_preempting_and_of_the_suspended_mission(go, control, knowledge, registry):
     between = Mission(name="between", robot="Alice", steps=(group(LONG, always=[skill("relocalise")]),))
     other = compile_mission(between, knowledge=knowledge, registry=registry)
 
@@ -191,7 +189,7 @@ def test_where_a_command_is_cancelled_the_end_begins_at_once(go, control):
     assert begun == ["navigate", "relocalise"]
 
 
-def test_a_mission_that_is_given_up_for_another_does_it_before_the_other_begins(go, control, knowledge, registry):
+def test_a_replaced_mission_runs_its_always_before_the_other_begins(go, control, knowledge, registry):
     other = Mission(name="other", robot="Alice", steps=(skill("back_off"),))
     tree = compile_mission(other, knowledge=knowledge, registry=registry)
     acts = {3: lambda: control.replace(tree)}
@@ -200,7 +198,7 @@ def test_a_mission_that_is_given_up_for_another_does_it_before_the_other_begins(
     assert (result.outcome, begun) == (Outcome.SUCCESS, ["relocalise", "stow", "back_off"])
 
 
-def test_a_cancel_meanwhile_lets_a_mission_that_was_given_up_do_it_too(go, control, knowledge, registry, script):
+def test_a_cancel_lets_a_replaced_mission_finish_its_always(go, control, knowledge, registry, script):
     script.steps = 5
     other = Mission(name="other", robot="Alice", steps=(skill("back_off"),))
     tree = compile_mission(other, knowledge=knowledge, registry=registry)

@@ -31,7 +31,7 @@ def found(*sentences):
     return [Finding("alice/p/1", 1.0, "q", True, sentence) for sentence in sentences]
 
 
-def test_every_answer_of_a_node_is_kept_in_order_with_its_time(findings, clock):
+def test_every_answer_of_a_node_is_stored_in_order_with_its_time(findings, clock):
     for answer in (False, False, True):
         clock.advance(1.0)
         told = findings.message("answer", answered("alice/patrol/1", answer, "told"))
@@ -46,13 +46,13 @@ def test_any_node_adds_a_finding_by_publishing_an_answer(findings, answer):
     assert (one.answer, one.sentence, one.question) == (answer, "Robin says so", "q")
 
 
-def test_what_was_said_is_kept(findings, clock):
+def test_speech_is_stored(findings, clock):
     clock.advance(2.0)
     findings.message("speech", {"robot": "Alice", "text": "Hello", "t": 2.0})
     assert findings.said == (Said(2.0, "Hello"),)
 
 
-def test_a_number_that_json_does_not_know_is_told_as_text(findings):
+def test_a_number_that_json_does_not_know_becomes_text(findings):
     findings.message("answer", answered("alice/patrol/1", math.nan, "nobody knows"))
     assert findings.findings[0].answer == "nan"
 
@@ -99,7 +99,7 @@ def test_another_answer_after_a_restart_is_a_finding_of_its_own(clock):
         ("", ["yes: " + "x" * 500, "b"], [], f"yes: {'x' * 294}…; and 1 more"),
     ],
 )
-def test_the_claim_tells_the_answers_briefly(message, sentences, skipped, told):
+def test_the_claim_lists_the_answers_briefly(message, sentences, skipped, told):
     assert claim(message, found(*sentences), skipped) == told
 
 

@@ -146,7 +146,7 @@ def lane() -> Lane:
     return Lane(VirtualClock(), [])
 
 
-def test_a_robot_whose_mission_is_over_clears_a_way_that_another_needs(lane: Lane) -> None:
+def test_a_robot_whose_mission_is_over_clears_a_reserved_path(lane: Lane) -> None:
     """Bob is done at once and stands in the lane; Alice gets to its end, and Bob's lease is given back."""
     alice, bob = lane.entry("Alice", Drives, 0.0), lane.entry("Bob", Finishes, 2.0)
     result = lane.run(alice, bob)
@@ -156,7 +156,7 @@ def test_a_robot_whose_mission_is_over_clears_a_way_that_another_needs(lane: Lan
     assert not any(topic == "errors" for topic, _ in lane.published)
 
 
-def test_a_robot_that_waits_for_another_clears_its_way(lane: Lane) -> None:
+def test_a_robot_that_waits_for_another_clears_its_path(lane: Lane) -> None:
     """Bob begins when Alice is done, and stands where she has to pass until then."""
     bob = lane.entry("Bob", Finishes, 2.0, after=("Alice",))
     result = lane.run(lane.entry("Alice", Drives, 0.0), bob)
@@ -165,7 +165,7 @@ def test_a_robot_that_waits_for_another_clears_its_way(lane: Lane) -> None:
     assert [each.stepped_aside for each in result.robots] == [False, False]
 
 
-def test_a_robot_in_nobodys_way_stays_where_it_ended(lane: Lane) -> None:
+def test_a_robot_outside_all_paths_stays_where_it_ended(lane: Lane) -> None:
     """Bob stands behind Alice."""
     bob = lane.entry("Bob", Finishes, -1.4)
     result = lane.run(lane.entry("Alice", Drives, 0.0), bob)
@@ -183,7 +183,7 @@ def test_a_verb_that_hangs_ends_the_mission_of_its_robot_only(lane: Lane) -> Non
     assert bob.robot.lease_holder() is None
 
 
-def test_a_robot_without_a_mission_clears_a_way_as_well(lane: Lane) -> None:
+def test_a_robot_without_a_mission_clears_a_reserved_path(lane: Lane) -> None:
     """Bob has nothing to do in the run, and is not among its results."""
     bob = lane.entry("Bob", Finishes, 2.0)
     result = lane.run(lane.entry("Alice", Drives, 0.0), spare=(bob,))

@@ -201,7 +201,7 @@ def test_a_hang_ends_a_run_that_is_not_in_the_main_thread(tmp_path, verb):
     assert robot.moving_parts == () or verb == "return_lease"
 
 
-def test_a_picture_that_hangs_in_the_workers_thread_holds_up_nobody(tmp_path, monkeypatch):
+def test_a_picture_that_hangs_in_the_workers_thread_does_not_stop_the_run(tmp_path, monkeypatch):
     over = threading.Event()
     monkeypatch.setitem(KINDS, "blocks", (lambda call: (over.wait(20.0), call.proceed())[1], ("image",)))
     threads = {"worker": lambda clock: ThreadWorker(), "limit_s": 2.0}

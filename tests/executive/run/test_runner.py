@@ -72,7 +72,7 @@ def test_timeouts_and_defects_are_not_tried_again(compiled, run_tree, make, scri
     assert script.begun.count("grasp") == 1
 
 
-def test_a_thing_lost_on_the_way_is_no_success(compiled, run_tree, make, robot, script):
+def test_an_object_lost_on_the_way_is_no_success(compiled, run_tree, make, robot, script):
     script.steps = 100
 
     def lose(progress):
@@ -115,7 +115,7 @@ def test_a_status_check_answers(compiled, run_tree, script, seen_on, answer):
     assert list(result.worst.answers.values()) == [answer]
 
 
-def test_a_status_check_with_a_blocked_way_does_not_say_no(compiled, run_tree, script):
+def test_a_status_check_with_a_blocked_path_does_not_say_no(compiled, run_tree, script):
     script.seen_on = ()
     script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "no way")
     worst = run_tree(compiled("Take [Nothing] to [kitchen] and do [find] to [drink]")).worst
@@ -232,7 +232,7 @@ def test_poses_are_logged_twice_a_second(compiled, run_tree, published, script):
     assert sum(topic == "pose" for topic, _ in published) == 7  # 0.05 s to 3.0 s
 
 
-def test_how_well_the_place_is_known_is_logged(compiled, run_tree, published):
+def test_the_quality_of_the_localisation_is_logged(compiled, run_tree, published):
     run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
     pose = next(message for topic, message in published if topic == "pose")
     state = next(message for topic, message in published if topic == "state")
@@ -240,7 +240,7 @@ def test_how_well_the_place_is_known_is_logged(compiled, run_tree, published):
     assert (state["localised"], state["localisation_health"]) == (True, 1.0)
 
 
-def test_where_the_robot_may_be_and_what_blocks_it_is_logged_once_it_changes(compiled, run_tree, published, script):
+def test_particles_and_obstacles_are_logged_when_they_change(compiled, run_tree, published, script):
     script.steps = 60
     run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
     (known,) = [message for topic, message in published if topic == "navigation"]

@@ -35,7 +35,7 @@ def table(time: Time, *names: str) -> TrafficTable:
     return made
 
 
-def test_whoever_claims_first_goes_first() -> None:
+def test_the_robot_that_claims_first_goes_first() -> None:
     """| claims | goes first |
     | bob, alice | bob |"""
     made = table(Time(), "alice", "bob")
@@ -65,7 +65,7 @@ def test_a_claim_that_is_given_back_is_free_for_the_next() -> None:
     assert made.view_of("bob").others()[0].path is None
 
 
-def test_a_robot_that_falls_silent_loses_its_right_and_is_not_heard_of() -> None:
+def test_a_robot_that_falls_silent_loses_its_right_of_way() -> None:
     """Others see it as an obstacle only."""
     time = Time()
     made = table(time, "alice", "bob")
@@ -123,7 +123,7 @@ def test_the_right_of_way_is_a_strict_order(actions: list[tuple[str, str]]) -> N
         assert not {(b, a), (c, b), (a, c)} <= before
 
 
-def test_a_reserved_way_is_told_once_and_told_again_when_it_is_given_back() -> None:
+def test_a_reserved_path_is_logged_once_and_again_when_it_is_released() -> None:
     """| what happened | news |
     | nothing | none |
     | claimed and announced | turn 1 and the way in steps of a quarter of a metre |
@@ -141,7 +141,7 @@ def test_a_reserved_way_is_told_once_and_told_again_when_it_is_given_back() -> N
     assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]
 
 
-def test_the_way_of_a_robot_that_does_not_answer_is_told_no_more() -> None:
+def test_the_path_of_a_silent_robot_is_not_logged() -> None:
     """What is silent reserves nothing."""
     time = Time()
     made = table(time, "alice", "bob")
@@ -151,7 +151,7 @@ def test_the_way_of_a_robot_that_does_not_answer_is_told_no_more() -> None:
     assert list(made.news()) == [{"robot": "alice", "turn": None, "x": [], "y": []}]
 
 
-def test_who_clears_a_way_is_told_from_who_works() -> None:
+def test_an_idle_robot_yields_and_a_robot_with_a_claim_does_not() -> None:
     """| bob | alice, who claimed, sees him yield |
     | claims later | yes |
     | has nothing to do | yes |
@@ -167,7 +167,7 @@ def test_who_clears_a_way_is_told_from_who_works() -> None:
     assert made.view_of("alice").others()[0].yields and not made.view_of("bob").others()[0].yields
 
 
-def test_what_the_others_cover_is_where_they_believe_to_be() -> None:
+def test_the_discs_of_the_others_lie_at_their_estimated_poses() -> None:
     """Bob's disc of 0.3 m about (2, 1), and a little more; nothing of Alice's own."""
     made = table(Time(), "alice", "bob")
     made.heard("bob", Pose2D(2.0, 1.0, 1.0))

@@ -73,7 +73,7 @@ def test_taking_an_image_has_its_own_limit(watchdog, monkeypatch):
     assert GuardedRobot(Hanging(), watchdog, limit_s=0.02, image_limit_s=2.0).image("hand") == "hand"
 
 
-def test_calls_from_other_threads_are_let_through_and_given_up_when_they_hang(hanging):
+def test_calls_from_other_threads_are_passed_on_and_abandoned_when_they_hang(hanging):
     results = []
 
     def call():

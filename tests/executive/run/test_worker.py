@@ -63,7 +63,7 @@ def test_lock_step_reads_sensors_at_once_in_this_thread(worker):
     assert (read_by, done_by is read_by) == (threading.main_thread(), False)
 
 
-def test_what_reading_raised_is_raised_by_result(worker):
+def test_an_exception_while_reading_is_raised_by_result(worker):
     job = worker.sense(lambda: 1 / 0, lambda given: given, latency_s=0.0, name="bad")
     with pytest.raises(ZeroDivisionError):
         job.result()
@@ -100,7 +100,7 @@ def test_a_job_may_ask_for_capabilities_which_never_change(worker):
     assert job.result() == spot_capabilities()
 
 
-def test_what_the_work_raised_is_raised_by_result(clock):
+def test_an_exception_of_a_job_is_raised_by_result(clock):
     job = LockStepWorker(clock).submit(lambda: 1 / 0, latency_s=0.0, name="bad")
     assert job.done()
     with pytest.raises(ZeroDivisionError):

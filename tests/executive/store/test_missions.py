@@ -39,7 +39,7 @@ def note(*changes, tree=None, now_s=1.0, board=None, pose=None, checkpoints=None
     return TickNote(tree, now_s, changes, board or {}, pose, checkpoints or {}, charge)
 
 
-def test_a_simulated_world_is_kept_before_what_a_tick_brought_and_not_for_a_pose(path):
+def test_a_simulated_world_is_stored_before_the_changes_of_a_tick_and_not_for_a_pose(path):
     with MissionStore(path) as store:
         mission, kept = store.add(REQUEST, queued=False).id, []
         journal = store.journal(mission)
@@ -59,7 +59,7 @@ def test_a_mission_keeps_where_it_starts(path, start):
         assert store.missions()[0].request == request
 
 
-def test_a_mission_keeps_what_goes_wrong_and_happens(path):
+def test_a_mission_stores_its_faults_and_events(path):
     events = {"people": {"Robin": {"start": 3.0}}, "doors": ({"name": "door", "closes": 4.0},), "moves": ()}
     request = replace(REQUEST, scenario=Scenario(("arm refuses at 3 s",), **events))
     with MissionStore(path) as store:
@@ -81,7 +81,7 @@ def test_missions_keep_their_order_and_states(path):
         assert done.request == REQUEST
 
 
-def test_what_takes_a_missions_place_is_kept_in_its_stead(path):
+def test_a_mission_that_replaces_another_is_stored_in_its_place(path):
     other = replace(REQUEST, name="go hall", commands=("Go",), fingerprint="other", sentence=None)
     with MissionStore(path) as store:
         mission = store.add(REQUEST, queued=False)
@@ -124,7 +124,7 @@ def test_a_store_that_is_locked_for_a_while_loses_no_note(path):
         assert set(store.memory(1).steps) == {"a", "b"}
 
 
-def test_values_that_cannot_be_kept_are_told_and_left_out(path):
+def test_values_that_cannot_be_stored_are_reported_and_left_out(path):
     with MissionStore(path) as store:
         journal = store.journal(store.add(REQUEST, queued=False).id)
         journal.note(note(changed("a", Status.SUCCESS), board={"alice/f": print}))
@@ -169,14 +169,14 @@ def test_an_empty_store_is_damaged(path):
     assert path.stat().st_size == 0
 
 
-def test_what_goes_wrong_while_a_store_is_claimed_is_not_the_stores(path):
+def test_an_error_while_a_store_is_claimed_is_no_store_error(path):
     with MissionStore(path) as store, pytest.raises(OSError, match="elsewhere"), store.claim():
         raise OSError("elsewhere")
     with MissionStore(path) as store, store.claim():
         pass
 
 
-def test_a_store_that_cannot_grow_names_the_way_on(path):
+def test_a_full_disk_names_how_to_continue(path):
     with MissionStore(path) as store:
         number = store.add(REQUEST, queued=True).id
         (pages,) = store._connection.execute("PRAGMA page_count").fetchone()
@@ -261,7 +261,7 @@ def test_a_folder_in_place_of_the_store_is_refused(tmp_path):
         MissionStore(tmp_path)
 
 
-def test_a_value_that_cannot_be_read_names_the_mend(path):
+def test_a_value_that_cannot_be_read_names_the_fix(path):
     with MissionStore(path) as store:
         store.add(REQUEST, queued=True)
         store._connection.execute("INSERT INTO value VALUES (1, 'alice/x', '{')")

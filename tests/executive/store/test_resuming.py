@@ -249,7 +249,7 @@ def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot,
         assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
 
 
-def test_what_was_finished_is_told_and_not_done_again(live, script, world):
+def test_finished_steps_are_reported_and_not_repeated(live, script, world):
     live(TIDY, kill_after=20)
     result, _, recollection = live(TIDY)
     assert result.outcome is Outcome.SUCCESS
@@ -280,7 +280,7 @@ def test_answers_and_the_start_pose_outlive_the_process(live, script):
     assert remembered.message.endswith("(before the restart)")
 
 
-def test_a_thing_lost_over_the_restart_is_taken_anew(live, robot, world):
+def test_an_object_lost_over_the_restart_is_grasped_again(live, robot, world):
     live(TIDY, kill_when=begins("stow"))
     assert (robot.holding, world.grasps) == (True, 1)
     robot.holding = False

@@ -262,7 +262,7 @@ def test_after_a_kill_in_any_tick_each_look_is_one_finding(live, done):
     assert not wrong, wrong
 
 
-def test_after_a_kill_in_any_tick_a_check_of_several_things_is_one_finding(live, done):
+def test_after_a_kill_in_any_tick_a_check_of_several_objects_is_one_finding(live, done):
     steps = (block(Check(condition=value("n == 0"))), *do("a"))
     whole = live(steps, "whole")
     counts = {}

@@ -87,7 +87,7 @@ def test_a_standing_mission_is_kept_and_never_run_itself(add, path, store):
         assert other.missions(MissionState.QUEUED) == ()
 
 
-def test_what_fires_is_a_queued_copy_that_says_where_it_came_from(add, clock, standing, store):
+def test_a_trigger_queues_a_copy_that_names_its_standing_mission(add, clock, standing, store):
     number = add("every weekday 09:00").id
     clock.pass_by(hours=1, seconds=1)
     (fired,) = standing.fire_due(waiting_since=START, serving_since=START)
@@ -108,9 +108,7 @@ def test_an_occurrence_fires_once(add, clock, fire):
 
 
 @pytest.mark.parametrize(("missed", "count"), [(Missed.SKIP, 0), (Missed.ONCE, 1)])
-def test_what_passed_while_a_mission_ran_or_nothing_served_is_skipped_or_made_up_for_once(
-    add, clock, fire, missed, count
-):
+def test_missed_occurrences_are_skipped_or_made_up_for_once(add, clock, fire, missed, count):
     add("every 10m", missed)
     clock.pass_by(minutes=31)
     assert fire(waiting_since=clock.now) == ["every 10m, due 2026-11-24 08:30, missed"] * count
@@ -119,7 +117,7 @@ def test_what_passed_while_a_mission_ran_or_nothing_served_is_skipped_or_made_up
     assert fire(waiting_since=START + timedelta(minutes=31)) == ["every 10m, due 2026-11-24 08:40"]
 
 
-def test_what_is_noticed_long_after_its_time_is_missed_although_nothing_ran(add, clock, fire):
+def test_an_occurrence_noticed_late_is_missed(add, clock, fire):
     """The machine has slept, or its clock was set forward."""
     add("every day 09:00"), add("every day 09:01", Missed.ONCE)
     clock.pass_by(hours=3)
@@ -167,7 +165,7 @@ def test_the_next_occurrence_is_the_earliest_of_all(add, standing):
     assert standing.due_next() == START + timedelta(minutes=15)
 
 
-def test_that_it_fired_and_its_mission_are_written_together(add, clock, fire, monkeypatch, standing, store):
+def test_an_occurrence_and_its_mission_are_written_together(add, clock, fire, monkeypatch, standing, store):
     add("every day 09:00")
     before = standing.missions()
     clock.pass_by(hours=1)
@@ -192,7 +190,7 @@ def test_a_process_that_ends_between_firing_and_running_loses_nothing(add, clock
         assert standing.fire_due(waiting_since=START, serving_since=START) == ()
 
 
-def test_a_removed_one_fires_no_more_and_what_it_has_queued_stays(add, clock, fire, standing, store):
+def test_a_removed_standing_mission_fires_no_more_and_its_copies_stay(add, clock, fire, standing, store):
     number = add("every 10m").id
     clock.pass_by(minutes=10)
     fire()
@@ -202,7 +200,7 @@ def test_a_removed_one_fires_no_more_and_what_it_has_queued_stays(add, clock, fi
     assert [each.standing for each in store.missions()] == [number]
 
 
-def test_one_that_is_removed_while_it_is_fired_is_refused(add, standing, store):
+def test_a_standing_mission_removed_while_it_fires_is_refused(add, standing, store):
     added = add("call x")
     store.remove(added.id)
     with pytest.raises(InputError, match="was removed"):
@@ -232,7 +230,9 @@ def test_copies_that_wait_do_not_pile_up_without_end(add, standing, store):
         ((), False),
     ],
 )
-def test_a_battery_is_full_when_a_mission_ends_so_and_it_was_not_while_it_ran(add, clock, fire, store, charges, fires):
+def test_a_battery_becomes_full_when_a_mission_ends_with_a_charge_that_was_lower_before(
+    add, clock, fire, store, charges, fires
+):
     add("battery full")
     clock.pass_by(minutes=1)
     end_mission(store, *charges)
@@ -242,7 +242,7 @@ def test_a_battery_is_full_when_a_mission_ends_so_and_it_was_not_while_it_ran(ad
     assert fire() == []
 
 
-def test_a_battery_counts_from_the_level_that_was_said(add, clock, fire, store):
+def test_a_battery_trigger_uses_its_own_level(add, clock, fire, store):
     add("battery 50%")
     clock.pass_by(minutes=1)
     end_mission(store, 0.48, 0.5)

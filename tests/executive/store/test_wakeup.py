@@ -68,7 +68,7 @@ def test_more_calls_than_a_pipe_holds_block_nobody(store):
         assert waited_s(pipe, store, 30) < 10
 
 
-def test_a_wait_for_what_has_passed_returns_at_once(store):
+def test_a_wait_for_a_past_moment_returns_at_once(store):
     with WakeupPipe(store) as pipe:
         assert waited_s(pipe, store, -5) < 5
 
@@ -80,7 +80,7 @@ def test_a_wait_is_never_so_long_that_a_clock_which_is_set_would_go_unnoticed(st
         pipe.wait(None)
 
 
-def test_what_is_noticed_at_the_end_of_the_longest_wait_is_not_late():
+def test_an_occurrence_noticed_at_the_end_of_the_longest_wait_is_not_late():
     assert LONGEST_WAIT < LATE
 
 

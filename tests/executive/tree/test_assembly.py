@@ -227,7 +227,7 @@ BEER = "Take [Nothing] to [kitchen] and do [grasp] to [beer]"
 
 
 @pytest.mark.parametrize(("then", "counts"), [(TAKE, True), (BEER, False)])
-def test_what_a_branch_may_have_taken_counts_only_as_what_it_is(compiled_steps, then, counts):
+def test_an_object_that_a_branch_may_have_grasped_is_not_certain(compiled_steps, then, counts):
     """A coke that may be in the gripper is no beer."""
     tree = compiled_steps(block(Choose(condition=HOLDING, then=(go(TAKE),))), go(then))
     assert any(node.kind == "only if holding" and "in-gripper" in node.path_id for node in tree.root.walk()) is counts
@@ -309,7 +309,7 @@ def test_steps_that_use_nothing_in_common_can_go_together(compiled_steps, other)
         ),
     ],
 )
-def test_what_is_watched_cannot_take_a_look(refusal, made):
+def test_a_monitored_condition_cannot_take_a_look(refusal, made):
     assert "takes a look, and cannot be watched" in refusal(block(made))
     assert "takes a look, and cannot be watched" in refusal(to("hall"), while_=made.while_, when=made.when)
 

@@ -95,7 +95,7 @@ def test_a_good_mission_has_no_errors_and_an_estimate(check, make):
     assert 0.001 < checked.estimate.charge < 0.02
 
 
-def test_what_empties_the_battery_is_warned_of_with_its_line_unless_it_charges_before(check, registry):
+def test_a_step_that_empties_the_battery_is_warned_of_with_its_line(check, registry):
     there, back = GO.format("kitchen"), GO.format("start")
     far = StraightRoutes(far_m=1e9, stretched=300.0)
     one_way = check(there, ways=far).estimate.charge
@@ -109,7 +109,7 @@ def test_what_empties_the_battery_is_warned_of_with_its_line_unless_it_charges_b
     assert (tired.errors, rested.warnings) == ((), ())
 
 
-def test_time_and_charge_follow_from_the_way(check):
+def test_time_and_charge_follow_from_the_route(check):
     near = check("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]").estimate
     drive, use = load_estimates().drive, load_estimates().battery
     assert near.distance_m == 4.0
@@ -117,7 +117,7 @@ def test_time_and_charge_follow_from_the_way(check):
     assert near.charge == pytest.approx(near.duration_s * use.driving_per_s)
 
 
-def test_each_way_begins_where_the_last_one_ended(check):
+def test_each_route_begins_where_the_last_one_ended(check):
     ways = StraightRoutes()
     check(
         *(f"Take [Nothing] to [{room}] and do [Nothing] to [Nothing]" for room in ("kitchen", "bedroom", "start")),
@@ -174,7 +174,7 @@ def test_a_raw_pose_out_of_reach_is_refused(check):
         (GET.format("blue coke"), {}, "what blue looks like"),
     ],
 )
-def test_what_cannot_be_seen_or_lifted_is_refused(check, text, abilities, says):
+def test_an_object_that_cannot_be_recognised_or_lifted_is_refused(check, text, abilities, says):
     ((line, message),) = told(check(text, abilities=replace(ABLE, **abilities)))
     assert (line, says in message) == (1, True), message
 
@@ -197,7 +197,7 @@ def walled():
     return LayeredCostmap(GridMap(np.array(occupied), 0.05, (-2.0, -2.0)))
 
 
-def test_ways_are_planned_on_the_map_for_the_whole_body(walled):
+def test_routes_are_planned_on_the_map_for_the_whole_body(walled):
     ways = PlannedRoutes(
         walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]), LatticePlanner()
     )
@@ -248,13 +248,13 @@ PUT = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
         ((GO.format("shelf"),), (0.0, 0.6), None),
     ],
 )
-def test_a_surface_that_is_too_high_or_too_low_for_the_arm_is_told(check, commands, reaches_m, why):
+def test_a_surface_that_is_too_high_or_too_low_for_the_arm_is_refused(check, commands, reaches_m, why):
     messages = [message for _, message in told(check(*commands, abilities=replace(ABLE, reaches_m=reaches_m)))]
     wanted = [] if why is None else [f"the shelf is 1 m high, and the arm reaches {why}"]
     assert messages == wanted
 
 
-def test_what_is_wider_than_the_gripper_opens_is_told_unless_another_is_meant_as_well(check):
+def test_an_object_wider_than_the_gripper_is_refused_unless_another_fits(check):
     narrow = replace(ABLE, widths_m={"coke": 0.05, "beer": 0.10}, opens_m=0.09)
     (told_of_beer,) = told(check(GET.format("beer"), abilities=narrow))
     assert told_of_beer == (1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m")
@@ -274,14 +274,14 @@ def test_a_hand_over_in_a_world_without_people_is_refused_with_its_line(check):
     assert told(check(GET.format("coke"), PUT_DOWN, abilities=nobody)) == []
 
 
-def test_a_person_who_is_not_in_the_world_is_told_by_name_with_those_who_are(check):
+def test_a_person_who_is_not_in_the_world_is_refused_with_those_who_are(check):
     (error,) = check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Anna"}))).errors
     assert error.message.startswith("Robin is not in this world, or takes nothing")
     assert "name Anna" in error.hint
     assert told(check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Robin"})))) == []
 
 
-def test_a_robot_without_a_gripper_is_told_for_each_step_that_needs_one(check):
+def test_a_robot_without_a_gripper_is_refused_for_each_step_that_needs_one(check):
     checked = check(GO.format("kitchen"), GET.format("coke"), abilities=replace(ABLE, gripper=False))
     assert told(checked) == [(2, "this kind of robot has no gripper to take the coke with")]
 

@@ -116,7 +116,7 @@ def test_attributes_reach_the_detector(compiled):
     assert port(detect, "attributes").value == ("red",)
 
 
-def test_the_way_back_leads_to_the_remembered_pose_under_a_guard(compiled, make):
+def test_the_drive_back_leads_to_the_remembered_pose_under_a_guard(compiled, make):
     tree = compiled(*make.FETCH)
     (guard,) = [node for node in tree.root.walk() if node.path_id == "alice/fetch-drink/2-start"]
     (navigate,) = [node for node in skills_of(tree) if node.path_id.endswith("2-start/navigate")]
@@ -131,7 +131,7 @@ def test_the_start_is_remembered_only_when_needed(compiled):
     assert port(skills_of(tree)[0], "goal").value == Pose2D(-4.0, 0.0, 0.0)
 
 
-def test_a_thing_is_put_on_any_surface_of_a_room(compiled):
+def test_an_object_is_put_on_any_surface_of_a_room(compiled):
     tree = compiled("Take [coke] to [kitchen] and do [Nothing] to [Nothing]")
     places = [node for node in skills_of(tree) if node.name == "place"]
     assert [port(node, "surface").value.name for node in places] == ["shelf", "counter"]
@@ -235,7 +235,7 @@ def test_people_who_cannot_be_looked_for_are_refused(compiled, asked, goal, why)
         ("some coke", (), False, "no: no cokes in the kitchen"),
     ],
 )
-def test_things_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, script, asked, seen_on, answer, told):
+def test_objects_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, script, asked, seen_on, answer, told):
     def look(skill):
         (surface,) = skill.inputs.surfaces
         if surface.name not in seen_on:

@@ -21,7 +21,7 @@ GOING = NodeState(Status.RUNNING, None, "going, 2.5 m to go")
         (NodeState(), GOING, False),
     ],
 )
-def test_new_words_of_a_running_node_are_news_and_new_numbers_are_not(before, after, new):
+def test_a_new_message_is_an_activity_and_new_numbers_are_not(before, after, new):
     assert Change("alice/go", before, after).is_activity is new
 
 
@@ -41,7 +41,7 @@ def changed(observed, **how):
     return {change.path_id: change.after.status for change in observed.changes(**how)}
 
 
-def test_only_nodes_that_were_ticked_or_stopped_are_looked_at(walk):
+def test_only_nodes_that_were_ticked_or_stopped_are_read(walk):
     observed = TreeObserver(walk)
     observed.tick(walk)
     assert changed(observed) == {"alice/walk": Status.RUNNING, "alice/one": Status.RUNNING}
@@ -53,7 +53,7 @@ def test_only_nodes_that_were_ticked_or_stopped_are_looked_at(walk):
     assert observed.states["alice/two"].message == "set by hand"
 
 
-def test_nodes_that_are_stopped_from_outside_are_looked_at(walk):
+def test_nodes_that_are_stopped_from_outside_are_read(walk):
     observed = TreeObserver(walk)
     for _ in range(2):
         observed.tick(walk)

@@ -149,7 +149,7 @@ def test_fields_of_the_one_port_that_has_them_go_there():
         ({"max_speed": 1, "max_speed_m_s": 2}, Drive, "remove one of them"),
     ],
 )
-def test_what_belongs_to_no_port_is_refused(values, inputs, says):
+def test_a_value_that_belongs_to_no_port_is_refused(values, inputs, says):
     with pytest.raises(PortValueError) as error:
         assign_ports(values, inputs)
     assert says in error.value.hint

@@ -163,7 +163,7 @@ def test_a_skill_of_another_distribution_is_not_loaded_before_it_is_used(others)
         GOOD.replace("def step", "def leap"),
     ],
 )
-def test_a_broken_skill_harms_no_other_and_a_file_that_uses_it_is_told_why(others, source):
+def test_a_broken_skill_affects_no_other_and_a_file_that_uses_it_is_refused_with_the_reason(others, source):
     others(source)
     others(GOOD.replace('"wave"', '"wink"'), name="winkers", entry="wink = {module}:Wave", module="winkers_skill")
     found = installed_skills()

@@ -56,7 +56,7 @@ def test_any_object_is_looked_for(compiled):
     assert {node.options["inputs"]["classes"] for node in detects} == {Constant(("thing",))}
 
 
-def test_it_goes_on_until_nothing_is_left_and_tells_what_it_moved(compiled, run_tree, script, table):
+def test_clearing_continues_until_no_object_is_left_and_reports_the_moved_ones(compiled, run_tree, script, table):
     result = run_tree(compiled(GET, BRING)).robots[0]
     assert result.outcome is Outcome.SUCCESS
     assert result.message == "moved one cube and two things to the bedside table; nothing is left on the counter"
@@ -83,7 +83,7 @@ def test_what_cannot_be_taken_is_left_for_last_and_then_fails(compiled, run_tree
     assert table == [wide]
 
 
-def test_what_is_gone_after_a_failure_is_no_success(compiled, run_tree, script, table):
+def test_an_object_gone_after_a_failure_is_no_success(compiled, run_tree, script, table):
     del table[1:]
 
     def push_off(skill):

@@ -83,14 +83,14 @@ def test_exhausted_selector_has_the_decisive_cause(causes, exhausted, expected):
     assert (root.status, root.cause) == (F, expected)
 
 
-def test_exhausted_selector_tells_the_sentences_of_all_that_began_the_decisive_first():
+def test_an_exhausted_selector_reports_the_messages_of_all_that_began_the_decisive_first():
     children = (Fails(Cause.PRECONDITION, "not begun"), Fails(Cause.POSTCONDITION, "a"), Fails(Cause.PLANNING, "b"))
     root = selector(*children, exhausted_message="found nothing")
     root.tick_once()
     assert root.message == "found nothing: b; a"
 
 
-def test_round_goes_on_whatever_becomes_of_each():
+def test_a_round_continues_whatever_the_results():
     # tick   round     first  second  third
     # 1      RUNNING   S      R       -
     # 2      SUCCESS   S      F       F

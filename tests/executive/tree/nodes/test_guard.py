@@ -244,7 +244,7 @@ def test_guard_passes_its_child_on(context, clock):
     assert (root.cause, root.message) == (Cause.EXECUTION, "slipped")
 
 
-def test_holding_lets_short_losses_pass_and_tells_long_ones(context, clock, robot):
+def test_holding_ignores_short_losses_and_reports_long_ones(context, clock, robot):
     # time  0.0   0.05       0.1        0.7 0.75
     # held  yes   no         yes        no  no
     condition = Holds("coke")

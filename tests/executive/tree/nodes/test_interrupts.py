@@ -185,7 +185,7 @@ def skill_mission(context, make, script, name):
     return MemorySequence(path_id="alice/m", name="m", children=[leaf])
 
 
-def test_a_call_spares_the_handling_of_a_thing_unless_it_is_urgent(context, make, script):
+def test_a_call_waits_for_the_handling_of_an_object_unless_it_is_urgent(context, make, script):
     script.steps = 100
     bench = Bench(context, mission=skill_mission(context, make, script, "stow"), spares={"stow"})
     bench.tick()

@@ -56,7 +56,7 @@ def fails(script):
 
 
 @pytest.mark.parametrize("cause", [Cause.PLANNING, Cause.EXECUTION])
-def test_a_blocked_way_is_seen_anew_then_backed_off_from(compiled, run_tree, script, fails, cause):
+def test_a_blocked_drive_clears_the_costmap_then_backs_off(compiled, run_tree, script, fails, cause):
     fails("navigate", cause, cause)
     assert run_tree(compiled(GO)).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", "clear_costmap", "navigate", "back_off", "navigate"]
@@ -69,7 +69,7 @@ def test_other_failures_to_go_somewhere_need_no_other_costmap(compiled, run_tree
     assert {"clear_costmap", "back_off"}.isdisjoint(script.begun)
 
 
-def test_a_pose_nearby_will_do_when_there_is_no_way_to_the_goal(compiled, run_tree, fails):
+def test_a_pose_nearby_is_tried_when_there_is_no_path_to_the_goal(compiled, run_tree, fails):
     navigate = fails("navigate", *[Cause.PLANNING] * 3)
     assert run_tree(compiled(GO)).outcome is Outcome.SUCCESS
     assert [inputs.goal for inputs in navigate.inputs[:3]] == [Pose2D(0.0, 0.0, 0.0)] * 3
@@ -91,7 +91,7 @@ def test_where_all_poses_are_out_of_reach_nothing_else_is_tried(compiled, run_tr
     assert script.begun == ["navigate"]
 
 
-def test_what_is_put_down_is_brought_beside_the_goal_where_there_is_no_way_to_it(compiled, run_tree, fails, robot):
+def test_an_object_is_put_down_from_beside_the_goal_pose_when_there_is_no_path_to_it(compiled, run_tree, fails, robot):
     robot.holding = True
     navigate = fails("navigate", *[Cause.PLANNING] * 3)
     run_tree(compiled("Take [coke] to [counter] and do [Nothing] to [Nothing]"))
@@ -101,7 +101,7 @@ def test_what_is_put_down_is_brought_beside_the_goal_where_there_is_no_way_to_it
 # ---- not seen
 
 
-def test_what_is_not_seen_is_looked_for_from_aside_and_elsewhere(compiled, run_tree, fails, script):
+def test_an_object_that_is_not_seen_is_searched_from_aside_and_elsewhere(compiled, run_tree, fails, script):
     script.seen_on = ("bedside table",)
     tree = compiled(GRASP)
     navigate = fails("navigate")
@@ -155,7 +155,7 @@ def test_a_grasp_that_slips_is_followed_by_another_grasp(compiled, run_tree, scr
     assert script.begun.count("navigate") == 1
 
 
-def test_what_was_tried_is_forgotten_when_the_step_begins_anew(compiled, run_tree, fails):
+def test_tried_grasps_are_forgotten_when_the_step_begins_again(compiled, run_tree, fails):
     def slips(skill):
         skill.context.robot._robot.holding = False
         return Failed(Cause.POSTCONDITION, "slipped", {"tried": (*skill.inputs.avoid, 1)})
@@ -169,14 +169,14 @@ def test_what_was_tried_is_forgotten_when_the_step_begins_anew(compiled, run_tre
     assert grasp.inputs[count].avoid == ()
 
 
-def test_no_way_to_grasp_looks_again_first_then_backs_off(compiled, run_tree, script, fails):
+def test_without_a_grasp_the_robot_looks_again_then_backs_off(compiled, run_tree, script, fails):
     fails("grasp", Cause.PLANNING, Cause.PLANNING)
     assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
     round_ = ["approach", "grasp"]
     assert script.begun == ["navigate", "detect", *round_, "detect", *round_, "back_off", "detect", *round_, *STOWED]
 
 
-def test_no_place_to_stand_sees_anew_what_stands_around_then_backs_off(compiled, run_tree, script, fails, make):
+def test_without_an_approach_the_robot_clears_the_costmap_then_backs_off(compiled, run_tree, script, fails, make):
     fails("approach", Cause.PLANNING, Cause.PLANNING, then=lambda skill: Succeeded("near", {"observation": make.COKE}))
     assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
     again = ["detect", "approach"]
@@ -192,7 +192,7 @@ def test_grasping_is_bounded(compiled, run_tree, script, fails, cause):
     assert script.begun[-1] == "stow"
 
 
-def test_all_remedies_together_are_bounded(compiled, run_tree, script, fails):
+def test_all_recoveries_together_are_bounded(compiled, run_tree, script, fails):
     causes = [Cause.POSTCONDITION, Cause.PLANNING] * 20
     fails("grasp", *causes)
     assert run_tree(compiled(GRASP)).outcome is Outcome.FAILURE
@@ -205,7 +205,7 @@ def test_a_failed_stow_after_a_good_grasp_is_tried_once_more(compiled, run_tree,
     assert script.begun[-3:] == ["grasp", "stow", "stow"]
 
 
-def test_an_arm_that_cannot_be_drawn_in_does_not_lose_what_is_held(compiled, run_tree, script, fails, robot):
+def test_an_arm_that_cannot_be_drawn_in_carries_the_object_as_it_is(compiled, run_tree, script, fails, robot):
     fails("stow", *[Cause.PLANNING] * 9)
     assert run_tree(compiled(GRASP)).outcome is Outcome.SUCCESS
     assert (script.begun.count("stow"), script.begun.count("grasp"), robot.holding) == (2, 1, True)
@@ -239,7 +239,7 @@ def carrying(compiled, run_tree, script, robot):
     return go
 
 
-def test_what_falls_on_the_way_is_picked_up_from_the_floor_and_carried_on(carrying, script, published):
+def test_a_dropped_object_is_picked_up_from_the_floor_and_carried_on(carrying, script, published):
     script.seen_on = ("floor",)
     worst = carrying(0.5)
     assert worst.outcome is Outcome.SUCCESS, worst.message
@@ -248,7 +248,7 @@ def test_what_falls_on_the_way_is_picked_up_from_the_floor_and_carried_on(carryi
     assert "the coke fell on the way to the bedroom; it is picked up again" in told
 
 
-def test_what_an_earlier_step_grasped_is_picked_up_again_when_it_falls_on_a_later_way(
+def test_an_object_of_an_earlier_step_is_picked_up_again_when_it_falls_later(
     compiled, run_tree, script, robot, published
 ):
     script.seen_on = ("counter", "floor")
@@ -265,7 +265,7 @@ def test_what_an_earlier_step_grasped_is_picked_up_again_when_it_falls_on_a_late
     assert "the coke fell on the way to the bedroom; it is picked up again" in told
 
 
-def test_where_nothing_was_grasped_before_a_way_is_not_watched(compiled):
+def test_a_drive_with_an_empty_gripper_has_no_guard(compiled):
     tree = compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")
     assert "holding" not in " ".join(node.name for node in tree.root.walk())
 
@@ -277,7 +277,7 @@ def test_a_loss_ends_the_running_skill_within_three_ticks(carrying, script, publ
     assert script.ended[0] == "navigate"
 
 
-def test_it_is_looked_for_where_the_robot_was_when_it_fell(carrying, script, fails, make):
+def test_a_dropped_object_is_searched_where_the_robot_was(carrying, script, fails, make):
     detect = fails("detect", then=lambda skill: Succeeded("seen", {"observation": make.COKE, "observations": ()}))
     assert carrying(0.5).outcome is Outcome.SUCCESS
     (floor,) = detect.inputs[0].surfaces
@@ -286,7 +286,7 @@ def test_it_is_looked_for_where_the_robot_was_when_it_fell(carrying, script, fai
     assert (min(xs), max(xs), min(ys), max(ys)) == pytest.approx((-2.6, -0.2, -1.2, 1.2))
 
 
-def test_it_is_picked_up_twice_and_then_given_up(carrying, script):
+def test_a_dropped_object_is_picked_up_twice_and_then_given_up(carrying, script):
     script.seen_on = ("floor",)
     worst = carrying(0.5, 15.0, 30.0)
     assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
@@ -294,27 +294,27 @@ def test_it_is_picked_up_twice_and_then_given_up(carrying, script):
     assert script.begun.count("grasp") == 2
 
 
-def test_lost_twice_it_is_picked_up_twice(carrying, script):
+def test_an_object_lost_twice_is_picked_up_twice(carrying, script):
     script.seen_on = ("floor",)
     worst = carrying(0.5, 15.0)
     assert worst.outcome is Outcome.SUCCESS, worst.message
     assert (script.begun.count("grasp"), script.begun[-1]) == (2, "place")
 
 
-def test_what_falls_while_it_is_put_down_is_picked_up_as_well(carrying, script):
+def test_an_object_that_falls_while_it_is_put_down_is_picked_up_again(carrying, script):
     script.seen_on = ("floor",)
     assert carrying(3.0).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", "place", "stow", "back_off", "detect", *TAKEN, "navigate", "place"]
 
 
-def test_what_falls_while_it_is_handed_over_is_picked_up_as_well(carrying, script):
+def test_an_object_that_falls_while_it_is_handed_over_is_picked_up_again(carrying, script):
     script.seen_on = ("floor",)
     text = "Take [coke] to [Robin] and do [Nothing] to [Nothing]"
     assert carrying(3.0, text=text).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", "hand_over", "stow", "back_off", "detect", *TAKEN, "navigate", "hand_over"]
 
 
-def test_where_the_skill_can_be_told_it_looks_first_at_the_spot_where_it_must_lie(knowledge):
+def test_the_robot_looks_first_at_the_spot_where_the_object_fell(knowledge):
     mission = Mission(name="m", robot="Alice", steps=(Do.from_command(parse_command(PUT)),))
     tree = compile_mission(mission, knowledge=knowledge, registry=built_in_skills())
     (find,) = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on/again/find")]
@@ -325,14 +325,14 @@ def test_where_the_skill_can_be_told_it_looks_first_at_the_spot_where_it_must_li
     ]
 
 
-def test_without_room_to_back_off_it_looks_from_where_it_stands(carrying, script, fails):
+def test_without_space_to_back_off_the_robot_looks_from_where_it_stands(carrying, script, fails):
     script.seen_on = ("floor",)
     fails("back_off", Cause.PLANNING)
     assert carrying(0.5).outcome is Outcome.SUCCESS
     assert script.begun[2:4] == ["back_off", "detect"]
 
 
-def test_what_fell_onto_a_surface_is_found_there(compiled, run_tree, script, robot):
+def test_an_object_that_fell_onto_a_surface_is_found_there(compiled, run_tree, script, robot):
     script.steps, robot.holding, script.seen_on = 40, True, ("bedside table",)
     robot.standing = Pose2D(-4.5, 0.5, 0.0)
     worst = run_tree(compiled(PUT), observer=Loses(robot, 0.5)).worst
@@ -340,7 +340,7 @@ def test_what_fell_onto_a_surface_is_found_there(compiled, run_tree, script, rob
     assert script.begun == ["navigate", "stow", "back_off", "detect", "detect", *TAKEN, "navigate", "place"]
 
 
-def test_what_is_not_found_again_is_a_failure_that_says_so(carrying, script):
+def test_a_dropped_object_that_is_not_found_is_a_failure(carrying, script):
     script.seen_on = ()
     worst = carrying(0.5)
     assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
@@ -367,14 +367,16 @@ def slipping(compiled, run_tree, script, robot):
     return go
 
 
-def test_what_begins_to_slip_is_gripped_again_and_carried_on(slipping, script, robot, published):
+def test_an_object_that_begins_to_slip_is_gripped_again_and_carried_on(slipping, script, robot, published):
     assert slipping(0.5).outcome is Outcome.SUCCESS
     assert (script.begun, robot.calls.count("set_gripper")) == (["navigate", "place"], 1)
     told = [message["message"] for topic, message in published if topic == "control"]
     assert told == ["the coke began to slip and is gripped again, more firmly"]
 
 
-def test_what_slips_on_is_set_down_on_the_floor_and_gripped_anew(slipping, script, robot, fails, published):
+def test_an_object_that_slips_twice_is_set_down_on_the_floor_and_grasped_again(
+    slipping, script, robot, fails, published
+):
     script.seen_on = ("floor",)
     place = fails("place", then=lambda skill: (setattr(robot, "holding", False), Succeeded("down"))[1])
     worst = slipping(0.3, 1.2)
@@ -385,7 +387,7 @@ def test_what_slips_on_is_set_down_on_the_floor_and_gripped_anew(slipping, scrip
     assert "the coke slips in the gripper on the way to the bedroom; it is set down and gripped again" in told
 
 
-def test_what_slips_on_and_cannot_be_set_down_is_carried_on_as_it_is(slipping, script, fails):
+def test_an_object_that_slips_and_cannot_be_set_down_is_carried_as_it_is(slipping, script, fails):
     fails("place", Cause.PLANNING)
     assert slipping(0.3, 1.2).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", "place", "stow", "navigate", "place"]
@@ -407,14 +409,14 @@ def test_cancelled_at_any_step_of_it_the_skill_ends_and_nothing_more_begins(comp
     assert (len(script.begun), script.begun[-1], script.ended) == (index, step.strip(), script.begun)
 
 
-def test_failing_to_get_there_with_the_thing_still_held_is_not_a_fall(compiled, run_tree, script, robot, fails):
+def test_a_failed_drive_with_the_object_still_held_is_no_fall(compiled, run_tree, script, robot, fails):
     robot.holding = True
     fails("navigate", *[Cause.EXECUTION] * 99)
     assert run_tree(compiled(PUT)).worst.cause is Cause.EXECUTION
     assert "detect" not in script.begun
 
 
-def test_what_falls_while_the_arm_is_tucked_in_is_looked_for_again_on_the_floor_too(
+def test_an_object_that_falls_while_the_arm_is_drawn_in_is_searched_on_the_floor_too(
     compiled, run_tree, script, robot, fails, make
 ):
     script.steps = 40
@@ -441,7 +443,7 @@ def test_a_low_battery_sends_it_to_the_dock_and_back_and_the_mission_goes_on(com
     assert goals == [Pose2D(0.0, -1.0, 0.0), Pose2D(1.0, 0.5, 0.0), Pose2D(0.0, 0.0, 0.0)]
 
 
-def test_the_mission_is_taken_up_where_it_was(compiled, run_tree, script, robot, make):
+def test_the_mission_continues_where_it_was(compiled, run_tree, script, robot, make):
     script.ends["charge"] = lambda skill: (setattr(robot, "charge", 0.9), Succeeded("charged"))[1]
 
     def runs_down(progress):
@@ -506,7 +508,7 @@ def test_thresholds_come_from_the_knowledge(compiled, knowledge, registry):
 # ---- the hand is felt before anything is searched for
 
 
-def test_what_a_failed_grasp_holds_is_used_and_not_searched_for_again(compiled, run_tree, script, robot):
+def test_an_object_held_after_a_failed_grasp_is_used_and_not_searched_again(compiled, run_tree, script, robot):
     def closes(skill):
         robot.holding, skill.context.payload.kind = True, ObjectKind("coke")
         return Failed(Cause.EXECUTION, "the arm was stopped while carrying the coke")
@@ -533,7 +535,7 @@ def test_an_object_lost_while_the_arm_is_drawn_in_is_grasped_again(compiled, run
     assert script.begun.count("grasp") == 2
 
 
-def test_what_an_earlier_step_took_is_not_searched_for(compiled, run_tree, script, robot, context):
+def test_an_object_of_an_earlier_step_is_not_searched(compiled, run_tree, script, robot, context):
     def holds_it(skill):
         robot.holding, skill.context.payload.kind = True, ObjectKind("coke")
         return Succeeded("gone")
@@ -557,7 +559,9 @@ def test_with_another_object_in_the_gripper_nothing_is_searched_for(compiled, ru
     assert script.begun == ["navigate"]
 
 
-def test_what_was_not_handed_over_is_picked_up_and_handed_over_again(compiled, run_tree, script, robot, make, fails):
+def test_an_object_dropped_in_a_hand_over_is_picked_up_and_handed_over_again(
+    compiled, run_tree, script, robot, make, fails
+):
     def drops(skill):
         robot.let_go()
         if script.begun.count("hand_over") == 1:

@@ -108,7 +108,7 @@ def test_a_defect_is_not_asked_about(ask):
 
 
 @pytest.mark.parametrize(("back", "says"), [(S, "is back where it started"), (F, "could not go back: slipped")])
-def test_the_way_back_ends_in_the_first_failure(back, says):
+def test_a_drive_back_ends_with_the_first_failure(back, says):
     # action  R   F
     # back          R   S or F
     # root  R   R   R   F
@@ -118,19 +118,19 @@ def test_the_way_back_ends_in_the_first_failure(back, says):
     assert (root.cause, root.message) == (Cause.PLANNING, f"slipped; the robot {says}")
 
 
-def test_there_is_no_way_back_after_success():
+def test_there_is_no_drive_back_after_success():
     action, way = Queue(R, S), Queue(S, name="back")
     assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 2) == [R, S]
     assert way.status == N
 
 
-def test_there_is_no_way_back_after_a_defect():
+def test_there_is_no_drive_back_after_a_defect():
     action, way = Queue(F, cause=Cause.ERROR), Queue(S, name="back")
     assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 1) == [F]
     assert way.status == N
 
 
-def test_the_way_back_begins_with_the_deed_when_it_starts_anew():
+def test_a_new_start_of_go_back_begins_with_its_work():
     action, way = Queue(F, S), Queue(S, name="back")
     assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 3) == [R, F, S]
 

@@ -119,7 +119,7 @@ def test_a_failed_recovery_gives_way_to_the_next_that_fits():
 
 
 @pytest.mark.parametrize(("cause", "expected"), [(EXECUTION, PLANNING), (Cause.ERROR, Cause.ERROR)])
-def test_when_all_recoveries_fail_both_sentences_are_told(cause, expected):
+def test_when_all_recoveries_fail_both_messages_are_reported(cause, expected):
     root = recover(Leaf("go", PLANNING), recovery(Leaf("clear", cause), PLANNING))
     assert [row[0] for row in table(root, 2)] == [R, F]
     assert (root.cause, root.message) == (expected, "go 1; clear: clear 1")
@@ -186,7 +186,7 @@ def test_interrupted_it_says_so_and_begins_anew_afterwards():
 
 
 @pytest.mark.parametrize(("first", "status"), [((R, S), S), ((R, POST), F)])
-def test_what_tidies_up_runs_whatever_came_before_and_leaves_the_result(first, status):
+def test_tidying_runs_after_any_result_and_keeps_it(first, status):
     # tick        root     first    then
     root = Afterwards(path_id="alice/a", name="a", children=[Leaf("look", *first), Leaf("stow", R, S)])
     assert table(root, 3) == [(R, R, N), (R, status, R), (status, status, S)]
@@ -200,7 +200,7 @@ def test_tidying_up_only_after_a_failure_leaves_a_success_alone():
     assert table(root, 1) == [(S, S, N)]
 
 
-def test_a_failure_to_tidy_up_is_told_but_changes_nothing():
+def test_a_failure_to_tidy_up_is_reported_but_changes_nothing():
     root = Afterwards(path_id="alice/a", name="a", children=[Leaf("look", S), Leaf("stow", PLANNING)])
     assert table(root, 1) == [(S, S, F)]
     assert (root.cause, root.message) == (None, "look 1 (stow failed: stow 1)")
@@ -210,7 +210,7 @@ def only_if_known(child, board):
     return OnlyIfKnown(path_id="alice/again", name="again", children=[child], key="alice/seen", board=board)
 
 
-def test_what_does_not_apply_is_passed_over_and_stays_idle():
+def test_a_child_that_does_not_apply_is_passed_over_and_stays_idle():
     board, again = Board("alice"), Leaf("again", POST)
     root = MemorySelector(path_id="alice/f", name="f", children=[only_if_known(again, board), Leaf("there", POST)])
     assert table(root, 1) == [(F, N, F)]
@@ -242,7 +242,7 @@ def test_a_recovery_that_completes_ends_it_without_another_attempt():
         (None, ("coke",), F),  # nobody knows what it is
     ],
 )
-def test_a_way_may_apply_only_while_a_certain_object_is_held(context, robot, taken_for, asked, status):
+def test_a_branch_may_apply_only_while_a_certain_object_is_held(context, robot, taken_for, asked, status):
     robot.holding, context.payload.kind = True, taken_for
     held = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], context=context, known_as=asked)
     root = MemorySelector(path_id="alice/f", name="f", children=[held, Leaf("search", PLANNING)])
@@ -257,7 +257,7 @@ def test_a_recovery_for_what_is_held_is_passed_over_while_nothing_is(context, ro
 
 
 @pytest.mark.parametrize(("holding", "status"), [(True, S), (False, F)])
-def test_a_way_may_apply_only_while_something_is_held(context, robot, holding, status):
+def test_a_branch_may_apply_only_while_something_is_held(context, robot, holding, status):
     robot.holding = holding
     anyway = OnlyIfHolding(path_id="alice/h", name="h", children=[Leaf("stow", S)], context=context)
     root = MemorySelector(path_id="alice/f", name="f", children=[Leaf("grasp", PLANNING), anyway])

@@ -46,7 +46,7 @@ def test_a_detection_is_a_yes(context):
     assert context.board.get("alice/q/answer") is True
 
 
-def test_an_answer_may_tell_what_was_seen(context):
+def test_an_answer_may_name_the_found_object(context):
     root = answer_of(context, Cause.POSTCONDITION, None, tells=True)
     assert root.message == "yes: hammer in the workshop; None"
     unseen = answer_of(context, *[Cause.POSTCONDITION] * 3, tells=True)
@@ -130,7 +130,7 @@ def count_of(context, bench: Cause | tuple[float, ...], trolley: Cause | tuple[f
         ((0.0,), Cause.PLANNING, 1, True, "; there is one beer on the bench, as far as was seen: not trolley"),
     ],
 )
-def test_things_are_counted_over_all_surfaces(context, bench, trolley, needed, answer, told):
+def test_objects_are_counted_over_all_surfaces(context, bench, trolley, needed, answer, told):
     root = count_of(context, bench, trolley, needed)
     assert (root.status, root.answer) == (Status.SUCCESS, answer)
     assert root.message == f"{'yes' if answer else 'no'}: beers in the workshop{told}"

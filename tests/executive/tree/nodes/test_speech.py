@@ -85,7 +85,7 @@ def test_answers(ask, answered, published, choices, names, gives, said, answer):
 
 
 @pytest.mark.parametrize("said", ["many", "nan", "inf", "-inf", "1e300", "1e16", "3 beers"])
-def test_what_is_no_number_is_asked_for_again(ask, answered, control, published, said):
+def test_an_answer_that_is_no_number_is_asked_for_again(ask, answered, control, published, said):
     root = ask(choices=(), names={}, gives=float)
     root.tick_once()
     control.answer(ID, said)

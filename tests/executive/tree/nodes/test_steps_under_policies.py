@@ -50,14 +50,14 @@ def nowhere(script):
 
 
 @pytest.mark.parametrize(("mission", "own", "count"), [(None, None, 2), (None, 0, 0), (3, None, 3), (3, 1, 1)])
-def test_how_often_a_fallen_object_is_picked_up_is_the_steps_to_say_or_the_missions(compile_steps, mission, own, count):
+def test_a_step_or_its_mission_says_how_often_a_dropped_object_is_picked_up(compile_steps, mission, own, count):
     carry = parse_command("Take [coke] to [bedroom] and do [Nothing] to [Nothing]")
     tree = compile_steps(step(carry, pick_ups=own), policy=Policy(pick_ups=mission))
     recovered = [node for node in tree.mission.walk() if node.path_id.endswith("carry-on")]
     assert [node.options["attempts"] for node in recovered] == ([count + 1] if count else [])
 
 
-def test_a_skipped_step_is_told_and_the_rest_is_done(play, nowhere):
+def test_a_skipped_step_is_reported_and_the_rest_runs(play, nowhere):
     result = play(step(FIND, on_failure=OnFailure.SKIP), step(GO["hall"]))
     assert result.outcome is Outcome.SUCCESS
     assert result.message.startswith("done, but skipped: step 1: grasp coke at kitchen (found no coke")
@@ -126,7 +126,7 @@ def test_return_goes_back_to_the_start_and_fails_with_the_first_reason(play, now
     assert result.states[f"{BASE}/2-hall"].status.name == "INVALID"
 
 
-def test_return_says_when_there_is_no_way_back(play, nowhere, script):
+def test_return_reports_when_there_is_no_path_back(play, nowhere, script):
     script.ends["detect"] = lambda skill: Failed(Cause.POSTCONDITION, "not seen")
 
     def last(skill):

@@ -390,7 +390,7 @@ def run(run_context):
             suspend(root)
             list(due.tick())
             if due.status != R:
-                run_context.endings.done()
+                run_context.endings.pop()
 
     return ticks
 

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 7675,
     "executive/speech": 1604,
     "executive/mission": 1534,
-    "executive/tree": 7472,
+    "executive/tree": 7404,
     "executive/run": 3067,
     "executive/record": 967,
     "executive/store": 1671,

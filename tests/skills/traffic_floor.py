@@ -109,7 +109,7 @@ class Floor:
         robot = ScriptedRobot(self.clock, name=name, capabilities=capabilities_of(base_kind), start=Start(start))
         self.robots[name] = robot
         self.table.join(name, Footprint.of(robot.capabilities()).discs)
-        self.table.heard(name, start)
+        self.table.report(name, start)
         return SkillContext(
             robot,
             robot.acquire_lease("test"),
@@ -138,7 +138,7 @@ class Floor:
         """One tick, robots in the order of their names."""
         self.clock.advance(TICK_S)
         for name, robot in sorted(self.robots.items()):
-            self.table.heard(name, robot.pose)
+            self.table.report(name, robot.pose)
         for _, trip in sorted(self.trips.items()):
             trip.step(self.table)
         self.apart_m = min(self.apart_m, least_apart_m(self.robots))

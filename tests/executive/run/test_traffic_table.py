@@ -31,7 +31,7 @@ def table(time: Time, *names: str) -> TrafficTable:
     """A table in which each robot has been heard of."""
     made = TrafficTable(dict.fromkeys(names, DISCS), time.now)
     for name in names:
-        made.heard(name, Pose2D(0.0, 0.0, 0.0))
+        made.report(name, Pose2D(0.0, 0.0, 0.0))
     return made
 
 
@@ -72,7 +72,7 @@ def test_a_robot_that_falls_silent_loses_its_right_of_way() -> None:
     made.view_of("alice").claim()
     made.view_of("bob").claim()
     time.now_s = SILENT_S + 0.1
-    made.heard("bob", Pose2D(0.0, 0.0, 0.0))
+    made.report("bob", Pose2D(0.0, 0.0, 0.0))
     assert made.view_of("bob").goes_before(made.view_of("alice"))
     assert made.view_of("bob").others() == ()
 
@@ -111,7 +111,7 @@ def test_the_right_of_way_is_a_strict_order(actions: list[tuple[str, str]]) -> N
         elif what == "release":
             made.view_of(name).release()
         elif what == "heard":
-            made.heard(name, None)
+            made.report(name, None)
         elif what == "wait":
             time.now_s += 0.8
         else:
@@ -170,7 +170,7 @@ def test_an_idle_robot_yields_and_a_robot_with_a_claim_does_not() -> None:
 def test_the_discs_of_the_others_lie_at_their_estimated_poses() -> None:
     """Bob's disc of 0.3 m about (2, 1), and a little more; nothing of Alice's own."""
     made = table(Time(), "alice", "bob")
-    made.heard("bob", Pose2D(2.0, 1.0, 1.0))
+    made.report("bob", Pose2D(2.0, 1.0, 1.0))
     covered = made.covered_W("alice")
     assert covered[:, :2].tolist() == [[2.0, 1.0]]
     assert 0.4 < covered[0, 2] < 0.7

@@ -104,8 +104,8 @@ class StraightOn:
 def among(name: str) -> tuple[GivingWay, Footprint]:
     """One of two robots, alice's claim being older: she goes from (3, -2) to (3, 2), across x = 3."""
     table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
-    table.heard("alice", Pose2D(3.0, -2.0, np.pi / 2.0))
-    table.heard("bob", Pose2D(0.0, 0.0, 0.0))
+    table.report("alice", Pose2D(3.0, -2.0, np.pi / 2.0))
+    table.report("bob", Pose2D(0.0, 0.0, 0.0))
     table.view_of("alice").claim()
     y = np.arange(-2.0, 2.0, 0.05)
     table.view_of("alice").announce(np.column_stack([np.full(80, 3.0), y, np.full(80, np.pi / 2.0)]), FOOTPRINT.discs)
@@ -140,8 +140,8 @@ def test_a_robot_in_a_reserved_way_finds_a_place_off_it() -> None:
 def test_a_goal_that_is_wished_for_is_reserved() -> None:
     """Alice wants to (6, 0), where Bob stands: he stands in her way, and not at (9, 0)."""
     table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
-    table.heard("alice", Pose2D(0.0, 0.0, 0.0))
-    table.heard("bob", Pose2D(6.0, 0.0, 0.0))
+    table.report("alice", Pose2D(0.0, 0.0, 0.0))
+    table.report("bob", Pose2D(6.0, 0.0, 0.0))
     views = [SimpleNamespace(traffic=table.view_of(name), clock=None) for name in ("alice", "bob")]
     alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
     alice.begin()
@@ -163,8 +163,8 @@ def test_who_clears_a_reserved_way_is_no_obstacle_to_a_plan_that_found_none(
     | has nothing to do | through where he stands |
     | works where he stands | nothing else |"""
     table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
-    table.heard("alice", Pose2D(0.0, 0.0, 0.0))
-    table.heard("bob", Pose2D(2.0, 0.0, 0.0))
+    table.report("alice", Pose2D(0.0, 0.0, 0.0))
+    table.report("bob", Pose2D(2.0, 0.0, 0.0))
     views = [SimpleNamespace(traffic=table.view_of(name), clock=None) for name in ("alice", "bob")]
     alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
     alice.begin()

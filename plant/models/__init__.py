@@ -1,1 +1,1 @@
-"""Models of robots and objects: SDF files, their visual meshes, and the scripts that made them."""
+"""Models of objects and people: SDF files with their meshes, their catalogue, and the import of meshes."""

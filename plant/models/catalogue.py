@@ -23,7 +23,7 @@ MODELS_FOLDER = Path(__file__).resolve().parent
 
 
 class ModelForm(BaseModel):
-    """One form of a class: its SDF file, its outline seen from above, and its resting height (m)."""
+    """One form of a class: its SDF file, its outline from above, and its resting height (m)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
@@ -33,7 +33,7 @@ class ModelForm(BaseModel):
     round: bool = False
 
     def path(self) -> Path:
-        """The SDF file."""
+        """Path of the SDF file."""
         return MODELS_FOLDER / self.file
 
 
@@ -48,7 +48,7 @@ class ModelClass(BaseModel):
 
 @cache
 def load_catalogue() -> Mapping[str, ModelClass]:
-    """All classes by name, read once."""
+    """Reads all classes by name; the result is cached."""
     entries = read_yaml(MODELS_FOLDER / "catalogue.yaml").data
     return MappingProxyType({name: ModelClass.model_validate(entry) for name, entry in entries.items()})
 
@@ -61,9 +61,9 @@ Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
 
 
 class ImportedObject(BaseModel):
-    """One imported object: `class` is what a detector takes it for, its own name where no class was given.
+    """One imported object: `class` is the class that a detector finds, by default the object's own name.
 
-    Its frame has the origin in the centre of the bounding box `size_m`, z up as it rests; `inertia_kg_m2` is xx, yy,
+    The origin of its frame is the centre of the bounding box `size_m`, z is up as it rests; `inertia_kg_m2` is xx, yy,
     zz, xy, xz, yz about its centre of mass.
     """
 
@@ -80,14 +80,14 @@ class ImportedObject(BaseModel):
     round: bool = False
 
     def form(self, folder: Path) -> ModelForm:
-        """Its form, with its files in a folder."""
+        """Form of the object, with its files in a folder."""
         x, y, z = self.size_m
         file = str((folder / f"{self.name}.sdf").resolve())
         return ModelForm(file=file, half_extents_m=(x / 2, y / 2), rest_height_m=z / 2, round=self.round)
 
 
 def read_imported(folder: Path) -> ImportedObject:
-    """The object in a folder. Raises InputError: there is none, or it is damaged."""
+    """Reads the object in a folder. Raises InputError when there is none, or it is damaged."""
     path = folder / FACTS_FILE
     if not path.exists():
         raise InputError(f"there is no imported object ({FACTS_FILE} is missing)", hint=_AGAIN, file=folder)
@@ -100,19 +100,19 @@ def read_imported(folder: Path) -> ImportedObject:
     return found
 
 
-def write_imported(folder: Path, made: ImportedObject) -> None:
-    """Writes what `read_imported` reads."""
-    text = yaml_of(made.model_dump(mode="json", by_alias=True))
+def write_imported(folder: Path, imported: ImportedObject) -> None:
+    """Writes the facts of an object, which `read_imported` reads."""
+    text = yaml_of(imported.model_dump(mode="json", by_alias=True))
     (folder / FACTS_FILE).write_text(f"# Made by `errand object import`, don't edit.\n{text}", encoding="utf-8")
 
 
 def user_cache() -> Path:
-    """The project's folder in the user's cache."""
+    """Folder of the project in the user's cache."""
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "errand"
 
 
-def kept_folder(folder: Path, fill: Callable[[Path], None]) -> Path:
-    """The folder, filled once by `fill`; it appears only when complete, whoever else makes the same meanwhile."""
+def cached_folder(folder: Path, fill: Callable[[Path], None]) -> Path:
+    """Returns a folder that `fill` fills once; it appears only when complete, also with several processes."""
     if folder.is_dir():
         return folder
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -130,7 +130,7 @@ def kept_folder(folder: Path, fill: Callable[[Path], None]) -> Path:
 
 
 class ObjectImportError(Exception):
-    """The file or what is wanted of it cannot be used; the message says why, `hint` what to do."""
+    """A mesh file or an option that cannot be used; the message says why, `hint` what to do."""
 
     def __init__(self, message: str, hint: str) -> None:
         self.message, self.hint = message, hint
@@ -138,11 +138,11 @@ class ObjectImportError(Exception):
 
 
 class ObjectsExtraMissingError(ImportError):
-    """A library of the extra `objects` is not installed."""
+    """A missing library of the extra `objects`."""
 
 
 def objects_module(name: str) -> Any:
-    """The module of that name, imported when it is needed. Raises ObjectsExtraMissingError."""
+    """Imports a library of the extra `objects`. Raises ObjectsExtraMissingError when it is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""Parts of URDF text, written from facts: links with primitive shapes, joints with motors."""
+"""Writes parts of URDF text from facts: links with primitive shapes, joints with motors."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from typing import Any
 from xml.etree import ElementTree
 
 Shape = Mapping[str, Any]
-"""A `box`, `cylinder` (radius, length) or `sphere` (radius) with `xyz` and, where it is turned, `rpy`."""
+"""A `box`, `cylinder` (radius, length) or `sphere` (radius) with `xyz` and, if it is rotated, `rpy`."""
 
 
 def text(values: Iterable[float]) -> str:
-    """Numbers as an attribute's value."""
+    """Formats numbers as the value of an attribute."""
     return " ".join(f"{value:.9g}" for value in values)
 
 
 def add_materials(robot: ElementTree.Element, colours: Mapping[str, Sequence[float]]) -> None:
-    """Materials by name."""
+    """Adds materials by name."""
     for name, rgba in colours.items():
         ElementTree.SubElement(ElementTree.SubElement(robot, "material", name=name), "color", rgba=text(rgba))
 
 
 def add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> ElementTree.Element:
-    """A link with its `mass`, `com` and `inertia`."""
+    """Adds a link with its `mass`, `com` and `inertia`."""
     link = ElementTree.SubElement(robot, "link", name=name)
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", xyz=text(part["com"]))
@@ -33,7 +33,7 @@ def add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> 
 
 
 def add_shape(element: ElementTree.Element, shape: Shape) -> ElementTree.Element:
-    """A shape's place and geometry in a `visual` or `collision`."""
+    """Adds the pose and geometry of a shape to a `visual` or `collision`."""
     ElementTree.SubElement(element, "origin", xyz=text(shape["xyz"]), rpy=text(shape.get("rpy", (0, 0, 0))))
     geometry = ElementTree.SubElement(element, "geometry")
     if "box" in shape:
@@ -47,7 +47,7 @@ def add_shape(element: ElementTree.Element, shape: Shape) -> ElementTree.Element
 
 
 def add_collision(link: ElementTree.Element, name: str, shape: Shape, contact: Mapping[str, float]) -> None:
-    """A collision shape with its proximity properties."""
+    """Adds a collision shape with its proximity properties to a link."""
     collision = add_shape(ElementTree.SubElement(link, "collision", name=name), shape)
     if contact:
         properties = ElementTree.SubElement(collision, "drake:proximity_properties")
@@ -55,8 +55,8 @@ def add_collision(link: ElementTree.Element, name: str, shape: Shape, contact: M
             ElementTree.SubElement(properties, f"drake:{key}", value=str(value))
 
 
-def add_look(link: ElementTree.Element, name: str, shape: Shape, material: str) -> None:
-    """A shape that is drawn."""
+def add_visual(link: ElementTree.Element, name: str, shape: Shape, material: str) -> None:
+    """Adds a visual shape to a link."""
     visual = add_shape(ElementTree.SubElement(link, "visual", name=name), shape)
     ElementTree.SubElement(visual, "material", name=material)
 
@@ -69,7 +69,7 @@ def friction(coefficient: float) -> Mapping[str, float]:
 def pad_shapes(
     pads: Mapping[str, Any], coefficient: float, stiffness_n_m: float
 ) -> Iterable[tuple[Shape, Mapping[str, float]]]:
-    """Rubber dots: balls of a `radius` at each of `xz` and `y`, each with its proximity properties."""
+    """Rubber pads: spheres of a `radius` at each of `xz` and `y`, each with its proximity properties."""
     contact = {**friction(coefficient), "point_contact_stiffness": stiffness_n_m}
     for x, z in pads["xz"]:
         for y in pads["y"]:
@@ -79,7 +79,7 @@ def pad_shapes(
 def add_joint(
     robot: ElementTree.Element, name: str, parent: str, child: str, part: Mapping[str, Any], kind: str = "revolute"
 ) -> None:
-    """A joint with a motor: `offset`, `axis`, `range` (but when continuous), `effort` and, of a turned child, `rpy`."""
+    """Adds a joint with a motor: `offset`, `axis`, `range` (unless continuous), `effort` and optionally `rpy`."""
     joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
     ElementTree.SubElement(joint, "origin", xyz=text(part["offset"]), rpy=text(part.get("rpy", (0, 0, 0))))
     ElementTree.SubElement(joint, "parent", link=parent)
@@ -94,7 +94,7 @@ def add_joint(
 
 
 def add_fixed(robot: ElementTree.Element, name: str, parent: str, child: str, xyz: Sequence[float]) -> None:
-    """A joint that does not move."""
+    """Adds a fixed joint."""
     joint = ElementTree.SubElement(robot, "joint", name=name, type="fixed")
     ElementTree.SubElement(joint, "origin", xyz=text(xyz))
     ElementTree.SubElement(joint, "parent", link=parent)

@@ -1,1 +1,1 @@
-"""Worlds: rooms, furniture, maps and knowledge in folders, their loader, and where the seed puts the things."""
+"""Worlds: rooms, furniture, maps and knowledge in folders, their loader, and the placement of objects by the seed."""

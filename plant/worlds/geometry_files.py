@@ -1,7 +1,7 @@
 """Checks the files of a world's geometry before Drake reads them: directives, models, meshes and textures.
 
-Drake follows whatever a file names: a pipe, an address, the file itself once more. So all that a world of somebody else
-names is looked at first. What comes with the plant is trusted.
+Drake opens every file that another file names: a pipe, an address, the same file again. So all files of a user's world
+are checked first. Files of the plant itself are trusted.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from skills.files.yaml_source import read_yaml
 
 OURS: Final = Path(__file__).resolve().parent.parent
 OWN_PACKAGE: Final = "world"
-"""The package of a world's own folder, wherever that lies."""
+"""Package of a world's own folder, wherever that is."""
 TAGS: Final = frozenset(
     f"!{name}"
     for name in ("Rpy", "AngleAxis", "Identity", "Uniform", "Deterministic", "Gaussian", "UniformDiscrete")
     + ("DeterministicVector", "GaussianVector", "UniformVector")
 )
-"""The tags that Drake's directives have."""
+"""Tags of Drake's directives."""
 MOST_MESH_BYTES: Final = 200_000_000
 MOST_MODEL_BYTES: Final = 20_000_000
 MOST_FILES: Final = 2_000
@@ -37,7 +37,7 @@ _BESIDE: Final = "put it beside the file that names it"
 _PACKAGES: Final = (OWN_PACKAGE, "errand", "drake")
 _IN_PACKAGE: Final = re.compile(r"(?:package|model)://([^/]*)/?(.*)", re.DOTALL)
 _NAMING: Final = frozenset({"uri", "filename", "albedo_map", "normal_map", "diffuse_map"})
-"""The elements whose text names a file."""
+"""Elements whose text names a file."""
 _ATTRIBUTES: Final = frozenset({"filename", "file"})
 _PICTURES: Final = frozenset({".png", ".jpg", ".jpeg", ".bmp"})
 _MAP: Final = re.compile(
@@ -47,29 +47,29 @@ _LIBRARY: Final = re.compile(rb"^\s*mtllib\s+(\S[^\r\n]*)", re.MULTILINE)
 
 
 def check_directives(file: Path, home: Path) -> None:
-    """Checks Drake model directives and all that they name, in the folder `home`.
+    """Checks Drake model directives and all files that they name, in the folder `home`.
 
     Raises:
-        InputError: with file and line: a file is missing, no plain file, too large, elsewhere, broken, or names itself.
+        InputError: with file and line: a file is missing, no plain file, too large, outside, broken, or names itself.
     """
     _Walk(home.resolve()).directives(file, ())
 
 
 def check_model(file: Path, home: Path) -> None:
-    """Checks a model's file and all that it names, in the folder `home`. Raises InputError as `check_directives`."""
+    """Checks the file of a model and all files that it names, in the folder `home`; raises like `check_directives`."""
     _Walk(home.resolve()).model(file, ())
 
 
 @dataclass
 class _Walk:
-    """Goes from file to file; each is looked at once, directives as often as they are named."""
+    """Walk from file to file; each file is checked once, directives as often as they are named."""
 
     home: Path
     done: set[Path] = field(default_factory=set)
     files: int = 0
 
     def directives(self, file: Path, chain: tuple[Path, ...]) -> None:
-        """Checks directives that the files of `chain` led to."""
+        """Checks directives; the files of `chain` name each other down to them."""
         source = read_yaml(file, TAGS)
         listed = source.data.get("directives") if isinstance(source.data, dict) else None
         if not isinstance(listed, list):
@@ -83,7 +83,7 @@ class _Walk:
                 self._follow(file, source.line(place), name, (*chain, file.resolve()), kind == "add_directives")
 
     def model(self, file: Path, chain: tuple[Path, ...]) -> None:
-        """Checks a model, mesh or picture that the files of `chain` led to."""
+        """Checks a model, mesh or picture; the files of `chain` name each other down to it."""
         kind = file.suffix.lower()
         if kind in _PICTURES:
             from skills.files.picture_files import check_picture  # brings OpenCV, which most commands do not need
@@ -98,7 +98,7 @@ class _Walk:
             self._follow(file, line, name, (*chain, file.resolve()), False)
 
     def _follow(self, file: Path, line: int | None, name: object, chain: tuple[Path, ...], directives: bool) -> None:
-        """Checks the file that `file` names in a line."""
+        """Checks the file that a line of `file` names."""
 
         def error(what: str, hint: str) -> InputError:
             return InputError(what, hint=hint, file=file, line=line)
@@ -114,7 +114,7 @@ class _Walk:
             raise error(f"{found.name} includes itself", "break the circle")
         self.files += 1
         if self.files > MOST_FILES or len(chain) > MOST_CHAIN:
-            raise error("its files name too many others", "put what they say into fewer files")
+            raise error("its files name too many other files", "merge them into fewer files")
         if not directives and real in self.done:
             return
         self.done.add(real)
@@ -126,7 +126,7 @@ class _Walk:
             raise
 
     def _found(self, file: Path, name: str) -> Path | None:
-        """The file that a name in `file` means; None for one of the plant or of Drake. Raises InputError."""
+        """Resolves a name in `file`; None for a file of the plant or of Drake. Raises InputError."""
         in_package = _IN_PACKAGE.match(name)
         if in_package is None:
             beside = name.removeprefix("file://") if name.startswith("file:///") else name
@@ -143,7 +143,7 @@ class _Walk:
 
 
 def _is_ours(path: Path) -> bool:
-    """Returns whether a file comes with the plant."""
+    """Returns whether a file belongs to the plant."""
     try:
         return path.resolve().is_relative_to(OURS) and path.is_file()
     except (OSError, ValueError, RuntimeError):
@@ -151,7 +151,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
-    """Lines and names of the files that an SDF, URDF or MJCF names."""
+    """Lines and names of the files in an SDF, URDF or MJCF."""
     text = read_text(file, most_bytes=MOST_MODEL_BYTES, hint=_BESIDE)
     found, open_elements, letters = list[tuple[int, str]](), list[str](), list[str]()
     parser = expat.ParserCreate()
@@ -168,8 +168,8 @@ def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
 
     def end(name: str) -> None:
         open_elements.pop()
-        if name.rpartition(":")[2] in _NAMING and (said := "".join(letters).strip()):
-            found.append((parser.CurrentLineNumber, said))
+        if name.rpartition(":")[2] in _NAMING and (text := "".join(letters).strip()):
+            found.append((parser.CurrentLineNumber, text))
         letters.clear()
 
     def refuse_types(*_: object) -> None:

@@ -1,4 +1,4 @@
-"""Where the seed puts objects and people, those of the world and more besides: pure functions of a world and a seed."""
+"""Placement of objects, people and clutter by the seed: pure functions of a world and a seed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from skills.robot import FloatArray
 
 @dataclass(frozen=True)
 class PointStop:
-    """A waypoint in the world frame, and how long the person stands there (s)."""
+    """A waypoint in the world frame, with the pause of the person there (s)."""
 
     at_W: Point
     pause_s: float = 0.0
@@ -28,7 +28,7 @@ class PointStop:
 
 @dataclass(frozen=True)
 class PointRoute:
-    """Where and how a person walks: m/s, set off at `start_s`, back from the last stop to the first if it `loops`.
+    """Route of a walking person: begins at `start_s`, and goes back from the last stop to the first if it `loops`.
 
     A person who `yields` stops for a robot that is close ahead.
     """
@@ -41,12 +41,12 @@ class PointRoute:
     yaw_rad: float | None = None
 
     def begun_at(self, at_W: Point, yaw_rad: float) -> PointRoute:
-        """The same for somebody who stands somewhere at first."""
+        """Returns the route for a person who stands at a pose first."""
         return replace(self, stops=(PointStop(at_W), *self.stops), yaw_rad=yaw_rad)
 
     @property
     def first_yaw_rad(self) -> float:
-        """The way that the person looks at first: as they stand, or towards the second stop."""
+        """First heading of the person: given, or towards the second stop."""
         if self.yaw_rad is not None:
             return self.yaw_rad
         (x0, y0), (x1, y1) = self.stops[0].at_W, self.stops[min(1, len(self.stops) - 1)].at_W
@@ -54,7 +54,7 @@ class PointRoute:
 
 
 def point_route(route: Route, standing: Mapping[str, Point]) -> PointRoute:
-    """The route whose places are known in `standing`."""
+    """Resolves the places of a route by `standing`."""
     stops = (each if isinstance(each, Stop) else Stop(at=each) for each in route.waypoints)
     points = (PointStop(standing[each.at] if isinstance(each.at, str) else each.at, each.pause) for each in stops)
     return PointRoute(tuple(points), route.speed, route.loop, route.start, route.yields)
@@ -67,7 +67,7 @@ _OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM = 1, 2, 3
 
 @dataclass(frozen=True)
 class Receiving:
-    """How a person takes what is held out: how hard they pull at it (N), once it has been still for so long (s)."""
+    """Manner in which a person takes an offered object: pull (N), and the time it must be still first (s)."""
 
     pull_n: float = 15.0
     reaction_s: float = 1.0
@@ -77,8 +77,8 @@ class Receiving:
 class Placement:
     """A model in the world: X_WO is its pose at the start.
 
-    Loose objects rest on `surface`; people are welded, but those who walk on a `route`, and take what is held out to
-    them as `receiving` says.
+    A loose object rests on `surface`. A person is welded to the world unless there is a `route`, and takes offered
+    objects as `receiving` says.
     """
 
     name: str
@@ -91,15 +91,15 @@ class Placement:
 
     @property
     def model_path(self) -> Path:
-        """The SDF file."""
+        """Path of the SDF file."""
         return self.form.path()
 
 
 def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
-    """The world's loose things, each at rest on one of its surfaces. Raises WorldError when they don't fit.
+    """Places the world's loose objects at rest on its surfaces. Raises WorldError when they do not fit.
 
-    Form, surface and pose vary with the seed; each thing has its own random streams, so that another thing more or
-    less in the world moves only what is in its way.
+    Form, surface and pose vary with the seed. Each object has random streams of its own, so that one more or one less
+    in the world moves only the objects that it touches.
     """
     catalogue, outlines, placed = load_catalogue(), list[FloatArray](), list[Placement]()
     for index, rule in enumerate(world.seed_rules.objects):
@@ -112,7 +112,7 @@ def place_objects(world: World, seed: int) -> tuple[Placement, ...]:
 
 
 def place_people(world: World, seed: int) -> tuple[Placement, ...]:
-    """The people: at the beginnings of their routes, or on the floor before the start pose, looking at the robot."""
+    """Places the people: at the beginnings of their routes, or on the floor before the start pose, facing the robot."""
     catalogue = load_catalogue()
     return tuple(
         _place_person(world, rule, _form(catalogue, rule.model, world, seed, index), seed, index)
@@ -123,7 +123,7 @@ def place_people(world: World, seed: int) -> tuple[Placement, ...]:
 def _model(
     catalogue: Mapping[str, ModelClass], name: str, world: World, seed: int, index: int
 ) -> tuple[str, ModelForm]:
-    """Class and form of an object: those of the imported model of that name, else a form of the class."""
+    """Class and form of an object: an imported model by its name, else a form of the class."""
     if name in world.imports:
         found = world.imports[name]
         return found.object.class_name, found.object.form(found.folder)
@@ -131,7 +131,7 @@ def _model(
 
 
 def _form(catalogue: Mapping[str, ModelClass], name: str, world: World, seed: int, index: int) -> ModelForm:
-    """The form of a class that an object has at a seed. Raises WorldError: there is no such class."""
+    """Form of a class that the seed chooses. Raises WorldError for an unknown class."""
     if name not in catalogue:
         raise WorldError(f"{world.folder / 'objects.yaml'}: no model {name!r}; there are {', '.join(catalogue)}")
     forms = tuple(catalogue[name].forms.values())
@@ -145,7 +145,7 @@ def place_one(
     others: Sequence[FloatArray],
     rng: np.random.Generator,
 ) -> tuple[Placement, FloatArray]:
-    """A free pose for one thing of a class and form, and its outline there. Raises WorldError: there is none."""
+    """Places one object of a class and form at a free pose; returns also its outline. Raises WorldError without one."""
     rules, (class_name, form) = world.seed_rules.rules, model
     first = int(rng.integers(len(rule.surfaces)))
     obstacles = np.array([shapely.Polygon(each) for each in (*others, *world.seed_rules.keep_clear)], dtype=np.object_)
@@ -163,7 +163,7 @@ def place_one(
 
 
 def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
-    """Random centres along the surface's front edges, with random yaws."""
+    """Random centres along the front edges of a surface, with random yaws."""
     fronts = world.seed_rules.fronts[surface.name]
     middle = np.mean(surface.polygon_W, axis=0)
     for _ in range(ATTEMPTS):
@@ -190,7 +190,7 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
 def _before_start(
     world: World, ranges: tuple[Lengths, Lengths, Lengths], rng: np.random.Generator
 ) -> tuple[float, float, float]:
-    """x, y and yaw of somebody at a random distance, bearing and turn before the start pose."""
+    """Pose (x, y, yaw) of a person at a random distance, bearing and turn before the start pose."""
     distance_m, bearing_rad, turned_rad = ranges
     direction = world.start.yaw_rad + rng.uniform(*bearing_rad)
     distance = rng.uniform(*distance_m)
@@ -201,9 +201,7 @@ def _before_start(
 
 
 def people_stand_W(world: World) -> FloatArray:
-    """Places (N, 2) in the world about which people may stand or set out at some seed: those in the midst and at the
-    edges of where each of them may be.
-    """
+    """Points (N, 2) where people may stand at first for some seed: a grid over the range of each person."""
     places = list[tuple[float, float]]()
     for rule in world.seed_rules.people:
         if rule.ranges is not None:
@@ -218,13 +216,13 @@ def people_stand_W(world: World) -> FloatArray:
 
 
 def outline_of(placement: Placement) -> FloatArray:
-    """The convex outline (K, 2) from above of an object that is placed, in the world."""
+    """Convex outline (K, 2) of a placed object from above, in the world."""
     x, y, _ = placement.X_WO.translation()
     return outline_W(placement.form, (float(x), float(y)), RollPitchYaw(placement.X_WO.rotation()).yaw_angle())
 
 
 def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:
-    """A form's convex outline from above at a pose, as (K, 2) corners in the world."""
+    """Convex outline (K, 2) of a form at a pose from above, in the world."""
     half = np.array(form.half_extents_m)
     if form.round:
         angle = np.arange(ROUND_SIDES) * 2 * np.pi / ROUND_SIDES
@@ -236,23 +234,23 @@ def outline_W(form: ModelForm, centre: Point, yaw_rad: float) -> FloatArray:
 
 
 def polygon_distance(a: FloatArray, b: FloatArray) -> float:
-    """Distance between two polygons (m), 0 when they overlap."""
+    """Distance between two polygons (m); 0 when they overlap."""
     return float(shapely.distance(shapely.Polygon(a), shapely.Polygon(b)))
 
 
 PAUSE_S = 4.0
 _CLUTTER_STREAM, _PASSING_STREAM = 11, 12
 _NEVER = frozenset({"person", "extinguisher"})
-"""What is not strewn about: people, and what is too large for most surfaces."""
+"""Classes that are never clutter: people, and objects that are too large for most surfaces."""
 _STOPS = 4
 
 
 def place_clutter(
     world: World, objects: Sequence[Placement], count: int, seed: int, *, spared: Collection[str] = ()
 ) -> tuple[Placement, ...]:
-    """Up to so many more objects beside those that are placed, of none of the `spared` classes.
+    """Places up to `count` more objects beside the placed ones, of none of the `spared` classes.
 
-    Each lies at rest on a surface that the rules allow; one that finds no free spot is left out.
+    Each rests on a surface that the rules allow; an object without a free spot is left out.
     """
     surfaces = tuple(sorted(name for name, fronts in world.seed_rules.fronts.items() if fronts))
     classes = [name for name in load_catalogue() if name not in _NEVER and name not in spared]
@@ -274,13 +272,13 @@ def place_clutter(
 
 
 def with_passers_by(world: World, count: int, seed: int) -> World:
-    """The world with so many more people, each of whom walks between some of its places, again and again.
+    """Adds `count` walking people to a world; the seed chooses the places of their looped routes.
 
-    Raises WorldError: the world has not places enough.
+    Raises WorldError when the world has fewer than two places.
     """
     places = sorted({place for name, place in world.standing.items() if name in world.rooms})
     if count and len(places) < 2:
-        raise WorldError(f"{world.name} has not two places between which somebody could walk")
+        raise WorldError(f"{world.name} has fewer than two places, and a person cannot walk between them")
     walks = {}
     for index in range(count):
         rng = np.random.default_rng([seed, _PASSING_STREAM, index])

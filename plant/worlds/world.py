@@ -1,4 +1,4 @@
-"""Loads a world: a folder with directives, knowledge, maps, and the rules by which the seed sets things in it."""
+"""Loads a world: a folder with directives, knowledge, maps, and the rules by which the seed places objects."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ WORLDS_FOLDER = Path(__file__).resolve().parent
 PACKAGE_NAME = "errand"
 DIRECTIVES: Final = "world.dmd.yaml"
 ROBOTS: Final = "map"
-"""The folder of the grids that the robots are given."""
+"""Folder of the grids that robots use."""
 TRUTH: Final = "truth"
-"""The folder of a world's surveyed grids, where the robot has made its own map."""
+"""Folder of the surveyed grids of a world whose robot has made a map of its own."""
 
 Point = tuple[quantities.Coordinate, quantities.Coordinate]
 Polygon = tuple[Point, ...]
@@ -42,7 +42,7 @@ Angles = tuple[quantities.Angle, quantities.Angle]
 
 
 class WorldError(InputError):
-    """A world is unknown or its files do not fit together; `path` is where in `objects.yaml`."""
+    """An unknown world, or files that do not fit together; `path` is the place in `objects.yaml`."""
 
     def __init__(self, message: str, *, path: KeyPath = ()) -> None:
         super().__init__(message)
@@ -54,7 +54,7 @@ class _Strict(BaseModel):
 
 
 class Rules(_Strict):
-    """How objects lie on surfaces, in metres; see `objects.yaml`."""
+    """Distances of objects on surfaces, in metres; see `objects.yaml`."""
 
     from_edge_m: Lengths = Field(description="least and greatest distance of an object's centre from the front edge")
     clear_m: quantities.Margin = Field(description="between objects, and from an object to a keep-clear outline")
@@ -71,9 +71,9 @@ class ObjectRule(_Strict):
 
 
 class PersonRule(_Strict):
-    """A person, who walks on a route, or stands before the robot's start pose where three ranges say.
+    """A person who walks on a route, or stands before the robot's start pose within three ranges.
 
-    One who has both walks to the waypoints from where the ranges say.
+    With both, the person walks to the waypoints from a pose within the ranges.
     """
 
     name: str = Field(description="the person's name in knowledge.yaml")
@@ -82,9 +82,9 @@ class PersonRule(_Strict):
     bearing_rad: Angles | None = Field(default=None, description="least and greatest bearing, seen from the start pose")
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: Route | None = Field(default=None, description="where the person walks")
-    receives: bool = Field(default=True, description="whether the person takes what is held out to them")
-    pull_n: Pull = Field(default=15.0, description="how hard the person pulls at it, N")
-    reaction_s: Reaction = Field(default=1.0, description="how long it is held out still before, s")
+    receives: bool = Field(default=True, description="whether the person takes offered objects")
+    pull_n: Pull = Field(default=15.0, description="the person's pull at an offered object, N")
+    reaction_s: Reaction = Field(default=1.0, description="how long an offered object must be still before, s")
 
     @model_validator(mode="after")
     def _walks_or_stands(self) -> PersonRule:
@@ -94,16 +94,16 @@ class PersonRule(_Strict):
 
     @property
     def ranges(self) -> tuple[Distances, Angles, Angles] | None:
-        """Distance, bearing and turn of one who stands."""
+        """Ranges of distance, bearing and turn; None for a person with only a route."""
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None
         return self.distance_m, self.bearing_rad, self.turned_rad
 
 
 class DoorRule(_Strict):
-    """A doorway with a sliding door, open at the edges' level inside the wall; metres in the world frame, seconds.
+    """A doorway with a sliding door that opens into the wall; metres in the world frame, seconds.
 
-    It is open until `closes`, and closed until `opens`; of both the earlier says how it is at the beginning.
+    It is open until `closes`, and closed until `opens`; the earlier of both decides its state at the beginning.
     """
 
     name: str
@@ -115,7 +115,7 @@ class DoorRule(_Strict):
 
 
 class MoveRule(_Strict):
-    """An object that somebody puts elsewhere: on a free spot of the surface `to`, or with its base at a point."""
+    """A move of an object by a person: to a free spot of the surface `to`, or with its base at a point."""
 
     name: str
     at: quantities.Delay = Field(description="s")
@@ -123,7 +123,7 @@ class MoveRule(_Strict):
 
 
 class SeedRules(_Strict):
-    """The schema of `objects.yaml`."""
+    """Schema of `objects.yaml`."""
 
     rules: Rules = Field(description="distances for all objects")
     fronts: dict[str, tuple[tuple[Point, Point], ...]] = Field(
@@ -140,12 +140,12 @@ class SeedRules(_Strict):
 NO_SEED_RULES: Final = SeedRules(
     rules=Rules(from_edge_m=(0.0, 0.0), clear_m=0.0, rim_m=0.0, drop_m=0.0), fronts={}, objects=()
 )
-"""Nothing loose, and nobody."""
+"""Rules of a world without loose objects and people."""
 
 
 @dataclass(frozen=True)
 class SurfaceTop:
-    """A flat top where things lie: outline in the world frame as (x, y) corners, height above the floor (m)."""
+    """A flat top for objects: outline in the world frame as (x, y) corners, height above the floor (m)."""
 
     name: str
     polygon_W: Polygon
@@ -154,7 +154,7 @@ class SurfaceTop:
 
 @dataclass(frozen=True)
 class Import:
-    """An imported model: the folder of its files, and what they hold."""
+    """An imported model: the folder of its files, and its facts."""
 
     folder: Path
     object: ImportedObject
@@ -162,12 +162,12 @@ class Import:
 
 @dataclass(frozen=True)
 class World:
-    """A world's files and what the plant needs to know of them. Lengths in metres, world frame.
+    """A world: its files, and the facts that the plant uses. Lengths in metres, world frame.
 
-    Only its geometry and a start are needed: no dock, rooms, surfaces or seed rules. `standing` tells where somebody
-    stands who is in a room, or at a surface. The robot has the grids of the folder `maps`, None for those in the
-    world's own `map`. `imports` are the models that are not of the catalogue, by name. `doors` close and open, and
-    `moves` happen, at their times.
+    Only its geometry and a start are necessary: dock, rooms, surfaces and seed rules may be missing. `standing` has the
+    point where a person or robot stands in each room or at each surface. `maps` is the folder of the robot's grids
+    (None: the world's own `map`). `imports` are the models outside the catalogue, by name. `doors` and `moves` are its
+    events.
     """
 
     name: str
@@ -186,30 +186,29 @@ class World:
 
     @property
     def corners(self) -> Polygon:
-        """Points between which all of it lies, as far as its rooms tell; else the surroundings of the start."""
+        """Corners of all rooms; without rooms, corners of a square around the start."""
         x, y, reach_m = self.start.x_m, self.start.y_m, 5.0
         rooms = [corner for room in self.rooms.values() for corner in room]
         return tuple(rooms) or ((x - reach_m, y - reach_m), (x + reach_m, y + reach_m))
 
     def with_routes(self, routes: Mapping[str, Route]) -> World:
-        """The same with people on these routes, by name: others than before, or somebody who is there already.
+        """Returns the world with people on these routes by name, whether they are in the world already or not.
 
-        Raises WorldError: a name is that of an object, or a waypoint is not known.
+        Raises WorldError when a name is that of an object, or a waypoint is unknown.
         """
         rules = self.seed_rules
         before = {rule.name: rule for rule in rules.people}
         walking = {
-            name: PersonRule(name=name, route=route, **_hands_of(before.get(name))) for name, route in routes.items()
+            name: PersonRule(name=name, route=route, **_receiving(before.get(name))) for name, route in routes.items()
         }
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
         _check_people(changed, self.standing)
         return replace(self, seed_rules=changed)
 
     def with_walks(self, walks: Mapping[str, Route]) -> World:
-        """The same with people who walk: those who stand there already from where they stand, others from the first
-        waypoint on.
+        """Returns the world with walking people: known people set off from where they stand, others at a waypoint.
 
-        Raises WorldError: somebody walks already, a name is that of an object, or a waypoint is not known.
+        Raises WorldError when a person walks already, a name is that of an object, or a waypoint is unknown.
         """
         before = {rule.name: rule for rule in self.seed_rules.people}
         for name in walks:
@@ -221,17 +220,17 @@ class World:
         return stood.with_routes({name: route for name, route in walks.items() if name not in before})
 
     def with_events(self, doors: Iterable[DoorRule], moves: Iterable[MoveRule]) -> World:
-        """The same with doors that close and open, and objects that are moved, besides those that it has."""
+        """Returns the world with more sliding doors and moves of objects."""
         return replace(self, doors=(*self.doors, *doors), moves=(*self.moves, *moves))
 
     def with_imports(self, folders: Iterable[Path]) -> World:
-        """The same with the models of these folders. Raises InputError: a folder holds none, or a name is taken."""
+        """Returns the world with the models of folders. Raises InputError for a folder without one, or a taken name."""
         return replace(self, imports=_with_imports(self.imports, folders))
 
     def with_objects(self, objects: Iterable[ObjectRule]) -> World:
-        """The same with these loose objects, besides those that it has.
+        """Returns the world with more loose objects.
 
-        Raises WorldError: a name is taken, a model or a surface is not known, or cannot carry objects.
+        Raises WorldError when a name is taken, a model or surface is unknown, or a surface cannot carry objects.
         """
         rules = self.seed_rules
         changed = rules.model_copy(update={"objects": (*rules.objects, *objects)})
@@ -241,32 +240,32 @@ class World:
         return replace(self, seed_rules=changed)
 
     def without_people(self) -> World:
-        """The same with nobody in it."""
+        """Returns the world without people."""
         return replace(self, seed_rules=self.seed_rules.model_copy(update={"people": ()}))
 
     @property
     def directives_path(self) -> Path:
-        """Drake model directives of rooms and furniture."""
+        """Path of the Drake model directives of rooms and furniture."""
         return self.folder / DIRECTIVES
 
     @property
     def knowledge_path(self) -> Path:
-        """What the robot is told."""
+        """Path of the robot's knowledge of the world."""
         return self.folder / "knowledge.yaml"
 
     @property
     def surveyed(self) -> World:
-        """The same with grids drawn from its geometry: the truth, for referees and tests, where they are kept apart."""
+        """Returns the world with the surveyed grids in place of the robot's own, for referees and tests."""
         truth = self.folder / TRUTH
         return replace(self, maps=truth if truth.is_dir() else None)
 
     @property
     def scan_map_path(self) -> Path:
-        """The grid of what the LiDAR sees."""
+        """Path of the grid at the height of the LiDAR."""
         return self._maps / "scan.yaml"
 
     def scan_map_seen_from(self, height_m: float | None) -> Path:
-        """The grid of what a LiDAR at a height sees: the one of the narrowest band about it, else `scan_map_path`."""
+        """Path of the grid with the narrowest band around the height of a LiDAR, else `scan_map_path`."""
         if height_m is None:
             return self.scan_map_path
         bands = {path: _band_m(path) for path in sorted(self._maps.glob("*scan.yaml"))}
@@ -275,7 +274,7 @@ class World:
 
     @property
     def keepout_map_path(self) -> Path:
-        """The grid of what the body would touch."""
+        """Path of the grid of everything that the body could touch."""
         return self._maps / "keepout.yaml"
 
     @property
@@ -284,7 +283,7 @@ class World:
 
 
 def _band_m(path: Path) -> tuple[float, float]:
-    """The heights that a grid speaks of; none where its file does not say."""
+    """Height band of a grid; an empty band when its file has none."""
     with suppress(InputError, ValueError, TypeError, AttributeError):
         low, high = read_yaml(path).data.get("height_band_m")
         return float(low), float(high)
@@ -292,12 +291,12 @@ def _band_m(path: Path) -> tuple[float, float]:
 
 
 def add_package(package_map: PackageMap) -> None:
-    """Makes `package://errand/` mean the plant's folder, as worlds and models use it."""
+    """Adds the package `errand`, the plant's folder, which worlds and models name as `package://errand/`."""
     package_map.Add(PACKAGE_NAME, WORLDS_FOLDER.parent)
 
 
 def known_worlds() -> tuple[str, ...]:
-    """Names of the worlds that come with the project."""
+    """Names of the worlds in the project."""
     return tuple(sorted(path.parent.name for path in WORLDS_FOLDER.glob(f"*/{DIRECTIVES}")))
 
 
@@ -305,7 +304,7 @@ def load_world(name_or_path: str | Path) -> World:
     """Loads a world by its name, or by the path of its folder.
 
     Raises:
-        InputError: with file and line: there is no such world, or one of its files, or what that names, is wrong.
+        InputError: with file and line: there is no such world, or one of its files or a file that they name is wrong.
     """
     folder = _find_folder(name_or_path)
     check_directives(folder / DIRECTIVES, folder)
@@ -340,17 +339,17 @@ def load_world(name_or_path: str | Path) -> World:
 
 
 def _with_imports(known: Mapping[str, Import], folders: Iterable[Path]) -> Mapping[str, Import]:
-    """The known models and those of folders by name. Raises InputError."""
+    """Known models and the models of folders, by name. Raises InputError."""
     found = dict(known)
     for folder in dict.fromkeys(each.resolve() for each in folders):
-        made = read_imported(folder)
-        check_model(folder / f"{made.name}.sdf", folder)
-        if made.name in load_catalogue():
-            raise WorldError(f"{folder}: the name {made.name!r} is that of a class; import it under another name")
-        other = found.setdefault(made.name, Import(folder, made))
+        imported = read_imported(folder)
+        check_model(folder / f"{imported.name}.sdf", folder)
+        if imported.name in load_catalogue():
+            raise WorldError(f"{folder}: the name {imported.name!r} is that of a class; import it under another name")
+        other = found.setdefault(imported.name, Import(folder, imported))
         if other.folder != folder:
             raise WorldError(
-                f"{folder} and {other.folder} are both called {made.name!r}; import one under another name"
+                f"{folder} and {other.folder} are both called {imported.name!r}; import one under another name"
             )
     return found
 
@@ -377,13 +376,13 @@ def _read(path: Path) -> YamlSource:
 
 
 def _check_surfaces(rules: SeedRules, surfaces: dict[str, SurfaceTop]) -> None:
-    """Every surface that the rules name is known, and those for things have fronts."""
+    """Raises WorldError when the rules name an unknown surface, or a surface for objects has no fronts."""
     for index, rule in enumerate(rules.objects):
         for name in rule.surfaces:
             path = ("objects", index, "surfaces")
             _refuse_unknown(name, surfaces, path)
             if not rules.fronts.get(name):
-                what = f"surface {name!r} may carry things but has no entry under `fronts` in objects.yaml"
+                what = f"surface {name!r} may carry objects but has no entry under `fronts` in objects.yaml"
                 raise WorldError(what, path=path)
     for name in rules.fronts:
         _refuse_unknown(name, surfaces, ("fronts", name))
@@ -395,7 +394,7 @@ def _refuse_unknown(name: str, surfaces: Mapping[str, SurfaceTop], path: KeyPath
 
 
 def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
-    """Every object is of a class, or is imported."""
+    """Raises WorldError for an object whose model is neither a class nor imported."""
     known = (*load_catalogue(), *imports)
     for index, rule in enumerate(rules.objects):
         if rule.model not in known:
@@ -403,13 +402,13 @@ def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
             raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}", path=("objects", index, "model"))
 
 
-def _hands_of(rule: PersonRule | None) -> dict[str, Any]:
-    """How somebody takes what is held out."""
+def _receiving(rule: PersonRule | None) -> dict[str, Any]:
+    """Values of a rule on the receiving of objects."""
     return {} if rule is None else rule.model_dump(include={"receives", "pull_n", "reaction_s"})
 
 
 def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
-    """Names are taken once, and every place on a route is known."""
+    """Raises WorldError when a name is given twice, or a place on a route is unknown."""
     taken = set[str]()
     places = [("objects", index, rule.name) for index, rule in enumerate(rules.objects)]
     places += [("people", index, rule.name) for index, rule in enumerate(rules.people)]

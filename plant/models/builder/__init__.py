@@ -1,1 +1,1 @@
-"""Meshes, shapes and SDF files of models; makes a model of a mesh of any program (`importing`)."""
+"""Builders of models: meshes, shapes and SDF files, and the import of mesh files (`importing`)."""

@@ -1,7 +1,6 @@
-"""Textured triangle meshes made of simple surfaces, and their OBJ form.
+"""Textured triangle meshes of simple surfaces, and their OBJ form.
 
-Texture coordinates outside of [0, 1] are clamped by the renderer, so a surface larger than its texture is cut into
-tiles here.
+The renderer clamps texture coordinates to [0, 1], so a surface larger than its texture is cut into tiles.
 """
 
 from __future__ import annotations
@@ -26,10 +25,10 @@ IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Material:
-    """How a surface looks: colour (RGB, 0..1), a texture file beside the mesh, metres that one texture covers.
+    """Appearance of a surface: colour (RGB, 0..1), a texture file beside the mesh, and the size of the texture (m).
 
     A `tile_m` of None stretches the texture once over each surface. `shine` (0 rough, 1 mirror) and `metal` (0 or 1)
-    count only where light is reckoned physically, in the glTF form.
+    count only in the glTF form, with physically based rendering.
     """
 
     colour: Colour = (1.0, 1.0, 1.0)
@@ -48,7 +47,7 @@ class _Triangles:
 
 @dataclass(frozen=True)
 class _Ring:
-    """One edge of a band of a lathe: (radius, z), the normal's (radial, z) and the texture's v."""
+    """Edge of a band of a lathe: (radius, z), the (radial, z) of the normal, and the v of the texture."""
 
     place: FloatArray
     facing: FloatArray
@@ -56,7 +55,7 @@ class _Ring:
 
 
 def _smoothed(facing: FloatArray, neighbour: FloatArray) -> FloatArray:
-    """A normal shared with the neighbouring band, unless there is an edge between them."""
+    """Normal that is shared with the neighbouring band, unless there is an edge between them."""
     if facing @ neighbour < SMOOTH_COSINE:
         return facing
     both = facing + neighbour
@@ -64,7 +63,7 @@ def _smoothed(facing: FloatArray, neighbour: FloatArray) -> FloatArray:
 
 
 class Mesh:
-    """Triangles by material. All `add_` methods take metres in the mesh's frame and outward-looking surfaces."""
+    """Triangles by material. All `add_` methods take metres in the mesh's frame and outward normals."""
 
     def __init__(self, materials: Mapping[str, Material]) -> None:
         self.materials = materials
@@ -113,7 +112,7 @@ class Mesh:
         *,
         faces: Mapping[str, str | None] | None = None,
     ) -> None:
-        """Adds the box between two corners. `faces` gives other materials (or None: leave out) to -x, +x, ... +z."""
+        """Adds the box between two corners; `faces` gives other materials, or None for no face, to -x, +x, ... +z."""
         a, b = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         x, y, z = np.diag(b - a)
         rectangles = {
@@ -132,7 +131,7 @@ class Mesh:
     def add_lathe(
         self, material: str, profile: Sequence[tuple[float, float]], *, centre: ArrayLike = (0, 0, 0), sides: int = 24
     ) -> None:
-        """Turns a profile of (radius, z), from the bottom up, about the vertical through `centre`."""
+        """Adds a surface of revolution: a profile (radius, z), from the bottom up, about the vertical at `centre`."""
         outline = np.asarray(profile, dtype=float)
         steps = np.diff(outline, axis=0)
         lengths = np.linalg.norm(steps, axis=1)
@@ -164,7 +163,7 @@ class Mesh:
         self.add_lathe(cap or material, [(radius, height), (0, height)], centre=centre, sides=sides)
 
     def add_mesh(self, other: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
-        """Adds another mesh, turned by the (3, 3) matrix R, then moved by p. R may scale, too."""
+        """Adds another mesh, transformed by the (3, 3) matrix R, which may scale, then moved by p."""
         matrix, offset = np.asarray(R, dtype=float), np.asarray(p, dtype=float)
         to_normal = np.linalg.inv(matrix)
         for material, points, normals, uvs in other.groups():
@@ -173,20 +172,20 @@ class Mesh:
             self.add_triangles(material, points @ matrix.T + offset, turned, uvs)
 
     def groups(self) -> Iterator[tuple[str, FloatArray, FloatArray, FloatArray]]:
-        """Material, points (3N, 3), normals (3N, 3) and texture coordinates (3N, 2), by material name."""
+        """Iterates over material names with points (3N, 3), normals (3N, 3) and texture coordinates (3N, 2)."""
         for material in sorted(self._groups):
             g = self._groups[material]
             yield material, np.concatenate(g.points), np.concatenate(g.normals), np.concatenate(g.uvs)
 
 
 def _cuts(span: float) -> list[tuple[float, float]]:
-    """Whole tiles and the rest of a length that is `span` textures long."""
+    """Intervals of whole tiles and the rest of a length of `span` textures."""
     edges = [*np.arange(0.0, span - 1e-6, 1.0), span]
     return [(float(a), float(b)) for a, b in itertools.pairwise(edges)]
 
 
 def obj_text(mesh: Mesh, material_file: str, shared_texture: str = "palette", places: int = 4) -> str:
-    """The Wavefront OBJ form. Plain colours share one material that reads `shared_texture`; see `mtl_text`.
+    """Returns the Wavefront OBJ form. Plain colours share one material, which uses `shared_texture`; see `mtl_text`.
 
     Points have `places` decimal places of a metre.
     """
@@ -207,7 +206,7 @@ def obj_text(mesh: Mesh, material_file: str, shared_texture: str = "palette", pl
 def _obj_group(
     name: str, points: FloatArray, normals: FloatArray, uvs: FloatArray, counts: list[int], places: int
 ) -> list[str]:
-    """One material's lines; `counts` (vertices, texture coordinates, normals so far) is moved on."""
+    """Lines of one material; increases `counts` (vertices, texture coordinates, normals so far)."""
     lines, index = [], []
     for k, (key, rows, digits) in enumerate((("v", points, places), ("vt", uvs, 4), ("vn", normals, 3))):
         unique, inverse = np.unique(np.round(rows, digits) + 0.0, axis=0, return_inverse=True)
@@ -220,7 +219,7 @@ def _obj_group(
 
 
 def plain_colours(materials: Mapping[str, Material]) -> list[str]:
-    """The names of the materials without a texture, in a fixed order."""
+    """Names of the materials without a texture, in a fixed order."""
     return sorted(name for name, material in materials.items() if material.texture is None)
 
 
@@ -231,7 +230,7 @@ def palette_uv(index: int) -> tuple[float, float]:
 
 
 def palette_picture(materials: Mapping[str, Material], cell: int = 4) -> NDArray[np.uint8]:
-    """The palette as an RGB picture. Raises ValueError when there are too many colours."""
+    """Palette as an RGB picture. Raises ValueError when there are too many colours."""
     names = plain_colours(materials)
     if len(names) > PALETTE_COLUMNS**2:
         raise ValueError(f"{len(names)} plain colours do not fit into the palette")
@@ -242,17 +241,16 @@ def palette_picture(materials: Mapping[str, Material], cell: int = 4) -> NDArray
 
 
 def mtl_text(mesh: Mesh, palette_file: str, shared_texture: str = "palette") -> str:
-    """The material file for a mesh written by `obj_text`: only what it uses, since viewers load every texture."""
+    """Returns the material file for `obj_text`, with only the used materials, because viewers load every texture."""
     used = {name: mesh.materials[name] for name, *_ in mesh.groups()}
     entries = {name: material for name, material in used.items() if material.texture is not None}
     if len(entries) < len(used):
         entries[shared_texture] = Material(texture=palette_file)
-    return "".join(_mtl_entry(name, material) for name, material in entries.items())
-
-
-def _mtl_entry(name: str, material: Material) -> str:
-    colour = " ".join(f"{value:.3f}" for value in material.colour)
-    return f"newmtl {name}\nKd {colour}\nmap_Kd {material.texture}\n\n"
+    text = ""
+    for name, material in entries.items():
+        colour = " ".join(f"{value:.3f}" for value in material.colour)
+        text += f"newmtl {name}\nKd {colour}\nmap_Kd {material.texture}\n\n"
+    return text
 
 
 def write_text(path: Path, text: str) -> None:

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from pydrake.math import RollPitchYaw, RotationMatrix
-from pydrake.multibody.tree import UnitInertia
 
 from plant.models.builder.mesh import Mesh
 from skills.robot import FloatArray
@@ -17,24 +15,24 @@ Vector = tuple[float, float, float]
 
 
 def number(value: float) -> str:
-    """A decimal number for a file: at most six places, no trailing zeros, no minus zero."""
+    """Formats a number for a file: at most six places, no trailing zeros, no minus zero."""
     text = f"{value:.6f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
 @dataclass(frozen=True, kw_only=True)
 class Geometry(ABC):
-    """What collides, in its model's frame: `p` is its origin (m), `rpy` its roll, pitch and yaw (rad)."""
+    """Collision geometry in the frame of its model: `p` is its origin (m), `rpy` its roll, pitch and yaw (rad)."""
 
     p: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)
 
     @abstractmethod
     def sdf(self) -> str:
-        """The SDF `<geometry>` content."""
+        """Content of the SDF element `<geometry>`."""
 
     def pose_text(self) -> str:
-        """The SDF pose."""
+        """Pose in SDF form."""
         return " ".join(number(v) for v in (*self.p, *self.rpy))
 
 
@@ -45,26 +43,13 @@ class ConvexMesh(Geometry):
     file: str
 
     def sdf(self) -> str:
-        """The SDF `<geometry>` content."""
+        """Content of the SDF element `<geometry>`."""
         return f"<mesh><drake:declare_convex/><uri>{self.file}</uri></mesh>"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shape(Geometry):
     """A primitive shape; `p` is its centre."""
-
-    @abstractmethod
-    def _own_inertia(self) -> UnitInertia:
-        """About the centre, in the shape's own axes."""
-
-    def rotation(self) -> FloatArray:
-        """The (3, 3) rotation of the shape in the model's frame."""
-        return np.asarray(RotationMatrix(RollPitchYaw(*self.rpy)).matrix())
-
-    def mass_properties(self, mass_kg: float) -> MassProperties:
-        """The shape filled evenly with a mass."""
-        own = self._own_inertia().CopyToFullMatrix3()
-        return MassProperties(mass_kg, np.array(self.p), mass_kg * self.rotation() @ own @ self.rotation().T)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,11 +59,8 @@ class Box(Shape):
     size: Vector
 
     def sdf(self) -> str:
-        """The SDF `<geometry>` content."""
+        """Content of the SDF element `<geometry>`."""
         return f"<box><size>{' '.join(number(v) for v in self.size)}</size></box>"
-
-    def _own_inertia(self) -> UnitInertia:
-        return UnitInertia.SolidBox(*self.size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,11 +71,8 @@ class Cylinder(Shape):
     length: float
 
     def sdf(self) -> str:
-        """The SDF `<geometry>` content."""
+        """Content of the SDF element `<geometry>`."""
         return f"<cylinder><radius>{number(self.radius)}</radius><length>{number(self.length)}</length></cylinder>"
-
-    def _own_inertia(self) -> UnitInertia:
-        return UnitInertia.SolidCylinder(self.radius, self.length, np.array([0.0, 0.0, 1.0]))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,11 +82,8 @@ class Sphere(Shape):
     radius: float
 
     def sdf(self) -> str:
-        """The SDF `<geometry>` content."""
+        """Content of the SDF element `<geometry>`."""
         return f"<sphere><radius>{number(self.radius)}</radius></sphere>"
-
-    def _own_inertia(self) -> UnitInertia:
-        return UnitInertia.SolidSphere(self.radius)
 
 
 @dataclass(frozen=True)
@@ -119,35 +95,22 @@ class MassProperties:
     inertia: FloatArray
 
 
-def together(bodies: Sequence[MassProperties]) -> MassProperties:
-    """The mass properties of bodies joined rigidly, all given in one frame. Raises ValueError without a mass."""
-    mass = sum(body.mass_kg for body in bodies)
-    if mass <= 0:
-        raise ValueError("together: the bodies have no mass")
-    com = np.asarray(sum(body.mass_kg * body.com for body in bodies)) / mass
-    inertia = np.zeros((3, 3))
-    for body in bodies:
-        offset = body.com - com
-        inertia += body.inertia + body.mass_kg * (offset @ offset * np.eye(3) - np.outer(offset, offset))
-    return MassProperties(float(mass), com, inertia)
-
-
 def solid_mass(mesh: Mesh, density_kg_m3: float) -> MassProperties:
-    """A closed mesh filled with matter. Raises ValueError when it encloses nothing."""
+    """Mass properties of a closed mesh that is filled evenly. Raises ValueError when it encloses no volume."""
     a, b, c = _corners(mesh)
     volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
     return _gathered(a, b, c, volume * density_kg_m3, apex=True)
 
 
 def shell_mass(mesh: Mesh, density_kg_m2: float) -> MassProperties:
-    """A thin skin along all surfaces. Raises ValueError when there is none."""
+    """Mass properties of a thin skin along all surfaces. Raises ValueError when the mesh has none."""
     a, b, c = _corners(mesh)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     return _gathered(a, b, c, area * density_kg_m2, apex=False)
 
 
 def scaled_to(body: MassProperties, mass_kg: float) -> MassProperties:
-    """The same form with another mass."""
+    """Mass properties of the same form with another mass."""
     return MassProperties(mass_kg, body.com, body.inertia * (mass_kg / body.mass_kg))
 
 
@@ -157,7 +120,7 @@ def _corners(mesh: Mesh) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _gathered(a: FloatArray, b: FloatArray, c: FloatArray, masses: FloatArray, *, apex: bool) -> MassProperties:
-    """Sum triangles, or tetrahedra with their apex at the origin, of the given masses (Blow and Binstock, 2004)."""
+    """Sums triangles, or tetrahedra with their apex at the origin, of given masses (Blow and Binstock, 2004)."""
     total = float(masses.sum())
     if total <= 0:
         raise ValueError("the mesh has no mass: it is empty, open or inside out")
@@ -177,7 +140,7 @@ _SMALL_KG_M2 = 5e-6
 class Model:
     """One rigid body: its visual geometry (a mesh file beside the SDF), collision shapes, mass and friction.
 
-    A model without mass properties is meant to be welded to the world; it gets a token mass.
+    A model without mass properties is for welding to the world.
     """
 
     name: str
@@ -190,14 +153,14 @@ class Model:
 
 
 def model_sdf(model: Model) -> str:
-    """The SDF text of a model."""
+    """Returns the SDF text of a model."""
     collisions = "".join(_collision(index, shape, model.friction) for index, shape in enumerate(model.collisions))
     return f"""<?xml version="1.0"?>
 <!-- {model.comment or model.name}; made by {model.maker}, don't edit. -->
 <sdf version="1.9" xmlns:drake="drake.mit.edu">
   <model name="{model.name}">
     <link name="{model.name}">
-{_inertial(model.mass)}      <visual name="looks">
+{_inertial(model.mass)}      <visual name="visual">
         <geometry><mesh><uri>{model.mesh}</uri></mesh></geometry>
       </visual>
 {collisions}    </link>

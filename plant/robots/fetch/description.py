@@ -101,7 +101,7 @@ def _base(facts: Mapping[str, Any]) -> Mapping[str, Any]:
         "com": com.tolist(),
         "inertia": dict(zip(("ixx", "iyy", "izz"), moments.tolist(), strict=True)),
         "shapes": [*base["shapes"], *(_moved(shape, offset) for shape in column["shapes"])],
-        "looks": [*base["looks"], *(_moved(shape, offset) for shape in column["looks"])],
+        "visuals": [*base["visuals"], *(_moved(shape, offset) for shape in column["visuals"])],
     }
 
 
@@ -114,8 +114,8 @@ def _add(robot: ElementTree.Element, name: str, part: Mapping[str, Any]) -> None
     link = urdf.add_link(robot, name, part)
     for index, shape in enumerate(part["shapes"]):
         urdf.add_collision(link, f"{name}_{index}", shape, {})
-    for index, shape in enumerate(part["looks"]):
-        urdf.add_look(link, f"{name}_look_{index}", shape, shape["colour"])
+    for index, shape in enumerate(part["visuals"]):
+        urdf.add_visual(link, f"{name}_visual_{index}", shape, shape["colour"])
     if "pads" in part:
         facts = fetch_facts()
         pads = urdf.pad_shapes(part["pads"], facts["pad_friction"], facts["pad_stiffness_n_m"])
@@ -131,7 +131,7 @@ def _add_casters(robot: ElementTree.Element, casters: Mapping[str, Any]) -> None
     for index, (x, y) in enumerate(casters["places"]):
         shape = {"sphere": radius, "xyz": [x, y, radius + casters["lift"]]}
         urdf.add_collision(link, f"caster_{index}", shape, urdf.friction(0.0))
-        urdf.add_look(link, f"caster_look_{index}", shape, "black")
+        urdf.add_visual(link, f"caster_visual_{index}", shape, "black")
 
 
 def _add_wheel(robot: ElementTree.Element, name: str, side: int, wheel: Mapping[str, Any]) -> None:
@@ -146,7 +146,7 @@ def _add_wheel(robot: ElementTree.Element, name: str, side: int, wheel: Mapping[
     ball = {"sphere": wheel["radius"], "xyz": (0, 0, 0)}
     urdf.add_collision(link, f"{name}_0", ball, urdf.friction(wheel["friction"]))
     tyre = {"cylinder": (wheel["radius"], wheel["width"]), "xyz": (0, 0, 0), "rpy": (math.pi / 2, 0, 0)}
-    urdf.add_look(link, f"{name}_look_0", tyre, "black")
+    urdf.add_visual(link, f"{name}_visual_0", tyre, "black")
     urdf.add_joint(robot, name, BASE_LINK, name, part, "continuous")
 
 
@@ -164,7 +164,7 @@ def _add_finger(robot: ElementTree.Element, name: str, side: int, finger: Mappin
         **finger,
         "com": _mirrored(finger["com"], side),
         "shapes": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["shapes"]],
-        "looks": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["looks"]],
+        "visuals": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["visuals"]],
         "pads": {**pads, "xz": [[x, side * z] for x, z in pads["xz"]]},
         "axis": (0, 0, side),
         "range": (0.0, finger["travel"]),

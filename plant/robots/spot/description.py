@@ -94,7 +94,7 @@ def _add_link(robot: ElementTree.Element, name: str, part: Mapping[str, Any], *,
             _add_mesh(link, f"{name}_visual_{index}", mesh)
     else:
         for index, (shape, _) in enumerate(shapes):
-            urdf.add_look(link, f"{name}_shape_{index}", shape, "grey")
+            urdf.add_visual(link, f"{name}_shape_{index}", shape, "grey")
 
 
 def _shapes(part: Mapping[str, Any]) -> Iterable[tuple[Mapping[str, Any], Mapping[str, float]]]:

@@ -12,7 +12,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context
 
-from plant.models.catalogue import kept_folder, user_cache
+from plant.models.catalogue import cached_folder, user_cache
 from plant.robots.robot_kind import LocomotionLimits, PlacedRobot, RobotBody
 from plant.robots.servos import ActuatedJoints
 from plant.robots.spot.description import (
@@ -43,7 +43,7 @@ def visuals_folder() -> Path | None:
         for path in sorted(source.glob("*.obj")):
             (folder / path.name).write_text(simplify_obj(path.read_text()))
 
-    return kept_folder(user_cache() / f"spot_visuals_{_FORMAT}", fill)
+    return cached_folder(user_cache() / f"spot_visuals_{_FORMAT}", fill)
 
 
 def simplify_obj(text: str, cell_m: float = _CELL_M) -> str:

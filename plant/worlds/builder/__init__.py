@@ -1,1 +1,1 @@
-"""Makes the folder of a world from a map or from cylinders."""
+"""Builders of worlds: the folder of a world from a map or from cylinders."""

@@ -1,4 +1,4 @@
-"""Makes the folder of a world from a map of any building, or from upright cylinders."""
+"""Builds the folder of a world from the map of a building, or from upright cylinders."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ directives:
 
 
 def world_from_grid(folder: Path, grid: Grid, *, start: Pose2D | None, wall_height_m: float) -> None:
-    """Writes a world of which the occupied cells are walls. Raises WorldError: the robot finds no place in it."""
-    grid = _workable(grid)
+    """Writes a world whose walls are the occupied cells. Raises WorldError when the robot fits nowhere."""
+    grid = _resampled(grid)
     walls = [_box(grid, cells, wall_height_m) for cells in rectangles(grid.cells == OCCUPIED)]
     _write(folder, walls, {"scan": grid, "keepout": grid}, start)
 
@@ -62,9 +62,9 @@ def world_from_cylinders(
     start: Pose2D | None,
     around: Sequence[tuple[float, float]] = (),
 ) -> None:
-    """Writes a world of upright cylinders (x, y, radius, height), and 2 m around some points.
+    """Writes a world of upright cylinders (x, y, radius, height) that reaches 2 m around some points.
 
-    Raises WorldError: the robot finds no place in it.
+    Raises WorldError when the robot fits nowhere.
     """
     shapes = [Cylinder(radius=r, length=h, p=(x, y, h / 2.0)) for x, y, r, h in cylinders]
     places, reach = np.array(cylinders)[:, :2], max(r for _, _, r, _ in cylinders) + _MARGIN_M / 2.0
@@ -88,7 +88,7 @@ def world_from_cylinders(
 
 
 def _set_disc(cells: np.ndarray[Any, np.dtype[np.uint8]], centre: Any, radius: float) -> None:
-    """Occupy the cells whose centres lie in a disc (column, row, in cells)."""
+    """Occupies the cells whose centres lie in a disc (column, row, in cells)."""
     c0, r0 = (max(0, int(value - radius) - 1) for value in centre)
     c1, r1 = (int(value + radius) + 2 for value in centre)
     part = cells[r0:r1, c0:c1]
@@ -96,8 +96,8 @@ def _set_disc(cells: np.ndarray[Any, np.dtype[np.uint8]], centre: Any, radius: f
     part[(column + c0 + 0.5 - centre[0]) ** 2 + (row + r0 + 0.5 - centre[1]) ** 2 <= radius**2] = OCCUPIED
 
 
-def _workable(grid: Grid) -> Grid:
-    """The same in cells that estimators and planners work with: coarse ones are cut, fine ones merged."""
+def _resampled(grid: Grid) -> Grid:
+    """Returns the grid in cells of a usable size: coarse cells are cut, fine cells merged."""
     if grid.resolution_m > COARSEST_M + 1e-9:
         cut = int(np.ceil(grid.resolution_m / COARSEST_M - 1e-6))
         if grid.cells.size * cut**2 > _MOST_CELLS:
@@ -114,14 +114,14 @@ def _workable(grid: Grid) -> Grid:
 
 
 def rectangles(occupied: Bools) -> list[tuple[int, int, int, int]]:
-    """Rectangles (row, column, row after, column after) that cover exactly these cells; few of them."""
+    """Covers cells with few rectangles (row, column, row after, column after)."""
     along = _runs_merged(occupied)
     across = [(r0, c0, r1, c1) for c0, r0, c1, r1 in _runs_merged(occupied.T)]
     return min(along, across, key=len)
 
 
 def _runs_merged(occupied: Bools) -> list[tuple[int, int, int, int]]:
-    """Runs along the rows, equal ones in rows that follow one another merged."""
+    """Runs of cells along the rows; equal runs in consecutive rows are merged."""
     done, open_runs = [], dict[tuple[int, int], int]()
     edges = np.diff(np.pad(occupied, ((0, 1), (1, 1))).astype(np.int8), axis=1)
     for row, changes in enumerate(edges):
@@ -142,7 +142,7 @@ def _box(grid: Grid, cells: tuple[int, int, int, int], height_m: float) -> Box:
 
 
 def _write(folder: Path, walls: Sequence[Shape], grids: dict[str, Grid], start: Pose2D | None) -> None:
-    """All files of the world. Raises WorldError: the start is not free, or the robot fits nowhere."""
+    """Writes all files of the world. Raises WorldError when the start is not free, or the robot fits nowhere."""
     keepout = grids["keepout"]
     start = _start(keepout, start)
     rooms, doors = find_rooms(keepout, start)

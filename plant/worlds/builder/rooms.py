@@ -1,8 +1,9 @@
-"""Rooms and doors in the free space of a grid: what opens up around a place, as far as it does not narrow to a door.
+"""Rooms and doors in the free space of a grid, by a watershed of the clearance.
 
-Cells are flooded from the most open one down. Where two basins meet at a saddle that is much narrower than both, there
-is a door; else they are one. Clearance is measured along the axes, so that a crossing of corridors is no wider than
-they; where that is equal the plain distance decides, which is least in the plane of a door.
+Cells are flooded from the highest clearance down. Two basins that meet at a saddle much narrower than both are rooms
+with a door between them; other basins merge. Clearance is measured along the axes, so that a crossing of corridors is
+no wider than the corridors; equal clearances are ordered by the Euclidean distance, which is least in the plane of a
+door.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from skills.robot import FloatArray, Pose2D
 Bools = NDArray[np.bool_]
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 BANDS_M = {"scan": (0.70, 1.30), "low_scan": (0.27, 0.31), "keepout": (0.05, 1.00)}
-"""The heights that each grid speaks of."""
+"""Height band of each grid (m)."""
 
 
 @dataclass(frozen=True)
@@ -33,13 +34,13 @@ class Grid:
 
 
 def pgm_bytes(grid: Grid) -> bytes:
-    """The binary PGM form, north up."""
+    """Returns the binary PGM form, north up."""
     rows, columns = grid.cells.shape
     return f"P5\n{columns} {rows}\n255\n".encode() + grid.cells[::-1].tobytes()
 
 
 def yaml_text(grid: Grid, image: str, band_m: tuple[float, float]) -> str:
-    """The YAML beside the PGM."""
+    """Returns the YAML text beside the PGM."""
     return f"""image: {image}
 mode: trinary
 resolution: {grid.resolution_m}
@@ -60,12 +61,12 @@ _YAWS = np.arange(8) * np.pi / 8
 
 Point = tuple[float, float]
 _Saddle = tuple[int, int, float, float, float]
-"""Two labels, the width (m) between them, and where: row and column as lengths in cells."""
+"""Two labels, the width (m) between their basins, and its row and column (in cells)."""
 
 
 @dataclass(frozen=True)
 class Room:
-    """A room: its name, outline (world frame, m), and a pose where the robot stands free in it."""
+    """A room: its name, outline (world frame, m), and a free pose of the robot in it."""
 
     name: str
     polygon: tuple[Point, ...]
@@ -74,7 +75,7 @@ class Room:
 
 @dataclass(frozen=True)
 class Door:
-    """A narrow passage between two rooms, its middle and its width (m)."""
+    """A narrow passage between two rooms: its centre and its width (m)."""
 
     between: tuple[str, str]
     at: Point
@@ -82,14 +83,14 @@ class Door:
 
 
 def clearance_m(grid: Grid) -> FloatArray:
-    """Distance (m) from each cell's centre to what is not free; what lies beyond the edge is not."""
+    """Distance (m) from each cell's centre to the nearest cell that is not free; outside the grid nothing is free."""
     free = np.pad((grid.cells == FREE).astype(np.uint8), 1)
     far = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1] - 0.5
     return np.asarray(far * grid.resolution_m, dtype=np.float64)
 
 
 def most_open_pose(grid: Grid, clearance: FloatArray, among: Bools | None = None) -> Pose2D | None:
-    """The free place with the most clearance, turned so that the body has the most room; None where it fits nowhere."""
+    """Free pose with the highest clearance, at the yaw with the widest margin; None when the body fits nowhere."""
     wanted = clearance if among is None else np.where(among, clearance, -1.0)
     row, column = np.unravel_index(int(np.argmax(wanted)), wanted.shape)
     x, y = ((index + 0.5) * grid.resolution_m + low for index, low in zip((column, row), grid.origin_m, strict=True))
@@ -100,7 +101,7 @@ def most_open_pose(grid: Grid, clearance: FloatArray, among: Bools | None = None
 
 
 def body_margin_m(grid: Grid, clearance: FloatArray, pose: Pose2D) -> float:
-    """How far all that is not free is from the body's sides at a pose; negative where it does not fit."""
+    """Margin (m) between the body's sides and the nearest cell that is not free; negative if it does not fit."""
     half = BODY_M[1] / 2.0
     along = np.linspace(half - BODY_M[0] / 2.0, BODY_M[0] / 2.0 - half, 9)
     points = np.array([pose.x_m, pose.y_m]) + along[:, None] * [np.cos(pose.yaw_rad), np.sin(pose.yaw_rad)]
@@ -112,7 +113,7 @@ def body_margin_m(grid: Grid, clearance: FloatArray, pose: Pose2D) -> float:
 
 
 def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door, ...]]:
-    """The rooms that can be reached from the start, the largest first, and the doors between them."""
+    """Finds the rooms that can be reached from the start, the largest first, and the doors between them."""
     clearance = clearance_m(grid)
     labels, saddles = _segmented(grid, clearance)
     reached = _reached(clearance, grid, start)
@@ -132,7 +133,7 @@ def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door,
 
 
 def _reached(clearance: FloatArray, grid: Grid, start: Pose2D) -> Bools:
-    """The cells where the body's middle may come to from the start."""
+    """Mask of the cells that the body's centre can reach from the start."""
     _, parts = cv2.connectedComponents((clearance >= BODY_M[1] / 2.0).astype(np.uint8))
     row, column = (
         int((value - low) / grid.resolution_m)
@@ -142,7 +143,7 @@ def _reached(clearance: FloatArray, grid: Grid, start: Pose2D) -> Bools:
 
 
 def _room(name: str, cells: Bools, grid: Grid, clearance: FloatArray, reached: Bools) -> Room | None:
-    """None where the body does not fit."""
+    """Room of some cells; None when the body does not fit."""
     pose = most_open_pose(grid, clearance, cells & reached)
     outlines, _ = cv2.findContours(cells.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     outline = cv2.approxPolyDP(max(outlines, key=cv2.contourArea), 2.0, True).reshape(-1, 2)
@@ -153,7 +154,7 @@ def _room(name: str, cells: Bools, grid: Grid, clearance: FloatArray, reached: B
 
 
 def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], list[_Saddle]]:
-    """Labels of the cells (0: not free), and the saddles between them: labels, width (m), row, column."""
+    """Labels of the cells (0: not free), and the saddles between the basins: labels, width (m), row, column."""
     free = np.pad((grid.cells == FREE).astype(np.uint8), 1)
     far = cv2.distanceTransform(free, cv2.DIST_C, 3) - 0.5 + _TIE * np.pad(clearance, 1) / grid.resolution_m
     order = np.argsort(-far, axis=None, kind="stable")[: np.count_nonzero(free)]
@@ -172,8 +173,8 @@ def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], li
         if a == b:
             continue
         if a in small or b in small:
-            keep, gone = (b, a) if a in small else (a, b)
-            joined[gone] = keep
+            larger, smaller = (b, a) if a in small else (a, b)
+            joined[smaller] = larger
             continue
         across_m = 2.0 * (float(far[row, column]) + 0.5) * grid.resolution_m
         widest.setdefault((a, b), (a, b, across_m, row - 0.5, column - 0.5))
@@ -187,7 +188,7 @@ def _segmented(grid: Grid, clearance: FloatArray) -> tuple[NDArray[np.int64], li
 
 
 def _roots(parent: NDArray[np.int64]) -> NDArray[np.int64]:
-    """For each label the one that it was merged into."""
+    """Final label of each label after all merges."""
     while True:
         above = parent[parent]
         if np.array_equal(above, parent):
@@ -206,7 +207,7 @@ _root_of = numba.njit(cache=True)(_root)
 
 @numba.njit(cache=True)
 def _flooded(far: Any, order: Any, narrower: float, widest: float, least: float) -> Any:
-    """Parents of the labels, the label of each cell, and the cells where two labels meet and stay apart."""
+    """Floods the cells; returns parents of labels, labels of cells, and the cells where separate basins meet."""
     rows, columns = far.shape
     labels = np.zeros((rows, columns), np.int64)
     parent = [0]

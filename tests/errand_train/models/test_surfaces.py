@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from errand_train.models.gltf import gltf_text
+from errand_train.models.mass import join_masses
 from errand_train.models.outlines import area, inset, triangles_of
 from errand_train.models.surfaces import add_ellipsoid, add_extruded, add_ring, add_rounded_box, add_tube
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import solid_mass, together
+from plant.models.builder.shapes import solid_mass
 
 MATERIALS = {"red": Material((1.0, 0.0, 0.0)), "label": Material(texture="label.png")}
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
@@ -69,7 +70,7 @@ def test_two_bodies_together_obey_the_parallel_axes() -> None:
         part = mesh()
         part.add_box("red", (x - 0.1, -0.1, -0.1), (x + 0.1, 0.1, 0.1))
         parts.append(solid_mass(part, 125.0))
-    whole = together(parts)
+    whole = join_masses(parts)
     assert whole.mass_kg == pytest.approx(2.0)
     np.testing.assert_allclose(whole.com, 0.0, atol=1e-12)
     own = 0.04 / 6

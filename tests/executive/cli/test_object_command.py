@@ -173,7 +173,7 @@ def test_a_mission_with_an_imported_object_is_checked(mesh, tmp_path):
         ("[drill]", "[drill, drll]", 2, "drll: there is no imported object"),
         ("model: drill", "model: drll", 4, "no model 'drll' for my drill; did you mean 'drill'?"),
         ("[workbench]", "[workbnch]", 4, "no surface 'workbnch' in knowledge.yaml; did you mean 'workbench'?"),
-        ("[workbench]", "[desk]", 4, "surface 'desk' may carry things but has no entry under `fronts`"),
+        ("[workbench]", "[desk]", 4, "surface 'desk' may carry objects but has no entry under `fronts`"),
         ("my drill:", "hammer:", 4, "'hammer' names two objects or people"),
         ("[workbench]", "[]", 4, "surfaces"),
     ],

@@ -16,7 +16,8 @@ from pydrake.systems.framework import DiagramBuilder
 from errand_train.dataset.objects.forms import FORMS, write_forms
 from errand_train.models import objects
 from errand_train.models.__main__ import build
-from plant.models.builder.shapes import Cylinder, together
+from errand_train.models.mass import join_masses, shape_mass
+from plant.models.builder.shapes import Cylinder
 from plant.models.catalogue import MODELS_FOLDER, ModelForm, load_catalogue
 
 LOOSE = [(name, form) for name, entry in load_catalogue().items() if name != "person" for form in entry.forms]
@@ -102,15 +103,15 @@ def test_the_hammer_is_heavy_at_its_head() -> None:
 def test_mass_properties_follow_the_parallel_axis_theorem() -> None:
     rod = Cylinder(radius=0.01, length=0.2, p=(0, 0, 0.1))
     other = Cylinder(radius=0.01, length=0.2, p=(0, 0, -0.1))
-    both = Cylinder(radius=0.01, length=0.4).mass_properties(2.0)
-    whole = together([rod.mass_properties(1.0), other.mass_properties(1.0)])
+    both = shape_mass(Cylinder(radius=0.01, length=0.4), 2.0)
+    whole = join_masses([shape_mass(rod, 1.0), shape_mass(other, 1.0)])
     np.testing.assert_allclose(whole.com, 0.0, atol=1e-12)
     np.testing.assert_allclose(whole.inertia, both.inertia, rtol=1e-9, atol=1e-15)
 
 
 def test_mass_properties_without_mass_are_refused() -> None:
     with pytest.raises(ValueError, match="no mass"):
-        together([Cylinder(radius=0.01, length=0.2).mass_properties(0.0)])
+        join_masses([shape_mass(Cylinder(radius=0.01, length=0.2), 0.0)])
 
 
 def test_class_ids_are_distinct_and_leave_zero_to_nothing() -> None:

@@ -103,7 +103,7 @@ def test_directives_that_multiply_are_refused(home: Path) -> None:
         (home / f"{n}.dmd.yaml").write_text(f"directives:\n{text}")
     (home / "15.dmd.yaml").write_text("directives: []\n")
     (home / "world.dmd.yaml").write_text("directives:\n- add_directives: {file: package://world/0.dmd.yaml}\n")
-    assert "too many others" in str(refusal(home))
+    assert "too many other files" in str(refusal(home))
 
 
 def test_a_model_that_includes_itself_is_refused(home: Path) -> None:

@@ -114,7 +114,7 @@ def test_a_surface_that_nobody_knows_is_refused(copy: Path) -> None:
 
 def test_a_surface_without_a_front_is_refused(copy: Path) -> None:
     replace(copy / "objects.yaml", "surfaces: [kitchen counter, kitchen table]", "surfaces: [desk]")
-    with pytest.raises(InputError, match="'desk' may carry things but has no entry under `fronts`"):
+    with pytest.raises(InputError, match="'desk' may carry objects but has no entry under `fronts`"):
         load_world(copy)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.math import RollPitchYaw, RotationMatrix
 
 from errand_train.dataset.furnish import BY_THE_WALL, IN_THE_MIDDLE, Furnished, random_materials
 from errand_train.dataset.textures import ROLES, numbers
@@ -178,7 +179,7 @@ def _set(
 
 def _bounds(shape: Shape, R: FloatArray, p: FloatArray) -> Obstacle:
     if isinstance(shape, Box):
-        half = np.abs(R @ shape.rotation()) @ np.array(shape.size) / 2
+        half = np.abs(R @ RotationMatrix(RollPitchYaw(*shape.rpy)).matrix()) @ np.array(shape.size) / 2
     elif isinstance(shape, Cylinder):
         half = np.array([shape.radius, shape.radius, shape.length / 2])
     else:

@@ -28,7 +28,7 @@ from errand_train.dataset.objects import sources_digest
 from errand_train.dataset.objects.model import MODEL_FACTS, read_model
 from errand_train.dataset.overview import contact_sheet
 from errand_train.dataset.render import Shot, render_scene, views_in
-from plant.models.catalogue import kept_folder
+from plant.models.catalogue import cached_folder
 
 FORMAT: Final = 1
 MANIFEST: Final = "dataset.json"
@@ -193,7 +193,7 @@ def _rendered(
             raise _LostSceneError(f"{out}: the processes that rendered scene {index} were killed")
         if shutil.disk_usage(out).free < LEAST_FREE_BYTES:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(out))
-        kept_folder(_scene_folder(out, index), partial(_write_files, files))
+        cached_folder(_scene_folder(out, index), partial(_write_files, files))
         yield index
 
 

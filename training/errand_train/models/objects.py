@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.models.builder.shapes import Box, Cylinder, Model, Shape, Sphere, together
+from errand_train.models.mass import join_masses, shape_mass
+from plant.models.builder.shapes import Box, Cylinder, Model, Shape, Sphere
 
 PROUD_M = 0.0003
 RIM_POINTS = 8
@@ -25,7 +26,7 @@ def coke() -> Model:
     """A 0.33 l can."""
     bodies = [Cylinder(radius=CAN_RADIUS_M, length=CAN_HEIGHT_M - 2 * PROUD_M)]
     rims = [*_rim(0.029, -CAN_HEIGHT_M / 2), *_rim(0.028, CAN_HEIGHT_M / 2)]
-    return Model("coke", "coke.obj", [*bodies, *rims], together([bodies[0].mass_properties(0.35)]), comment="a red can")
+    return Model("coke", "coke.obj", [*bodies, *rims], join_masses([shape_mass(bodies[0], 0.35)]), comment="a red can")
 
 
 def beer() -> Model:
@@ -35,7 +36,7 @@ def beer() -> Model:
     body = Cylinder(radius=BOTTLE_RADIUS_M, length=BOTTLE_BODY_M - PROUD_M, p=(0, 0, bottom + BOTTLE_BODY_M / 2))
     neck = Cylinder(radius=BOTTLE_NECK_RADIUS_M, length=top - neck_from, p=(0, 0, (top + neck_from) / 2))
     shoulder = Cylinder(radius=0.023, length=0.02, p=(0, 0, neck_from + 0.01))
-    mass = together([body.mass_properties(0.48), neck.mass_properties(0.05), shoulder.mass_properties(0.02)])
+    mass = join_masses([shape_mass(body, 0.48), shape_mass(neck, 0.05), shape_mass(shoulder, 0.02)])
     return Model("beer", "beer.obj", [body, shoulder, neck, *_rim(0.026, bottom)], mass, comment="a bottle")
 
 
@@ -43,7 +44,7 @@ def cube() -> Model:
     """A wooden cube, painted blue."""
     box = Box(size=(CUBE_M - 2 * PROUD_M,) * 3)
     corners = _corners((0, 0, 0), (CUBE_M, CUBE_M, CUBE_M))
-    return Model("cube", "cube.obj", [box, *corners], together([box.mass_properties(0.12)]), comment="a blue cube")
+    return Model("cube", "cube.obj", [box, *corners], join_masses([shape_mass(box, 0.12)]), comment="a blue cube")
 
 
 def hammer() -> Model:
@@ -57,7 +58,7 @@ def hammer() -> Model:
         *_corners(head.p, (HEAD_WIDTH_M, HEAD_LENGTH_M, HAMMER_THICKNESS_M)),
         *_corners((-half + 0.01, 0, 0), (0.02, HANDLE_WIDTH_M, HAMMER_THICKNESS_M)),
     ]
-    mass = together([handle.mass_properties(0.13), head.mass_properties(0.42)])
+    mass = join_masses([shape_mass(handle, 0.13), shape_mass(head, 0.42)])
     return Model("hammer", "hammer.obj", [handle, head, *feet], mass, comment="a claw hammer")
 
 

@@ -8,8 +8,9 @@ what falls by a centimetre in one step of the plant. Upright in a person's torso
 from __future__ import annotations
 
 from errand_train.models.appearance import Appearance
+from errand_train.models.mass import join_masses, shape_mass
 from plant.models.builder.mesh import Material, Mesh
-from plant.models.builder.shapes import Box, Model, Shape, together
+from plant.models.builder.shapes import Box, Model, Shape
 
 SIZE_M, PLATE_M, DEEP_M = (0.36, 0.31), 0.008, 0.04
 RIM_M, RIM_HEIGHT_M = 0.006, 0.010
@@ -22,7 +23,7 @@ def tray() -> Model:
     """Collision shapes of the tray: plate and rim; the handle is only seen."""
     plate = Box(size=(*SIZE_M, DEEP_M), p=(0, 0, -DEEP_M / 2))
     shapes: list[Shape] = [plate, *_rim()]
-    return Model("tray", "tray.obj", shapes, together([plate.mass_properties(TRAY_KG)]), comment="a person's tray")
+    return Model("tray", "tray.obj", shapes, join_masses([shape_mass(plate, TRAY_KG)]), comment="a person's tray")
 
 
 def tray_appearance() -> Appearance:

@@ -1,4 +1,4 @@
-"""Meshes of any program as models: `import_object` writes a folder that worlds and missions name under `imports`."""
+"""Import of mesh files as models: `import_object` writes a folder that worlds and missions name under `imports`."""
 
 from plant.models.builder.importing.import_object import Wanted, import_object
 from plant.models.catalogue import ObjectImportError, ObjectsExtraMissingError

@@ -1,4 +1,4 @@
-"""Reads COLLADA (.dae): triangles with colours, in metres by the unit that the file names."""
+"""Reads COLLADA files (.dae): triangles with colours, in metres by the unit of the file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SEVERAL: Final = ("triangles", "polylist", "polygons")
 
 @dataclass(frozen=True)
 class Collada:
-    """Triangles (T, 3, 3) in metres with their colours (None: not told), and the axis that is up."""
+    """Triangles (T, 3, 3) in metres with their colours (None: without a colour), and the axis that is up."""
 
     parts: tuple[tuple[FloatArray, Colour | None], ...]
     up: str
@@ -36,8 +36,8 @@ def read_collada(path: Path) -> Collada:
     """Reads a COLLADA file.
 
     Raises:
-        ObjectImportError: it is no COLLADA, or is damaged.
-        InputError: it cannot be read.
+        ObjectImportError: the file is no COLLADA, or damaged.
+        InputError: the file cannot be read.
     """
     text = read_text(path, most_bytes=MOST_BYTES)
     if not text.strip():
@@ -85,7 +85,7 @@ class _Document:
     nodes: int = 0
 
     def read(self) -> Collada:
-        """All triangles of the scene."""
+        """Reads all triangles of the scene."""
         if _name(self.root) != "COLLADA":
             raise ObjectImportError("it is no COLLADA file", _AGAIN)
         self.by_id = {identifier: each for each in self.root.iter() if (identifier := each.get("id"))}
@@ -101,7 +101,7 @@ class _Document:
         return Collada(tuple(parts), up)
 
     def _scenes(self) -> list[Element]:
-        """The scene that is shown, else all of them."""
+        """Scenes that the file instances, else all its scenes."""
         named = [each.get("url", "") for each in self.root.iter() if _name(each) == "instance_visual_scene"]
         shown = [self._found(url) for url in named]
         return shown or [each for each in self.root.iter() if _name(each) == "visual_scene"]
@@ -110,7 +110,7 @@ class _Document:
         return self.by_id[url.removeprefix("#")]
 
     def _node(self, node: Element, X: FloatArray, depth: int) -> Iterator[tuple[FloatArray, Colour | None]]:
-        """The triangles of a node and those below it, moved by X."""
+        """Triangles of a node and the nodes below it, transformed by X."""
         self.nodes += 1
         if self.nodes > MOST_NODES or depth > MOST_DEPTH:
             raise ObjectImportError("it has too many nodes", _AGAIN)
@@ -131,7 +131,7 @@ class _Document:
                 yield from self._node(child, X, depth + 1)
 
     def _geometry(self, geometry: Element) -> Iterator[tuple[FloatArray, str]]:
-        """Triangles (T, 3, 3) of a geometry, and the name of their material."""
+        """Triangles (T, 3, 3) of a geometry, with the name of their material."""
         for mesh in _children(geometry, "mesh"):
             for group in _children(mesh, *_SEVERAL):
                 faces = _corners(group)
@@ -139,7 +139,7 @@ class _Document:
                     yield self._positions(group)[faces], group.get("material", "")
 
     def _positions(self, group: Element) -> FloatArray:
-        """The points (N, 3) that a group of triangles counts."""
+        """Points (N, 3) that a group of triangles indexes."""
         vertices = self._found(_input(group, "VERTEX").get("source", ""))
         source = self._found(_input(vertices, "POSITION").get("source", ""))
         accessor = next((each for each in source.iter() if _name(each) == "accessor"), None)
@@ -147,7 +147,7 @@ class _Document:
         return _numbers(_child(source, "float_array")).reshape(-1, stride)[:, :3]
 
     def _colours(self, instance: Element) -> Iterator[tuple[str, Colour]]:
-        """The diffuse colours of the materials that are bound in an instance, by their names there."""
+        """Diffuse colours of the materials that an instance binds, by their names there."""
         for bound in (each for each in instance.iter() if _name(each) == "instance_material"):
             material = self.by_id.get(bound.get("target", "").removeprefix("#"))
             effect = None if material is None else next(_children(material, "instance_effect"), None)
@@ -160,7 +160,7 @@ class _Document:
 
 
 def _corners(group: Element) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
-    """The points (T, 3) at the corners of a group's triangles; polygons become fans."""
+    """Indices (T, 3) of the corners of a group's triangles; polygons become fans."""
     inputs = list(_children(group, "input"))
     stride = 1 + max(int(each.get("offset", "0")) for each in inputs)
     offset = int(_input(group, "VERTEX").get("offset", "0"))
@@ -184,7 +184,7 @@ def _corners(group: Element) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
 
 
 def _transform(element: Element) -> FloatArray:
-    """The (4, 4) matrix of an element that moves a node; of any other the unit matrix."""
+    """Matrix (4, 4) of an element that transforms a node; the unit matrix for any other element."""
     X, kind = np.eye(4), _name(element)
     if kind == "matrix":
         X = _numbers(element).reshape(4, 4)

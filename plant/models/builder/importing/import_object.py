@@ -1,4 +1,4 @@
-"""From a mesh file to a model: visual geometry with normals, convex collision parts, mass and inertia, as SDF."""
+"""Imports a mesh file as an SDF model: visual geometry with normals, convex collision parts, mass and inertia."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from skills.robot import FloatArray, Picture
 LARGEST_M: Final = 5.0
 SMALLEST_M: Final = 0.005
 PROUD_M: Final = 0.0003
-"""The small spheres stand out by this much, so that they bear the body."""
+"""Distance by which the small spheres stand out, so that they bear the body."""
 PLACES: Final = 6
 PERSON: Final = "person"
 _UNITS: Final = (("millimetres", 0.001), ("centimetres", 0.01), ("inches", 0.0254), ("feet", 0.3048), ("km", 1000.0))
 _PLAUSIBLE_M: Final = (0.02, 1.5)
-"""An object for a table is so long."""
+"""Plausible lengths of an object for a table."""
 _UP: Final = {
     "x": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
@@ -51,9 +51,9 @@ _ROUND_SAME, _ROUND_WIDEST = 0.02, 0.52
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is wanted of a mesh: name, mass (kg), class, metres per unit, the axis that is up, and whether holes close.
+    """Options of an import: name, mass (kg), class, metres per unit, the axis that is up, and closing of holes.
 
-    Without a class, the object is of a class of its own, which no detector knows.
+    Without a class, the object has a class of its own, which no detector knows.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Wanted:
     close_holes: bool = False
 
     def refuse_wrong(self) -> None:
-        """Raises ObjectImportError for a value that cannot be."""
+        """Checks the options. Raises ObjectImportError for an invalid value."""
         catalogue = load_catalogue()
         if re.fullmatch(NAME, self.name) is None:
             hint = "use letters, digits and _, a letter first, at most 40"
@@ -87,7 +87,7 @@ class Wanted:
 
 @dataclass(frozen=True)
 class _Body:
-    """A mesh as it rests, about the centre of its bounding box: its appearance, and the solid that it bounds."""
+    """A mesh: the patches of its appearance, and the solid that it bounds."""
 
     patches: tuple[Patch, ...]
     solid: Solid
@@ -98,12 +98,12 @@ class _Body:
 
 
 def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
-    """Writes the model of a mesh file into a folder that is there: SDF, OBJ, pictures, and what they are.
+    """Writes the model of a mesh file into an existing folder: SDF, OBJ, pictures, and its facts.
 
-    The object keeps its side that is down where it can rest on it; else it is laid down where it is lowest.
+    The object keeps its bottom side if it can rest on it; else it lies on the side with the lowest centre of mass.
 
     Raises:
-        ObjectImportError: the file or what is wanted of it cannot be used.
+        ObjectImportError: the file or an option cannot be used.
         ObjectsExtraMissingError: the libraries are not installed.
         OSError: the folder cannot be written.
     """
@@ -132,7 +132,7 @@ def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
 
 
 def _placed(mesh: Path, wanted: Wanted) -> _Body:
-    """The mesh in metres, z up. Raises ObjectImportError."""
+    """Reads the mesh in metres, z up. Raises ObjectImportError."""
     read, own_up = read_patches(mesh)
     patches = tuple(patch.moved(wanted.scale * _UP[wanted.up or own_up], np.zeros(3)) for patch in read)
     triangles = np.concatenate([patch.triangles for patch in patches])
@@ -144,32 +144,32 @@ def _placed(mesh: Path, wanted: Wanted) -> _Body:
 
 
 def _turned(patch: Patch, which: NDArray[np.bool_]) -> Patch:
-    """The patch with some triangles (T,) looking the other way."""
+    """Flips the triangles of a mask (T,)."""
     both = which[:, None, None]
     triangles = np.where(both, patch.triangles[:, ::-1], patch.triangles)
     return replace(patch, triangles=triangles, uvs=np.where(both, patch.uvs[:, ::-1], patch.uvs))
 
 
 def _refuse_size(size_m: FloatArray, scale: float) -> None:
-    """Refuses what is no object for a table: the unit of the file is another one, then."""
-    told = " x ".join(f"{value:.3g}" for value in size_m)
+    """Refuses a mesh of implausible size, whose file has another unit. Raises ObjectImportError."""
+    size = " x ".join(f"{value:.3g}" for value in size_m)
     if size_m.max() > LARGEST_M:
-        raise ObjectImportError(f"it is {told} m large", _scale_hint(float(size_m.max()), scale))
+        raise ObjectImportError(f"it is {size} m large", _scale_hint(float(size_m.max()), scale))
     if size_m.max() < SMALLEST_M:
-        raise ObjectImportError(f"it is {told} m small", _scale_hint(float(size_m.max()), scale))
+        raise ObjectImportError(f"it is {size} m small", _scale_hint(float(size_m.max()), scale))
 
 
 def _scale_hint(largest_m: float, scale: float) -> str:
-    """Which unit the file may have, by how long the object were then."""
+    """Hint on the unit that gives the object a plausible length."""
     fitting = [(unit, factor) for unit, factor in _UNITS if _PLAUSIBLE_M[0] <= factor * largest_m <= _PLAUSIBLE_M[1]]
     if not fitting:
         return "give --scale, the metres of one unit of the file"
-    told = (f"{factor * scale:g} if its unit is {unit} ({factor * largest_m:.3g} m long)" for unit, factor in fitting)
-    return f"give --scale {', '.join(told)}"
+    scales = (f"{factor * scale:g} if its unit is {unit} ({factor * largest_m:.3g} m long)" for unit, factor in fitting)
+    return f"give --scale {', '.join(scales)}"
 
 
 def _refuse_impossible(mass: MassProperties) -> None:
-    """Refuses an inertia that no body has: pieces that are inside out count as holes."""
+    """Refuses an inertia that no body has, because of pieces that are inside out. Raises ObjectImportError."""
     moments = np.linalg.eigvalsh(mass.inertia)
     if moments[0] <= 0.0 or moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
         hint = "unite its pieces to one body and let its normals be calculated again, or import its hull"
@@ -177,14 +177,14 @@ def _refuse_impossible(mass: MassProperties) -> None:
 
 
 def _at_rest(body: _Body) -> _Body:
-    """The body laid down where it would fall, about the centre of its bounding box."""
+    """Lays the body down as it would rest, with the centre of its bounding box at the origin."""
     turned = body.moved(resting_rotation(body.solid.points, _mass(body.solid).com), np.zeros(3))
     points = turned.solid.points
     return turned.moved(np.eye(3), -(points.min(axis=0) + points.max(axis=0)) / 2.0)
 
 
 def _mass(solid: Solid) -> MassProperties:
-    """Those of the solid filled evenly."""
+    """Mass properties of the solid at a density of 1 kg/m^3."""
     mesh = Mesh({"": Material()})
     corners = solid.triangles
     mesh.add_triangles("", corners, np.zeros_like(corners), np.zeros((len(corners), 3, 2)))
@@ -192,7 +192,7 @@ def _mass(solid: Solid) -> MassProperties:
 
 
 def _shrunk(part: FloatArray, points: FloatArray) -> FloatArray:
-    """A convex part a little smaller, so that the spheres at the body's corners stand out."""
+    """Shrinks a convex part slightly, so that the spheres at the body's corners stand out."""
     low, high = part.min(axis=0), part.max(axis=0)
     scale = np.clip(1.0 - 2.0 * PROUD_M / np.maximum(high - low, 1e-9), 0.8, 1.0)
     smaller = (low + high) / 2.0 + (part - (low + high) / 2.0) * scale
@@ -201,7 +201,7 @@ def _shrunk(part: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _hull_text(points: FloatArray) -> str:
-    """The convex hull of points as OBJ, its triangles looking outward."""
+    """Convex hull of points as OBJ text, with outward triangles."""
     hull = hull_of(points)
     corners, faces = points[hull.vertices], np.searchsorted(hull.vertices, hull.simplices)
     a, b, c = (corners[faces[:, k]] for k in range(3))
@@ -212,7 +212,7 @@ def _hull_text(points: FloatArray) -> str:
 
 
 def _write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None:
-    """The visual geometry with its pictures; equal colours and equal pictures are one material."""
+    """Writes the visual geometry with its pictures; equal colours or pictures are one material."""
     materials, pictures = dict[str, Material](), dict[str, Picture]()
     mesh, known = Mesh(materials), dict[Colour | bytes, str]()
     normals = _corner_normals(np.concatenate([patch.triangles for patch in patches]))
@@ -235,9 +235,9 @@ def _write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None
 
 
 def _corner_normals(triangles: FloatArray) -> FloatArray:
-    """Unit normals (T, 3, 3) of corners: the mean of those of the triangles that meet there without an edge.
+    """Unit normals (T, 3, 3) of corners: the mean over the triangles that meet there without an edge.
 
-    A triangle counts by its angle there.
+    A triangle is weighted by its angle at the corner.
     """
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     facing = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-20)
@@ -261,7 +261,7 @@ def _corner_normals(triangles: FloatArray) -> FloatArray:
 
 
 def _corner_angles(triangles: FloatArray) -> FloatArray:
-    """The angles (T, 3) of triangles at their corners."""
+    """Angles (T, 3) of triangles at their corners."""
     ahead = np.roll(triangles, -1, axis=1) - triangles
     behind = np.roll(triangles, 1, axis=1) - triangles
     lengths = np.linalg.norm(ahead, axis=2) * np.linalg.norm(behind, axis=2)

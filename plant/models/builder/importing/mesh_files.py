@@ -1,4 +1,4 @@
-"""Reads mesh files: triangles with colours, pictures and texture coordinates, whatever the format."""
+"""Reads mesh files of many formats: triangles with colours, pictures and texture coordinates."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COLLADA: Final = ".dae"
 Y_UP: Final = (".gltf", ".glb")
 """Formats that define y as up."""
 MOST_COLOURS: Final = 64
-"""More colours than that are rounded to few."""
+"""More colours than this are rounded to few."""
 GREY: Final[Colour] = (0.7, 0.7, 0.7)
 _NO_MESHES: Final = frozenset({"zip", "tar.gz", "bz2", "tar.bz2", "stl_ascii", "dxf", "xyz"})
 _NAMING_OTHERS: Final = (".obj", ".gltf")
@@ -44,12 +44,12 @@ class Patch:
     picture: Picture | None = None
 
     def moved(self, R: FloatArray, p: FloatArray) -> Patch:
-        """The same, turned or scaled by the (3, 3) matrix R, then moved by p."""
+        """Returns the patch transformed by the (3, 3) matrix R, then moved by p."""
         return replace(self, triangles=self.triangles @ R.T + p)
 
 
 def read_patches(path: Path) -> tuple[tuple[Patch, ...], str]:
-    """The triangles of a mesh file in its own axes, and the axis that is up; in metres where the format knows its unit.
+    """Reads the triangles of a mesh file in its own axes, and the axis that is up; in metres if the format has a unit.
 
     Raises:
         ObjectImportError: the file is missing, too large or no mesh, is empty, or has too many triangles.
@@ -66,8 +66,10 @@ def read_patches(path: Path) -> tuple[tuple[Patch, ...], str]:
         if suffix in _NAMING_OTHERS:
             check_model(path, path.parent)
         if suffix == COLLADA:
-            told = read_collada(path)
-            patches, up = tuple(_plain_patch(triangles, colour) for triangles, colour in told.parts), told.up
+            collada = read_collada(path)
+            parts = ((triangles, GREY if colour is None else colour) for triangles, colour in collada.parts)
+            patches = tuple(Patch(each, np.zeros((len(each), 3, 2)), colour) for each, colour in parts)
+            up = collada.up
         else:
             patches, up = _with_trimesh(path, trimesh), "y" if suffix in Y_UP else "z"
     except InputError as error:
@@ -85,7 +87,7 @@ def read_patches(path: Path) -> tuple[tuple[Patch, ...], str]:
 
 
 def _with_trimesh(path: Path, trimesh: Any) -> tuple[Patch, ...]:
-    """The triangles of a file that trimesh reads. Raises ObjectImportError."""
+    """Reads the triangles of a file with trimesh. Raises ObjectImportError."""
     try:
         scene = trimesh.load_scene(path, process=False)
         parts = [part for part in scene.dump() if isinstance(part, trimesh.Trimesh) and len(part.faces)]
@@ -110,12 +112,8 @@ def _too_many(count: int) -> ObjectImportError:
     return ObjectImportError(f"it has {count} triangles, and at most {MOST_TRIANGLES} are taken", hint)
 
 
-def _plain_patch(triangles: FloatArray, colour: Colour | None) -> Patch:
-    return Patch(triangles, np.zeros((len(triangles), 3, 2)), GREY if colour is None else colour)
-
-
 def _patches(part: Any) -> Iterator[Patch]:
-    """The patches of one mesh, by colour where it has several."""
+    """Patches of one mesh, one for each colour."""
     triangles = np.asarray(part.triangles, dtype=np.float64)
     if triangles.shape[1:] != (3, 3):
         raise ValueError(f"triangles of {triangles.shape[1:]} numbers")
@@ -127,7 +125,9 @@ def _patches(part: Any) -> Iterator[Patch]:
         if picture is None or uv is None:
             yield Patch(triangles, plain, _colour(visual.material.main_color))
         else:
-            yield Patch(triangles, _texture(np.asarray(uv)[part.faces]), picture=picture)
+            uvs = np.asarray(uv)[part.faces]
+            uvs = np.asarray(uvs - np.floor(uvs.min(axis=1, keepdims=True) + 1e-6))  # begins within the first texture
+            yield Patch(triangles, uvs, picture=picture)
     elif visual.kind in ("face", "vertex"):
         colours = np.asarray(visual.face_colors)[:, :3].astype(np.uint8)
         for colour, chosen in _by_colour(colours):
@@ -137,7 +137,7 @@ def _patches(part: Any) -> Iterator[Patch]:
 
 
 def _picture(material: Any) -> Picture | None:
-    """The picture of a material's colour, RGB, shrunk to `LARGEST_PICTURE_PX`."""
+    """Picture of a material's colour, RGB, shrunk to `LARGEST_PICTURE_PX`; None without one."""
     found = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     if found is None:
         return None
@@ -150,24 +150,19 @@ def _picture(material: Any) -> Picture | None:
     return picture
 
 
-def _texture(uvs: FloatArray) -> FloatArray:
-    """Texture coordinates (T, 3, 2), each triangle's moved by whole textures to begin within the first one."""
-    return np.asarray(uvs - np.floor(uvs.min(axis=1, keepdims=True) + 1e-6))
-
-
 def _colour(rgb: ArrayLike) -> Colour:
     r, g, b = (float(value) / 255.0 for value in np.asarray(rgb)[:3])
     return r, g, b
 
 
 def _rounded(colour: Colour) -> Colour:
-    """One of few colours."""
+    """Rounds a colour to one of few."""
     r, g, b = (round(value * (_SHADES - 1)) / (_SHADES - 1) for value in colour)
     return r, g, b
 
 
 def _by_colour(colours: NDArray[np.uint8]) -> Iterator[tuple[NDArray[np.uint8], NDArray[np.bool_]]]:
-    """Colours, and which triangles (T,) have each; many colours are rounded to few."""
+    """Colours with the mask (T,) of their triangles; many colours are rounded to few."""
     if len(np.unique(colours, axis=0)) > MOST_COLOURS:
         step = 255 / (_SHADES - 1)
         colours = np.round(np.round(colours / step) * step).astype(np.uint8)

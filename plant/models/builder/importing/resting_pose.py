@@ -1,7 +1,7 @@
-"""How a body rests on a plane: the side it stands on, and small spheres there that bear it.
+"""The rest of a body on a plane: the sides on which it can rest, and small spheres at their corners that bear it.
 
-A convex part that lies on a box has a single contact point and would wobble. So the sides on which a body can rest
-get spheres at their corners, which touch the plane from inside.
+A convex part that lies on a box has a single contact point and would wobble. So each side on which the body can rest
+gets spheres at its corners, which touch the side's plane from inside.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ CORNERS: Final = 6
 MOST_SIDES: Final = 6
 _THICKNESS: Final = 0.01
 _LEAST_M: Final = 0.0003
-"""Points belong to a side when they are that near to its plane: a share of the body's height over it, or metres."""
+"""Greatest distance of a side's points from its plane: a share of the body's height above it, or metres."""
 _LEAST_TIPPING_RAD: Final = 0.05
 _LEAST_AREA: Final = 0.04
 _MOST_CANDIDATES: Final = 60
@@ -34,7 +34,7 @@ DOWN: Final = (0.0, 0.0, -1.0)
 class Side:
     """A side on which a body can lie: its outward normal, its corners (K, 3) in its plane, in order, and its area.
 
-    There the centre of mass is `height_m` over the plane, and the body falls over when tilted by `tipping_rad`.
+    The centre of mass is `height_m` above the plane, and the body falls over when it is tilted by `tipping_rad`.
     """
 
     normal: FloatArray
@@ -45,7 +45,7 @@ class Side:
 
 
 def resting_rotation(points: FloatArray, com: FloatArray) -> FloatArray:
-    """The rotation (3, 3) that lays a body down so that it rests: none at all where it stands as it is."""
+    """Rotation (3, 3) that lays a body down so that it rests; the identity if it stands as it is."""
     as_it_is = side_towards(points, com, np.array(DOWN))
     if as_it_is is not None and as_it_is.tipping_rad >= _LEAST_TIPPING_RAD:
         return np.eye(3)
@@ -61,7 +61,7 @@ def resting_rotation(points: FloatArray, com: FloatArray) -> FloatArray:
 
 
 def resting_sides(points: FloatArray, com: FloatArray) -> list[Side]:
-    """The sides of a body that it does not fall over from, the lowest first."""
+    """Sides of a body on which it does not fall over, the lowest centre of mass first."""
     hull = ConvexHull(points)
     normals, index = np.unique(np.round(hull.equations[:, :3], 3), axis=0, return_inverse=True)
     triangles = points[hull.simplices]
@@ -78,7 +78,7 @@ def resting_sides(points: FloatArray, com: FloatArray) -> list[Side]:
 
 
 def side_towards(points: FloatArray, com: FloatArray, normal: FloatArray) -> Side | None:
-    """The side that points into a direction; None where the body touches a plane there in a line or a point."""
+    """Side that faces a direction; None when the body touches a plane there only in a line or a point."""
     heights = points @ normal
     top, depth = float(heights.max()), float(np.ptp(heights))
     touching = points[heights >= top - max(_THICKNESS * depth, _LEAST_M)]
@@ -96,9 +96,9 @@ def side_towards(points: FloatArray, com: FloatArray, normal: FloatArray) -> Sid
 
 
 def feet(points: FloatArray, com: FloatArray) -> list[Sphere]:
-    """Small spheres at the corners of the sides on which a body can rest, that on which it stands first.
+    """Small spheres at the corners of the sides on which a body can rest, first of the side on which it stands.
 
-    They touch the sides' planes from inside; of a body with plane sides they stand out nowhere.
+    They touch the planes of the sides from inside; they do not stand out of a body with plane sides.
     """
     hull = ConvexHull(points)
     radius = min(FOOT_M, float(np.ptp(points, axis=0).min()) / 6.0)
@@ -115,14 +115,14 @@ def feet(points: FloatArray, com: FloatArray) -> list[Sphere]:
 
 
 def _rounded_feet(side: Side, radius: float) -> list[Sphere]:
-    """Those of a side that is no plane, as of a ball, which would roll away."""
+    """Feet of a side that is not plane, for instance of a ball, which would roll away."""
     middle = side.corners.mean(axis=0)
     centres = middle + (_spread(side.corners) - middle) / 2.0 - side.normal * radius
     return [Sphere(radius=radius, p=(x, y, z)) for x, y, z in centres.tolist()]
 
 
 def _feet_of(side: Side, hull: FloatArray, radius: float) -> list[Sphere]:
-    """Those of one side, smaller where it is narrow."""
+    """Feet of one side, smaller where it is narrow; none where even small ones do not fit."""
     corners = _spread(side.corners)
     for small in (radius, radius / 2.0, radius / 4.0):
         centres = [_inside(corner - small * side.normal, side.normal, hull, small) for corner in corners]
@@ -133,7 +133,7 @@ def _feet_of(side: Side, hull: FloatArray, radius: float) -> list[Sphere]:
 
 
 def _inside(start: FloatArray, normal: FloatArray, hull: FloatArray, radius: float) -> FloatArray | None:
-    """The point near `start` in its plane where a sphere does not stand out of a hull's half spaces (K, 4), or None."""
+    """Point near `start`, in its plane, where a sphere stays within a hull's half spaces (K, 4); None without one."""
     centre = start
     for _ in range(_PROJECTIONS):
         out = hull[:, :3] @ centre + hull[:, 3] + radius
@@ -146,7 +146,7 @@ def _inside(start: FloatArray, normal: FloatArray, hull: FloatArray, radius: flo
 
 
 def _spread(corners: FloatArray) -> FloatArray:
-    """At most `CORNERS` of the corners, far apart."""
+    """Selects at most `CORNERS` corners that are far apart."""
     if len(corners) <= CORNERS:
         return corners
     chosen = [int(np.argmax(np.linalg.norm(corners - corners.mean(axis=0), axis=1)))]
@@ -157,7 +157,7 @@ def _spread(corners: FloatArray) -> FloatArray:
 
 
 def _turning(a: FloatArray, b: FloatArray) -> FloatArray:
-    """A rotation (3, 3) that takes the unit vector a to b."""
+    """Rotation (3, 3) of the unit vector a to b."""
     cross, cosine = np.cross(a, b), float(a @ b)
     if cosine < -1.0 + 1e-9:
         other = np.eye(3)[int(np.argmin(np.abs(a)))]

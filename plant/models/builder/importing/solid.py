@@ -1,4 +1,4 @@
-"""A mesh as a solid body: is it closed, what volume does it enclose, and which convex parts fill it."""
+"""A mesh as a solid body: its closed surface, its volume, and the convex parts that fill it."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Faces = NDArray[np.int64]
 
 
 def pieces(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
-    """The connected piece of each triangle (T,), and which to turn so that the neighbours in a piece agree.
+    """Connected piece of each triangle (T,), and the mask of triangles to flip so that neighbours agree.
 
-    None where three triangles meet at an edge, the surface has one side only, or there are too many pieces.
+    None when three triangles meet at an edge, the surface has only one side, or there are too many pieces.
     """
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     _, index, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
@@ -56,7 +56,7 @@ def pieces(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
 
 
 def outward(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Which triangles (T,) to turn so that each piece looks outward, and those that lie within another inward."""
+    """Mask of triangles (T,) to flip so that each piece faces outward, and a piece inside another inward."""
     numbers = np.unique(piece)
     corners = {number: points[faces[piece == number]] for number in numbers.tolist()}
     volumes = {number: _volume(triangles) for number, triangles in corners.items()}
@@ -72,7 +72,7 @@ def outward(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArr
 
 
 def _is_inside(probe: FloatArray, triangles: FloatArray) -> bool:
-    """Returns whether a closed surface winds about all of some points."""
+    """Returns whether all probe points are inside a closed surface, by their winding numbers."""
     for point in probe:
         a, b, c = (triangles[:, k] - point for k in range(3))
         la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
@@ -87,37 +87,37 @@ def _is_inside(probe: FloatArray, triangles: FloatArray) -> bool:
 MOST_PARTS: Final = 16
 MOST_CORNERS: Final = 64
 CONCAVITY: Final = 0.05
-"""How far CoACD lets a convex part differ from the body (its `threshold`)."""
+"""CoACD's `threshold`: the allowed difference of a convex part from the body."""
 AS_GOOD_AS_CONVEX: Final = 0.97
 _EFFORT: Final = MappingProxyType({"mcts_iterations": 60, "mcts_nodes": 10, "resolution": 1000})
-"""Half of CoACD's usual search, which takes a quarter of the time and finds no worse parts."""
+"""Half of CoACD's default search, which takes a quarter of the time and finds equally good parts."""
 _SAME_POINT: Final = 1e-6
 _LEAST_VOLUME: Final = 1e-6
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed surface that looks outward: points (N, 3) in metres and corners of triangles (T, 3)."""
+    """A closed surface that faces outward: points (N, 3) in metres and indices of triangles (T, 3)."""
 
     points: FloatArray
     faces: Faces
 
     @property
     def triangles(self) -> FloatArray:
-        """Corners (T, 3, 3)."""
+        """Corners (T, 3, 3) of the triangles."""
         return np.asarray(self.points[self.faces])
 
     @property
     def volume_m3(self) -> float:
-        """What it encloses."""
+        """Enclosed volume."""
         return _volume(self.triangles)
 
 
 def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, NDArray[np.bool_]]:
-    """The body that triangles (T, 3, 3) enclose, and which of them (T,) do not look outward and are turned for it.
+    """Solid that triangles (T, 3, 3) enclose, and the mask (T,) of the triangles that are flipped to face outward.
 
-    A closed surface has for every edge of a triangle one that runs the other way. With `close_holes`, each ring of
-    edges without a partner is closed by a fan about its middle.
+    In a closed surface every edge of a triangle has a partner in the opposite direction. With `close_holes`, a fan
+    about its centre closes each ring of edges without partners.
 
     Raises:
         ObjectImportError: the surface is open, its triangles cannot be wound alike, or it is flat.
@@ -128,7 +128,7 @@ def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid
     faces = _turned(faces, turned)
     rims = _unpaired(faces)
     if len(np.unique(rims, axis=0)) < len(rims):
-        hint = "let its normals be calculated anew in the program that made it"
+        hint = "let its normals be calculated again in the program that made it"
         raise ObjectImportError("its triangles do not all look outward", hint)
     if len(rims) and not close_holes:
         hint = "close it in the program that made it, or add --close-holes"
@@ -158,7 +158,7 @@ def _volume(triangles: FloatArray) -> float:
 
 
 def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
-    """Each point once (N, 3), and the corners of the triangles (T, 3), where nearly the same is the same."""
+    """Unique points (N, 3) and the indices of the triangles (T, 3); nearly equal points count as equal."""
     corners = triangles.reshape(-1, 3)
     step = max(float(np.ptp(corners, axis=0).max()) * _SAME_POINT, 1e-12)
     _, first, index = np.unique(
@@ -168,7 +168,7 @@ def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
 
 
 def _welded(triangles: FloatArray) -> tuple[FloatArray, Faces, NDArray[np.bool_]]:
-    """Points, corners of the triangles that have an extent, and which of all (T,) these are."""
+    """Points, indices of the triangles that are not degenerate, and the mask (T,) of these."""
     points, faces = same_points(triangles)
     apart = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return points, faces[apart], apart
@@ -179,7 +179,7 @@ def _edges(faces: Faces) -> Faces:
 
 
 def _unpaired(faces: Faces) -> Faces:
-    """Edges (E, 2) of triangles for which none runs the other way, each as often as it lacks a partner."""
+    """Edges (E, 2) of triangles without a partner in the opposite direction, each as often as it lacks one."""
     edges = _edges(faces)
     low, sign = np.sort(edges, axis=1), np.where(edges[:, 0] < edges[:, 1], 1, -1)
     unique, index = np.unique(low, axis=0, return_inverse=True)
@@ -191,7 +191,7 @@ def _unpaired(faces: Faces) -> Faces:
 
 
 def _closed(points: FloatArray, faces: Faces, rims: Faces) -> tuple[FloatArray, Faces]:
-    """The surface with a fan in each ring of edges without a partner: every triangle is a ring, so they form rings."""
+    """Surface with a fan in each ring of edges without partners; these edges always form rings."""
     following: dict[int, list[int]] = {}
     for a, b in rims.tolist():
         following.setdefault(b, []).append(a)  # a fan runs against the rim
@@ -211,9 +211,9 @@ def _closed(points: FloatArray, faces: Faces, rims: Faces) -> tuple[FloatArray, 
 
 
 def convex_parts(solid: Solid) -> tuple[FloatArray, ...]:
-    """Corners (N, 3) of at most `MOST_PARTS` convex parts, each of at most `MOST_CORNERS`, that fill a body.
+    """Decomposes a body into at most `MOST_PARTS` convex parts, each of at most `MOST_CORNERS` corners (N, 3).
 
-    A body that fills its convex hull almost is its own only part; CoACD takes the others apart.
+    A body that almost fills its convex hull is the only part; CoACD decomposes other bodies.
 
     Raises:
         ObjectsExtraMissingError: CoACD is not installed.
@@ -236,7 +236,7 @@ def convex_parts(solid: Solid) -> tuple[FloatArray, ...]:
 
 
 def _cornered(parts: Iterable[FloatArray]) -> Iterator[FloatArray]:
-    """The corners of parts; those as thin as paper are left out."""
+    """Corners of parts, without parts that are as thin as paper."""
     for points in parts:
         try:
             hull = hull_of(points)
@@ -246,7 +246,7 @@ def _cornered(parts: Iterable[FloatArray]) -> Iterator[FloatArray]:
 
 
 def hull_of(points: FloatArray) -> ConvexHull:
-    """The convex hull of points (N, 3). Raises ObjectImportError: they lie in a plane."""
+    """Convex hull of points (N, 3). Raises ObjectImportError when they lie in a plane."""
     try:
         return ConvexHull(points)
     except QhullError as error:
@@ -254,7 +254,7 @@ def hull_of(points: FloatArray) -> ConvexHull:
 
 
 def _few_corners(corners: FloatArray) -> FloatArray:
-    """The corners that lie farthest in `MOST_CORNERS` directions, where there are more than so many."""
+    """Selects the corners that lie farthest in `MOST_CORNERS` directions, if there are more corners than that."""
     if len(corners) <= MOST_CORNERS:
         return corners
     step = np.arange(MOST_CORNERS) + 0.5

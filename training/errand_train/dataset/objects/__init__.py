@@ -17,7 +17,7 @@ from errand_train.dataset.objects.draft import Draft, Finished
 from errand_train.dataset.objects.model import ObjectModel, Surface, held_out, read_model, write_model
 from errand_train.dataset.objects.recipes import build, load_recipes
 from errand_train.dataset.objects.repainting import in_one_colour, plainly_painted
-from plant.models.catalogue import MODELS_FOLDER, kept_folder, load_catalogue, user_cache
+from plant.models.catalogue import MODELS_FOLDER, cached_folder, load_catalogue, user_cache
 
 __all__ = [
     "CLASSES",
@@ -125,4 +125,4 @@ def instance(category: str, seed: int) -> ObjectModel:
 
     chosen = os.environ.get("ERRAND_MODEL_CACHE")
     folder = (Path(chosen) if chosen else user_cache() / "models") / sources_digest()
-    return read_model(kept_folder(folder / f"{category}_{seed:03d}", fill))
+    return read_model(cached_folder(folder / f"{category}_{seed:03d}", fill))

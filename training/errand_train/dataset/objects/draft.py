@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from errand_train.models.mass import join_masses
 from errand_train.models.pictures import to_picture
 from plant.models.builder.mesh import IDENTITY, Colour, Material, Mesh
 from plant.models.builder.shapes import (
@@ -19,7 +20,6 @@ from plant.models.builder.shapes import (
     scaled_to,
     shell_mass,
     solid_mass,
-    together,
 )
 from skills.robot import FloatArray, Picture
 
@@ -113,7 +113,7 @@ class Draft:
         origin = np.array([0.0, 0.0, low[2]]) if on_floor else (low + high) / 2
         moved = Mesh(self.materials)
         moved.add_mesh(self.mesh, p=-origin)
-        mass = together(self._bodies)
+        mass = join_masses(self._bodies)
         mass = mass if mass_kg is None else scaled_to(mass, mass_kg)
         mass = MassProperties(mass.mass_kg, mass.com - origin, mass.inertia)
         used = {self.materials[name].texture for name, *_ in moved.groups()}

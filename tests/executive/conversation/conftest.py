@@ -34,7 +34,7 @@ def control():
 
 @pytest.fixture
 def talk(speech, control):
-    """A conversation beside a run that was begun with a sentence."""
+    """Conversation beside a run that began with a sentence."""
 
     def begin(sentence="fetch me a coke from the kitchen", **options):
         conversation = Conversation(speech, control, **options)
@@ -49,7 +49,7 @@ def talk(speech, control):
 
 @pytest.fixture
 def given(control):
-    """The commands of the missions that were given: first, instead, later."""
+    """Commands of the started missions: first, instead, later."""
 
     def texts():
         missions = {}

@@ -1,4 +1,4 @@
-"""What is said during a run that began with "fetch me a coke from the kitchen", and what becomes of it."""
+"""Sentences during a run that began with "fetch me a coke from the kitchen", and their effects."""
 
 import time
 from dataclasses import replace
@@ -250,7 +250,7 @@ def test_odd_input_is_answered_at_once(talk, given, text):
 
 @pytest.fixture
 def compiling_talk(speech, control):
-    """A conversation whose missions are all compiled as one drive; the steps that were asked for."""
+    """Conversation that compiles every mission as one drive, and the steps that it compiled."""
     asked = []
 
     def compiled(steps, taken):
@@ -294,7 +294,7 @@ def test_a_part_of_it_cannot_be_changed(compiling_talk):
 
 
 def test_a_corrected_mission_is_run_to_its_end(talk, speech, control, run_tree, compiled, script):
-    """No coke but a beer, said while the robot drives."""
+    """The speaker asks for a beer instead of the coke while the robot drives."""
     meant = speech.understand("fetch me a coke from the kitchen", None)
     tree = speech.compile(steps_of_commands(meant.commands), frozenset())
     conversation = Conversation(speech, control)

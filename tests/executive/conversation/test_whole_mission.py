@@ -1,4 +1,4 @@
-"""A whole mission in the plant, corrected while the robot drives; the referee judges what was said last."""
+"""Whole mission in the plant, corrected while the robot drives; the referee judges the corrected one."""
 
 import pytest
 

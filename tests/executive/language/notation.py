@@ -1,9 +1,4 @@
-"""Steps in a short notation, in which the tables of sentences say what each is to become.
-
-A command is its text form; a block is a word for what it does, with the steps that it holds in braces:
-
-    If (Take [Nothing] to [kitchen] and do [find] to [beer]) {Take [beer] to [hall] and do [Nothing] to [Nothing]}
-"""
+"""Short notation of steps for the tables of sentences."""
 
 from __future__ import annotations
 
@@ -20,12 +15,12 @@ __all__ = ["as_noted", "noted"]
 
 
 def noted(steps: Iterable[Step]) -> str:
-    """The steps in the notation, with ";" between them."""
+    """Steps in the notation, with ";" between them."""
     return "; ".join(map(_step, steps))
 
 
 def as_noted(lines: Iterable[str]) -> str:
-    """What a table says in lines, where "then" may stand between commands, as `noted` writes it."""
+    """Lines of a table in the form of `noted`; "then" may stand between commands."""
     return re.sub(r"\]\s*then Take", "]; Take", "; ".join(lines))
 
 
@@ -111,5 +106,5 @@ def _number(value: float) -> str:
 
 
 def _policy(step: Step) -> str:
-    """What becomes of the mission when a step fails, where it says so."""
+    """Reaction to a failed step, where there is one."""
     return "" if step.on_failure is None else f" {step.on_failure.value}"

@@ -6,7 +6,7 @@ from executive.language.understand import Status, understand
 
 
 @pytest.fixture
-def told(parser, knowledge):
+def understood(parser, knowledge):
     return lambda sentence: understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
 
 
@@ -25,8 +25,8 @@ def told(parser, knowledge):
         ("fetch me the big screwdrver", "big screwdriver"),
     ],
 )
-def test_object_is_found_by_a_synonym(told, sentence, thing):
-    answer = told(sentence)
+def test_object_is_found_by_a_synonym(understood, sentence, thing):
+    answer = understood(sentence)
     assert answer.status is Status.OK, answer.reason
     assert str(answer.commands[0].object) == thing
 
@@ -46,8 +46,8 @@ def test_object_is_found_by_a_synonym(told, sentence, thing):
         ("go to the workshop bench", "workbench"),
     ],
 )
-def test_a_place_by_another_name_is_known(told, sentence, place):
-    answer = told(sentence)
+def test_a_place_by_another_name_is_known(understood, sentence, place):
+    answer = understood(sentence)
     assert answer.status is Status.OK, answer.reason
     assert answer.commands[0].goal == place
 
@@ -61,8 +61,8 @@ def test_a_place_by_another_name_is_known(told, sentence, place):
         ("fetch me the coke can", ()),
     ],
 )
-def test_note_says_which_name_was_taken_for_which(told, sentence, notes):
-    assert told(sentence).notes == notes
+def test_note_says_which_name_was_taken_for_which(understood, sentence, notes):
+    assert understood(sentence).notes == notes
 
 
 @pytest.mark.parametrize(
@@ -78,8 +78,8 @@ def test_note_says_which_name_was_taken_for_which(told, sentence, notes):
         ("send the hammer", "goal", []),
     ],
 )
-def test_ambiguous_or_doubtful_name_makes_a_question(told, sentence, slot, candidates):
-    answer = told(sentence)
+def test_ambiguous_or_doubtful_name_makes_a_question(understood, sentence, slot, candidates):
+    answer = understood(sentence)
     assert (answer.status, answer.commands) == (Status.QUESTION, ())
     asked = answer.to_json()["question"]
     assert (asked["slot"], asked["candidates"]) == (slot, candidates)
@@ -87,15 +87,15 @@ def test_ambiguous_or_doubtful_name_makes_a_question(told, sentence, slot, candi
 
 
 @pytest.mark.parametrize("sentence", ["fetch me a drink", "fetch me a tool", "find a drink in the kitchen"])
-def test_any_member_serves_for_a_category_and_nothing_is_asked(told, sentence):
-    assert told(sentence).status is Status.OK
+def test_any_member_serves_for_a_category_and_nothing_is_asked(understood, sentence):
+    assert understood(sentence).status is Status.OK
 
 
 @pytest.mark.parametrize(
     "sentence", ["fetch me a banana", "go to the cellar", "bring the hammer to Quentin", "fetch me a unicorn"]
 )
-def test_unknown_name_is_refused_with_the_known_ones(told, sentence):
-    answer = told(sentence)
+def test_unknown_name_is_refused_with_the_known_ones(understood, sentence):
+    answer = understood(sentence)
     assert (answer.status, answer.question) == (Status.REFUSED, None)
     assert "known" in answer.reason
     assert "\n" not in answer.reason
@@ -119,8 +119,8 @@ def test_two_members_of_a_kind_are_asked_by_their_names(parser, knowledge):
         ("飲み物を持ってきて", "English only"),
     ],
 )
-def test_other_languages_are_answered_as_such(told, sentence, words):
-    answer = told(sentence)
+def test_other_languages_are_answered_as_such(understood, sentence, words):
+    answer = understood(sentence)
     assert answer.status is Status.REFUSED
     assert words in answer.reason
 
@@ -135,8 +135,8 @@ def test_the_only_person_of_a_world_is_looked_for(parser, knowledge, sentence, p
     assert [str(command) for command in answer.commands] == [f"Take [Nothing] to [{place}] and do [find] to [Robin]"]
 
 
-def test_object_asked_for_in_a_room_without_surfaces_is_brought_there(told):
-    answer = told("I need the hammer in the hall")
+def test_object_asked_for_in_a_room_without_surfaces_is_brought_there(understood):
+    answer = understood("I need the hammer in the hall")
     assert [str(command) for command in answer.commands] == [
         "Take [Nothing] to [workshop] and do [grasp] to [hammer]",
         "Take [hammer] to [hall] and do [Nothing] to [Nothing]",
@@ -145,8 +145,8 @@ def test_object_asked_for_in_a_room_without_surfaces_is_brought_there(told):
 
 
 @pytest.mark.parametrize("sentence", ["bring me the hammer from the hall", "I need the hammer in the kitchen"])
-def test_object_from_a_room_is_looked_for_there(told, sentence):
-    assert str(told(sentence).commands[1].goal) == "start"
+def test_object_from_a_room_is_looked_for_there(understood, sentence):
+    assert str(understood(sentence).commands[1].goal) == "start"
 
 
 @pytest.mark.parametrize(
@@ -160,8 +160,8 @@ def test_object_from_a_room_is_looked_for_there(told, sentence):
         ("put everything on the coffee table onto the workbench", "place"),
     ],
 )
-def test_everything_on_a_surface_is_taken_to_another(told, sentence, task):
-    answer = told(sentence)
+def test_everything_on_a_surface_is_taken_to_another(understood, sentence, task):
+    answer = understood(sentence)
     assert answer.status is Status.OK, answer.reason
     get, bring = map(str, answer.commands)
     assert get == "Take [Nothing] to [coffee table] and do [grasp] to [everything]"
@@ -169,7 +169,7 @@ def test_everything_on_a_surface_is_taken_to_another(told, sentence, task):
     assert bring == f"Take [everything] to [workbench] and do [{task}] to [{target}]"
 
 
-def test_everything_needs_a_place_to_be_taken_from(told):
-    answer = told("move all the things to the workbench")
+def test_everything_needs_a_place_to_be_taken_from(understood):
+    answer = understood("move all the things to the workbench")
     assert answer.status is not Status.OK
     assert "from where" in answer.reason

@@ -1,4 +1,4 @@
-"""Somebody who was told of by name is who "her" and "him" mean, also where the name is not known for one."""
+""" "Her" and "him" mean the last person in a statement, also with an unknown name."""
 
 import pytest
 

@@ -88,12 +88,12 @@ def test_the_answer_is_put_into_the_sentence(sentence, question, answer, whole):
     ],
 )
 def test_an_answered_question_leads_to_the_commands(parser, knowledge, sentence, answer, commands):
-    def told(text):
+    def understood(text):
         return understand(text, parser=parser, knowledge=knowledge, require_wake=False)
 
-    asked = told(sentence)
+    asked = understood(sentence)
     assert asked.status is Status.QUESTION
-    answered = told(insert_answer(sentence, asked.question, answer))
+    answered = understood(insert_answer(sentence, asked.question, answer))
     assert (answered.reason, len(answered.commands)) == (None, commands)
 
 

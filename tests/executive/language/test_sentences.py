@@ -1,4 +1,4 @@
-"""Sentences of our own, in families; see the files in `sentences/`."""
+"""Our own sentences, in families; see the files in `sentences/`."""
 
 import re
 from pathlib import Path

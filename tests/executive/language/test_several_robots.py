@@ -1,4 +1,4 @@
-"""What a sentence means for several robots."""
+"""Sentences for several robots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How words are spelled and how they sound."""
+"""Spelling and sound of words."""
 
 import pytest
 from hypothesis import given

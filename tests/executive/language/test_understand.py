@@ -160,7 +160,7 @@ def test_no_sentence_raises_and_every_command_parses_back(parser, knowledge, sen
 @settings(max_examples=150, deadline=None)
 @given(st.data(), st.booleans())
 def test_no_understood_sentence_raises_when_it_is_mangled(parser, knowledge, data, is_open):
-    """Words of a good sentence left out, doubled, moved about, run together, and odd characters between them."""
+    """Words of a good sentence are left out, doubled, moved or run together, with odd characters between them."""
     words = data.draw(st.sampled_from(UNDERSTOOD))[0].split()
     words = data.draw(st.permutations(words)) if data.draw(st.booleans()) else words
     cut = data.draw(st.integers(0, len(words)))

@@ -1,4 +1,4 @@
-"""A part of a sentence that no command carries refuses the sentence, and the reason names it."""
+"""A part that no command supports refuses the whole sentence, and the reason names the part."""
 
 from pathlib import Path
 
@@ -13,13 +13,13 @@ SENTENCES = [(kind, text, part) for kind, rows in ROWS.items() for text, part in
 
 
 @pytest.fixture
-def told(parser, knowledge):
+def understood(parser, knowledge):
     return lambda sentence: understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
 
 
 @pytest.mark.parametrize(("kind", "sentence", "part"), SENTENCES, ids=[text for _, text, _ in SENTENCES])
-def test_it_is_refused_by_its_kind_and_its_part(told, kind, sentence, part):
-    answer = told(sentence)
+def test_unsupported_part_is_named_in_the_refusal(understood, kind, sentence, part):
+    answer = understood(sentence)
     assert (answer.status, answer.commands) == (Status.REFUSED, ())
     assert kind in answer.reason
     assert part in answer.reason
@@ -38,13 +38,13 @@ def test_it_is_refused_by_its_kind_and_its_part(told, kind, sentence, part):
         ("go to the living room table", "coffee table"),
     ],
 )
-def test_carried_object_stays_in_the_command(told, sentence, goal):
-    assert [command.goal for command in told(sentence).commands] == [goal]
+def test_carried_object_stays_in_the_command(understood, sentence, goal):
+    assert [command.goal for command in understood(sentence).commands] == [goal]
 
 
 @pytest.mark.parametrize("sentence", ["go to the room", "go to kitchen 3", "go to the red kitchen"])
-def test_place_with_an_unknown_description_makes_a_question(told, sentence):
-    answer = told(sentence)
+def test_place_with_an_unknown_description_makes_a_question(understood, sentence):
+    answer = understood(sentence)
     assert answer.status is Status.QUESTION
     assert "kitchen" in answer.question.candidates
 
@@ -52,8 +52,8 @@ def test_place_with_an_unknown_description_makes_a_question(told, sentence):
 @pytest.mark.parametrize(
     "sentence", ["is there a beer or a coke on the bench", "is there a beer on the bench or the counter"]
 )
-def test_a_question_after_one_or_the_other_is_asked_about(told, sentence):
-    answer = told(sentence)
+def test_a_question_after_one_or_the_other_is_asked_about(understood, sentence):
+    answer = understood(sentence)
     assert answer.status is Status.QUESTION
     assert len(answer.question.candidates) == 2
 
@@ -69,8 +69,8 @@ def test_a_question_after_one_or_the_other_is_asked_about(told, sentence):
         ("14 hammers", 14),
     ],
 )
-def test_number_of_objects_stays_in_a_correction(told, said, count):
-    answer = told(f"put {said} on the coffee table")
+def test_number_of_objects_stays_in_a_correction(understood, said, count):
+    answer = understood(f"put {said} on the coffee table")
     assert [command.object_count for command in answer.commands] == [count, count]
 
 
@@ -104,7 +104,7 @@ def test_number_of_objects_stays_in_a_correction(told, said, count):
         ),
     ],
 )
-def test_requests_become_their_missions(told, sentence, commands):
-    answer = told(sentence)
+def test_requests_become_their_missions(understood, sentence, commands):
+    answer = understood(sentence)
     assert [str(command) for command in answer.commands] == commands
     assert [str(parse_command(str(command))) for command in answer.commands] == commands

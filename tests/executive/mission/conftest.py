@@ -1,4 +1,4 @@
-"""The flat as missions see it; the parser is loaded once."""
+"""Missions in the flat; the parser is loaded once."""
 
 import shutil
 from pathlib import Path
@@ -32,13 +32,13 @@ def skills():
 
 @pytest.fixture(scope="session")
 def missions():
-    """The mission files that come with the project."""
+    """Shipped mission files."""
     return sorted((ROOT / "missions").glob("*.yaml"))
 
 
 @pytest.fixture(scope="session")
 def compile_file(parser, flat, skills):
-    """Load and compile a file, as `errand run` does before it runs."""
+    """Loads and compiles a file as `errand run` does before it runs."""
 
     def compile_path(path):
         loaded = load_mission(path)
@@ -53,7 +53,7 @@ def compile_file(parser, flat, skills):
 
 @pytest.fixture
 def compile_text(compile_file, tmp_path):
-    """Compile a text as `mission.yaml` in a folder with other files given by name."""
+    """Compiles a text as `mission.yaml` in a folder with other files by name."""
 
     def compile_here(text, **others):
         for name, other in others.items():
@@ -66,7 +66,7 @@ def compile_text(compile_file, tmp_path):
 
 @pytest.fixture
 def mission_folder(tmp_path, missions):
-    """A folder with copies of all missions that come with the project."""
+    """Folder with copies of all shipped missions."""
     for path in missions:
         shutil.copy(path, tmp_path)
     return tmp_path

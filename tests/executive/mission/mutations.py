@@ -1,4 +1,4 @@
-"""Ways to break a good mission file, each of which makes it a wrong one for certain. Chosen by a seeded generator."""
+"""Mutations that certainly break a good mission file, chosen by a seeded generator."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NAMES = ("to", "take", "object", "skill", "use", "world")
 
 
 def broken_files(good: list[Path], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
-    """`count` broken files as the name of the mutation and the bytes."""
+    """Yields `count` broken files: the name of the mutation and the bytes."""
     rng = np.random.default_rng(seed)
     names = sorted(MUTATIONS)
     made = 0
@@ -34,7 +34,7 @@ def broken_files(good: list[Path], count: int, seed: int) -> Iterator[tuple[str,
 
 
 def positions(data: Any, path: Path_ = ()) -> Iterator[Path_]:
-    """The paths of all keys and items, but those where anything may stand."""
+    """Paths of all keys and items except free ones."""
     items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
     for key, value in items:
         yield (*path, key)
@@ -53,7 +53,7 @@ def chosen(rng: np.random.Generator, options: list[Any]) -> Any:
 
 
 def changed(text: str, rng: np.random.Generator, where: Callable[[Path_, Any], bool], change: Any) -> bytes | None:
-    """The document with one place changed that fits; None when none does."""
+    """Changes one suitable place of the document; None when there is none."""
     data = yaml.safe_load(text)
     path = chosen(rng, [p for p in positions(data) if where(p, parent(data, p)[p[-1]])])
     if path is None:
@@ -148,7 +148,7 @@ def unknown_parameter(text, rng):
 
 
 def steps_of(data):
-    """The steps of a file, or of its first part."""
+    """Steps of a file, or of its first part."""
     return next(iter(data["parts"].values()))["steps"] if "parts" in data else data["steps"]
 
 
@@ -261,7 +261,7 @@ VALUES = (
 
 
 def mutated_files(good: list[Path], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
-    """`count` files with one to three random changes each, as a name and the bytes."""
+    """Yields `count` files with one to three random changes each: a name and the bytes."""
     rng = np.random.default_rng(seed)
     texts = [file.read_text(encoding="utf-8") for file in good]
     for number in range(count):
@@ -274,7 +274,7 @@ def mutated_files(good: list[Path], count: int, seed: int) -> Iterator[tuple[str
 
 
 def some_bytes(raw, rng):
-    """Some bytes changed, added or left out."""
+    """Changes, adds or removes some bytes."""
     data = bytearray(raw)
     for _ in range(int(rng.integers(1, 6))):
         at, kind = int(rng.integers(len(data) + 1)), int(rng.integers(3))
@@ -284,7 +284,7 @@ def some_bytes(raw, rng):
 
 
 def some_lines(raw, rng):
-    """A line left out, doubled, moved, indented anew, or cut off."""
+    """Removes, doubles, moves, indents or cuts off a line."""
     lines = raw.split(b"\n")
     at, other, kind = int(rng.integers(len(lines))), int(rng.integers(len(lines))), int(rng.integers(5))
     line = lines[at]
@@ -302,7 +302,7 @@ def some_lines(raw, rng):
 
 
 def some_key(raw, rng):
-    """A key that is another's, left out, or added."""
+    """Replaces, removes or adds a key."""
 
     def change(node, key, rng):
         kind, part = int(rng.integers(3)), chosen(rng, list(PARTS))
@@ -317,7 +317,7 @@ def some_key(raw, rng):
 
 
 def some_value(raw, rng):
-    """A value that is another's."""
+    """Replaces a value by another one of the file."""
 
     def change(node, key, rng):
         node[key] = chosen(rng, list(VALUES))
@@ -326,7 +326,7 @@ def some_value(raw, rng):
 
 
 def some_branch(raw, rng):
-    """A part of the file in the place of another."""
+    """Replaces a part of the file by another part."""
     data = _plain(raw)
     places = list(positions(data)) if isinstance(data, dict) else []
     if not places:
@@ -360,7 +360,7 @@ def _dumped(data):
 
 
 class _Dumper(yaml.SafeDumper):
-    """Writes a thing twice instead of an alias."""
+    """Dumper that writes a value twice instead of an alias."""
 
     def ignore_aliases(self, data):
         return True

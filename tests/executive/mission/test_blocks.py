@@ -1,4 +1,4 @@
-"""Blocks in mission files: what they are read as, and what is refused with file, line and hint."""
+"""Blocks in mission files: their models, and refusals with file, line and hint."""
 
 import time
 
@@ -18,7 +18,7 @@ BEER = Look(object="beer", at="kitchen")
 
 @pytest.fixture
 def load(tmp_path, parser, flat):
-    """The mission of a text, with other files given by name."""
+    """Loads the mission of a text, with other files by name."""
 
     def load_text(text, **others):
         for name, other in others.items():
@@ -32,7 +32,7 @@ def load(tmp_path, parser, flat):
 
 @pytest.fixture
 def block(load):
-    """The block of the only step."""
+    """Block of the only step."""
 
     def read(text):
         (step,) = load(f"steps:\n{text}").steps

@@ -1,4 +1,4 @@
-"""Conditions that cannot hold or cannot fail."""
+"""Conditions that always or never hold."""
 
 from __future__ import annotations
 

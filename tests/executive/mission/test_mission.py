@@ -156,7 +156,7 @@ def test_an_error_can_name_the_line_of_any_key(write):
 
 @pytest.fixture
 def spoken(parser, knowledge):
-    """The mission of a sentence."""
+    """Mission of a sentence."""
 
     def mission(sentence):
         meant = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)

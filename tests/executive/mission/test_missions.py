@@ -1,4 +1,4 @@
-"""The missions that come with the project: each compiles for the flat and runs to its end with scripted skills."""
+"""Shipped missions: each compiles for the flat and runs to its end with scripted skills."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def test_all_missions_are_named_here(missions):
 
 @pytest.fixture
 def run_mission(parser, flat, skills, run_tree, script, missions, make):
-    """Run a mission file with scripted skills that have the real skills' ports."""
+    """Runs a mission file with scripted skills that have the real skills' ports."""
 
     def put_down(skill):
         skill.context.robot._robot.holding = False

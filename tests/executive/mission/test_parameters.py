@@ -22,7 +22,7 @@ steps:
 
 @pytest.fixture
 def resolved(parser, flat, tmp_path):
-    """The mission of FILE with some values given as on the command line."""
+    """Resolves the mission of FILE with values given as on the command line."""
 
     def of(*settings, text=FILE):
         (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")

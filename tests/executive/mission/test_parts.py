@@ -1,4 +1,4 @@
-"""Mission files for several robots: what each of them is to do, and where the file says so."""
+"""Mission files for several robots: the part of each, and its lines."""
 
 import pytest
 
@@ -45,7 +45,7 @@ def load(tmp_path):
 
 @pytest.fixture
 def part(load, parser, flat):
-    """The mission of one robot."""
+    """Mission of one robot."""
 
     def of(name, text=FILE, **given):
         return mission_from_file(

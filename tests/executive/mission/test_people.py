@@ -1,4 +1,4 @@
-"""People who walk in a mission file."""
+"""Walking people in a mission file."""
 
 import pytest
 

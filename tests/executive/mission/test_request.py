@@ -1,4 +1,4 @@
-"""What is asked for: where the robot starts, and a request that can be taken up from any folder."""
+"""Requests: the robot's start, and a form for any folder."""
 
 from pathlib import Path
 

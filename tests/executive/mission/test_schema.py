@@ -1,4 +1,4 @@
-"""The schema of mission files: what is refused, with which line and hint; and the JSON Schema for editors."""
+"""Schema of mission files: refusals with line and hint, and the JSON Schema for editors."""
 
 import json
 

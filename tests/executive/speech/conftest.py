@@ -1,4 +1,4 @@
-"""The flat, the parser, a synthetic voice where one is installed, and the way to `made_speech`."""
+"""The flat, the parser, a synthetic voice where one is installed, and the path of `made_speech`."""
 
 import shutil
 import struct
@@ -23,7 +23,7 @@ PROGRAMS = {
 
 @pytest.fixture(scope="session")
 def flat():
-    """What is known of the flat."""
+    """Knowledge of the flat."""
     return load_knowledge(load_world("flat").knowledge_path)
 
 
@@ -52,7 +52,7 @@ TYPES = {np.dtype("<f4"): 0, np.dtype("<i1"): 1, np.dtype("<i2"): 2, np.dtype("<
 
 @pytest.fixture(scope="session")
 def model_bin():
-    """Makes a `model.bin` of variables by name, as CTranslate2's converter writes it."""
+    """Makes a `model.bin` of variables by name, as CTranslate2's converter does."""
 
     def text(words):
         return struct.pack("<H", len(words) + 1) + words.encode() + b"\0"

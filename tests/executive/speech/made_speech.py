@@ -1,4 +1,4 @@
-"""For tests of speech: sound made on the spot, and a recogniser and a detector that follow a script."""
+"""Synthetic sound for tests, and a scripted recogniser and detector."""
 
 from __future__ import annotations
 
@@ -28,10 +28,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class ScriptedRecognition:
-    """Readings as given; `likely` holds the log likelihoods of other texts, and `otherwise` is that of all else.
-
-    `plain` is what is heard when no names are expected; when empty, the first of the readings.
-    """
+    """Recognition with given readings; `likely` has log likelihoods of other texts, `otherwise` that of all else."""
 
     transcripts: Sequence[Transcript] = ()
     wider: Sequence[Transcript] = ()
@@ -40,38 +37,38 @@ class ScriptedRecognition:
     plain: str = ""
 
     def more(self) -> Iterator[Sequence[Transcript]]:
-        """The readings of one further search."""
+        """Readings of one further search."""
         yield self.wider
 
     def unprompted_text(self) -> str:
-        """The text that was given for it, or the first of the readings."""
+        """Given text, or the first of the readings."""
         return self.plain or next((transcript.text for transcript in self.transcripts), "")
 
     def likelihoods(self, texts: Sequence[str]) -> list[float]:
-        """The likelihoods that were given."""
+        """Given likelihoods."""
         return [self.likely.get(text, self.otherwise) for text in texts]
 
 
 @dataclass
 class ScriptedRecogniser:
-    """Hears the given texts one after another, whatever the sound, and notes how long the sounds were (s)."""
+    """Recogniser that returns the given texts in order, and stores the length of each sound (s)."""
 
     texts: list[str]
     lengths_s: list[float] = field(default_factory=list)
 
     def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> ScriptedRecognition:
-        """The next text; nothing for an empty one, or when none is left."""
+        """Next text; none for an empty one, or when no text is left."""
         self.lengths_s.append(len(sound) / RATE_HZ)
         text = self.texts.pop(0) if self.texts else ""
         return ScriptedRecognition((Transcript(text, -1.0),) if text else ())
 
     def partial_transcript(self, sound: Samples, vocabulary: Vocabulary) -> str:
-        """The first word of the next text."""
+        """First word of the next text."""
         return self.texts[0].split()[0] if self.texts else ""
 
 
 class LoudIsSpeech:
-    """Takes for speech whatever is loud."""
+    """Detector that takes loud sound for speech."""
 
     def probability(self, frame: Samples) -> float:
         """1 above 26 dB below full scale, else 0."""
@@ -85,7 +82,7 @@ def tone(seconds: float, *, rate_hz: int = RATE_HZ, height: float = 0.5) -> Samp
 
 
 def silence(seconds: float, *, rate_hz: int = RATE_HZ) -> Samples:
-    """No sound at all."""
+    """Silence."""
     return np.zeros(round(seconds * rate_hz), np.float32)
 
 
@@ -95,7 +92,7 @@ def speech_like(*lengths_s: float) -> Samples:
 
 
 def write_wav(file: Path, samples: npt.ArrayLike, *, rate_hz: int = RATE_HZ, channels: int = 1) -> Path:
-    """A wav file with 16 bits a sample; each channel holds the same."""
+    """Writes a wav file with 16 bits a sample and the same sound in each channel."""
     whole = (np.asarray(samples, np.float32) * 32767).astype("<i2")
     with wave.open(str(file), "wb") as writer:
         writer.setnchannels(channels)
@@ -108,7 +105,7 @@ def write_wav(file: Path, samples: npt.ArrayLike, *, rate_hz: int = RATE_HZ, cha
 def write_raw_wav(
     file: Path, data: bytes, *, tag: int, bits: int, rate_hz: int = RATE_HZ, size: int | None = None, extra: bytes = b""
 ) -> Path:
-    """A wav file of one channel with any samples in it: their kind `tag`, and any `size` told in its head."""
+    """Writes a wav file of one channel with any samples: their type `tag`, and the `size` in its head."""
     form = struct.pack("<HHIIHH", tag, 1, rate_hz, rate_hz * bits // 8, bits // 8, bits) + extra
     chunks = b"fmt " + struct.pack("<I", len(form)) + form
     chunks += b"data" + struct.pack("<I", len(data) if size is None else size) + data

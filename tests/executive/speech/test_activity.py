@@ -1,4 +1,4 @@
-"""Utterances are cut out of the sound at pauses."""
+"""Splitting of sound into utterances at pauses."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Heard sentences are read for one robot: its name, known names, and which words are to blame."""
+"""Reading of heard sentences for one robot: its name, known names, and suspect words."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The recogniser itself, with a synthetic voice of this machine; skipped where the extra or a voice is missing."""
+"""The recogniser with a synthetic voice of this machine; skipped without the extra or a voice."""
 
 import socket
 from importlib import import_module
@@ -20,7 +20,7 @@ pytest.importorskip("faster_whisper")
 
 @pytest.fixture(scope="module")
 def whisper():
-    """The recogniser, loaded where there is no network."""
+    """Recogniser, loaded without a network."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(socket, "socket", _no_network)
         return load_whisper()

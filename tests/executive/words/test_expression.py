@@ -1,4 +1,4 @@
-"""The expression language of mission files: what it reads, its types, its values, and all that it refuses."""
+"""Expression language of mission files: grammar, types, values and refusals."""
 
 import string
 
@@ -31,7 +31,7 @@ def value(text):
 
 
 def refused(text):
-    """The message and the hint."""
+    """Message and hint of a refusal."""
     with pytest.raises(ExpressionError) as error:
         value(text)
     return error.value.message, error.value.hint
@@ -254,7 +254,7 @@ ANY_TEXT = st.text(max_size=60) | st.lists(st.sampled_from(WORDS), max_size=25).
 
 
 def meant(text, values):
-    """The value, None when it is refused."""
+    """Value; None when the expression is refused."""
     try:
         expression = Expression(text)
         kind = expression.kind(KINDS)
@@ -290,7 +290,7 @@ OPERATORS = st.sampled_from(["+", "-", "*", "/", "//", "%", "==", "!=", "<", "<=
 
 @st.composite
 def of_the_grammar(draw, depth=3):
-    """An expression, most of whose types fit."""
+    """Expression whose types mostly fit."""
     form = draw(st.integers(0, 6)) if depth else 0
     if form < 2:
         return draw(NUMBERS | TEXTS | TRUTHS)

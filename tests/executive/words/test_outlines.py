@@ -1,4 +1,4 @@
-"""Outlines in the plane: what lies within, and how far outside."""
+"""Outlines in the plane: containment and distance."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The robots of a run, from the option that names them."""
+"""Robots of a run, from the option that names them."""
 
 from __future__ import annotations
 

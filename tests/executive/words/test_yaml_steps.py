@@ -21,7 +21,7 @@ checks = st.builds(Command, goal=st.none() | words, task=st.just(Task.FIND), obj
 
 
 def built(model, **values):
-    """A model of fields by their names; hypothesis would take them by their aliases."""
+    """Model of fields by their names; hypothesis would use their aliases."""
     return st.fixed_dictionaries(values).map(lambda given: model(**given))
 
 

@@ -1,4 +1,4 @@
-"""Sentences that decide, repeat, wait and go on: the mission of each, and what near misses are refused for."""
+"""Sentences that decide, repeat, wait and go on: their missions, and the refusals of near misses."""
 
 from functools import partial
 from pathlib import Path

@@ -212,14 +212,10 @@ def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPat
 def _value(name: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
     if name not in values:
         near = did_you_mean(name, values)
-        known = f"declared are {listing(values)}" if values else _how_to_declare(source)
+        misspelled = None if DECLARED in source.data else did_you_mean(DECLARED, (str(key) for key in source.data))
+        known = f"declare it under '{DECLARED}' with its default"
+        known = known if misspelled is None else f"did you mean '{DECLARED}' by '{misspelled}'?"
+        known = f"declared are {listing(values)}" if values else known
         hint = f"did you mean '${{{near}}}'?" if near else known
         raise source.error(path, f"unknown parameter '{name}'", hint)
     return values[name]
-
-
-def _how_to_declare(source: YamlSource) -> str:
-    misspelled = did_you_mean(DECLARED, (str(key) for key in source.data))
-    if misspelled is not None and DECLARED not in source.data:
-        return f"did you mean '{DECLARED}' by '{misspelled}'?"
-    return f"declare it under '{DECLARED}' with its default"

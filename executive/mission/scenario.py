@@ -57,22 +57,16 @@ class Scenario:
     def lines(self) -> tuple[str, ...]:
         """One line for each fault and event."""
         people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
-        doors = (f"the {door['name']} {_times(door)}" for door in self.doors)
-        moves = (f"somebody moves the {_moved(move)} at {move['at']:g} s" for move in self.moves)
+        doors = []
+        for door in self.doors:
+            times = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
+            doors.append(f"the {door['name']} {' and '.join(f'{verb} at {at_s:g} s' for at_s, verb in times)}")
+        moves = []
+        for move in self.moves:
+            to = f"the {move['to']}" if isinstance(move["to"], str) else "({:g}, {:g}, {:g})".format(*move["to"])
+            moves.append(f"somebody moves the {move['name']} to {to} at {move['at']:g} s")
         return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
 
 
 NO_SCENARIO: Final = Scenario()
 """Scenario without faults and events."""
-
-
-def _times(door: Mapping[str, Any]) -> str:
-    """Times at which a door closes and opens, in order."""
-    times = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
-    return " and ".join(f"{verb} at {at_s:g} s" for at_s, verb in times)
-
-
-def _moved(move: Mapping[str, Any]) -> str:
-    """Moved object and its destination."""
-    to = move["to"]
-    return f"{move['name']} to {f'the {to}' if isinstance(to, str) else '({:g}, {:g}, {:g})'.format(*to)}"

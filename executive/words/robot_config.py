@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Final
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -65,15 +65,10 @@ class NamedRobot(BaseModel):
     )
 
 
-def _short_robot(value: object) -> Any:
-    """Expands a bare kind to a robot."""
-    return {"kind": value} if isinstance(value, str) else value
-
-
-RobotsFile = Annotated[
-    dict[Name, Annotated[NamedRobot, BeforeValidator(_short_robot, json_schema_input_type=NamedRobot | Name)]],
-    Field(min_length=1),
-]
+_SHORT: Final = BeforeValidator(
+    lambda value: {"kind": value} if isinstance(value, str) else value, json_schema_input_type=NamedRobot | Name
+)
+RobotsFile = Annotated[dict[Name, Annotated[NamedRobot, _SHORT]], Field(min_length=1)]
 """Robots by name, each as its kind alone or with more keys."""
 
 

@@ -10,7 +10,7 @@ from functools import partial
 from executive.app.feasibility import refuse_impossible
 from executive.app.prepared import Prepared
 from executive.conversation import Conversation, Reply, ReplyKind, Speech
-from executive.conversation.parts import Waiting
+from executive.conversation.replies import Waiting
 from executive.language.addressees import RobotChoice, addressees
 from executive.language.cleaning import find_address
 from executive.language.followups import parse_remark

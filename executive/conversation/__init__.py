@@ -9,6 +9,6 @@ From Python, beside a run:
 """
 
 from executive.conversation.dialogue import Conversation
-from executive.conversation.parts import Reply, ReplyKind, Speech
+from executive.conversation.replies import Reply, ReplyKind, Speech
 
 __all__ = ["Conversation", "Reply", "ReplyKind", "Speech"]

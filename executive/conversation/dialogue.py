@@ -11,7 +11,8 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final
 
-from executive.conversation.parts import (
+from executive.conversation.remarks import RemarkAnswers
+from executive.conversation.replies import (
     NEVER_MIND,
     OVER,
     Reply,
@@ -22,7 +23,6 @@ from executive.conversation.parts import (
     confirmation,
     refusal,
 )
-from executive.conversation.remarks import RemarkAnswers
 from executive.language.cleaning import find_heard_wake, strip_wake
 from executive.language.followups import (
     Amendment,

@@ -8,7 +8,7 @@ from typing import Final
 
 from py_trees.common import Status
 
-from executive.conversation.parts import OVER, Reply, Speech, answer, confirmation, refusal
+from executive.conversation.replies import OVER, Reply, Speech, answer, confirmation, refusal
 from executive.language.followups import Remark
 from executive.language.grounding import known_line
 from executive.run.control import Control

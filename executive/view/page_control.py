@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from py_trees.common import Status
 
-from executive.conversation.parts import Waiting
+from executive.conversation.replies import Waiting
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode
 from executive.run.visitor import Progress, RunVisitor

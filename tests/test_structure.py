@@ -14,15 +14,15 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2957,
+    "executive/words": 2945,
     "executive/language": 7675,
     "executive/speech": 1604,
-    "executive/mission": 1534,
+    "executive/mission": 1517,
     "executive/tree": 7404,
     "executive/run": 3067,
     "executive/record": 967,
     "executive/store": 1671,
-    "executive/conversation": 591,
+    "executive/conversation": 583,
     "executive/view": 1383,
     "executive/testing": 812,
     "executive/app": 7419,
@@ -30,7 +30,7 @@ LINES = {
     "skills": 25238,
     "plant": 11612,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 452, 75, 9
+MODULES, ONE_IMPORTER, SAME_NAME = 449, 74, 9
 """All modules; those that one other imports; file names that stand more than once."""
 
 

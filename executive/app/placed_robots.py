@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from executive.mission.load import load_stack
 from executive.mission.request import Start
-from executive.mission.stack_file import load_stack
 from executive.words.knowledge import Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import PlacedRobot, robot_kind

@@ -19,7 +19,7 @@ from typer.core import TyperCommand
 
 from executive.cli.number_options import quantity_option
 from executive.mission.request import Request, parse_start
-from executive.words.option import Option
+from executive.words.forms import Option
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 

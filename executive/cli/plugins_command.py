@@ -16,8 +16,8 @@ from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
 from executive.cli.output import console_for, finish, show_table
+from executive.mission.load import load_stack
 from executive.mission.request import Request
-from executive.mission.stack_file import load_stack
 from executive.store import trigger_source
 from executive.tree import registry
 from plant.robots import robot_kind as kinds

@@ -15,8 +15,8 @@ from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
 from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
+from executive.mission.load import load_stack
 from executive.mission.request import Request
-from executive.mission.stack_file import load_stack
 from executive.store.missions import STORE as STORE_NAME
 from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
 from executive.store.standing_missions import StandingMission, StandingMissions

@@ -11,10 +11,10 @@ from functools import partial
 from types import MappingProxyType
 from typing import Final
 
-from executive.conversation.remarks import RemarkAnswers
 from executive.conversation.replies import (
     NEVER_MIND,
     OVER,
+    RemarkAnswers,
     Reply,
     ReplyKind,
     Speech,

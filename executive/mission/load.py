@@ -1,4 +1,4 @@
-"""Reading of mission files: parameters are replaced, and each step gets its place in the file."""
+"""Reading of mission files, with parameters and places of steps, and of stack files."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ from executive.words.knowledge import Corner, Knowledge, knowledge_of_source
 from executive.words.mission import Mission, Route, Stop
 from executive.words.step import Place, Step
 from skills.files.errors import Problems, suggestion
+from skills.files.outside import is_file, is_there
 from skills.files.schema import validate
 from skills.files.yaml_source import KeyPath, YamlSource, parse_yaml, read_yaml
+from skills.stack import DEFAULT_FILE, RobotStack, StackError, default_stack, stack_of
 
 _NONE_GIVEN: Final[Given] = MappingProxyType({})
 _KEY: Final = "knowledge"
@@ -121,3 +123,20 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
         for key, value in above.items()
     }
     return {**below, **both}
+
+
+def stack_file(given: Path) -> Path:
+    """Path of a stack file: the given one, or the shipped file of that name."""
+    own = DEFAULT_FILE.with_name(f"{given.name}_stack.yaml")
+    return own if given == Path(given.name) and not is_there(given) and is_file(own) else given
+
+
+def load_stack(path: Path | None) -> RobotStack:
+    """Reads the stack of a file, or the default one. Raises InputError with file and line."""
+    if path is None:
+        return default_stack()
+    source = read_yaml(path)
+    try:
+        return stack_of(source.data or {})
+    except StackError as error:
+        raise source.error(error.path, error.message, error.hint) from error

@@ -13,8 +13,8 @@ from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 from executive.mission.scenario import NO_SCENARIO, Scenario
+from executive.words.forms import Option
 from executive.words.mission import QuestionPolicy
-from executive.words.option import Option
 from executive.words.robot_config import RobotConfig, parse_pose, parse_robots
 from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
@@ -53,7 +53,7 @@ def _given(settings: list[str]) -> Mapping[str, Any]:
 
 
 def _stack_file(path: Path) -> Path:
-    from executive.mission.stack_file import stack_file
+    from executive.mission.load import stack_file
 
     return stack_file(path)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Final
 
-from executive.words.option import Option
+from executive.words.forms import Option
 from skills.quantities import Quantity
 
 RandomFaults = Annotated[int, Quantity(ge=0, le=100)]

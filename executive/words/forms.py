@@ -1,4 +1,4 @@
-"""Models of mappings in a file, and unions of models that the keys distinguish."""
+"""Declarations with models: mappings in a file, unions of models by key, and options of the command line."""
 
 from __future__ import annotations
 
@@ -72,3 +72,19 @@ class Forms:
             if model.model_fields[name].is_required() and data.get(key) is None:
                 raise ValueError(f"'{form}' needs '{key}' beside it")
         return fitting
+
+
+@dataclass(frozen=True)
+class Option:
+    """Command-line option of a field; a number has the range of the field's quantity.
+
+    `name` is the option, by default the field's name; an `argument` has none. `read` converts the typed value, of type
+    `typed`, to the field's value; it raises InputError.
+    """
+
+    help: str
+    name: str = ""
+    metavar: str | None = None
+    argument: bool = False
+    read: Callable[[Any], Any] | None = None
+    typed: Any = str

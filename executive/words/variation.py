@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Annotated, Final
 
-from executive.words.option import Option
+from executive.words.forms import Option
 from skills.files.errors import InputError, suggestion
 from skills.quantities import Quantity, QuantityError, number_in, number_of
 

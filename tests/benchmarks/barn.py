@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.mission.stack_file import load_stack
+from executive.mission.load import load_stack
 from plant.worlds.builder.own import world_from_cylinders
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import GridMap

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from executive.mission.stack_file import load_stack
+from executive.mission.load import load_stack
 from plant.worlds.builder.own import world_from_grid
 from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
 from plant.worlds.seeding import place_people

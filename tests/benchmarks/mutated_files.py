@@ -24,9 +24,8 @@ import numpy as np
 from executive.app.evaluate.evaluation_file import load_evaluation
 from executive.app.scenarios import read_scenario
 from executive.language.parser import load_parser
-from executive.mission.load import knowledge_of_mission, load_mission, mission_of_robot
+from executive.mission.load import knowledge_of_mission, load_mission, load_stack, mission_of_robot
 from executive.mission.resolve import mission_from_file
-from executive.mission.stack_file import load_stack
 from executive.testing.skill_test import load_skill_tests
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.app.evaluate.results import Evaluation, RunSpec
 from executive.app.mission_files import mission_file
+from executive.mission.load import stack_file
 from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
-from executive.mission.stack_file import stack_file
 from executive.words.robot_config import NamedRobot, RobotConfig, robots_of_file
 from executive.words.slug import slug
 from executive.words.variation import (

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from executive.mission.load import load_mission
-from executive.mission.stack_file import load_stack
+from executive.mission.load import load_mission, load_stack
 from executive.words.knowledge import load_knowledge
 from executive.words.mission import Mission
 from skills.files.errors import InputError

@@ -1,7 +1,7 @@
 import pytest
 from py_trees.common import Status
 
-from executive.conversation.remarks import doing_in_words, place_in_words
+from executive.conversation.replies import doing_in_words, place_in_words
 from executive.run.control import Control
 from executive.run.visitor import Progress
 from executive.tree.node import NodeState

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from executive.mission.stack_file import load_stack, stack_file
+from executive.mission.load import load_stack, stack_file
 from skills.files.errors import InputError
 from skills.stack import default_stack
 

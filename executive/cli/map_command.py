@@ -253,12 +253,11 @@ _TRAJECTORY, _LOOP, _ROBOT, _GOAL = (70, 120, 220), (230, 150, 30), (30, 140, 60
 
 def map_picture(ground: GridMap, graph: PoseGraph, pose: Pose2D, goal: Pose2D | None) -> Picture:
     """Draws the ground as known so far (north up, RGB), at most _WIDEST pixels wide or high."""
-    unknown = np.zeros_like(ground.occupied) if ground.unknown is None else ground.unknown
-    grey = np.where(ground.occupied, _GREY["occupied"], np.where(unknown, _GREY["unknown"], _GREY["free"]))
-    seen = np.argwhere(~unknown)
+    grey = ground.grey(**_GREY)
+    seen = np.argwhere(grey != _GREY["unknown"])
     low, high = seen.min(axis=0), seen.max(axis=0) + 1
     scale = max(1, min(4, _WIDEST // int(max(high - low))))
-    cut = grey[low[0] : high[0], low[1] : high[1]][::-1].astype(np.uint8)
+    cut = grey[low[0] : high[0], low[1] : high[1]][::-1]
     picture = cv2.cvtColor(np.kron(cut, np.ones((scale, scale), dtype=np.uint8)), cv2.COLOR_GRAY2RGB)
 
     def pixel(x_m: float, y_m: float) -> tuple[int, int]:

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
-import numpy as np
 import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
@@ -16,12 +15,12 @@ from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import new_folder, writing
 from plant.worlds.world import WorldError
-from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError, count_text
 from skills.files.outside import read_text
 from skills.files.schema import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity
-from skills.robot import Picture, Pose2D
+from skills.robot import Pose2D
 
 MAX_BYTES: Final = 20_000_000
 WallHeight = Annotated[float, Quantity(ge=1.3, le=10.0, unit="m")]
@@ -59,8 +58,7 @@ def from_map(
     read = load_grid_map(map_file)
     for note in read.notes:
         typer.echo(f"errand: warning: {map_file}: {note}", err=True)
-    unknown = np.zeros_like(read.occupied) if read.unknown is None else read.unknown
-    cells = np.where(read.occupied, OCCUPIED, np.where(unknown, UNKNOWN, FREE)).astype(np.uint8)
+    cells = read.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED)
     grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
     _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
 
@@ -94,7 +92,7 @@ def show(
     grid = load_grid_map(drawn.surveyed.keepout_map_path)
     picture = draw_world(
         drawn,
-        _grey(grid),
+        grid.grey(free=255, unknown=150, occupied=0),
         grid.origin_m,
         grid.resolution_m,
         labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
@@ -104,12 +102,6 @@ def show(
         save_png(out, picture)
     counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"))
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
-
-
-def _grey(grid: GridMap) -> Picture:
-    """Grey values of a grid, rows from the south."""
-    unknown = np.zeros_like(grid.occupied) if grid.unknown is None else grid.unknown
-    return np.where(grid.occupied, 0, np.where(unknown, 150, 255)).astype(np.uint8)
 
 
 def _cylinders(path: Path) -> _Cylinders:

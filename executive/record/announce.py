@@ -111,10 +111,7 @@ def versions(packages: Sequence[str]) -> dict[str, str]:
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
     """Encodes the map: a grey PNG (first row: largest y), its origin in the world frame (m), labels of the rooms."""
-    grey = np.full(grid.occupied.shape, FREE, np.uint8)
-    if grid.unknown is not None:
-        grey[grid.unknown] = UNKNOWN
-    grey[grid.occupied] = OCCUPIED
+    grey = grid.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
     return {

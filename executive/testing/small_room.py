@@ -9,7 +9,6 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import cv2
-import numpy as np
 import yaml
 
 from executive.words.knowledge import Knowledge
@@ -54,8 +53,8 @@ def _facts() -> dict[str, Any]:
 
 def _write_map(folder: Path, name: str, band_m: tuple[float, float]) -> None:
     grid = grid_of(ROOM, band_m, _RESOLUTION_M)
-    cells = np.where(grid.occupied, 0, 254).astype(np.uint8)
-    cv2.imwrite(str(folder / f"{name}.pgm"), cells[::-1])
+    grey = grid.grey(free=254, unknown=205, occupied=0)
+    cv2.imwrite(str(folder / f"{name}.pgm"), grey[::-1])
     facts = {
         "image": f"{name}.pgm",
         "mode": "trinary",

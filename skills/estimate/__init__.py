@@ -1,1 +1,1 @@
-"""Estimators: immutable snapshots of where the robot is and what stands around it, made from its sensors."""
+"""Estimators: localisation and costmaps from the robot's sensors."""

@@ -1,4 +1,4 @@
-"""Compilation of inner loops to machine code, kept on disk between runs, and the loops that several modules share."""
+"""Compilation of inner loops to machine code, cached on disk between runs, and the loops that several modules share."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ FunctionT = TypeVar("FunctionT", bound=Callable[..., Any])
 
 
 def compiled(function: FunctionT) -> FunctionT:
-    """Compiles at the first call, single-threaded and without reordering of floating point: equal runs stay equal."""
+    """Compiles a function at its first call, single-threaded and without reordering of floating-point operations."""
     return cast(FunctionT, CompiledFunction(function))
 
 
 class CompiledFunction:
-    """A function to be compiled. numba is imported at the first call, as that takes half a second."""
+    """A function that numba compiles at the first call, since importing numba takes half a second."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
@@ -31,12 +31,12 @@ class CompiledFunction:
 
     @property
     def is_compiled(self) -> bool:
-        """Returns whether it was called, so that numba knows it."""
+        """Returns whether the function was called, and so compiled."""
         return "machine_code" in self.__dict__
 
     @functools.cached_property
     def machine_code(self) -> Callable[..., Any]:
-        """The function as numba has it; so are, in its module, the compiled functions that it calls."""
+        """The compiled function; the functions that it calls are compiled, too."""
         from numba import njit
 
         names = self._function.__globals__
@@ -64,7 +64,7 @@ def bilinear(field: NDArray[np.float32], u: float, v: float) -> float:
 def distances(
     field: NDArray[np.float32], resolution_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Looks up (N, 2) points in a distance field (m); outside it, minus the distance to its edge."""
+    """Distances (m) of points (N, 2) by a distance field; outside the field, minus the distance to its edge."""
     rows, columns = field.shape
     values = np.empty(points.shape[0])
     for n in range(points.shape[0]):

@@ -1,20 +1,17 @@
-"""Where the body can go: the surveyed keep-out grid and, above it, a layer of what the sensors see now."""
+"""The costmap of a mapped place: the surveyed keep-out grid and the obstacle layer of what the sensors see now."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import LocalisationEstimate
-from skills.estimate.compiled import distances
+from skills.estimate.compiled import compiled, distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.obstacle_layer import clear_cells, mark_cells
 from skills.estimate.scan_points import SelfFilter, in_body_axes, outside_discs, placed_points, scan_points, sensor_pose
 from skills.geometry import compose
 from skills.quantities import Count, Delay, Height, Length, Margin
@@ -26,8 +23,8 @@ class CostmapOptions:
     """The surveyed keep-out grid and a layer of obstacles that the sensors see.
 
     A point between the heights counts when it is nearer than max_range_m and farther than `explained_m` from all
-    that the keep-out grid knows. LiDAR cells count once two scans agree; a cell is remembered for `memory_s` unless
-    a beam sees past it. A depth picture must put `min_points_per_cell` points into a cell.
+    occupied cells of the keep-out grid. LiDAR cells count once two scans agree within `confirm_s`; a cell is remembered
+    for `memory_s` unless a beam sees past it. A depth picture must put `min_points_per_cell` points into a cell.
     """
 
     heights_m: tuple[Height, Height] = (0.1, 1.0)
@@ -40,17 +37,18 @@ class CostmapOptions:
     min_points_per_cell: Count = 3
 
     def build(self, keepout: GridMap) -> LayeredCostmap:
-        """A costmap on a surveyed keep-out grid."""
+        """Creates a costmap on a surveyed keep-out grid."""
         return LayeredCostmap(keepout, self)
 
 
 class LayeredCostmap:
-    """Implements `skills.api.Costmap`. `keepout` is the surveyed grid; its unknown cells count as blocked."""
+    """Costmap on a surveyed grid `keepout`, whose unknown cells count as blocked; implements `skills.api.Costmap`."""
 
     def __init__(self, keepout: GridMap, options: CostmapOptions | None = None) -> None:
         self._keepout = keepout.with_unknown_blocked()
         self._options = options or CostmapOptions()
-        self._layer = _empty_like(keepout, self._options.cell_m)
+        rows_columns = [max(2, math.ceil(size / self._options.cell_m)) for size in reversed(keepout.size_m)]
+        self._layer = GridMap(np.zeros(rows_columns, dtype=np.bool_), self._options.cell_m, keepout.origin_m)
         self._until_s = np.full(self._layer.occupied.shape, -math.inf)
         self._candidate_s = np.full(self._layer.occupied.shape, -math.inf)
         self._height_m = np.zeros(self._layer.occupied.shape)
@@ -73,22 +71,22 @@ class LayeredCostmap:
         """Distance (m) from each (x, y) row to the nearest obstacle, negative inside one and off the grid."""
         points = np.ascontiguousarray(points_W, dtype=np.float64)
         clearance = self._keepout.distance_m(points)
-        field = self._seen_field()
+        field = self._layer_field()
         if field is None:
             return clearance
         x0_m, y0_m = self._layer.origin_m
         return np.minimum(clearance, distances(field, self._layer.resolution_m, x0_m, y0_m, points))
 
     def seen_m(self) -> FloatArray:
-        """Centres (x, y) of the cells that are blocked by something seen and not surveyed."""
+        """Centres (x, y) of the blocked cells of the obstacle layer."""
         return self._layer.centres(np.argwhere(self._until_s > self._now_s))
 
     def unexplained(self) -> tuple[float, FloatArray]:
-        """The last scan's stamp and those of its returns (N, 3) that the surveyed grid does not explain."""
+        """The last scan's stamp, and its returns (N, 3) that the surveyed grid does not explain."""
         return self._scan_stamp_s, self._returns_W
 
     def forget_seen(self, within_W: FloatArray | None = None) -> int:
-        """Forgets what was seen and not surveyed, perhaps only within discs; how many cells were blocked by it."""
+        """Clears the obstacle layer, or only what lies within discs; returns the number of cells that were blocked."""
         cells = self._active()
         if within_W is None:
             self._candidate_s.fill(-math.inf)
@@ -100,14 +98,14 @@ class LayeredCostmap:
         return len(cells)
 
     def leave_out(self, discs_W: FloatArray) -> None:
-        """From now on take in nothing that is seen within these discs, rows of x, y and radius (m, world).
+        """Leaves out of the obstacle layer what lies within these discs, rows of x, y and radius (m, world).
 
-        `unexplained` still has it.
+        `unexplained` still returns it.
         """
         self._left_out_W = discs_W
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Takes in the newest scan, if it is new and the robot knows where it is."""
+        """Takes in the newest scan, if it is new and the robot is localised."""
         odometry = robot.odometry()
         X_WO = Pose2D.from_transform(localisation.X_WO)
         self._pass_time(odometry.stamp_s)
@@ -116,31 +114,31 @@ class LayeredCostmap:
         scan = robot.scan()
         if scan is not None and scan.stamp_s > self._scan_stamp_s and localisation.localised:
             self._scan_stamp_s = scan.stamp_s
-            self._take_scan(scan, X_WO, partial(self._foreign, self._filter, robot, scan))
+            self._take_scan(scan, X_WO, self._filter, robot)
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Takes in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
+        """Takes in (N, 3) points of a depth camera, without those on the floor."""
         if self._X_WB is None or self._filter is None or len(points_W) == 0:
             return
         own = self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
-        points = self._others_left_out(self._unexplained(points_W[own]))
+        points = self._outside_robots(self._unexplained(points_W[own]))
         if len(points) == 0:
             return
         cells, first, counts = np.unique(self._layer.cells(points), axis=0, return_index=True, return_counts=True)
-        kept = counts >= self._options.min_points_per_cell
-        rows, columns = cells[kept].T
+        enough = counts >= self._options.min_points_per_cell
+        rows, columns = cells[enough].T
         self._until_s[rows, columns] = np.maximum(self._until_s[rows, columns], stamp_s + self._options.memory_s)
-        self._height_m[rows, columns] = points[first[kept], 2]
+        self._height_m[rows, columns] = points[first[enough], 2]
         self._note_change()
 
     def _pass_time(self, now_s: float) -> None:
-        """Forgets what is too old."""
+        """Notes the time, at which cells may expire."""
         self._now_s = now_s
         if now_s >= self._next_expiry_s:
             self._note_change()
 
     def _note_change(self) -> None:
-        """The set of blocked cells is another than before."""
+        """Notes that the set of blocked cells changed."""
         blocked = self._until_s[self._until_s > self._now_s]
         self._next_expiry_s = float(blocked.min()) if len(blocked) else math.inf
         self._changed = True
@@ -151,21 +149,8 @@ class LayeredCostmap:
             return np.empty((0, 2), dtype=np.int64)
         return np.argwhere(self._until_s > self._now_s)
 
-    def _foreign(self, own: SelfFilter, robot: Robot, scan: Scan, points_F: FloatArray) -> NDArray[np.bool_]:
-        """Which points (N, 3) in the levelled body frame are none of the robot's."""
-        return own.foreign(points_F, self._arm_F(robot, scan), holding=robot.gripper().holding)
-
-    def _arm_F(self, robot: Robot, scan: Scan) -> FloatArray:
-        """The arm's segments in the levelled body frame."""
-        if self._filter is None or self._filter.arm is None:
-            return np.empty((0, 3))
-        rotation, translation = sensor_pose(scan)
-        points_B = self._filter.arm.points_B(robot.joints())
-        points_L = scan.X_BL.inverse().multiply(points_B.T)
-        return np.asarray((rotation @ points_L).T + translation)
-
-    def _take_scan(self, scan: Scan, X_WO: Pose2D, foreign: Callable[[FloatArray], NDArray[np.bool_]]) -> None:
-        """Clears the cells that beams see past, then mark those that are hit, not explained and not the robot's own."""
+    def _take_scan(self, scan: Scan, X_WO: Pose2D, own: SelfFilter, robot: Robot) -> None:
+        """Clears the cells that beams see past, then marks cells of returns that neither map nor robot explains."""
         options = self._options
         X_WF = compose(X_WO, Pose2D.from_transform(scan.X_OB))
         changed = self._clear(scan, X_WF)
@@ -174,9 +159,10 @@ class LayeredCostmap:
         )
         points = self._unexplained(placed_points(points_F, X_WF))
         if len(points):
-            points = points[foreign(in_body_axes(points, X_WF))]
+            holding = robot.gripper().holding
+            points = points[own.foreign(in_body_axes(points, X_WF), own.arm_F(robot, scan), holding=holding)]
         self._returns_W = points
-        points = self._others_left_out(points)
+        points = self._outside_robots(points)
         times = (scan.stamp_s, options.confirm_s, options.memory_s)
         cells = self._layer.cells(points)
         changed |= mark_cells(cells, points[:, 2].copy(), times, self._candidate_s, self._until_s, self._height_m)
@@ -184,7 +170,7 @@ class LayeredCostmap:
             self._note_change()
 
     def _clear(self, scan: Scan, X_WF: Pose2D) -> bool:
-        """Forgets the cells that the scan's beams see past; True when there were any."""
+        """Clears the cells that the scan's beams see past; returns whether there were any."""
         active = self._active()
         if len(active) == 0:
             return False
@@ -195,17 +181,17 @@ class LayeredCostmap:
         return len(gone) > 0
 
     def _unexplained(self, points_W: FloatArray) -> FloatArray:
-        """Those (x, y, z) rows that lie on the grid and away from all that was surveyed."""
+        """The (x, y, z) rows that lie on the grid and away from its occupied cells."""
         return np.ascontiguousarray(points_W[self._keepout.distance_m(points_W) > self._options.explained_m])
 
-    def _others_left_out(self, points_W: FloatArray) -> FloatArray:
-        """Those (x, y, z) rows that do not lie where another robot says that it is."""
+    def _outside_robots(self, points_W: FloatArray) -> FloatArray:
+        """The (x, y, z) rows that do not lie where another robot reports to be."""
         if not len(self._left_out_W) or not len(points_W):
             return points_W
         return np.ascontiguousarray(points_W[outside_discs(points_W, self._left_out_W)])
 
-    def _seen_field(self) -> NDArray[np.float32] | None:
-        """Distance (m) from each cell of the layer to what is seen, None when nothing is."""
+    def _layer_field(self) -> NDArray[np.float32] | None:
+        """Distance (m) from each cell of the obstacle layer to the nearest blocked one, None when none is."""
         if self._changed:
             seen = self._until_s > self._now_s
             self._field, self._changed = None, False
@@ -215,7 +201,94 @@ class LayeredCostmap:
         return self._field
 
 
-def _empty_like(grid: GridMap, cell_m: float) -> GridMap:
-    """An empty grid over the same ground with cells of another size."""
-    columns, rows = (max(2, math.ceil(size / cell_m)) for size in grid.size_m)
-    return GridMap(np.zeros((rows, columns), dtype=np.bool_), cell_m, grid.origin_m)
+def clear_cells(scan: Scan, centres_F: FloatArray, cell_m: float) -> NDArray[np.bool_]:
+    """Returns whether the beams of a whole revolution see past each point (N, 3) of the levelled body frame F.
+
+    A point is free when all beams that could have hit it go on for 0.3 m at least. A point that no beam can hit (too
+    low, too near) is free when a free one lies beside it, since both were seen on one object.
+    """
+    rotation, translation = sensor_pose(scan)
+    places_L = np.ascontiguousarray((centres_F - translation) @ rotation)
+    return _clear(np.ascontiguousarray(scan.ranges_m), scan.elevations_rad, scan.azimuths_rad, places_L, cell_m)
+
+
+@compiled
+def _clear(
+    ranges: NDArray[np.float32],
+    elevations: FloatArray,
+    azimuths: FloatArray,
+    places: FloatArray,
+    cell_m: float,
+) -> NDArray[np.bool_]:
+    """The loop of `clear_cells`."""
+    count = azimuths.shape[0]
+    spacing = azimuths[1] - azimuths[0]
+    ring_gap = abs(elevations[1] - elevations[0])
+    lowest, highest = elevations.min() + 0.5 * ring_gap, elevations.max()
+    free = np.zeros(places.shape[0], dtype=np.bool_)
+    hidden = np.zeros(places.shape[0], dtype=np.bool_)
+    for n in range(places.shape[0]):
+        x, y, z = places[n, 0], places[n, 1], places[n, 2]
+        flat = math.hypot(x, y)
+        reach = math.hypot(flat, z)
+        elevation = math.atan2(z, flat)
+        if not lowest <= elevation <= highest:
+            hidden[n] = True
+            continue
+        middle = round((math.atan2(y, x) - azimuths[0]) / spacing)
+        half = math.ceil(cell_m / max(flat, 0.3) / abs(spacing))
+        looked, blocked = 0, False
+        for i in range(elevations.shape[0]):
+            if abs(elevations[i] - elevation) > ring_gap:
+                continue
+            for j in range(middle - half, middle + half + 1):
+                r = ranges[i, j % count]
+                if not r > reach + 0.3:
+                    blocked = True
+                looked += 1
+        free[n] = looked > 0 and not blocked
+    return _spread(free, hidden, places, 3.0 * cell_m)
+
+
+@compiled
+def _spread(
+    free: NDArray[np.bool_], hidden: NDArray[np.bool_], places: FloatArray, radius_m: float
+) -> NDArray[np.bool_]:
+    """Returns whether each place is free, or hidden and within radius_m of a free one."""
+    gone = free.copy()
+    for n in np.flatnonzero(hidden):
+        for m in np.flatnonzero(free):
+            if math.hypot(places[n, 0] - places[m, 0], places[n, 1] - places[m, 1]) <= radius_m:
+                gone[n] = True
+    return gone
+
+
+@compiled
+def mark_cells(
+    cells: NDArray[np.int64],
+    heights: FloatArray,
+    times: tuple[float, float, float],
+    candidate_s: FloatArray,
+    until_s: FloatArray,
+    height_m: FloatArray,
+) -> bool:
+    """Marks hit cells in place; returns whether a cell became blocked that was not.
+
+    `times` are the scan's stamp, the time within which another scan must have hit the cell or a neighbour, and the time
+    for which a blocked cell is remembered, in seconds.
+    """
+    stamp, confirm, memory = times
+    rows, columns = until_s.shape
+    changed = False
+    for n in range(cells.shape[0]):
+        i, j = cells[n, 0], cells[n, 1]
+        for a in range(max(0, i - 1), min(rows, i + 2)):
+            for b in range(max(0, j - 1), min(columns, j + 2)):
+                if stamp - confirm <= candidate_s[a, b] < stamp:
+                    fresh = until_s[i, j] <= stamp
+                    changed |= fresh
+                    until_s[i, j] = stamp + memory
+                    height_m[i, j] = heights[n] if fresh else max(height_m[i, j], heights[n])
+    for n in range(cells.shape[0]):
+        candidate_s[cells[n, 0], cells[n, 1]] = stamp
+    return changed

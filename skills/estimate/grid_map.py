@@ -24,7 +24,7 @@ from skills.robot import FloatArray
 BoolGrid = NDArray[np.bool_]
 MOST_CELLS: Final = 16_000_000
 UNKNOWN_GREY: Final = 205
-"""What map_saver writes for unknown ground."""
+"""The grey that map_saver writes for unknown ground."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class GridMap:
 
     `occupied` and `unknown` are (rows, columns) with row 0 at the smallest y; `origin_m` is the world (x, y) of the
     outer corner of cell [0, 0]. `distance` is the signed distance (m) from each cell's centre to the boundary of the
-    occupied cells: positive in the open, negative inside. `height_band_m` is the heights above the floor that the
-    grid speaks of, None when its file does not say; `notes` are what a person may want to know of its file. Raises
+    occupied cells: positive in the open, negative inside. `height_band_m` is the band of heights above the floor that
+    the grid shows, None when its file does not name one; `notes` are remarks on the file for the user. Raises
     ValueError for grids of fewer than 2 x 2 cells.
     """
 
@@ -58,7 +58,7 @@ class GridMap:
         return columns * self.resolution_m, rows * self.resolution_m
 
     def cells(self, points_W: FloatArray) -> NDArray[np.int64]:
-        """The (row, column) of each (x, y) row; cells outside the grid are given as they would count on."""
+        """The (row, column) of each (x, y) row; the numbers continue outside the grid."""
         scaled = (np.asarray(points_W, dtype=np.float64)[:, :2] - self.origin_m) / self.resolution_m
         return np.asarray(np.floor(scaled[:, ::-1]).astype(np.int64))
 
@@ -69,13 +69,21 @@ class GridMap:
     def distance_m(self, points_W: FloatArray) -> FloatArray:
         """Signed distance (m) from each (x, y) row to the nearest occupied cell, bilinear between cell centres.
 
-        Off the grid it is minus the distance to the grid: ground that nobody surveyed counts as blocked.
+        Off the grid it is minus the distance to the grid, since ground that is not surveyed counts as blocked.
         """
         points = np.ascontiguousarray(points_W, dtype=np.float64)
         return distances(self.distance, self.resolution_m, self.origin_m[0], self.origin_m[1], points)
 
+    def grey(self, *, free: int, unknown: int, occupied: int) -> NDArray[np.uint8]:
+        """The grid as a grey picture (rows, columns), row 0 at the smallest y."""
+        grey = np.full(self.occupied.shape, free, np.uint8)
+        if self.unknown is not None:
+            grey[self.unknown] = unknown
+        grey[self.occupied] = occupied
+        return grey
+
     def with_unknown_blocked(self) -> GridMap:
-        """The same grid with unknown cells counted as occupied, as planning wants it."""
+        """The same grid with unknown cells counted as occupied, for planning."""
         return self if self.unknown is None else replace(self, occupied=self.occupied | self.unknown, unknown=None)
 
 
@@ -110,38 +118,37 @@ class _MapFile(BaseModel):
 
     @property
     def read_as(self) -> str:
-        """The mode; `trinary` is how older files say it."""
+        """The mode; older files give it as `trinary`."""
         return self.mode or ("scale" if self.trinary is False else "trinary")
 
 
 def load_grid_map(path: Path) -> GridMap:
-    """Reads a map_server YAML file and the picture that it names, as map_server reads them.
+    """Reads a map_server YAML file and the picture that it names.
 
-    Raises:
-        InputError: with file and line: the file is no such map, or its picture cannot be used.
+    Raises InputError, with file and line, when the file is no such map or its picture cannot be used.
     """
     source = read_yaml(path)
-    told = validate(_MapFile, source)
-    if not told.free_thresh < told.occupied_thresh:
-        what = f"free_thresh: {told.free_thresh:g} should be below occupied_thresh, {told.occupied_thresh:g}"
+    file = validate(_MapFile, source)
+    if not file.free_thresh < file.occupied_thresh:
+        what = f"free_thresh: {file.free_thresh:g} should be below occupied_thresh, {file.occupied_thresh:g}"
         raise source.error(("free_thresh",), what, "swap the two, or correct them")
-    if told.trinary is not None and told.mode is not None:
+    if file.trinary is not None and file.mode is not None:
         raise source.error(("trinary",), "trinary: 'mode' says it, too", "remove 'trinary'")
-    shares, opacity = _picture(source, told)
-    occupied, unknown = _classify(shares, opacity, told)
-    notes = _notes(shares, told)
-    if told.origin[2] != 0.0:
-        return _turned(occupied, unknown, told, source, notes)
-    return GridMap(occupied, told.resolution, told.origin[:2], unknown, told.height_band_m, notes)
+    shares, opacity = _picture(source, file)
+    occupied, unknown = _classify(shares, opacity, file)
+    notes = _notes(shares, file)
+    if file.origin[2] != 0.0:
+        return _turned(occupied, unknown, file, source, notes)
+    return GridMap(occupied, file.resolution, file.origin[:2], unknown, file.height_band_m, notes)
 
 
-def _picture(source: YamlSource, told: _MapFile) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _picture(source: YamlSource, file: _MapFile) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Brightness and opacity of the map's picture. Raises InputError in the line that names it."""
     try:
-        picture = file_beside(source.path, told.image)
+        picture = file_beside(source.path, file.image)
         shares, opacity = read_brightness(picture, most_pixels=MOST_CELLS)
     except InputError as error:
-        what = f"image: {error.message}" if error.file == source.path else f"image: {told.image[:100]}: {error.message}"
+        what = f"image: {error.message}" if error.file == source.path else f"image: {file.image[:100]}: {error.message}"
         raise source.error(("image",), what, error.hint) from error
     if min(shares.shape) < 2:
         rows, columns = shares.shape
@@ -150,60 +157,60 @@ def _picture(source: YamlSource, told: _MapFile) -> tuple[NDArray[np.float64], N
     return shares, opacity
 
 
-def _notes(shares: NDArray[np.float64], told: _MapFile) -> tuple[str, ...]:
-    """What a person may want to know of a map that is read as its file says."""
+def _notes(shares: NDArray[np.float64], file: _MapFile) -> tuple[str, ...]:
+    """Remarks on a map whose thresholds probably do not mean what its file says."""
     unknown = UNKNOWN_GREY / 255.0
-    free = (unknown if told.negate else 1.0 - unknown) < told.free_thresh
+    free = (unknown if file.negate else 1.0 - unknown) < file.free_thresh
     share = float(np.mean(np.abs(shares - unknown) < 0.5 / 255.0))
-    if told.read_as == "raw" or not free or share == 0.0:
+    if file.read_as == "raw" or not free or share == 0.0:
         return ()
     return (
         f"{100.0 * share:.0f} % of the picture has the grey {UNKNOWN_GREY}, by which map_saver means unknown ground. "
-        f"It counts as free, since free_thresh is {told.free_thresh:g}; write 0.196 unless that is meant",
+        f"It counts as free, since free_thresh is {file.free_thresh:g}; write 0.196 unless that is meant",
     )
 
 
 def _turned(
-    occupied: BoolGrid, unknown: BoolGrid, told: _MapFile, source: YamlSource, notes: tuple[str, ...]
+    occupied: BoolGrid, unknown: BoolGrid, file: _MapFile, source: YamlSource, notes: tuple[str, ...]
 ) -> GridMap:
-    """The grid of a turned map with axes parallel to the world's, in cells half as long, so that thin walls stay."""
-    x, y, yaw = told.origin
+    """The grid of a turned map with axes parallel to the world's; cells are half as long, so that thin walls stay."""
+    x, y, yaw = file.origin
     c, s = math.cos(yaw), math.sin(yaw)
     rows, columns = occupied.shape
-    ends = np.array([(0, 0), (columns, 0), (0, rows), (columns, rows)]) * told.resolution @ np.array([[c, s], [-s, c]])
-    low, step = ends.min(axis=0), told.resolution / 2.0
+    ends = np.array([(0, 0), (columns, 0), (0, rows), (columns, rows)]) * file.resolution @ np.array([[c, s], [-s, c]])
+    low, step = ends.min(axis=0), file.resolution / 2.0
     count = np.ceil((ends.max(axis=0) - low) / step - 1e-6).astype(int)
     if count[0] * count[1] > 4 * MOST_CELLS:
         raise source.error(("origin",), "origin: the map becomes too large when it is turned", "cut it")
     across, up = np.meshgrid(*(edge + (np.arange(n) + 0.5) * step for edge, n in zip(low, count, strict=True)))
     column, row = (
-        np.floor(along / told.resolution).astype(int) for along in (c * across + s * up, c * up - s * across)
+        np.floor(along / file.resolution).astype(int) for along in (c * across + s * up, c * up - s * across)
     )
     inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
     column, row = column.clip(0, columns - 1), row.clip(0, rows - 1)
     origin_m = (x + float(low[0]), y + float(low[1]))
     unknown = unknown[row, column] | ~inside
-    return GridMap(occupied[row, column] & inside, step, origin_m, unknown, told.height_band_m, notes)
+    return GridMap(occupied[row, column] & inside, step, origin_m, unknown, file.height_band_m, notes)
 
 
 def _classify(
-    shares: NDArray[np.float64], opacity: NDArray[np.float64] | None, told: _MapFile
+    shares: NDArray[np.float64], opacity: NDArray[np.float64] | None, file: _MapFile
 ) -> tuple[BoolGrid, BoolGrid]:
-    """Occupied and unknown cells, row 0 at the bottom, as map_server tells them by mode and thresholds.
+    """Occupied and unknown cells, row 0 at the bottom, by the mode and thresholds as map_server applies them.
 
-    What lies between the thresholds is unknown in trinary mode, in which opacity counts as a fourth colour. In scale
-    mode it is what is likelier, and unknown where the picture is transparent. In raw mode a value is the percentage
+    Values between the thresholds are unknown in trinary mode, in which opacity counts as a fourth colour. In scale mode
+    they are what is likelier, and unknown where the picture is transparent. In raw mode a value is the percentage
     itself, and unknown above 100.
     """
-    if told.read_as == "raw":
+    if file.read_as == "raw":
         percent = np.flipud(np.rint(255.0 * shares))
         unknown = percent > 100.0
         return (percent >= 50.0) & ~unknown, unknown
-    if opacity is not None and told.read_as == "trinary":
+    if opacity is not None and file.read_as == "trinary":
         shares = (3.0 * shares + opacity) / 4.0
-    probability = np.flipud(shares if told.negate else 1.0 - shares)
-    if told.read_as == "scale":
+    probability = np.flipud(shares if file.negate else 1.0 - shares)
+    if file.read_as == "scale":
         unknown = np.zeros(shares.shape, dtype=np.bool_) if opacity is None else np.flipud(opacity < 1.0)
-        return (probability >= (told.free_thresh + told.occupied_thresh) / 2.0) & ~unknown, unknown
-    occupied = probability > told.occupied_thresh
-    return occupied, ~occupied & (probability >= told.free_thresh)
+        return (probability >= (file.free_thresh + file.occupied_thresh) / 2.0) & ~unknown, unknown
+    occupied = probability > file.occupied_thresh
+    return occupied, ~occupied & (probability >= file.free_thresh)

@@ -1,4 +1,4 @@
-"""Where the robot is, from matching its LiDAR scans to the surveyed grid."""
+"""Localisers: by LiDAR scans matched to the surveyed grid, or by odometry alone where there is no map."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from pydrake.math import RigidTransform
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
-from skills.estimate.matching import Match, MatchOptions, match, score_poses
-from skills.estimate.scan_points import outside_discs, placed_points, scan_points
+from skills.estimate.matching import GridSurfaces, Match, MatchOptions, match, score_poses
+from skills.estimate.scan_points import has_moved, outside_discs, placed_points, scan_points
 from skills.geometry import compose, inverse, relative
 from skills.quantities import Count, Height, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _HEIGHTS_M = (0.7, 1.3)
 """The band of a grid that does not name its own."""
-_FROZEN_M, _FROZEN_RAD = 0.02, 0.02
-"""Equal scans farther apart than this by odometry come from a LiDAR that is frozen."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +25,10 @@ class LocaliserOptions:
     """Matches scans to the surveyed grid, within `height_band_m` above the floor (the grid's own where None).
 
     `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad); `unsure_sigma` and
-    `unsure_radius_m` count instead where the robot may have been moved since. Odometry is expected to err by
-    `drift_per_m` of the way, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. Fewer explained points than
-    `lost_share`, for `lost_scans` scans on end, means lost; `found_share` is needed to be found again. Places whose
-    shares differ by less than `alike_share` count as alike.
+    `unsure_radius_m` apply instead where the robot may have been moved since. Odometry is expected to err by
+    `drift_per_m` of the distance, `yaw_drift_rad_per_m` and `yaw_drift_per_rad` of a turn. The robot is lost when the
+    map explains a smaller share of the points than `lost_share` for `lost_scans` scans in a row, and found at
+    `found_share`. Poses whose shares differ by less than `alike_share` count as alike.
     """
 
     height_band_m: tuple[Height, Height] | None = None
@@ -53,7 +51,7 @@ class LocaliserOptions:
     matching: MatchOptions = field(default_factory=MatchOptions)
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> ScanMatchingLocaliser:
-        """A localiser that starts at a pose, not `surely` when the robot may have been moved since, or anywhere."""
+        """Creates a localiser that starts at a pose, surely or only probably, or anywhere (None)."""
         if surely or start is None:
             return ScanMatchingLocaliser(grid, start, self)
         wide = replace(self, initial_sigma=self.unsure_sigma, search_radius_m=self.unsure_radius_m)
@@ -63,20 +61,22 @@ class LocaliserOptions:
 class ScanMatchingLocaliser:
     """Follows the pose by odometry and corrects it with every new scan; implements `skills.api.Localiser`.
 
-    `initial` is X_WB when the localiser first sees the robot, None where it is not known: then it waits to `accept` an
-    estimate. The estimate says `localised` once a scan has agreed with the map, and no longer when several on end do
-    not; it then searches around where it believes to be.
+    `initial` is X_WB at the first update; where it is None, the localiser waits to `accept` an estimate. The estimate
+    says `localised` once a scan has agreed with the map, and no longer when several in a row do not; the localiser then
+    searches around its belief.
     """
 
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: LocaliserOptions | None = None) -> None:
-        self._grid = grid
+        self._grid, self._surfaces = grid, GridSurfaces(grid)
         self._options = options or LocaliserOptions()
         self._heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
         self._initial = initial
         self._placed = initial is not None
-        self._X_WO = initial or _middle(grid)
+        (x, y), (width, height) = grid.origin_m, grid.size_m
+        self._X_WO = initial or Pose2D(x + 0.5 * width, y + 0.5 * height, 0.0)
         self._X_OB: Pose2D | None = None
-        self._covariance = np.diag(np.square(self._options.initial_sigma if initial else _anywhere_sigma(grid)))
+        anywhere_sigma = (width / math.sqrt(12.0), height / math.sqrt(12.0), math.pi / math.sqrt(3.0))
+        self._covariance = np.diag(np.square(self._options.initial_sigma if initial else anywhere_sigma))
         self._inlier_share = 0.0
         self._stamp_s = -math.inf
         self._scan: Scan | None = None
@@ -91,7 +91,7 @@ class ScanMatchingLocaliser:
         return self._grid
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest estimate; its stamp is that of the scan that it rests on (minus infinity before the first)."""
+        """The latest estimate, with the stamp of its last scan (minus infinity before the first)."""
         if self._transformed is None or self._transformed[0] is not self._X_WO:
             self._transformed = self._X_WO, self._X_WO.transform()
         covariance = self._covariance.copy()
@@ -111,21 +111,21 @@ class ScanMatchingLocaliser:
         if len(points_F) < self._options.min_points:
             self._note_poor(0.0)
             return
-        others_left_out_F = self._others_left_out(points_F)
-        if len(others_left_out_F) >= self._options.min_points:
-            self._take_in(others_left_out_F)
+        rest_F = self._outside_robots(points_F)
+        if len(rest_F) >= self._options.min_points:
+            self._take_in(rest_F)
 
     def leave_out(self, discs_W: FloatArray) -> None:
-        """From now on match nothing that is seen within these discs, rows of x, y and radius (m, world).
+        """Leaves out of later scans what lies within these discs, rows of x, y and radius (m, world).
 
-        They count from where the robot believes to be. A scan of which they leave too little says nothing about it.
+        The discs are placed by the believed pose. A scan of which too little is left neither confirms nor refutes it.
         """
         self._left_out_W = discs_W
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where a scan fits the map, within radius_m of a belief or anywhere (None); changes nothing.
+        """Searches for the pose where a scan fits the map, within radius_m of a belief or anywhere (None).
 
-        Costs a few milliseconds for a small radius and some hundred for a whole flat.
+        Changes nothing. Takes a few milliseconds for a small radius and some hundred for a whole flat.
         """
         X_OB = Pose2D.from_transform(scan.X_OB)
         found = self._best_match(self._points(scan), compose(Pose2D.from_transform(belief.X_WO), X_OB), radius_m)
@@ -135,13 +135,13 @@ class ScanMatchingLocaliser:
         return LocalisationEstimate(scan.stamp_s, X_WO.transform(), found.covariance, True)
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Believe an estimate from now on; the next scans tell whether it holds."""
+        """Believes an estimate from now on; the next scans confirm or refute it."""
         self._X_WO = Pose2D.from_transform(estimate.X_WO)
         self._covariance = estimate.covariance.copy()
         self._poor_scans, self._localised, self._placed = 0, True, True
 
     def _take_in(self, points_F: FloatArray) -> None:
-        """Correct the belief by a scan; where scans do not agree any more, search around it."""
+        """Corrects the belief by a scan; searches around it once scans do not agree any more."""
         if not self._placed:
             return
         self._correct(points_F)
@@ -149,7 +149,7 @@ class ScanMatchingLocaliser:
             self._search(points_F, self._options.search_radius_m)
 
     def _health(self) -> float:
-        """How far the estimate can be trusted, 0 to 1."""
+        """Trust in the estimate, 0 to 1."""
         return self._inlier_share if self._localised else 0.0
 
     def _points(self, scan: Scan) -> FloatArray:
@@ -162,8 +162,8 @@ class ScanMatchingLocaliser:
             return points
         return np.ascontiguousarray(points[np.linspace(0, len(points) - 1, options.max_points).astype(np.int64)])
 
-    def _others_left_out(self, points_F: FloatArray) -> FloatArray:
-        """Those points that do not lie where another robot says that it is."""
+    def _outside_robots(self, points_F: FloatArray) -> FloatArray:
+        """The points that do not lie where another robot reports to be."""
         if not (self._placed and len(self._left_out_W)):
             return points_F
         assert self._X_OB is not None
@@ -171,22 +171,21 @@ class ScanMatchingLocaliser:
         return np.ascontiguousarray(points_F[outside_discs(points_W, self._left_out_W)])
 
     def _predict(self, X_OB: Pose2D) -> None:
-        """Moves the belief along with odometry and lets its spread grow."""
+        """Moves the belief along with odometry and increases its covariance."""
         before, self._X_OB = self._X_OB or X_OB, X_OB
         step = relative(before, X_OB)
         distance, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         old, new = compose(self._X_WO, before), compose(self._X_WO, X_OB)
-        jacobian = np.array([[1.0, 0.0, old.y_m - new.y_m], [0.0, 1.0, new.x_m - old.x_m], [0.0, 0.0, 1.0]])
         options = self._options
         along = 5e-4 + options.drift_per_m * distance
         yaw = 5e-4 + options.yaw_drift_rad_per_m * distance + options.yaw_drift_per_rad * turn
-        self._covariance = jacobian @ self._covariance @ jacobian.T + np.diag([along**2, along**2, yaw**2])
+        self._covariance = moved_covariance(self._covariance, old, new, along, yaw)
 
     def _correct(self, points_F: FloatArray) -> None:
-        """Matches the scan from the belief on; poor matches are counted, not believed."""
+        """Matches a scan from the belief on; counts poor matches instead of believing them."""
         assert self._X_OB is not None
         prior = compose(self._X_WO, self._X_OB)
-        found = match(self._grid, points_F, prior, self._covariance, self._options.matching)
+        found = match(self._surfaces, points_F, prior, self._covariance, self._options.matching)
         if found.inlier_share < self._options.lost_share:
             self._note_poor(found.inlier_share)
             return
@@ -199,19 +198,17 @@ class ScanMatchingLocaliser:
         self._believe(found)
 
     def _note_poor(self, inlier_share: float) -> None:
-        """Counts a scan of which the map explains too little."""
+        """Counts a scan of which the map explains too small a share."""
         self._inlier_share = inlier_share
         self._poor_scans += 1
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
 
     def _frozen(self, scan: Scan) -> bool:
         """Returns whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
-        last = self._scan
-        if last is None or not scan.repeats(last):
+        if self._scan is None or not scan.repeats(self._scan):
             self._scan = scan
             return False
-        step = relative(Pose2D.from_transform(last.X_OB), Pose2D.from_transform(scan.X_OB))
-        return math.hypot(step.x_m, step.y_m) > _FROZEN_M or abs(step.yaw_rad) > _FROZEN_RAD
+        return has_moved(self._scan, scan)
 
     def _believe(self, found: Match) -> None:
         assert self._X_OB is not None
@@ -219,7 +216,7 @@ class ScanMatchingLocaliser:
         self._covariance = found.covariance
 
     def _search(self, points_F: FloatArray, radius_m: float) -> None:
-        """Search around the belief, and believe what fits."""
+        """Searches around the belief, and believes the pose that fits."""
         assert self._X_OB is not None
         found = self._best_match(points_F, compose(self._X_WO, self._X_OB), radius_m)
         if found is not None:
@@ -227,9 +224,9 @@ class ScanMatchingLocaliser:
             self._poor_scans, self._localised = 0, True
 
     def _best_match(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> Match | None:
-        """The match that explains most, None when it explains too little.
+        """The match that explains the largest share of the points, None when that is too small.
 
-        Of several that explain about as much the one nearest to the centre.
+        Of several that explain about as much, the one nearest to the centre.
         """
         options, matches = self._options, self._matches(points_F, centre, radius_m)
         most = max((found.inlier_share for found in matches), default=0.0)
@@ -239,7 +236,7 @@ class ScanMatchingLocaliser:
         return min(alike, key=lambda m: math.hypot(m.pose.x_m - centre.x_m, m.pose.y_m - centre.y_m))
 
     def _matches(self, points_F: FloatArray, centre: Pose2D, radius_m: float | None) -> list[Match]:
-        """Score many poses, refine the best few."""
+        """Scores many poses and refines the best few."""
         options = self._options
         if len(points_F) < options.min_points:
             return []
@@ -247,23 +244,19 @@ class ScanMatchingLocaliser:
         few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 120)])
         best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
         spread = np.diag([0.2**2, 0.2**2, 0.15**2])
-        return [match(self._grid, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
+        return [match(self._surfaces, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
 
 
-def _middle(grid: GridMap) -> Pose2D:
-    """The middle of a grid."""
-    (x, y), (width, height) = grid.origin_m, grid.size_m
-    return Pose2D(x + 0.5 * width, y + 0.5 * height, 0.0)
-
-
-def _anywhere_sigma(grid: GridMap) -> tuple[float, float, float]:
-    """The standard deviations of a pose that may be anywhere on a grid."""
-    width, height = grid.size_m
-    return width / math.sqrt(12.0), height / math.sqrt(12.0), math.pi / math.sqrt(3.0)
+def moved_covariance(
+    covariance: FloatArray, before: Pose2D, after: Pose2D, sigma_m: float, sigma_rad: float
+) -> FloatArray:
+    """Covariance over x, y (m), yaw (rad) after a motion that odometry measures with these standard deviations."""
+    jacobian = np.array([[1.0, 0.0, before.y_m - after.y_m], [0.0, 1.0, after.x_m - before.x_m], [0.0, 0.0, 1.0]])
+    return np.asarray(jacobian @ covariance @ jacobian.T + np.diag([sigma_m**2, sigma_m**2, sigma_rad**2]))
 
 
 def candidate_poses(grid: GridMap, centre: Pose2D, radius_m: float | None) -> FloatArray:
-    """Poses (K, 3) in the open, 0.2 m and 10 degrees apart, within radius_m of a pose, or on the whole grid (None).
+    """Poses (K, 3) on free ground, 0.2 m and 10 degrees apart, within radius_m of a pose or on the whole grid (None).
 
     With a radius, headings stay within 60 degrees of the centre's.
     """
@@ -285,21 +278,21 @@ _START_VARIANCE = 1e-4
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """Trusts odometry and needs no map: goals are relative to the start, and the error grows with the way.
+    """Trusts odometry and needs no map: goals are relative to the start, and the error grows with the distance.
 
-    Odometry is expected to err by `drift_per_m` of the way and by `yaw_drift_rad_per_m`.
+    Odometry is expected to err by `drift_per_m` of the distance and by `yaw_drift_rad_per_m`.
     """
 
     drift_per_m: Share = 0.01
     yaw_drift_rad_per_m: Share = 0.005
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> OdometryLocaliser:
-        """A localiser that ignores the grid; a start that is not known becomes the origin."""
+        """Creates a localiser that ignores the grid; an unknown start becomes the origin."""
         return OdometryLocaliser(start or Pose2D(0.0, 0.0, 0.0), self)
 
 
 class OdometryLocaliser:
-    """Implements `skills.api.Localiser`. `start` is X_WB when it first sees the robot."""
+    """Localiser by odometry alone; implements `skills.api.Localiser`. `start` is X_WB at the first update."""
 
     def __init__(self, start: Pose2D, options: DeadReckoning | None = None) -> None:
         self._start, self._options = start, options or DeadReckoning()
@@ -309,7 +302,7 @@ class OdometryLocaliser:
         self._stamp_s = -math.inf
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest estimate: sure of the start, less so with the way gone."""
+        """The latest estimate; its covariance grows with the distance from the start."""
         along = self._options.drift_per_m * self._way_m
         yaw = self._options.yaw_drift_rad_per_m * self._way_m
         across = 0.5 * yaw * self._way_m

@@ -1,9 +1,10 @@
-"""Matching of planar points to a distance field: robust Gauss-Newton from a guess, and scoring of many guesses."""
+"""Scan matching: robust Gauss-Newton from a guess on any map of surfaces, and scores of many poses on a grid."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,22 +15,24 @@ from skills.geometry import wrap
 from skills.quantities import Count, Factor, Length
 from skills.robot import FloatArray, Pose2D
 
-INLIER_M = 0.15
-"""A point nearer than this to the surveyed surface (m) is explained by the map."""
+_CONVERGED = 1e-4
+"""A step of less than this (m plus rad) ends the iterations."""
 
 
 @dataclass(frozen=True)
 class MatchOptions:
-    """How points are weighed.
+    """Weights of the points.
 
     `sigma_m` is the noise of one point against the map; neighbouring points err alike, so all of them together count
-    as `effective_points` independent ones. Points further off than `outlier_m` have no weight.
+    as `effective_points` independent ones. Points farther off than `outlier_m` have no weight, or `coarse_outlier_m` in
+    the first third of the iterations. The map explains a point within `inlier_m` of a surface.
     """
 
     sigma_m: Length = 0.05
     effective_points: Factor = 80.0
     outlier_m: Length = 0.25
     coarse_outlier_m: Length = 0.5
+    inlier_m: Length = 0.15
     iterations: Count = 12
 
 
@@ -42,93 +45,119 @@ class Match:
     inlier_share: float
 
 
-def match(grid: GridMap, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: MatchOptions) -> Match:
-    """The pose X_WF at which points_F (N, 2 or more columns) best lie on the grid's surfaces, given a prior."""
+class Surfaces(Protocol):
+    """A map of surfaces that scans are matched to."""
+
+    def linearise(
+        self, points_F: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
+    ) -> tuple[FloatArray, FloatArray, int]:
+        """Hessian (3, 3) and gradient (3,) of the points' weighted squares at a pose (3,), and the count of inliers."""
+
+
+@dataclass(frozen=True)
+class GridSurfaces:
+    """The surfaces of a surveyed grid, as its distance field."""
+
+    grid: GridMap
+
+    def linearise(
+        self, points_F: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
+    ) -> tuple[FloatArray, FloatArray, int]:
+        """See `Surfaces.linearise`."""
+        return _linearise(self.grid.distance, _frame(self.grid), points_F, pose, weight, outlier_m, inlier_m)
+
+
+def match(
+    surfaces: Surfaces, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: MatchOptions
+) -> Match:
+    """The pose X_WF at which the points (N, 2 or more columns) lie best on the surfaces, given a prior."""
     mean = np.array([prior.x_m, prior.y_m, prior.yaw_rad])
     weight = min(1.0, options.effective_points / max(1, len(points_F))) / options.sigma_m**2
-    field = (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
-    caps = (options.coarse_outlier_m, options.outlier_m)
     information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
-    pose, hessian, share = _gauss_newton(
-        grid.distance, field, points_F, mean, information, weight, caps, options.iterations
-    )
-    matched = Pose2D(float(pose[0]), float(pose[1]), wrap(float(pose[2])))
-    return Match(matched, np.asarray(np.linalg.inv(hessian), dtype=np.float64), share)
-
-
-def score_poses(grid: GridMap, points_F: FloatArray, poses: FloatArray, reach_m: float = 0.3) -> FloatArray:
-    """How well points_F fit at each of (K, 3) poses x, y, yaw: 1 is all on surfaces, 0 none within reach_m."""
-    return _score(grid.distance, (grid.resolution_m, grid.origin_m[0], grid.origin_m[1]), points_F, poses, reach_m)
-
-
-@compiled
-def _gauss_newton(
-    distance: NDArray[np.float32],
-    field: tuple[float, float, float],
-    points: FloatArray,
-    mean: FloatArray,
-    information: FloatArray,
-    weight: float,
-    caps: tuple[float, float],
-    iterations: int,
-) -> tuple[FloatArray, FloatArray, float]:
-    """Pose, Hessian there, share of inliers. The outlier cap narrows after a third of the iterations."""
-    pose = mean.copy()
-    hessian, inliers = information.copy(), 0
-    for iteration in range(iterations):
-        cap = caps[0] if iteration < iterations // 3 else caps[1]
-        hessian, gradient, inliers = _linearise(distance, field, points, pose, weight, cap)
+    pose, hessian, inliers, coarse = mean.copy(), information.copy(), 0, options.iterations // 3
+    for iteration in range(options.iterations):
+        outlier_m = options.coarse_outlier_m if iteration < coarse else options.outlier_m
+        hessian, gradient, inliers = surfaces.linearise(points_F, pose, weight, outlier_m, options.inlier_m)
         hessian += information
         gradient += information @ (pose - mean)
         step = np.linalg.solve(hessian, gradient)
         pose -= step
-        if iteration > iterations // 3 and abs(step[0]) + abs(step[1]) + abs(step[2]) < 1e-4:
+        if iteration > coarse and abs(step[0]) + abs(step[1]) + abs(step[2]) < _CONVERGED:
             break
-    return pose, hessian, inliers / max(1, points.shape[0])
+    matched = Pose2D(float(pose[0]), float(pose[1]), wrap(float(pose[2])))
+    return Match(matched, np.asarray(np.linalg.inv(hessian), dtype=np.float64), inliers / max(1, len(points_F)))
+
+
+def score_poses(grid: GridMap, points_F: FloatArray, poses: FloatArray, reach_m: float = 0.3) -> FloatArray:
+    """Scores of (K, 3) poses x, y, yaw: 1 where all points lie on surfaces, 0 where none lies within reach_m of one."""
+    return _score(grid.distance, _frame(grid), points_F, poses, reach_m)
+
+
+def _frame(grid: GridMap) -> tuple[float, float, float]:
+    """The size of a cell and the x, y of the grid's corner, in metres."""
+    return (grid.resolution_m, grid.origin_m[0], grid.origin_m[1])
+
+
+@compiled
+def add_residual(
+    hessian: FloatArray,
+    gradient: FloatArray,
+    normal: tuple[float, float],
+    offset: tuple[float, float],
+    residual: float,
+    weight: float,
+    outlier_m: float,
+) -> None:
+    """Adds one point's residual along a surface normal, weighed by Tukey's biweight, in place.
+
+    `offset` is the point as seen from the pose, in the axes of the map.
+    """
+    turn = normal[1] * offset[0] - normal[0] * offset[1]
+    jacobian = (normal[0], normal[1], turn)
+    robust = weight * (1.0 - (residual / outlier_m) ** 2) ** 2
+    for k in range(3):
+        gradient[k] += robust * residual * jacobian[k]
+        for m in range(3):
+            hessian[k, m] += robust * jacobian[k] * jacobian[m]
 
 
 @compiled
 def _linearise(
     distance: NDArray[np.float32],
-    field: tuple[float, float, float],
+    frame: tuple[float, float, float],
     points: FloatArray,
     pose: FloatArray,
     weight: float,
-    cap: float,
+    outlier_m: float,
+    inlier_m: float,
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Hessian and gradient of the points' weighted squares at a pose (Tukey's biweight), and the count of inliers."""
-    hessian, gradient, jacobian = np.zeros((3, 3)), np.zeros(3), np.empty(3)
+    """The loop of `GridSurfaces.linearise`."""
+    hessian, gradient = np.zeros((3, 3)), np.zeros(3)
     rows, columns = distance.shape
     c, s, inliers = math.cos(pose[2]), math.sin(pose[2]), 0
     for n in range(points.shape[0]):
         dx, dy = c * points[n, 0] - s * points[n, 1], s * points[n, 0] + c * points[n, 1]
-        u = (pose[0] + dx - field[1]) / field[0] - 0.5
-        v = (pose[1] + dy - field[2]) / field[0] - 0.5
+        u = (pose[0] + dx - frame[1]) / frame[0] - 0.5
+        v = (pose[1] + dy - frame[2]) / frame[0] - 0.5
         if not (0.0 <= u < columns - 1.0 and 0.0 <= v < rows - 1.0):
             continue
         residual = bilinear(distance, u, v)
-        if abs(residual) >= cap:
+        if abs(residual) >= outlier_m:
             continue
-        inliers += abs(residual) < INLIER_M
+        inliers += abs(residual) < inlier_m
         i, j = int(v), int(u)
         a, b = u - j, v - i
         low, high = distance[i, j + 1] - distance[i, j], distance[i + 1, j + 1] - distance[i + 1, j]
         left, right = distance[i + 1, j] - distance[i, j], distance[i + 1, j + 1] - distance[i, j + 1]
-        jacobian[0] = ((1.0 - b) * low + b * high) / field[0]
-        jacobian[1] = ((1.0 - a) * left + a * right) / field[0]
-        jacobian[2] = jacobian[1] * dx - jacobian[0] * dy
-        robust = weight * (1.0 - (residual / cap) ** 2) ** 2
-        for k in range(3):
-            gradient[k] += robust * residual * jacobian[k]
-            for m in range(3):
-                hessian[k, m] += robust * jacobian[k] * jacobian[m]
+        normal = ((1.0 - b) * low + b * high) / frame[0], ((1.0 - a) * left + a * right) / frame[0]
+        add_residual(hessian, gradient, normal, (dx, dy), residual, weight, outlier_m)
     return hessian, gradient, inliers
 
 
 @compiled
 def _score(
     distance: NDArray[np.float32],
-    field: tuple[float, float, float],
+    frame: tuple[float, float, float],
     points: FloatArray,
     poses: FloatArray,
     reach: float,
@@ -141,7 +170,7 @@ def _score(
         for n in range(points.shape[0]):
             x = poses[k, 0] + c * points[n, 0] - s * points[n, 1]
             y = poses[k, 1] + s * points[n, 0] + c * points[n, 1]
-            j, i = int((x - field[1]) / field[0]), int((y - field[2]) / field[0])
+            j, i = int((x - frame[1]) / frame[0]), int((y - frame[2]) / frame[0])
             if 0 <= j < columns and 0 <= i < rows:
                 scores[k] += max(0.0, 1.0 - (distance[i, j] / reach) ** 2)
     scores /= max(1, points.shape[0])

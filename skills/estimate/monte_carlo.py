@@ -1,4 +1,4 @@
-"""Where the robot is, by adaptive Monte Carlo localisation; scan matching refines the estimate."""
+"""Adaptive Monte Carlo localisation; scan matching refines the estimate."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _MOST_AT_REST = 3
 
 @dataclass(frozen=True)
 class MonteCarloOptions:
-    """A particle filter says in which place the robot is, scan matching where in it.
+    """A particle filter finds the place of the robot, scan matching the pose in that place.
 
-    Particles are weighed after each `update_m` of the way or `update_rad` of a turn; at rest, while the place is not
-    known, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known once
-    `sure_mass` of the weight is in one mode for `sure_updates` on end. When less than `unsure_mass` is left there, it
-    is given up for a mode where the scan fits better by `better_share`; while scan matching still explains most of the
-    scan, only after `better_updates` of that. Where scans surprise by more than `surprise`, or the place is not known,
-    particles are injected: of `draws` random poses, the best `hypotheses`, refined by scan matching; about each
-    `injected` particles. Two places alike but for `alike_share` are none that a search finds.
+    Particles are weighed after each `update_m` of driving or `update_rad` of a turn; at rest, while the place is
+    unknown, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known
+    once `sure_mass` of the weight is in one mode for `sure_updates` in a row. When less than `unsure_mass` is left
+    there, the belief goes to a mode where the scan fits better by `better_share`; while scan matching still explains
+    most of the scan, only after `better_updates` such updates. Where scans surprise by more than `surprise`, or the
+    place is unknown, `injected` particles join about each of the best `hypotheses` of `draws` random poses, refined by
+    scan matching. A search finds no pose where two places fit alike, within `alike_share`.
     """
 
     tracking: LocaliserOptions = field(default_factory=LocaliserOptions)
@@ -52,7 +52,7 @@ class MonteCarloOptions:
     alike_share: Share = 0.05
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> MonteCarloLocaliser:
-        """A localiser that starts at a pose, not `surely` when the robot may have been moved since, or anywhere."""
+        """Creates a localiser that starts at a pose, surely or only probably, or anywhere (None)."""
         if surely or start is None:
             return MonteCarloLocaliser(grid, start, self)
         wide = replace(self.tracking, initial_sigma=self.tracking.unsure_sigma)
@@ -62,8 +62,8 @@ class MonteCarloOptions:
 class MonteCarloLocaliser(ScanMatchingLocaliser):
     """Adaptive Monte Carlo localisation; implements `skills.api.SearchingLocaliser`.
 
-    A belief that is carried by scan matching stands as long as the particles about it have the weight; where they
-    gather elsewhere, the belief goes there. `initial` None: it may be anywhere.
+    Scan matching carries the belief as long as the particles about it have the weight; where they gather elsewhere, the
+    belief goes there. With `initial` None the robot may be anywhere.
     """
 
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: MonteCarloOptions | None = None) -> None:
@@ -83,23 +83,23 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
 
     @property
     def particles(self) -> ParticleFilter:
-        """The particles."""
+        """The particle filter."""
         return self._filter
 
     def particles_W(self, most: int) -> FloatArray:
-        """Sees `skills.api.ParticleView`."""
+        """Sample poses of the particles; see `skills.api.ParticleView`."""
         weights = np.cumsum(self._filter.weights)
         ends = (np.arange(most) + 0.5) / most * weights[-1]
         chosen = np.unique(np.searchsorted(weights, ends))
         return np.asarray(self._filter.poses[chosen])
 
     def estimate(self) -> LocalisationEstimate:
-        """The latest estimate; while the place is not known its covariance is that of all particles."""
+        """The latest estimate; while the place is unknown its covariance is that of all particles."""
         estimate = super().estimate()
         return estimate if self._localised else replace(estimate, covariance=self._lost_covariance.copy())
 
     def accept(self, estimate: LocalisationEstimate) -> None:
-        """Believe an estimate from now on; all particles go there."""
+        """Believes an estimate from now on; all particles go there."""
         super().accept(estimate)
         if self._X_OB is not None:
             self._filter.place(compose(self._X_WO, self._X_OB), estimate.covariance + _SPREAD)
@@ -107,9 +107,9 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._mass, self._agreeing = 1.0, self._own.sure_updates
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
-        """Where a scan fits the map, as the scan matching has it; None also where two places fit equally well.
+        """Searches for the pose where a scan fits the map; None also where two places fit equally well.
 
-        At the beginning, of places that fit equally well it is the one where the robot is expected to be.
+        Before the first fix, of places that fit equally well it is the one where the robot is expected to be.
         """
         X_OB = Pose2D.from_transform(scan.X_OB)
         here = compose(Pose2D.from_transform(belief.X_WO), X_OB)
@@ -126,7 +126,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return LocalisationEstimate(scan.stamp_s, X_WO, best.covariance, True, best.inlier_share)
 
     def _take_in(self, points_F: FloatArray) -> None:
-        """Carries the belief on by scan matching; when it is time, weighs the particles, and see what they say."""
+        """Carries the belief on by scan matching, and weighs the particles when that is due."""
         if self._localised:
             self._expected = False
         if self._placed:
@@ -141,7 +141,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return self._mass * self._inlier_share if self._placed else 0.0
 
     def _due(self) -> bool:
-        """Returns whether the robot has moved enough since the last time, or waits to know where it is."""
+        """Returns whether particles are to be weighed: the robot moved enough, or waits at rest to be localised."""
         assert self._X_OB is not None
         if self._weighed_at is None:
             return True
@@ -153,7 +153,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return waits and self._at_rest < _MOST_AT_REST
 
     def _weigh(self, points_F: FloatArray) -> None:
-        """One update of the filter, and what follows from it."""
+        """Updates the filter and the belief by one scan."""
         assert self._X_OB is not None
         particles, self._scans = self._filter, 0
         self._at_rest += 1
@@ -166,7 +166,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         self._lost_covariance = particles.covariance
 
     def _judge(self, points_F: FloatArray) -> None:
-        """Goes to where the particles are; know the place, or not any more."""
+        """Moves the belief to where the particles are, and decides whether the place is known."""
         assert self._X_OB is not None
         options = self._own
         self._mass = self._filter.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0
@@ -178,8 +178,8 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._localised, self._poor_scans = True, 0
 
     def _go_to(self, mode: Mode, points_F: FloatArray) -> None:
-        """Believe in a mode where the scan fits; in place of a belief that fits well only if it is better for long."""
-        found = match(self._grid, points_F, mode.mean, mode.covariance + _SPREAD, self._options.matching)
+        """Believes in a mode where the scan fits; gives up a belief that fits well only after many better updates."""
+        found = match(self._surfaces, points_F, mode.mean, mode.covariance + _SPREAD, self._options.matching)
         fits = mode.mass > self._mass and found.inlier_share >= self._options.lost_share
         better = fits and found.inlier_share > self._inlier_share + self._own.better_share
         self._rival_updates = self._rival_updates + 1 if better else 0
@@ -191,7 +191,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._mass, self._inlier_share = mode.mass, found.inlier_share
 
     def _injected(self, points_F: FloatArray, beams: FloatArray) -> FloatArray | None:
-        """Particles for hypotheses that the filter may not have: the belief, and when scans surprise, any other."""
+        """Particles about the belief and, when scans surprise, about hypotheses anywhere; None when there are none."""
         assert self._X_OB is not None
         options, particles = self._own, self._filter
         hypotheses = [compose(self._X_WO, self._X_OB)] if self._placed else []
@@ -201,14 +201,15 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         return np.concatenate(drawn) if drawn else None
 
     def _hypotheses(self, points_F: FloatArray, beams: FloatArray) -> list[Match]:
-        """The best of some random poses, refined."""
+        """The best of some random poses, refined by scan matching."""
         best = self._filter.likely(self._own.draws, self._own.hypotheses, beams)
-        found = [match(self._grid, points_F, Pose2D(*pose), _BASIN, self._options.matching) for pose in best.tolist()]
+        surfaces, options = self._surfaces, self._options.matching
+        found = [match(surfaces, points_F, Pose2D(*pose), _BASIN, options) for pose in best.tolist()]
         return [each for each in found if each.inlier_share >= self._options.lost_share]
 
 
 def _thinned(points_F: FloatArray, count: int) -> FloatArray:
-    """So many of the points, evenly chosen."""
+    """At most `count` of the points, evenly chosen."""
     chosen = np.linspace(0, len(points_F) - 1, min(count, len(points_F))).astype(np.int64)
     return np.ascontiguousarray(points_F[chosen])
 

@@ -22,22 +22,24 @@ MODE_RADIUS_M = 0.5
 MODE_TURN_RAD = 0.35
 """Particles nearer than both to a pose belong to the mode there."""
 _AGREEMENT_PARTICLES = 200
+"""Particles that vote on which beams the map explains."""
 _IN_WALL = 5.0
+"""Log likelihood that a pose loses where no robot can stand."""
 _MOST_ANNEALING = 12
 _LEAST_SHARE = 1e-6
 
 
 @dataclass(frozen=True)
 class FilterOptions:
-    """How particles move, are weighed, and how many there are.
+    """Motion, weights and number of the particles.
 
     `beams` points of a scan count as `effective_beams` independent ones, or fewer, so that after weighing at least
-    `least_effective` particles count; each is a hit of spread `hit_sigma_m`, or with
-    `random_share` anything. A beam that less than `skip_share` of the particles explain within `skip_m` is skipped,
-    unless that were more than `skip_most` of the beams. The number of particles keeps the KL divergence over bins of
-    `bin_m` and `bin_rad` below `kld_error` at the normal quantile `kld_quantile`. `slow` and `fast` are the rates of
-    the two averages of the likelihood. Odometry errs by `drift_per_m`, `yaw_drift_rad_per_m` and `yaw_drift_per_rad`;
-    `roughening_m` and `roughening_rad` keep equal particles apart.
+    `least_effective` particles count. Each is a hit of spread `hit_sigma_m`, or random with `random_share`. A beam that
+    less than `skip_share` of the particles explain within `skip_m` is skipped, unless that were more than `skip_most`
+    of the beams. The number of particles keeps the KL divergence over bins of `bin_m` and `bin_rad` below `kld_error`
+    at the normal quantile `kld_quantile`. `slow` and `fast` are the rates of the two averages of the likelihood.
+    Odometry errs by `drift_per_m`, `yaw_drift_rad_per_m` and `yaw_drift_per_rad`; `roughening_m` and `roughening_rad`
+    keep equal particles apart.
     """
 
     seed: Tries = 0
@@ -74,9 +76,9 @@ class Mode:
 
 
 class ParticleFilter:
-    """Weighted poses X_WB. `place` or `scatter` first; then `move`, `weigh` and `resample` in turn.
+    """Weighted poses X_WB. Call `place` or `scatter` first; then `move`, `weigh` and `resample` in turn.
 
-    Raises InputError: the map has no free ground.
+    Raises InputError when the map has no free ground.
     """
 
     def __init__(self, grid: GridMap, options: FilterOptions) -> None:
@@ -95,7 +97,7 @@ class ParticleFilter:
 
     @property
     def surprise(self) -> float:
-        """How far the likelihood of the last scans is below what it used to be: 0 not at all, towards 1 kidnapped."""
+        """Drop of the likelihood of the last scans: 0 for none, towards 1 for a kidnapped robot."""
         return max(0.0, 1.0 - self._fast / self._slow) if self._slow > 0.0 else 0.0
 
     @property
@@ -108,7 +110,7 @@ class ParticleFilter:
         self._replace(self.around(mean, covariance, self._options.min_particles))
 
     def scatter(self) -> None:
-        """Spread the most particles evenly over the map."""
+        """Spreads the greatest number of particles evenly over the map."""
         self._replace(self.anywhere(self._options.max_particles))
 
     def around(self, mean: Pose2D, covariance: FloatArray, count: int) -> FloatArray:
@@ -118,16 +120,16 @@ class ParticleFilter:
 
     def anywhere(self, count: int) -> FloatArray:
         """Poses (count, 3) drawn evenly from the free cells."""
-        kept = np.empty((0, 2))
-        while len(kept) < count:
+        free = np.empty((0, 2))
+        while len(free) < count:
             drawn = self._rng.random((4 * count, 2)) * self._standable.shape
             rows, columns = drawn.astype(np.int64).T
-            kept = np.concatenate([kept, drawn[self._standable[rows, columns]]])
-        places = kept[:count, ::-1] * self._grid.resolution_m + self._grid.origin_m
+            free = np.concatenate([free, drawn[self._standable[rows, columns]]])
+        places = free[:count, ::-1] * self._grid.resolution_m + self._grid.origin_m
         return np.column_stack([places, self._rng.uniform(-math.pi, math.pi, count)])
 
     def likely(self, draws: int, count: int, points_F: FloatArray) -> FloatArray:
-        """The likeliest (count, 3) of so many random poses, at most one of each part of the map and heading."""
+        """The likeliest `count` poses (count, 3) of `draws` random ones, at most one for each place and heading."""
         drawn = self.anywhere(draws)
         drawn = drawn[np.argsort(-self.log_likelihoods(drawn, points_F), kind="stable")]
         _, first = np.unique(_bins(drawn, MODE_RADIUS_M, MODE_TURN_RAD), return_index=True)
@@ -153,8 +155,8 @@ class ParticleFilter:
         fit = float(self.weights @ np.exp(everything))
         self._slow = self._slow + options.slow * (fit - self._slow) if self._slow > 0.0 else fit
         self._fast = self._fast + options.fast * (fit - self._fast) if self._fast > 0.0 else fit
-        kept = self._explained(points_F)
-        logs = everything if kept.all() else self.log_likelihoods(self.poses, points_F[kept])
+        used = self._explained(points_F)
+        logs = everything if used.all() else self.log_likelihoods(self.poses, points_F[used])
         power, steps = options.effective_beams, 0
         weights = self._weighed(logs, power)
         while 1.0 / float(weights @ weights) < options.least_effective and steps < _MOST_ANNEALING:
@@ -168,11 +170,11 @@ class ParticleFilter:
         return _log_likelihoods(self._field, self._standable, self._geometry, poses, points)
 
     def forget(self) -> None:
-        """Begins the averages of the likelihood anew."""
+        """Starts the averages of the likelihood again."""
         self._slow = self._fast = 0.0
 
     def resample(self, injected: FloatArray | None = None) -> None:
-        """Draws as many particles as the KL divergence asks for; the `injected` (K, 3) join them, weighed as equals."""
+        """Draws as many particles as the KL divergence asks for; adds the `injected` ones (K, 3) with equal weights."""
         options, joining = self._options, 0 if injected is None else len(injected)
         drawn = self._draw(min(options.max_particles, 4 * max(len(self.poses), options.min_particles)))
         count = self._enough(self.poses[drawn])
@@ -180,7 +182,7 @@ class ParticleFilter:
         self._replace(poses if injected is None or not joining else np.concatenate([poses, injected]), keep=True)
 
     def mass_near(self, pose: Pose2D) -> float:
-        """The share of the weight in the mode at a pose."""
+        """Share of the weight in the mode at a pose."""
         return float(self.weights[self._near(pose)].sum())
 
     def mode(self) -> Mode:
@@ -203,15 +205,15 @@ class ParticleFilter:
         return np.asarray(near & (np.abs(wrap(off[:, 2])) < MODE_TURN_RAD))
 
     def _explained(self, points_F: FloatArray) -> NDArray[np.bool_]:
-        """The beams (M,) that count; all of them where too many would be skipped."""
+        """Returns whether each beam (M,) counts; all of them do where too many would be skipped."""
         options = self._options
         stride = max(1, len(self.poses) // _AGREEMENT_PARTICLES)
         poses = np.ascontiguousarray(self.poses[::stride])
         share = _agreement(
             self._grid.distance, self._geometry, poses, np.ascontiguousarray(points_F[:, :2]), options.skip_m
         )
-        kept = share >= options.skip_share
-        return kept if 1.0 - kept.mean() <= options.skip_most else np.ones_like(kept)
+        used = share >= options.skip_share
+        return used if 1.0 - used.mean() <= options.skip_most else np.ones_like(used)
 
     def _draw(self, count: int) -> NDArray[np.int64]:
         """Indices drawn by low-variance sampling, in random order."""
@@ -220,7 +222,7 @@ class ParticleFilter:
         return self._rng.permutation(drawn)
 
     def _enough(self, poses: FloatArray) -> int:
-        """How many of the drawn poses are enough, by KLD sampling: as more bins fill, more are wanted."""
+        """The number of drawn poses that is enough, by KLD sampling: the more bins are filled, the more poses."""
         options = self._options
         _, first = np.unique(_bins(poses, options.bin_m, options.bin_rad), return_index=True)
         new = np.zeros(len(poses))
@@ -236,14 +238,14 @@ class ParticleFilter:
 
 
 def _likelihood_field(grid: GridMap, options: FilterOptions) -> NDArray[np.float32]:
-    """The log likelihood of a beam that ends in each cell."""
+    """Log likelihood of a beam that ends in each cell."""
     hits = np.exp(-0.5 * np.square(grid.distance / options.hit_sigma_m))
     field = np.log((1.0 - options.random_share) * hits + max(options.random_share, _LEAST_SHARE))
     return np.ascontiguousarray(field, dtype=np.float32)
 
 
 def _standable(grid: GridMap) -> NDArray[np.bool_]:
-    """Cells where the middle of a robot can be: known, and off everything."""
+    """The cells where the middle of a robot can be: known, and away from occupied cells."""
     open_cells = grid.distance > 0.1
     return open_cells if grid.unknown is None else open_cells & ~grid.unknown
 
@@ -257,7 +259,7 @@ def _bins(poses: FloatArray, size_m: float, size_rad: float) -> NDArray[np.int64
 
 
 def _kld_bound(bins: FloatArray, error: float, quantile: float) -> FloatArray:
-    """How many particles keep the KL divergence below `error` with so many bins filled (Fox, 2003)."""
+    """The number of particles that keeps the KL divergence below `error` with so many bins filled (Fox, 2003)."""
     degrees = np.maximum(bins - 1.0, 1.0)
     part = 2.0 / (9.0 * degrees)
     return np.asarray(degrees / (2.0 * error) * (1.0 - part + np.sqrt(part) * quantile) ** 3)
@@ -282,7 +284,7 @@ def _log_likelihoods(
     poses: FloatArray,
     points: FloatArray,
 ) -> FloatArray:
-    """The loop of `log_likelihoods`. A pose where no robot can stand gets a malus."""
+    """The loop of `log_likelihoods`. A pose where no robot can stand loses _IN_WALL."""
     rows, columns = field.shape
     least = float(field.min())
     sums = np.empty(poses.shape[0])

@@ -1,4 +1,4 @@
-"""Where the body can go in a place without a map: what the LiDAR has seen, on a window that moves with the robot."""
+"""The costmap of a place without a map: obstacles that the LiDAR has seen, on a window that moves with the robot."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from skills.api import LocalisationEstimate
 from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
 from skills.estimate.scan_points import (
-    ArmShape,
     SelfFilter,
     in_body_axes,
     outside_discs,
@@ -27,16 +26,26 @@ from skills.quantities import Count, Factor, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _MOST = 3.5
-_NEAR_M, _NEAR_SURE_M, _NEW_M = 7.0, 1.0, 0.15
+"""Greatest log odds of a cell."""
+_LEAST = -1.0
+"""Least log odds of a cell."""
+_NEAR_M = 7.0
+"""Half the width of the part about the robot whose distances are computed apart."""
+_NEAR_SURE_M = 1.0
+"""Greatest clearance by that part."""
+_NEW_M = 0.15
+"""Returns farther than this from obstacles seen before are unexplained."""
+_FACE_M = 0.15
+"""Depth of an upright face in the returns of one column."""
 
 
 @dataclass(frozen=True)
 class RollingCostmapOptions:
-    """No map: what the LiDAR sees between the heights and nearer than max_range_m; ground not seen may be crossed.
+    """No map: obstacles that the LiDAR sees between the heights and within max_range_m; unseen ground may be crossed.
 
-    Each beam adds `hit` to the log odds of the cell that it ends in and takes `miss` from those that it passes at the
-    height of what was seen there (Moravec and Elfes 1985). The window is `window_m` wide and moves once the robot is a
-    quarter of that off its middle. Ground not seen yet counts as `unknown_clearance_m` from the next obstacle at most.
+    Each beam adds `hit` to the log odds of the cell in which it ends, and takes `miss` from the cells that it passes at
+    the height of the obstacle seen there (Moravec and Elfes 1985). The window is `window_m` wide and moves once the
+    robot is a quarter of that off its middle. Unseen ground has a clearance of `unknown_clearance_m` at most.
     """
 
     heights_m: tuple[Height, Height] = (0.1, 1.0)
@@ -50,12 +59,12 @@ class RollingCostmapOptions:
     min_points_per_cell: Count = 3
 
     def build(self, keepout: GridMap) -> RollingCostmap:
-        """A costmap that ignores the surveyed grid."""
+        """Creates a costmap that ignores the surveyed grid."""
         return RollingCostmap(self)
 
 
 class RollingCostmap:
-    """Implements `skills.api.Costmap` in any frame that drifts slowly, such as odometry's."""
+    """Costmap in a frame that drifts slowly, such as odometry's; implements `skills.api.Costmap`."""
 
     def __init__(self, options: RollingCostmapOptions | None = None) -> None:
         self._options = options or RollingCostmapOptions()
@@ -72,7 +81,7 @@ class RollingCostmap:
         self._filter: SelfFilter | None = None
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance (m) from each (x, y) row to the nearest obstacle seen; off the window as at its edge."""
+        """Distance (m) from each (x, y) row to the nearest obstacle; off the window as at its edge."""
         points = np.ascontiguousarray(points_W, dtype=np.float64)
         off_m = np.abs(points[:, :2] - (self._X_WB.x_m, self._X_WB.y_m))
         if len(points) and self._corner_m is not None and float(off_m.max()) < _NEAR_M - _NEAR_SURE_M:
@@ -84,11 +93,11 @@ class RollingCostmap:
         return _looked_up(self._all, self._options.cell_m, *(self._corner_m or (0.0, 0.0)), points)
 
     def unexplained(self) -> tuple[float, FloatArray]:
-        """The last scan's stamp and those of its returns (N, 3) that lie away from all that was seen before."""
+        """The last scan's stamp, and its returns (N, 3) that lie away from all obstacles seen before."""
         return self._stamp_s, self._returns_W
 
     def forget_seen(self, within_W: FloatArray | None = None) -> int:
-        """Forgets all, or what lies within discs; the number of cells that were blocked."""
+        """Clears all cells, or those within discs; returns the number of cells that were blocked."""
         forgotten = np.ones(self._odds.shape, dtype=np.bool_)
         if within_W is not None:
             rows, columns = np.indices(self._odds.shape).reshape(2, -1)
@@ -102,7 +111,7 @@ class RollingCostmap:
         return blocked
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Moves the window along, and takes in the newest scan, if it is new."""
+        """Moves the window along and takes in the newest scan, if it is new."""
         X_WO = Pose2D.from_transform(localisation.X_WO)
         self._X_WB = compose(X_WO, robot.odometry().pose)
         self._filter = self._filter or SelfFilter.of(robot.capabilities())
@@ -116,15 +125,15 @@ class RollingCostmap:
         self._changed()
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Takes in (N, 3) points of a depth camera that lie on things in the way; leave out the floor before."""
+        """Takes in (N, 3) points of a depth camera, without those on the floor."""
         if self._corner_m is None or self._filter is None or len(points_W) == 0:
             return
         points = points_W[self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
         cells, first, counts = np.unique(self._cells(points), axis=0, return_index=True, return_counts=True)
-        kept = (counts >= self._options.min_points_per_cell) & self._inside(cells)
-        rows, columns = cells[kept].T
+        enough = (counts >= self._options.min_points_per_cell) & self._inside(cells)
+        rows, columns = cells[enough].T
         self._odds[rows, columns] = _MOST
-        self._height_m[rows, columns] = points[first[kept], 2]
+        self._height_m[rows, columns] = points[first[enough], 2]
         self._changed()
 
     def _changed(self) -> None:
@@ -139,7 +148,7 @@ class RollingCostmap:
         return np.asarray(np.all((cells >= 0) & (cells < self._odds.shape), axis=1))
 
     def _follow(self, X_WF: Pose2D) -> None:
-        """Keeps the robot in the middle half of the window; what lies in the old and the new one is kept."""
+        """Keeps the robot in the middle half of the window; cells of the old window that lie in the new one stay."""
         cell, count = self._options.cell_m, self._odds.shape[0]
         place = np.array([X_WF.x_m, X_WF.y_m])
         corner = np.round(place / cell - 0.5 * count)
@@ -153,16 +162,16 @@ class RollingCostmap:
         self._corner_m = (float(corner[0] * cell), float(corner[1] * cell))
 
     def _take(self, robot: Robot, scan: Scan, X_WF: Pose2D) -> None:
-        """Trace each column of beams to the nearest thing in it.
+        """Traces each column of beams to the nearest obstacle in it.
 
-        A column is seen past only where all beams that lead down came back: none is lost, or too near to be measured.
+        Beams see past a column only where all beams that lead down came back: none is lost, or too near to be measured.
         """
         assert self._corner_m is not None and self._filter is not None
         options = self._options
         points = scan_points(
             scan, azimuths=options.azimuths, heights_m=options.heights_m, max_range_m=options.max_range_m
         )
-        foreign = self._filter.foreign(points[:, :3], _arm_F(self._filter.arm, robot, scan))
+        foreign = self._filter.foreign(points[:, :3], self._filter.arm_F(robot, scan))
         stride = max(1, len(scan.azimuths_rad) // options.azimuths)
         seen_past = np.asarray(np.all(np.isfinite(scan.ranges_m[scan.elevations_rad < 0.0, ::stride]), axis=0))
         seen_past[points[~foreign, 4].astype(np.int64) // stride] = False
@@ -189,7 +198,7 @@ class RollingCostmap:
         )
 
     def _near_field(self) -> tuple[NDArray[np.float32], float, float]:
-        """The distances about the robot and the corner of what they are for."""
+        """The distance field about the robot, and the x and y of its corner (m)."""
         assert self._corner_m is not None
         cell, (x0_m, y0_m) = self._options.cell_m, self._corner_m
         half, most = round(_NEAR_M / cell), self._odds.shape[0]
@@ -209,17 +218,8 @@ class RollingCostmap:
         return field
 
 
-def _arm_F(arm: ArmShape | None, robot: Robot, scan: Scan) -> FloatArray:
-    """The arm's segments in the levelled body frame."""
-    if arm is None:
-        return np.empty((0, 3))
-    rotation, translation = sensor_pose(scan)
-    points_L = scan.X_BL.inverse().multiply(arm.points_B(robot.joints()).T)
-    return np.asarray((rotation @ points_L).T + translation)
-
-
 def _shifted(values: NDArray[Any], rows: int, columns: int) -> NDArray[Any]:
-    """A grid's values in a window that lies so many cells on."""
+    """The values of a grid in a window that is shifted by so many cells."""
     moved = np.zeros_like(values)
     height, width = values.shape
     if abs(rows) < height and abs(columns) < width:
@@ -232,7 +232,7 @@ def _shifted(values: NDArray[Any], rows: int, columns: int) -> NDArray[Any]:
 def _looked_up(
     field: NDArray[np.float32], cell_m: float, x0_m: float, y0_m: float, points: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """The field at (N, 2) points; off it, that of its edge."""
+    """The values of a field at points (N, 2); off the field, those of its edge."""
     values = np.empty(points.shape[0])
     for n in range(points.shape[0]):
         values[n] = bilinear(field, (points[n, 0] - x0_m) / cell_m - 0.5, (points[n, 1] - y0_m) / cell_m - 0.5)
@@ -241,9 +241,9 @@ def _looked_up(
 
 @compiled
 def _nearest(points: FloatArray, origin: FloatArray, weight: FloatArray, stride: int) -> FloatArray:
-    """Range and height (columns, 2) of the nearest thing in each column of beams, infinite where there is none.
+    """Range and height (columns, 2) of the nearest obstacle in each column of beams, infinite where there is none.
 
-    Of the returns within 0.15 m behind the first, the mean range and the greatest height: beams on one upright face.
+    Both are of the returns within 0.15 m behind the first, which lie on one upright face: mean range, greatest height.
     """
     count = weight.shape[0]
     first = np.full(count, np.inf)
@@ -254,7 +254,7 @@ def _nearest(points: FloatArray, origin: FloatArray, weight: FloatArray, stride:
     for n in range(points.shape[0]):
         column = int(points[n, 4]) // stride
         flat = math.hypot(points[n, 0] - origin[0], points[n, 1] - origin[1])
-        if flat < first[column] + 0.15:
+        if flat < first[column] + _FACE_M:
             nearest[column, 0] += flat
             nearest[column, 1] = max(nearest[column, 1], points[n, 2])
             weight[column] += 1.0
@@ -280,8 +280,8 @@ def _trace(
 ) -> None:
     """Lowers the odds along each column of beams and raises them half a cell behind its end, in place.
 
-    `frame` is the cell size and the corner, `gains` hit, miss and the range; `slope` is that of the lowest beam. The
-    ground under the robot is known.
+    `frame` is the size of a cell and the corner, `gains` are hit, miss and range, `slope` is that of the lowest beam.
+    Ground under the robot (outline `own`) becomes known.
     """
     cell, x0, y0 = frame
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -298,14 +298,14 @@ def _trace(
                 break
             known[i, j] = True
             if origin[2] + slope * r < heights[i, j] or odds[i, j] <= 0.0:
-                odds[i, j] = max(odds[i, j] - gains[1], -1.0)
+                odds[i, j] = max(odds[i, j] - gains[1], _LEAST)
         if not reach < gains[2]:
             continue
         end = reach + 0.5 * cell
         i, j = int((oy + end * dy - y0) / cell), int((ox + end * dx - x0) / cell)
         if 0 <= i < rows and 0 <= j < columns:
             known[i, j] = True
-            odds[i, j] = min(odds[i, j] + gains[0], 3.5)
+            odds[i, j] = min(odds[i, j] + gains[0], _MOST)
             heights[i, j] = max(heights[i, j] if odds[i, j] > gains[0] else 0.0, nearest[n, 1])
     for a in range(int((own[1] - own[0]) / (0.7 * cell)) + 1):
         for b in range(int((own[3] - own[2]) / (0.7 * cell)) + 1):

@@ -1,7 +1,7 @@
-"""Points of one LiDAR revolution, thinned out and cut to a band of heights, in the levelled body frame.
+"""Points of one LiDAR revolution in the levelled body frame F, and the filter of the robot's own points.
 
-The levelled frame F stands at the body's origin on the floor: x along the body's heading, z straight up from the
-floor. It differs from the body frame by height, roll and pitch, so planar matching may leave these out.
+Frame F stands at the body's origin on the floor: x along the body's heading, z straight up from the floor. It differs
+from the body frame by height, roll and pitch.
 """
 
 from __future__ import annotations
@@ -15,11 +15,15 @@ from numpy.typing import NDArray
 from pydrake.math import RotationMatrix
 
 from skills.estimate.compiled import compiled
-from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Scan
+from skills.geometry import relative
+from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Robot, Scan
+
+_MOVED_M = 0.02
+_MOVED_RAD = 0.02
 
 
 class ArmShape:
-    """The arm as line segments, from the robot's own description and joint angles."""
+    """The arm as line segments, by the robot's description and joint angles."""
 
     def __init__(self, capabilities: Capabilities) -> None:
         if capabilities.arm is None:
@@ -49,7 +53,7 @@ class ArmShape:
 
 @dataclass(frozen=True)
 class SelfFilter:
-    """Tells foreign points from the robot's own. `outline_m` is (x_min, x_max, y_min, y_max) of the body."""
+    """Filter of the robot's own points. `outline_m` is (x_min, x_max, y_min, y_max) of the body."""
 
     outline_m: tuple[float, float, float, float]
     arm: ArmShape | None = None
@@ -59,17 +63,25 @@ class SelfFilter:
 
     @staticmethod
     def of(capabilities: Capabilities) -> SelfFilter:
-        """The filter of a robot; its arm is left out when the robot has none or describes none."""
+        """Creates the filter of a robot, without the arm when the robot has none or describes none."""
         corners = np.array(capabilities.footprint_m)
         (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
         arm = ArmShape(capabilities) if capabilities.arm and capabilities.description else None
         return SelfFilter((float(x0), float(x1), float(y0), float(y1)), arm)
 
+    def arm_F(self, robot: Robot, scan: Scan) -> FloatArray:
+        """The arm's points (N, 3) as it stands now, in the levelled body frame of a scan; empty without an arm."""
+        if self.arm is None:
+            return np.empty((0, 3))
+        rotation, translation = sensor_pose(scan)
+        points_L = scan.X_BL.inverse().multiply(self.arm.points_B(robot.joints()).T)
+        return np.asarray((rotation @ points_L).T + translation)
+
     def foreign(self, points_F: FloatArray, arm_F: FloatArray, *, holding: bool = False) -> NDArray[np.bool_]:
-        """Returns whether each (x, y, z) row is none of the robot's.
+        """Returns whether each (x, y, z) row is not part of the robot.
 
         All are given in one frame with the body's axes; `arm_F` holds the arm's points (`ArmShape`) and may be empty.
-        While `holding`, what is about the hand counts as the thing in it.
+        While `holding`, points about the hand count as the held object.
         """
         x0, x1, y0, y1 = self.outline_m
         m = self.body_margin_m
@@ -90,17 +102,17 @@ def segment_distance(points: FloatArray, start: FloatArray, end: FloatArray) -> 
 
 
 def in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
-    """World points (N, 3) as seen from a planar pose; heights stay above the floor."""
+    """World points (N, 3) in the axes of a planar pose; heights stay above the floor."""
     c, s = np.cos(X_WB.yaw_rad), np.sin(X_WB.yaw_rad)
     dx, dy = points_W[:, 0] - X_WB.x_m, points_W[:, 1] - X_WB.y_m
     return np.column_stack([c * dx + s * dy, -s * dx + c * dy, points_W[:, 2]])
 
 
 def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], max_range_m: float) -> FloatArray:
-    """Returns (N, 5) of a scan in frame F: x, y, height above the floor (m), ring and azimuth index in the scan.
+    """Points (N, 5) of a scan in frame F: x, y, height above the floor (m), ring and azimuth index in the scan.
 
-    About `azimuths` columns of the scan are used, evenly spaced; kept are returns nearer than max_range_m whose height
-    lies in heights_m.
+    About `azimuths` columns of the scan are used, evenly spaced, and returns nearer than max_range_m whose height lies
+    in heights_m.
     """
     stride = max(1, len(scan.azimuths_rad) // azimuths)
     ranges = np.ascontiguousarray(scan.ranges_m[:, ::stride])
@@ -111,17 +123,23 @@ def scan_points(scan: Scan, *, azimuths: int, heights_m: tuple[float, float], ma
 
 
 def placed_points(points_F: FloatArray, X_WF: Pose2D) -> FloatArray:
-    """Points of the levelled body frame in the world, (N, 3)."""
+    """World points (N, 3) of points in the levelled body frame."""
     c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
     x, y = points_F[:, 0], points_F[:, 1]
     return np.column_stack([X_WF.x_m + c * x - s * y, X_WF.y_m + s * x + c * y, points_F[:, 2]])
 
 
 def outside_discs(points_W: FloatArray, discs_W: FloatArray) -> NDArray[np.bool_]:
-    """Which of the points (N, 2 or more columns) lie in none of the discs, rows of x, y and radius (m, same frame)."""
+    """Returns whether each point (N, 2 or more columns) lies outside all discs, rows of x, y and radius (m)."""
     offsets = np.linalg.norm(points_W[:, None, :2] - discs_W[None, :, :2], axis=2)
     outside: NDArray[np.bool_] = (offsets > discs_W[:, 2]).all(axis=1)
     return outside
+
+
+def has_moved(before: Scan, scan: Scan) -> bool:
+    """Returns whether the robot moved between two scans, by odometry; equal scans then come from a frozen LiDAR."""
+    step = relative(Pose2D.from_transform(before.X_OB), Pose2D.from_transform(scan.X_OB))
+    return math.hypot(step.x_m, step.y_m) > _MOVED_M or abs(step.yaw_rad) > _MOVED_RAD
 
 
 def sensor_pose(scan: Scan) -> tuple[FloatArray, FloatArray]:

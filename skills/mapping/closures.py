@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
+from skills.estimate.grid_map import GridMap
 from skills.robot import FloatArray, Pose2D
 
 _FINEST_M = 0.1
@@ -37,8 +38,7 @@ class Found:
 
 
 def find_pose(
-    distance: NDArray[np.float32],
-    frame: tuple[float, float, float],
+    grid: GridMap,
     points_F: FloatArray,
     guess: Pose2D,
     window: Window,
@@ -47,10 +47,11 @@ def find_pose(
     reach_m: float = 0.25,
     rival_m: float = 0.5,
 ) -> Found | None:
-    """Where points (N, 2 or more columns) fit a distance field best about a guess, None when not better than `least`.
+    """The pose about a guess where points (N, 2 or more columns) fit a grid best, None when not better than `least`.
 
-    `frame` is the field's resolution and the x, y of its outer corner (m). A rival lies farther than rival_m away.
+    A rival lies farther than rival_m away.
     """
+    distance, frame = grid.distance, (grid.resolution_m, *grid.origin_m)
     turns = max(1, math.ceil(window.yaw_rad / math.radians(1.5)))
     yaws = guess.yaw_rad + np.linspace(-window.yaw_rad, window.yaw_rad, 2 * turns + 1)
     centre = (guess.x_m, guess.y_m)

@@ -9,13 +9,12 @@ face different ways are kept apart by quarters, so that the two sides of a thin 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
-from skills.geometry import wrap
+from skills.estimate.matching import add_residual
 from skills.robot import FloatArray, Pose2D
 
 CELL_M = 0.1
@@ -24,30 +23,6 @@ _LEAST_SPREAD_M = 0.05
 """A line has at least this standard deviation along it; the noise of the range alone has less."""
 _QUARTER_RAD = 0.5 * math.pi
 Moments = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Alignment:
-    """The pose X_AF, its covariance over x, y (m), yaw (rad), and the share of points that lie on the submap."""
-
-    pose: Pose2D
-    covariance: FloatArray
-    inlier_share: float
-
-
-@dataclass(frozen=True)
-class AlignOptions:
-    """`sigma_m` is a point's noise across a surface; all points count as `effective_points` independent ones.
-
-    Points farther off than `outlier_m` have no weight, in the first third of the iterations `coarse_outlier_m`.
-    """
-
-    sigma_m: float = 0.03
-    effective_points: float = 80.0
-    outlier_m: float = 0.12
-    coarse_outlier_m: float = 0.3
-    inlier_m: float = 0.1
-    iterations: int = 12
 
 
 class Distributions:
@@ -62,20 +37,11 @@ class Distributions:
         """Adds the points (N, 3) of a scan taken at a pose: x, y, and the direction that the surface faces (rad)."""
         _add(self._moments, self._low_m, points_F, np.array([X_AF.x_m, X_AF.y_m, X_AF.yaw_rad]))
 
-    def align(
-        self, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: AlignOptions | None = None
-    ) -> Alignment:
-        """The pose at which points (N, 3) lie best on the submap, given a prior."""
-        used = options or AlignOptions()
-        mean = np.array([prior.x_m, prior.y_m, prior.yaw_rad])
-        share = min(1.0, used.effective_points / max(1, len(points_F)))
-        limits = (used.sigma_m, share, used.coarse_outlier_m, used.outlier_m, used.inlier_m)
-        information = np.asarray(np.linalg.inv(covariance), dtype=np.float64)
-        pose, hessian, inliers = _align(
-            self._moments, self._low_m, points_F, mean, information, limits, used.iterations
-        )
-        aligned = Pose2D(float(pose[0]), float(pose[1]), wrap(float(pose[2])))
-        return Alignment(aligned, np.asarray(np.linalg.inv(hessian)), inliers)
+    def linearise(
+        self, points_F: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
+    ) -> tuple[FloatArray, FloatArray, int]:
+        """See `skills.estimate.matching.Surfaces`; points are as in `add`."""
+        return _linearise(self._moments, self._low_m, points_F, pose, weight, outlier_m, inlier_m)
 
 
 @compiled
@@ -103,41 +69,18 @@ def _add(moments: Moments, low: float, points: FloatArray, pose: FloatArray) -> 
 
 
 @compiled
-def _align(
-    moments: Moments,
-    low: float,
-    points: FloatArray,
-    mean: FloatArray,
-    information: FloatArray,
-    limits: tuple[float, float, float, float, float],
-    iterations: int,
-) -> tuple[FloatArray, FloatArray, float]:
-    """Pose, Hessian there, share of inliers: robust Gauss-Newton."""
-    pose, hessian, inliers = mean.copy(), information.copy(), 0
-    for iteration in range(iterations):
-        cap = limits[2] if iteration < iterations // 3 else limits[3]
-        hessian, gradient, inliers = _linearise(moments, low, points, pose, limits, cap)
-        hessian += information
-        gradient += information @ (pose - mean)
-        step = np.linalg.solve(hessian, gradient)
-        pose -= step
-        if iteration > iterations // 3 and abs(step[0]) + abs(step[1]) + abs(step[2]) < 1e-4:
-            break
-    return pose, hessian, inliers / max(1, points.shape[0])
-
-
-@compiled
 def _linearise(
     moments: Moments,
     low: float,
     points: FloatArray,
     pose: FloatArray,
-    limits: tuple[float, float, float, float, float],
-    cap: float,
+    weight: float,
+    outlier_m: float,
+    inlier_m: float,
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Hessian and gradient of the points' weighted squares (Tukey's biweight), and the count of inliers."""
+    """The loop of `Distributions.linearise`."""
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
-    jacobian, cells, inliers = np.zeros(3), moments.shape[0], 0
+    cells, inliers = moments.shape[0], 0
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for n in range(points.shape[0]):
         dx, dy = c * points[n, 0] - s * points[n, 1], s * points[n, 0] + c * points[n, 1]
@@ -159,13 +102,8 @@ def _linearise(
             continue
         nx, ny = math.cos(angle), math.sin(angle)
         residual = nx * ex + ny * ey
-        if abs(residual) >= cap:
+        if abs(residual) >= outlier_m:
             continue
-        inliers += abs(residual) < limits[4]
-        robust = limits[1] / (limits[0] * limits[0]) * (1.0 - (residual / cap) ** 2) ** 2
-        jacobian[0], jacobian[1], jacobian[2] = nx, ny, ny * dx - nx * dy
-        for k in range(3):
-            gradient[k] += robust * residual * jacobian[k]
-            for m in range(3):
-                hessian[k, m] += robust * jacobian[k] * jacobian[m]
+        inliers += abs(residual) < inlier_m
+        add_residual(hessian, gradient, (nx, ny), (dx, dy), residual, weight, outlier_m)
     return hessian, gradient, inliers

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
 from skills.estimate.scan_points import SelfFilter, scan_points, sensor_pose
-from skills.robot import FloatArray, Joints, Pose2D, Scan, unit_rays
+from skills.robot import FloatArray, Pose2D, Robot, Scan, unit_rays
 
 BAND_M = (0.5, 1.6)
 """Heights (m) of the points that scans are matched by."""
@@ -37,18 +37,14 @@ class Keyframe:
     points_F: FloatArray
 
     @staticmethod
-    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, joints: Joints | None, *, stride: int = 2) -> Keyframe:
-        """Every `stride`-th column of a scan, without returns from the robot itself (its arm by its joints)."""
+    def of(scan: Scan, points_F: FloatArray, own: SelfFilter, robot: Robot, *, stride: int = 2) -> Keyframe:
+        """Creates a keyframe of every `stride`-th column of a scan, without returns from the robot itself."""
         rotation, translation = sensor_pose(scan)
         ranges, azimuths = scan.ranges_m[:, ::stride].copy(), scan.azimuths_rad[::stride]
         rays = unit_rays(scan.elevations_rad, azimuths) * np.nan_to_num(ranges, nan=0.0)[..., None]
         hits_F = rays.reshape(-1, 3) @ rotation.T + translation
-        arm_F = np.empty((0, 3))
-        if own.arm is not None and joints is not None:
-            arm_L = scan.X_BL.inverse().multiply(own.arm.points_B(joints).T)
-            arm_F = np.asarray((rotation @ arm_L).T + translation)
         near = np.flatnonzero(np.hypot(hits_F[:, 0], hits_F[:, 1]) < 1.5)
-        ranges.reshape(-1)[near[~own.foreign(hits_F[near], arm_F)]] = np.nan
+        ranges.reshape(-1)[near[~own.foreign(hits_F[near], own.arm_F(robot, scan))]] = np.nan
         return Keyframe(
             stamp_s=scan.stamp_s,
             X_OF=Pose2D.from_transform(scan.X_OB),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import zipfile
 import zlib
@@ -31,7 +30,6 @@ LAYER_M: Final = 0.025
 """Sizes of the grid's cells, across and up."""
 GRAPH_FILE: Final = "pose_graph.json"
 KEYFRAMES_FILE: Final = "keyframes.npz"
-_FORM: Final = 1
 MOST_GRAPH_BYTES: Final = 100_000_000
 MOST_KEYFRAMES_BYTES: Final = 4_000_000_000
 _AGAIN: Final = "copy the whole folder, or name another --out"
@@ -115,28 +113,25 @@ def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M
 def save_graph(folder: Path, mapper: Mapper) -> None:
     """Writes pose graph and keyframes, from which `load_mapper` goes on. Raises OSError."""
     frames, graph = mapper.keyframes, mapper.graph
-    document = {
-        "form": _FORM,
-        "poses": [[pose.x_m, pose.y_m, pose.yaw_rad] for pose in graph.poses],
-        "stamps_s": [frame.stamp_s for frame in frames],
-        "edges": [
-            {
-                "from": edge.first,
-                "to": edge.second,
-                "measured": [edge.measured.x_m, edge.measured.y_m, edge.measured.yaw_rad],
-                "covariance": edge.covariance.tolist(),
-                "closure": edge.closure,
-            }
+    document = _GraphFile(
+        form=1,
+        poses=[_triple(pose) for pose in graph.poses],
+        stamps_s=[frame.stamp_s for frame in frames],
+        edges=[
+            _EdgeFile(
+                first=edge.first,
+                second=edge.second,
+                measured=_triple(edge.measured),
+                covariance=edge.covariance.tolist(),
+                closure=edge.closure,
+            )
             for edge in graph.edges
         ],
-        "submaps": [
-            {
-                "anchor": submap.anchor,
-                "members": {str(index): [pose.x_m, pose.y_m, pose.yaw_rad] for index, pose in submap.members.items()},
-            }
-            for submap in mapper.submaps
+        submaps=[
+            _SubmapFile(anchor=each.anchor, members={index: _triple(pose) for index, pose in each.members.items()})
+            for each in mapper.submaps
         ],
-    }
+    )
     first, most = frames[0], max(len(frame.points_F) for frame in frames)
     points = np.full((len(frames), most, 3), np.nan, dtype=np.float32)
     for row, frame in zip(points, frames, strict=True):
@@ -155,19 +150,23 @@ def save_graph(folder: Path, mapper: Mapper) -> None:
             points=points,
         )
     draft.replace(folder / KEYFRAMES_FILE)
-    _write(folder / GRAPH_FILE, json.dumps(document).encode())
+    _write(folder / GRAPH_FILE, document.model_dump_json(by_alias=True).encode())
 
 
 Triple = tuple[float, float, float]
 
 
-class _Told(BaseModel):
+def _triple(pose: Pose2D) -> Triple:
+    return pose.x_m, pose.y_m, pose.yaw_rad
+
+
+class _FilePart(BaseModel):
     model_config = ConfigDict(frozen=True, allow_inf_nan=False, populate_by_name=True)
 
 
-class _Edge(_Told):
-    first: int = Field(alias="from", ge=0)
-    second: int = Field(alias="to", ge=0)
+class _EdgeFile(_FilePart):
+    first: int = Field(validation_alias="from", serialization_alias="from", ge=0)
+    second: int = Field(validation_alias="to", serialization_alias="to", ge=0)
     measured: Triple
     covariance: tuple[Triple, Triple, Triple]
     closure: bool
@@ -176,22 +175,22 @@ class _Edge(_Told):
         return Edge(self.first, self.second, Pose2D(*self.measured), np.array(self.covariance), self.closure)
 
 
-class _Submap(_Told):
+class _SubmapFile(_FilePart):
     anchor: int = Field(ge=0)
     members: dict[int, Triple]
 
 
-class _Graph(_Told):
+class _GraphFile(_FilePart):
     """What `save_graph` writes of the pose graph."""
 
     form: Literal[1]
     poses: list[Triple] = Field(min_length=1)
     stamps_s: list[float]
-    edges: list[_Edge]
-    submaps: list[_Submap]
+    edges: list[_EdgeFile]
+    submaps: list[_SubmapFile]
 
     @model_validator(mode="after")
-    def _belongs_together(self) -> _Graph:
+    def _belongs_together(self) -> _GraphFile:
         count = len(self.poses)
         named = [end for edge in self.edges for end in (edge.first, edge.second)]
         named += [index for submap in self.submaps for index in (submap.anchor, *submap.members)]
@@ -213,7 +212,7 @@ def load_mapper(folder: Path, options: MapperOptions | None = None) -> Mapper:
     """
     graph_file, keyframes_file = folder / GRAPH_FILE, folder / KEYFRAMES_FILE
     try:
-        told = _Graph.model_validate_json(read_text(graph_file, most_bytes=MOST_GRAPH_BYTES, hint=_AGAIN))
+        told = _GraphFile.model_validate_json(read_text(graph_file, most_bytes=MOST_GRAPH_BYTES, hint=_AGAIN))
     except ValidationError as error:
         where, why, _ = first_error(error.errors())
         what = f"it is no pose graph ({': '.join(filter(None, ('.'.join(map(str, where)), why)))})"

@@ -10,21 +10,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import SelfFilter
+from skills.estimate.localiser import moved_covariance
+from skills.estimate.matching import Match, MatchOptions, match
+from skills.estimate.scan_points import SelfFilter, has_moved
 from skills.geometry import compose, inverse, relative
 from skills.mapping.closures import Window, find_pose
-from skills.mapping.distributions import Alignment, Distributions
+from skills.mapping.distributions import Distributions
 from skills.mapping.keyframe import Keyframe, matching_points
 from skills.mapping.pose_graph import Edge, PoseGraph
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
-_FROZEN_M, _FROZEN_RAD = 0.02, 0.02
 _FIELD_CELL_M = 0.05
 
 
@@ -66,7 +68,11 @@ class MapperOptions:
     agree_rad: float = 0.02
     agree_within_m: float = 8.0
     most_sigmas: float = 5.0
-    least_sigma: tuple[float, float] = (0.01, 0.003)
+    least_sigma_m: float = 0.01
+    least_sigma_rad: float = 0.003
+    matching: MatchOptions = field(
+        default_factory=partial(MatchOptions, sigma_m=0.03, outlier_m=0.12, coarse_outlier_m=0.3, inlier_m=0.1)
+    )
 
 
 @dataclass
@@ -162,8 +168,7 @@ class Mapper:
             return
         self.blind_since_s = None
         if not self._active or self._keyframe_is_due():
-            joints = None if self._filter.arm is None else robot.joints()
-            self._keep(Keyframe.of(scan, points_F, self._filter, joints))
+            self._keep(Keyframe.of(scan, points_F, self._filter, robot))
 
     def _recognised(self, points_F: FloatArray) -> bool:
         """Find the robot on the map that it goes on from, about where that began; its keyframe then joins the graph."""
@@ -184,21 +189,16 @@ class Mapper:
     def _frozen(self, scan: Scan) -> bool:
         """Returns whether a scan repeats the last one, noise and all, although the robot has moved."""
         last = self._scan
-        if last is None or not scan.repeats(last):
-            return False
-        step = relative(Pose2D.from_transform(last.X_OB), Pose2D.from_transform(scan.X_OB))
-        return math.hypot(step.x_m, step.y_m) > _FROZEN_M or abs(step.yaw_rad) > _FROZEN_RAD
+        return last is not None and scan.repeats(last) and has_moved(last, scan)
 
     def _predict(self, step: Pose2D) -> None:
         """Moves along with odometry, and lets the spread grow."""
         options = self._options
         way, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         old, self._X_AF = self._X_AF, compose(self._X_AF, step)
-        new = self._X_AF
-        jacobian = np.array([[1.0, 0.0, old.y_m - new.y_m], [0.0, 1.0, new.x_m - old.x_m], [0.0, 0.0, 1.0]])
         along = 5e-4 + options.drift_per_m * way
         yaw = 1e-3 + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
-        self._covariance = jacobian @ self._covariance @ jacobian.T + np.diag([along**2, along**2, yaw**2])
+        self._covariance = moved_covariance(self._covariance, old, self._X_AF, along, yaw)
         self.way_m += way
         self._since_keyframe = (self._since_keyframe[0] + way, self._since_keyframe[1] + turn)
 
@@ -208,7 +208,7 @@ class Mapper:
             return not self._returning or self._recognised(points_F)
         distributions = self._current.distributions
         assert distributions is not None
-        found = distributions.align(points_F, self._X_AF, self._covariance)
+        found = match(distributions, points_F, self._X_AF, self._covariance, self._options.matching)
         if found.inlier_share < self._options.least_share:
             return False
         self._X_AF, self._covariance = found.pose, found.covariance
@@ -270,7 +270,7 @@ class Mapper:
 
     def _at_least(self, covariance: FloatArray) -> FloatArray:
         """A covariance that is no smaller than what systematic errors allow."""
-        place, yaw = self._options.least_sigma
+        place, yaw = self._options.least_sigma_m, self._options.least_sigma_rad
         return np.asarray(covariance + np.diag([place**2, place**2, yaw**2]))
 
     # ---- loop closures
@@ -341,19 +341,18 @@ class Mapper:
         places = (self.graph.poses[member] for member in submap.members)
         return min(math.hypot(place.x_m - here.x_m, place.y_m - here.y_m) for place in places)
 
-    def find_in(self, submap: Submap, points_F: FloatArray, guess: Pose2D, window: Window) -> Alignment | None:
+    def find_in(self, submap: Submap, points_F: FloatArray, guess: Pose2D, window: Window) -> Match | None:
         """Where a scan's points fit into a submap, clearly and nowhere else in the window."""
         options = self._options
         distributions = self.rebuilt(submap)
         points_A = np.vstack([_placed(self.keyframes[i].points_F, pose) for i, pose in submap.members.items()])
         grid = _hit_grid(points_A)
         few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 150)])
-        place = (grid.resolution_m, *grid.origin_m)
-        coarse = find_pose(grid.distance, place, few, guess, window, least=options.closure_score)
+        coarse = find_pose(grid, few, guess, window, least=options.closure_score)
         if coarse is None or coarse.rival_score > options.rival_share * coarse.score:
             return None
         wide = np.diag([0.2**2, 0.2**2, 0.05**2])
-        found = distributions.align(points_F, coarse.pose, wide)
+        found = match(distributions, points_F, coarse.pose, wide, options.matching)
         return found if found.inlier_share >= options.closure_share else None
 
     def rebuilt(self, submap: Submap) -> Distributions:

@@ -78,6 +78,17 @@ class LayeredOccupancy:
         low = (values[self._layers((LOWEST_M, low_m))] != 0).any(axis=0)
         return occupied, (layers != 0).any(axis=0), low | occupied
 
+    def window(self, x_m: float, y_m: float, half_m: float) -> tuple[slice, slice]:
+        """The rows and columns of the cells within half_m of a point along both axes."""
+        columns, rows = (
+            slice(
+                max(0, math.floor((at_m - half_m - start_m) / self.resolution_m)),
+                math.ceil((at_m + half_m - start_m) / self.resolution_m),
+            )
+            for at_m, start_m in zip((x_m, y_m), self.origin_m, strict=True)
+        )
+        return rows, columns
+
     def _layers(self, band_m: tuple[float, float]) -> slice:
         """The layers that lie in a band of heights by more than half."""
         first, last = ((height - LOWEST_M) / self._layer_m for height in band_m)

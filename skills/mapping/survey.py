@@ -26,6 +26,9 @@ from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
 _ROUNDS = 1
 """So many times, once back at the start, the frontiers that were given up are tried again."""
 _EXPIRY_S = 0.3
+_FRONTIER_M = 0.3
+_FRONTIER_CELLS = 8
+"""A frontier is one as long as so many cells within _FRONTIER_M were not seen near the floor."""
 _FAR_STAND_M = 2.5
 """Frontiers are looked at from so near at least."""
 
@@ -201,13 +204,7 @@ class Survey:
         shape = grid.values.shape[1:]
         rows, columns = slice(0, shape[0]), slice(0, shape[1])
         if around_m is not None:
-            rows, columns = (
-                slice(
-                    max(0, math.floor((at - around_m - start) / grid.resolution_m)),
-                    math.ceil((at + around_m - start) / grid.resolution_m),
-                )
-                for at, start in ((poses[-1].y_m, grid.origin_m[1]), (poses[-1].x_m, grid.origin_m[0]))
-            )
+            rows, columns = grid.window(poses[-1].x_m, poses[-1].y_m, around_m)
         origin_m = (
             grid.origin_m[0] + columns.start * grid.resolution_m,
             grid.origin_m[1] + rows.start * grid.resolution_m,
@@ -227,15 +224,9 @@ class Survey:
         """Returns whether a frontier is none any more, looked at when the costmap has been refreshed."""
         if goal.purpose is not Purpose.FRONTIER or self._refreshed[1] != now_s:
             return False
-        window = tuple(
-            slice(
-                max(0, math.floor((at - start) / self._grid.resolution_m) - 6),
-                math.floor((at - start) / self._grid.resolution_m) + 7,
-            )
-            for at, start in zip(reversed(goal.about), reversed(self._grid.origin_m), strict=True)
-        )
-        _, _, low = self._grid.ground((window[0], window[1]), self._options.low_m)
-        return int(np.count_nonzero(~low)) < 8
+        window = self._grid.window(*goal.about, _FRONTIER_M)
+        _, _, low = self._grid.ground(window, self._options.low_m)
+        return int(np.count_nonzero(~low)) < _FRONTIER_CELLS
 
     def _choose(self, now_s: float) -> None:
         """The next goal, or the end."""

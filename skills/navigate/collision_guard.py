@@ -12,7 +12,7 @@ import numpy as np
 
 from skills.api import ReturnsView, SkillContext
 from skills.navigate.footprint import Footprint, disc_centres
-from skills.navigate.path import TURN_M_PER_RAD
+from skills.navigate.path import progress_m
 from skills.perception.moving_objects import Moving, MovingOptions, MovingWatch
 from skills.quantities import Acceleration, Count, Delay, Duration, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
@@ -98,7 +98,7 @@ class CollisionGuard:
         for one in (one for one in moving if not self._follows(one, here, on_path)):
             places_W = one.places_W(times, now_s)
             for poses in (on_path, coasting):
-                centres = disc_centres(self.footprint, poses)
+                centres = disc_centres(self.footprint.discs, poses)
                 apart_m = np.linalg.norm(centres - places_W[:, None], axis=2) - self.footprint.discs[:, 2]
                 if float(apart_m.min()) < options.margin_m + one.radius_m:
                     return one.place_W
@@ -119,16 +119,13 @@ class CollisionGuard:
     def _on_path(self, follower: LocalController, speed: float, most_m_s: float, times: FloatArray) -> FloatArray:
         """Poses (N, 3) on the path at these times."""
         path = follower.ahead(most_m_s * self._options.horizon_s)
-        steps = np.abs(np.diff(path, axis=0))
-        lengths = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.minimum(steps[:, 2], math.tau - steps[:, 2])
-        ways = np.concatenate([[0.0], np.cumsum(lengths)])
         gained = np.minimum(speed + self._options.acceleration_m_s2 * times, max(most_m_s, speed))
         driven = np.concatenate([[0.0], np.cumsum(0.5 * (gained[1:] + gained[:-1]) * np.diff(times))])
-        return np.asarray(path[np.minimum(np.searchsorted(ways, driven), len(path) - 1)])
+        return np.asarray(path[np.minimum(np.searchsorted(progress_m(path), driven), len(path) - 1)])
 
     def _apart_m(self, poses: FloatArray, points_W: FloatArray) -> FloatArray:
         """Distances (N, points) from the outline at poses to points."""
-        centres = disc_centres(self.footprint, poses)
+        centres = disc_centres(self.footprint.discs, poses)
         offsets = np.linalg.norm(centres[:, :, None] - points_W[None, None], axis=3)
         return np.asarray(np.min(offsets - self.footprint.discs[None, :, 2:3], axis=1))
 

@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import ForgettingCostmap, FreeSpace, SkillContext
-from skills.navigate.footprint import Footprint
+from skills.navigate.footprint import Footprint, clearance_on_grid
+from skills.navigate.obstacles import with_segments
 from skills.perception.doorway import Doorway, measure_opening
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D
-
-__all__ = ["DoorOptions", "DoorWatch", "Regions", "closed_sentence"]
 
 _CELL_M = 0.05
 _AROUND_M = 8.0
@@ -77,7 +76,11 @@ class DoorWatch:
 
     def costmap(self, costmap: FreeSpace) -> FreeSpace:
         """The costmap, with the closed doors in it as long as they are not seen open."""
-        return WithDoors(costmap, self.closed) if self._closed else costmap
+        if not self._closed:
+            return costmap
+        turns = [(door, door.through_rad) for door in self._closed]
+        panels = [(np.array(d.middle_W), np.array([-np.sin(a), np.cos(a)]), d.width_m) for d, a in turns]
+        return with_segments(costmap, panels, _PANEL_M)
 
     def forget_distant(self, here: Pose2D) -> bool:
         """Forgets what was seen in doorways too far away to be judged, once another door is closed; whether it did.
@@ -115,26 +118,6 @@ class DoorWatch:
         return regions.doors_between(self.closed) if regions.cut_off else ()
 
 
-@dataclass(frozen=True)
-class WithDoors:
-    """A costmap in which closed doors are obstacles, whether or not they were seen of late."""
-
-    costmap: FreeSpace
-    doors: tuple[Doorway, ...]
-
-    def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance from each (x, y) row to the nearest obstacle or closed door."""
-        points = np.asarray(points_W, dtype=np.float64)[:, :2]
-        clearance = np.array(self.costmap.clearance_m(points_W))
-        for door in self.doors:
-            middle = np.array(door.middle_W)
-            across = np.array([-np.sin(door.through_rad), np.cos(door.through_rad)])
-            along_m = np.clip((points - middle) @ across, -0.5 * door.width_m, 0.5 * door.width_m)
-            nearest = middle + along_m[:, None] * across
-            clearance = np.minimum(clearance, np.linalg.norm(points - nearest, axis=1) - _PANEL_M)
-        return np.asarray(clearance)
-
-
 class Regions:
     """The connected regions of the ground in which a disc as wide as the robot can move.
 
@@ -155,8 +138,7 @@ class Regions:
         self._corner = places.min(axis=0) - _AROUND_M
         columns, rows = np.ceil((places.max(axis=0) + _AROUND_M - self._corner) / _CELL_M).astype(int).tolist()
         xs, ys = (self._corner[axis] + _CELL_M * np.arange(n) for axis, n in ((0, columns), (1, rows)))
-        points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-        free = costmap.clearance_m(points).reshape(rows, columns) > footprint.inscribed_m - _CELL_M
+        free = clearance_on_grid(costmap, xs, ys) > footprint.inscribed_m - _CELL_M
         cells = self._cell(free_W)
         free[tuple(cells[np.all((cells >= 0) & (cells < free.shape), axis=1)].T)] = True
         labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)[1]

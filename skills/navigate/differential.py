@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.geometry import wrap
-from skills.navigate.lattice import Lattice, Needs, Space
-from skills.navigate.motion_cost import drive_cost, segment_cost
+from skills.navigate.lattice import Lattice
+from skills.navigate.motion_cost import Space, clearance_needed, drive_cost, segment_cost
 from skills.navigate.smoothing import clearances
 from skills.robot import FloatArray
 
@@ -44,30 +44,22 @@ Links = dict[int, tuple[float, tuple[FloatArray, ...]]]
 """By the index of a lattice state: the cost between it and a pose off the lattice, and poses on the way."""
 
 
-def links(space: Space, lattice: Lattice, pose: FloatArray, needs: Needs, *, to_pose: bool) -> Links:
+def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) -> Links:
     """How states of the lattice are reached from a pose, or the pose from them.
 
     From the pose the robot goes straight as far as it likes, since it may have no clearance to turn where it stands.
     """
     found: Links = {}
-    for cost, via in _straights(space, pose, needs):
+    for cost, via in _straights(space, pose):
         for state, place in _around(lattice, via):
             pair = (place, via) if to_pose else (via, place)
-            total = (
-                cost + drive_cost(space.field, space.frame, space.discs, *pair, need_at(needs, place), space.weights)[0]
-            )
+            total = cost + drive_cost(space, *pair, clearance_needed(space, place[0], place[1]))[0]
             if total < found.get(state, (math.inf,))[0]:
                 found[state] = (total, () if via is pose else (via,))
     return found
 
 
-def need_at(needs: Needs, pose: FloatArray) -> float:
-    """The clearance that a pose needs."""
-    near = math.hypot(pose[0] - needs.x_m, pose[1] - needs.y_m) < needs.escape_m
-    return needs.escape_margin_m if near else needs.margin_m
-
-
-def _straights(space: Space, pose: FloatArray, needs: Needs) -> Iterator[tuple[float, FloatArray]]:
+def _straights(space: Space, pose: FloatArray) -> Iterator[tuple[float, FloatArray]]:
     """Poses straight ahead and behind as far as it is free, and what going there costs; the pose itself first."""
     yield 0.0, pose
     ahead = np.array([math.cos(pose[2]), math.sin(pose[2]), 0.0])
@@ -75,7 +67,7 @@ def _straights(space: Space, pose: FloatArray, needs: Needs) -> Iterator[tuple[f
         cost, before = 0.0, pose
         for way_m in sign * _LEGS_M:
             via = pose + way_m * ahead
-            cost += segment_cost(space.field, space.frame, space.discs, before, via, need_at(needs, via), space.weights)
+            cost += segment_cost(space, before, via, clearance_needed(space, via[0], via[1]))
             if not math.isfinite(cost):
                 break
             yield cost, via
@@ -96,9 +88,9 @@ def _around(lattice: Lattice, pose: FloatArray) -> Iterator[tuple[int, FloatArra
                 yield (i * lattice.columns + j) * lattice.headings + heading, place
 
 
-def drives(space: Space, knots: FloatArray, needs: Needs) -> FloatArray:
+def drives(space: Space, knots: FloatArray) -> FloatArray:
     """Poses (N, 3) of the path through some knots: turn, straight, turn; corners are rounded where that is free."""
-    legs = _legs(space, knots, needs)
+    legs = _legs(space, knots)
     places = [legs[0][0], *(end for _, end, _ in legs)]
     poses = [knots[0]]
     trimmed_m = 0.0
@@ -110,7 +102,7 @@ def drives(space: Space, knots: FloatArray, needs: Needs) -> FloatArray:
             room_m = min(
                 float(np.linalg.norm(end - begin)) - trimmed_m, 0.5 * float(np.linalg.norm(places[n + 2] - end))
             )
-            arc = _rounded(space, legs[n], legs[n + 1], room_m, needs)
+            arc = _rounded(space, legs[n], legs[n + 1], room_m)
         trimmed_m = 0.0
         if arc is None:
             poses.append(np.array([*end, yaw]))
@@ -125,7 +117,7 @@ def drives(space: Space, knots: FloatArray, needs: Needs) -> FloatArray:
 _Leg = tuple[FloatArray, FloatArray, float]
 
 
-def _legs(space: Space, knots: FloatArray, needs: Needs) -> list[_Leg]:
+def _legs(space: Space, knots: FloatArray) -> list[_Leg]:
     """The straights between knots, each from a place to a place with the yaw on it, the yaws continuous."""
     legs: list[_Leg] = []
     yaw = float(knots[0, 2])
@@ -133,13 +125,13 @@ def _legs(space: Space, knots: FloatArray, needs: Needs) -> list[_Leg]:
         if np.hypot(*(b - a)[:2]) < 1e-6:
             continue
         begin = np.array([a[0], a[1], yaw + wrap(a[2] - yaw)])
-        _, on_it = drive_cost(space.field, space.frame, space.discs, begin, b, need_at(needs, a), space.weights)
+        _, on_it = drive_cost(space, begin, b, clearance_needed(space, a[0], a[1]))
         yaw += wrap(on_it - yaw)
         legs.append((a[:2], b[:2], yaw))
     return legs or [(knots[0, :2], knots[0, :2], yaw)]
 
 
-def _rounded(space: Space, first: _Leg, second: _Leg, room_m: float, needs: Needs) -> list[FloatArray] | None:
+def _rounded(space: Space, first: _Leg, second: _Leg, room_m: float) -> list[FloatArray] | None:
     """The widest arc from one straight to the next, None where they turn back or no arc is free."""
     (_, corner, yaw), (_, _, yaw_after) = first, second
     turn = yaw_after - yaw
@@ -156,6 +148,6 @@ def _rounded(space: Space, first: _Leg, second: _Leg, room_m: float, needs: Need
         x = begin[0] + side * (np.sin(angles) - math.sin(course))
         y = begin[1] - side * (np.cos(angles) - math.cos(course))
         arc = np.column_stack([x, y, yaws])
-        if float(np.min(clearances(space, arc))) >= max(need_at(needs, arc[0]), needs.margin_m):
+        if float(np.min(clearances(space, arc))) >= max(clearance_needed(space, x[0], y[0]), space.needs.margin_m):
             return list(arc)
     return None

@@ -177,7 +177,7 @@ class PathFollower:
 
     def _culprit(self, costmap: FreeSpace, pose: FloatArray) -> tuple[float, float]:
         """Where on the outline at a pose something is touched."""
-        centres = disc_centres(self._footprint, pose[None, :])[0]
+        centres = disc_centres(self._footprint.discs, pose[None, :])[0]
         worst = int(np.argmin(costmap.clearance_m(centres) - self._footprint.discs[:, 2]))
         return float(centres[worst, 0]), float(centres[worst, 1])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,16 +90,16 @@ def pose_array(poses: Sequence[Pose2D]) -> FloatArray:
     return np.array([(p.x_m, p.y_m, p.yaw_rad) for p in poses], dtype=np.float64).reshape(-1, 3)
 
 
-def disc_centres(footprint: Footprint, poses: FloatArray) -> FloatArray:
+def disc_centres(discs: FloatArray, poses: FloatArray) -> FloatArray:
     """World (x, y) of all discs at (N, 3) poses: (N, discs, 2)."""
     c, s = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
-    x, y = footprint.discs[:, 0], footprint.discs[:, 1]
+    x, y = discs[:, 0], discs[:, 1]
     return np.stack([poses[:, 0:1] + c * x - s * y, poses[:, 1:2] + s * x + c * y], axis=-1)
 
 
 def footprint_clearance_m(costmap: FreeSpace, footprint: Footprint, poses: FloatArray) -> FloatArray:
     """Distance (m) from the outline to the nearest obstacle at (N, 3) poses x, y, yaw; negative when it is touched."""
-    centres = disc_centres(footprint, poses)
+    centres = disc_centres(footprint.discs, poses)
     clearance = costmap.clearance_m(centres.reshape(-1, 2)).reshape(centres.shape[:2])
     return np.asarray(np.min(clearance - footprint.discs[:, 2], axis=1))
 
@@ -108,23 +109,30 @@ def footprint_clear(costmap: FreeSpace, footprint: Footprint, pose: Pose2D, marg
     return bool(footprint_clearance_m(costmap, footprint, pose_array([pose]))[0] >= margin_m)
 
 
-@compiled
-def clearance_at(
-    field: NDArray[np.float32],
-    frame: tuple[float, float, float],
-    discs: FloatArray,
-    x: float,
-    y: float,
-    yaw: float,
-) -> float:
-    """Clearance of the discs at one pose in a sampled field.
+class ClearanceField(NamedTuple):
+    """Clearance (m) sampled at the points (x0_m + column * cell_m, y0_m + row * cell_m), and the footprint's discs."""
 
-    `frame` is the field's resolution and the x, y of the centre of field[0, 0]; off the field it is -1.
-    """
-    cells = 1.0 / frame[0]
+    values: NDArray[np.float32]
+    cell_m: float
+    x0_m: float
+    y0_m: float
+    discs: FloatArray
+
+
+def clearance_on_grid(costmap: FreeSpace, xs: FloatArray, ys: FloatArray) -> FloatArray:
+    """Clearance (rows, columns) in metres at the points of a grid with these x and y."""
+    points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
+    return costmap.clearance_m(points).reshape(len(ys), len(xs))
+
+
+@compiled
+def clearance_at(field: ClearanceField, x: float, y: float, yaw: float) -> float:
+    """Clearance (m) of the footprint at one pose; -1 off the sampled field."""
+    values, discs = field.values, field.discs
+    cells = 1.0 / field.cell_m
     c, s = math.cos(yaw) * cells, math.sin(yaw) * cells
-    u0, v0 = (x - frame[1]) * cells, (y - frame[2]) * cells
-    rows, columns = field.shape
+    u0, v0 = (x - field.x0_m) * cells, (y - field.y0_m) * cells
+    rows, columns = values.shape
     least = 1e9
     for n in range(discs.shape[0]):
         u = u0 + c * discs[n, 0] - s * discs[n, 1]
@@ -133,7 +141,7 @@ def clearance_at(
             return -1.0
         i, j = int(v), int(u)
         a, b = u - j, v - i
-        low = field[i, j] + a * (field[i, j + 1] - field[i, j])
-        high = field[i + 1, j] + a * (field[i + 1, j + 1] - field[i + 1, j])
+        low = values[i, j] + a * (values[i, j + 1] - values[i, j])
+        high = values[i + 1, j] + a * (values[i + 1, j + 1] - values[i + 1, j])
         least = min(least, low + b * (high - low) - discs[n, 2])
     return least

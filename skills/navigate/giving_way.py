@@ -13,33 +13,26 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import FreeSpace, SkillContext
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
-from skills.navigate.path import TURN_M_PER_RAD
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_on_grid, footprint_clearance_m, pose_array
+from skills.navigate.obstacles import NoObstacles, with_outlines
+from skills.navigate.path import progress_m
 from skills.quantities import Count, Delay, Length, Margin
 from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
 from skills.traffic import Neighbour
-
-if TYPE_CHECKING:
-    from scipy.spatial import cKDTree
-
-__all__ = ["Avoided", "GivingWay", "GivingWayOptions", "WithBodies", "first_that_suits", "reachable", "with_bodies"]
 
 _WAY_STEP_M = 0.12
 _CELL_M = 0.1
 _YAWS = 8
 _SLACK_M = 0.03
 _UNSURE_M = 0.04
-_ROUND_UP_M = 0.02
 _AT_ONCE = 200
 _ANEW_M = 0.6
-_FAR_M = 1.5
 _ABOUT_M = 1.2
 _BODY_M = 0.3
 
@@ -73,56 +66,6 @@ class Avoided(enum.Enum):
     WAYS = "ways"  # their bodies, and the ways that are reserved against us
     BODIES = "bodies"  # their bodies: the robot stops before a reserved way
     WORKING = "working"  # only those that do not clear a way which is reserved
-
-
-@dataclass(frozen=True)
-class WithBodies:
-    """A costmap in which discs (centres (N, 2) with one radius (m)) stand as well."""
-
-    costmap: FreeSpace
-    tree: cKDTree
-    radius_m: float
-
-    def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance from each (x, y) row to the nearest obstacle or disc; discs farther than 1.5 m do not count."""
-        points = np.asarray(points_W, dtype=np.float64)[:, :2]
-        clearance, most_m = self.costmap.clearance_m(points), self.radius_m + _FAR_M
-        near = np.all((points > self.tree.mins - most_m) & (points < self.tree.maxes + most_m), axis=1)
-        nearest, _ = self.tree.query(points[near], distance_upper_bound=most_m)
-        clearance = np.array(clearance, dtype=np.float64)
-        clearance[near] = np.minimum(clearance[near], nearest - self.radius_m)
-        return clearance
-
-
-def with_bodies(costmap: FreeSpace, swept: Sequence[tuple[FloatArray, FloatArray]], larger_m: float = 0.0) -> FreeSpace:
-    """The costmap with outlines (discs), larger_m wider to all sides, at poses (N, 3)."""
-    if not swept:
-        return costmap
-    from scipy.spatial import cKDTree
-
-    for discs, poses in swept:
-        steps = np.ceil(discs[:, 2] / _ROUND_UP_M - 1e-6)
-        for step in np.unique(steps):
-            same = discs[steps == step]
-            tree = cKDTree(_centres(same, poses))
-            costmap = WithBodies(costmap, tree, float(same[:, 2].max()) + larger_m)
-    return costmap
-
-
-def _centres(discs: FloatArray, poses: FloatArray) -> FloatArray:
-    """World (x, y) of all discs at all poses, one list."""
-    c, s = np.cos(poses[:, 2:3]), np.sin(poses[:, 2:3])
-    x = poses[:, 0:1] + c * discs[:, 0] - s * discs[:, 1]
-    y = poses[:, 1:2] + s * discs[:, 0] + c * discs[:, 1]
-    return np.column_stack([x.ravel(), y.ravel()])
-
-
-@dataclass(frozen=True)
-class _Nothing:
-    """A costmap without anything."""
-
-    def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        return np.full(len(points_W), np.inf)
 
 
 class GivingWay:
@@ -165,10 +108,10 @@ class GivingWay:
     def costmap(self, costmap: FreeSpace, avoided: Avoided) -> FreeSpace:
         """The costmap with that of the others which is to be avoided."""
         others = [one for one in self._traffic.others() if avoided is not Avoided.WORKING or not _will_move(one)]
-        with_others = with_bodies(costmap, [(one.discs, one.pose[None, :]) for one in others], _UNSURE_M)
+        with_others = with_outlines(costmap, [(one.discs, one.pose[None, :]) for one in others], _UNSURE_M)
         if avoided is not Avoided.WAYS:
             return with_others
-        return with_bodies(with_others, [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+        return with_outlines(with_others, [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
 
     def less(self, avoided: Avoided) -> Avoided | None:
         """What is avoided instead when there was no way around more; None: nothing less would help."""
@@ -188,10 +131,10 @@ class GivingWay:
         ahead = follower.ahead(self._options.look_m)
         found: tuple[float, str] | None = None
         for one in self.ahead_of_us():
-            ways = with_bodies(_Nothing(), [(one.discs, _thinned(one))])
+            ways = with_outlines(NoObstacles(), [(one.discs, _thinned(one))])
             met = np.flatnonzero(footprint_clearance_m(ways, footprint, ahead) < self._options.apart_m)
             if len(met):
-                way_m = float(_along(ahead)[met[0]])
+                way_m = float(progress_m(ahead)[met[0]])
                 found = (way_m, one.name) if found is None or way_m < found[0] else found
         return found
 
@@ -204,7 +147,7 @@ class GivingWay:
         for one in self._traffic.others():
             if not one.yields:
                 continue
-            body = with_bodies(_Nothing(), [(one.discs, one.pose[None, :])])
+            body = with_outlines(NoObstacles(), [(one.discs, one.pose[None, :])])
             clearance = footprint_clearance_m(body, footprint, ahead)
             if clearance.min() < min(self._options.room_m, float(clearance[0]) - 0.02):
                 now_s = self._clock.now()
@@ -222,7 +165,7 @@ class GivingWay:
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
         """Returns whether another robot covers a place (x, y), or ends just before it."""
-        bodies = self.costmap(_Nothing(), Avoided.BODIES)
+        bodies = self.costmap(NoObstacles(), Avoided.BODIES)
         return bool(bodies.clearance_m(np.array([place_W]))[0] < _BODY_M)
 
     def name_at(self, place_W: tuple[float, float] | None) -> str | None:
@@ -237,7 +180,7 @@ class GivingWay:
         return [one.name for one in self.ahead_of_us() if self._in_way_of(one, here, footprint)]
 
     def _in_way_of(self, one: Neighbour, here: Pose2D, footprint: Footprint) -> bool:
-        way = with_bodies(_Nothing(), [(one.discs, _thinned(one)[1:])])
+        way = with_outlines(NoObstacles(), [(one.discs, _thinned(one)[1:])])
         return bool(footprint_clearance_m(way, footprint, pose_array([here]))[0] < self._options.apart_m)
 
     def waiting_place(
@@ -250,12 +193,12 @@ class GivingWay:
         options = self._options
         n = int(2.0 * options.reach_m / _CELL_M) + 1
         axis = np.linspace(-options.reach_m, options.reach_m, n)
-        x, y = np.meshgrid(here.x_m + axis, here.y_m + axis)
-        centres = np.column_stack([x.ravel(), y.ravel()])
+        xs, ys = here.x_m + axis, here.y_m + axis
+        x, y = np.meshgrid(xs, ys)
         everything = self.costmap(costmap, Avoided.BODIES)
-        free = everything.clearance_m(centres).reshape(n, n) > footprint.inscribed_m + SAFE_MARGIN_M
-        ways = with_bodies(_Nothing(), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
-        aside = ways.clearance_m(centres).reshape(n, n) > footprint.inscribed_m + options.aside_m
+        free = clearance_on_grid(everything, xs, ys) > footprint.inscribed_m + SAFE_MARGIN_M
+        ways = with_outlines(NoObstacles(), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+        aside = clearance_on_grid(ways, xs, ys) > footprint.inscribed_m + options.aside_m
         for other in tried:
             aside &= np.hypot(x - other.x_m, y - other.y_m) > _ANEW_M
         yaws = here.yaw_rad + np.arange(_YAWS) * (2.0 * math.pi / _YAWS)
@@ -301,19 +244,10 @@ def _will_move(one: Neighbour) -> bool:
 def _thinned(one: Neighbour) -> FloatArray:
     """The poses that a robot still covers: where it is, and its way, not closer than needed."""
     way = one.path if one.path is not None else np.empty((0, 3))
-    along = _along(way)
+    along = progress_m(way)
     kept, last = [one.pose], -math.inf
     for pose, at in zip(way, along, strict=True):
         if at - last >= _WAY_STEP_M:
             kept.append(pose)
             last = float(at)
     return np.vstack([*kept, way[-1:]])
-
-
-def _along(poses: FloatArray) -> FloatArray:
-    """Way up to each pose (m), turns counted."""
-    if not len(poses):
-        return np.empty(0)
-    steps = np.diff(poses, axis=0)
-    ways = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.abs(steps[:, 2])
-    return np.concatenate([[0.0], np.cumsum(ways)])

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
-from skills.navigate.motion_cost import Weights, motion_seconds, nearness
+from skills.navigate.motion_cost import Space, Weights, clearance_needed, motion_seconds, nearness
 from skills.robot import FloatArray
 
 IntArray = NDArray[np.int64]
-Frame = tuple[float, float, float]
 
 
 class Lattice(NamedTuple):
@@ -28,25 +27,6 @@ class Lattice(NamedTuple):
     rows: int
     columns: int
     headings: int
-
-
-class Space(NamedTuple):
-    """What poses are checked against: a sampled clearance field, its frame (see `clearance_at`), the robot's discs."""
-
-    field: NDArray[np.float32]
-    frame: Frame
-    discs: FloatArray
-    weights: Weights
-
-
-class Needs(NamedTuple):
-    """Clearance wanted: margin_m, or escape_margin_m within escape_m of the start (x, y)."""
-
-    margin_m: float
-    escape_margin_m: float
-    escape_m: float
-    x_m: float
-    y_m: float
 
 
 def lattice_moves(headings: int) -> IntArray:
@@ -63,15 +43,16 @@ def lattice_moves(headings: int) -> IntArray:
 @compiled
 def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, inscribed_m: float) -> FloatArray:
     """Least seconds from each place to the goal for a disc of the inscribed radius; infinite where there is no way."""
-    field, frame, _, weights = space
+    field, weights = space.field, space.weights
+    values, least_m = field.values, inscribed_m - field.cell_m
     rows, columns = lattice.rows, lattice.columns
     factor = np.full((rows, columns), np.inf)
     for i in range(rows):
         for j in range(columns):
-            u = round((lattice.x0_m + j * lattice.cell_m - frame[1]) / frame[0])
-            v = round((lattice.y0_m + i * lattice.cell_m - frame[2]) / frame[0])
-            if 0 <= v < field.shape[0] and 0 <= u < field.shape[1] and field[v, u] > inscribed_m - frame[0]:
-                factor[i, j] = nearness(field[v, u] - inscribed_m + frame[0], weights)
+            u = round((lattice.x0_m + j * lattice.cell_m - field.x0_m) / field.cell_m)
+            v = round((lattice.y0_m + i * lattice.cell_m - field.y0_m) / field.cell_m)
+            if 0 <= v < values.shape[0] and 0 <= u < values.shape[1] and values[v, u] > least_m:
+                factor[i, j] = nearness(values[v, u] - inscribed_m + field.cell_m, weights)
     cost = np.full((rows, columns), np.inf)
     cost[goal_row, goal_column] = 0.0
     heap = [(0.0, goal_row * columns + goal_column)]
@@ -82,7 +63,7 @@ def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, 
             continue
         for a in range(max(0, i - 1), min(rows, i + 2)):
             for b in range(max(0, j - 1), min(columns, j + 2)):
-                way = math.hypot(a - i, b - j) * lattice.cell_m / weights[0]
+                way = math.hypot(a - i, b - j) * lattice.cell_m / weights.forward_m_s
                 new = here + way * factor[a, b]
                 if new < cost[a, b]:
                     cost[a, b] = new
@@ -98,7 +79,6 @@ def search(
     to_go: FloatArray,
     seeds: FloatArray,
     ends: FloatArray,
-    needs: Needs,
     greed: float,
     expansions: IntArray,
 ) -> IntArray:
@@ -137,7 +117,6 @@ def search(
             moves,
             seconds,
             to_go,
-            needs,
             int(index),
             cost,
             closed,
@@ -182,7 +161,6 @@ def _expand(
     moves: IntArray,
     seconds: FloatArray,
     to_go: FloatArray,
-    needs: Needs,
     index: int,
     cost: FloatArray,
     closed: NDArray[np.bool_],
@@ -198,9 +176,8 @@ def _expand(
     here[0], here[1] = lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m
     here[2] = lattice.yaws_rad[k]
     if math.isnan(clear[index]):
-        clear[index] = clearance_at(space.field, space.frame, space.discs, here[0], here[1], here[2])
-    near = math.hypot(here[0] - needs.x_m, here[1] - needs.y_m) < needs.escape_m
-    need = needs.escape_margin_m if near else needs.margin_m
+        clear[index] = clearance_at(space.field, here[0], here[1], here[2])
+    need = clearance_needed(space, here[0], here[1])
     for n in range(moves.shape[1]):
         a, b = i + moves[k, n, 1], j + moves[k, n, 0]
         if not (0 <= a < lattice.rows and 0 <= b < columns) or not to_go[a, b] < np.inf:
@@ -232,16 +209,16 @@ def _move_cost(
 ) -> float:
     """Cost of one move, checked at its end (kept in `clear`), and in between unless both ends have enough to spare."""
     if math.isnan(clear[new]):
-        clear[new] = clearance_at(space.field, space.frame, space.discs, there[0], there[1], there[2])
+        clear[new] = clearance_at(space.field, there[0], there[1], there[2])
     if clear[new] < need:
         return math.inf
-    way = math.hypot(there[0] - here[0], there[1] - here[1]) + space.weights[6] * abs(there[2] - here[2])
+    way = math.hypot(there[0] - here[0], there[1] - here[1]) + space.weights.turning_radius_m * abs(there[2] - here[2])
     steps = math.ceil(way / 0.12)
     if clear_here + clear[new] - way < 2.0 * need:
         for n in range(1, steps):
             t = n / steps
             pose = here + t * (there - here)
-            if clearance_at(space.field, space.frame, space.discs, pose[0], pose[1], pose[2]) < need:
+            if clearance_at(space.field, pose[0], pose[1], pose[2]) < need:
                 return math.inf
     return seconds * nearness(clear[new], space.weights)
 

@@ -1,21 +1,58 @@
-"""What a short motion costs: seconds at usual speeds, more near obstacles. Shared by search and shortcutting."""
+"""Cost of short motions: seconds at the usual speeds, more near obstacles. Search, smoothing and shortcuts share it."""
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import NamedTuple
 
 from skills.estimate.compiled import compiled
-from skills.navigate.footprint import clearance_at
+from skills.navigate.footprint import ClearanceField, clearance_at
 from skills.robot import FloatArray
 
 TURNING_RADIUS_M = 0.6
-"""How far (m) the outline moves with a turn of one radian, at least."""
-Weights = tuple[float, float, float, float, float, float, float]
-"""Speeds ahead, back, sideways (m/s) and turning (rad/s), then `soft_m` and `soft_weight` of the planner, and how far
-(m) the outline moves with a turn of one radian, at most."""
+"""Distance (m) that the outline moves in a turn of one radian, at least."""
+_PLAIN_STEP_M = 0.06
+_LONGEST_STEP_M = 0.3
+_SLOWER_SHARE = 0.3
+"""Share of the shorter of shift and turn by which doing both at once takes longer."""
+
+
+class Weights(NamedTuple):
+    """Speeds and factors of the cost: see `LatticePlanner`. `turning_radius_m` is the outline's reach in a turn."""
+
+    forward_m_s: float
+    backward_m_s: float
+    lateral_m_s: float
+    turn_rad_s: float
+    soft_m: float
+    soft_weight: float
+    turning_radius_m: float
+
+
+class Needs(NamedTuple):
+    """Required clearance: margin_m, or escape_margin_m within escape_m of the start (x, y)."""
+
+    margin_m: float
+    escape_margin_m: float
+    escape_m: float
+    x_m: float
+    y_m: float
+
+
+class Space(NamedTuple):
+    """Input of a plan: the sampled clearance, the required clearance, and the weights of the cost."""
+
+    field: ClearanceField
+    needs: Needs
+    weights: Weights
+
+
+@compiled
+def clearance_needed(space: Space, x: float, y: float) -> float:
+    """Clearance (m) that a pose at (x, y) needs."""
+    needs = space.needs
+    near = math.hypot(x - needs.x_m, y - needs.y_m) < needs.escape_m
+    return needs.escape_margin_m if near else needs.margin_m
 
 
 @compiled
@@ -23,62 +60,48 @@ def motion_seconds(dx: float, dy: float, dyaw: float, yaw: float, weights: Weigh
     """Seconds for a short motion (world dx, dy, dyaw) of a body that heads to yaw midway."""
     c, s = math.cos(yaw), math.sin(yaw)
     ahead, aside = c * dx + s * dy, -s * dx + c * dy
-    speed = weights[0] if ahead >= 0.0 else weights[1]
-    shift, turn = math.hypot(ahead / speed, aside / weights[2]), abs(dyaw) / weights[3]
-    return max(shift, turn) + 0.3 * min(shift, turn)
+    speed = weights.forward_m_s if ahead >= 0.0 else weights.backward_m_s
+    shift, turn = math.hypot(ahead / speed, aside / weights.lateral_m_s), abs(dyaw) / weights.turn_rad_s
+    return max(shift, turn) + _SLOWER_SHARE * min(shift, turn)
 
 
 @compiled
 def nearness(clearance: float, weights: Weights) -> float:
-    """The factor by which a clearance makes a motion dearer."""
-    short = min(max(0.0, (weights[4] - clearance) / weights[4]), 1.0)
-    return 1.0 + weights[5] * short * short
+    """Factor, 1 or more, by which a small clearance raises the cost of a motion."""
+    short = min(max(0.0, (weights.soft_m - clearance) / weights.soft_m), 1.0)
+    return 1.0 + weights.soft_weight * short * short
 
 
 @compiled
-def segment_cost(
-    field: NDArray[np.float32],
-    frame: tuple[float, float, float],
-    discs: FloatArray,
-    a: FloatArray,
-    b: FloatArray,
-    need: float,
-    weights: Weights,
-) -> float:
-    """Cost of going straight from pose a to pose b while turning evenly; infinite where clearance falls below need.
+def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> float:
+    """Cost of a straight motion from pose a to pose b with an even turn; infinite where clearance falls below need.
 
-    The yaws must differ by the turn that is meant (no wrapping here). Steps are as long as the clearance to spare,
-    since no point of the outline moves farther than that; at least 6 cm.
+    The yaws must differ by the meant turn (no wrapping here). Steps are as long as the clearance to spare, since no
+    point of the outline moves farther than that; at least 6 cm.
     """
     dx, dy, dyaw = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    way = max(1e-9, math.hypot(dx, dy) + weights[6] * abs(dyaw))
+    way = max(1e-9, math.hypot(dx, dy) + space.weights.turning_radius_m * abs(dyaw))
     cost, gone, spare = 0.0, 0.0, 0.0
     while gone < 1.0:
-        part = min(1.0 - gone, max(0.06, min(0.3, spare)) / way)
+        part = min(1.0 - gone, max(_PLAIN_STEP_M, min(_LONGEST_STEP_M, spare)) / way)
         gone = 1.0 if part >= 1.0 - gone else gone + part
-        least = clearance_at(field, frame, discs, a[0] + gone * dx, a[1] + gone * dy, a[2] + gone * dyaw)
+        least = clearance_at(space.field, a[0] + gone * dx, a[1] + gone * dy, a[2] + gone * dyaw)
         if least < need:
             return math.inf
         spare = least - need
-        seconds = motion_seconds(part * dx, part * dy, part * dyaw, a[2] + (gone - 0.5 * part) * dyaw, weights)
-        cost += seconds * nearness(least, weights)
+        midway = a[2] + (gone - 0.5 * part) * dyaw
+        cost += motion_seconds(part * dx, part * dy, part * dyaw, midway, space.weights) * nearness(
+            least, space.weights
+        )
     return cost
 
 
 @compiled
-def drive_cost(
-    field: NDArray[np.float32],
-    frame: tuple[float, float, float],
-    discs: FloatArray,
-    a: FloatArray,
-    b: FloatArray,
-    need: float,
-    weights: Weights,
-) -> tuple[float, float]:
+def drive_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> tuple[float, float]:
     """Cost of a turn on the spot, a straight and a turn from pose a to pose b, and the yaw on the straight.
 
     Ahead or back, whichever is cheaper; infinite, with the nearer yaw, where neither is free. The yaw differs from a's
-    by the turn that is meant.
+    by the meant turn.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     moved = math.hypot(dx, dy) > 1e-6
@@ -90,11 +113,11 @@ def drive_cost(
     for back in range(2 if moved else 1):
         corner[2] = end[2] = a[2] + _half_turn(course + back * math.pi - a[2])
         last[2] = end[2] + _half_turn(b[2] - end[2])
-        cost = segment_cost(field, frame, discs, corner, end, need, weights)
+        cost = segment_cost(space, corner, end, need)
         if cost < best:
-            cost += segment_cost(field, frame, discs, a, corner, need, weights)
+            cost += segment_cost(space, a, corner, need)
         if cost < best:
-            cost += segment_cost(field, frame, discs, end, last, need, weights)
+            cost += segment_cost(space, end, last, need)
         if cost < best:
             best, heading = cost, corner[2]
     return best, heading

@@ -7,20 +7,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skills.api import FreeSpace
 from skills.estimate.compiled import compiled
 from skills.geometry import wrap
 from skills.navigate.follower import Drive, FollowerOptions, PathFollower
-from skills.navigate.footprint import Footprint, clearance_at, footprint_clearance_m
+from skills.navigate.footprint import (
+    ClearanceField,
+    Footprint,
+    clearance_at,
+    clearance_on_grid,
+    footprint_clearance_m,
+)
 from skills.navigate.path import Path
 from skills.quantities import Count, Duration, Factor, Margin, Speed, TurnRate
 from skills.robot import FloatArray, Pose2D
 
-_CELL_M, _NOISES = 0.08, 8
+_CELL_M = 0.08
+_HALF_M = 2.8
+_NOISES = 8
+_NEAR_GOAL_M = 0.3
 _CORNER_M_S = 0.15
 """Slower than this a base that cannot go sideways is at a corner of its path."""
 
@@ -69,7 +78,7 @@ class MppiController(PathFollower):
     ) -> Drive:
         """As the path follower's, with the velocity of the weighted rollouts where the way ahead is free."""
         plain = super().command(pose, velocity, last, costmap, most_m_s)
-        if plain.remaining_m < 0.3 or plain.blocked_at is not None or not any(plain.velocity):
+        if plain.remaining_m < _NEAR_GOAL_M or plain.blocked_at is not None or not any(plain.velocity):
             self._plan = None
             return plain
         here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
@@ -79,28 +88,8 @@ class MppiController(PathFollower):
             return plain
         nominal = feed if self._plan is None else self._shifted(self._plan)
         self._tick += 1
-        field, frame = _sampled(costmap, pose)
-        options = self._mppi
-        lateral_m_s = options.lateral_m_s if self._sideways else 0.0
-        limits = np.array([options.max_speed_m_s, options.backward_m_s, lateral_m_s, options.turn_rad_s])
-        rates = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
-        weights = np.array([options.yaw_m, options.clearance_weight, options.change_weight, options.near_m])
-        self._plan = _improved(
-            field,
-            frame,
-            self._footprint.discs,
-            here,
-            last,
-            nominal,
-            feed,
-            self._noise[self._tick % _NOISES],
-            reference,
-            limits,
-            rates * options.step_s,
-            weights,
-            options.step_s,
-            options.temperature,
-        )
+        field, noise = self._sampled(costmap, pose), self._noise[self._tick % _NOISES]
+        self._plan = _improved(field, self._rollout(), here, last, nominal, feed, noise, reference)
         wanted = self._slew(self._clip(self._plan[0]), last)
         now_m = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
         wanted = wanted if now_m > 0.0 else np.array(plain.velocity)
@@ -122,6 +111,21 @@ class MppiController(PathFollower):
         poses[:, 2] += here[2] - poses[0, 2] + wrap(poses[0, 2] - here[2])
         return np.ascontiguousarray(poses[1:]), np.ascontiguousarray(feed)
 
+    def _sampled(self, costmap: FreeSpace, pose: Pose2D) -> ClearanceField:
+        """Clearance on a grid about the robot."""
+        offsets = np.arange(-_HALF_M, _HALF_M + _CELL_M, _CELL_M)
+        values = clearance_on_grid(costmap, pose.x_m + offsets, pose.y_m + offsets).astype(np.float32)
+        return ClearanceField(values, _CELL_M, pose.x_m - _HALF_M, pose.y_m - _HALF_M, self._footprint.discs)
+
+    def _rollout(self) -> _Rollout:
+        """The options as the compiled loop takes them."""
+        options = self._mppi
+        lateral_m_s = options.lateral_m_s if self._sideways else 0.0
+        limits = np.array([options.max_speed_m_s, options.backward_m_s, lateral_m_s, options.turn_rad_s])
+        rates = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
+        weights = (options.yaw_m, options.clearance_weight, options.change_weight)
+        return _Rollout(limits, rates * options.step_s, *weights, options.near_m, options.step_s, options.temperature)
+
     def _shifted(self, plan: FloatArray) -> FloatArray:
         """The last plan as it looks a control period later."""
         share = min(1.0, self._mppi.period_s / self._mppi.step_s)
@@ -139,32 +143,32 @@ def _noise(options: MppiOptions) -> FloatArray:
     return np.ascontiguousarray(white)
 
 
-def _sampled(costmap: FreeSpace, pose: Pose2D) -> tuple[NDArray[np.float32], tuple[float, float, float]]:
-    """Clearance on a grid about the robot, and the grid's frame (see `clearance_at`)."""
-    offsets = np.arange(-2.8, 2.8 + _CELL_M, _CELL_M)
-    points = np.stack(np.meshgrid(pose.x_m + offsets, pose.y_m + offsets), axis=-1).reshape(-1, 2)
-    field = costmap.clearance_m(points).reshape(len(offsets), -1).astype(np.float32)
-    return field, (_CELL_M, pose.x_m - 2.8, pose.y_m - 2.8)
+class _Rollout(NamedTuple):
+    """Speed limits (ahead, back, sideways, turning), the most change per step, and weights: see `MppiOptions`."""
+
+    limits: FloatArray
+    rates: FloatArray
+    yaw_m: float
+    clearance_weight: float
+    change_weight: float
+    near_m: float
+    step_s: float
+    temperature: float
 
 
 @compiled
 def _improved(
-    field: NDArray[np.float32],
-    frame: tuple[float, float, float],
-    discs: FloatArray,
+    field: ClearanceField,
+    rollout: _Rollout,
     here: FloatArray,
     last: FloatArray,
     nominal: FloatArray,
     feed: FloatArray,
     noise: FloatArray,
     reference: FloatArray,
-    limits: FloatArray,
-    rates: FloatArray,
-    weights: FloatArray,
-    step_s: float,
-    temperature: float,
 ) -> FloatArray:
     """The plan (steps, 3) of body-frame velocities after one round of sampling about `nominal` and, once, `feed`."""
+    limits, rates, step_s = rollout.limits, rollout.rates, rollout.step_s
     samples, steps = noise.shape[0], noise.shape[1]
     plans = np.empty((samples, steps, 3))
     costs = np.zeros(samples)
@@ -185,17 +189,17 @@ def _improved(
             y += step_s * (s * v[0] + c * v[1])
             yaw += step_s * v[2]
             dx, dy, turn = x - reference[n, 0], y - reference[n, 1], yaw - reference[n, 2]
-            cost = dx * dx + dy * dy + (weights[0] * turn) ** 2
-            clear = clearance_at(field, frame, discs, x, y, yaw)
-            if clear < weights[3]:
-                cost += weights[1] * (weights[3] - clear) ** 2
+            cost = dx * dx + dy * dy + (rollout.yaw_m * turn) ** 2
+            clear = clearance_at(field, x, y, yaw)
+            if clear < rollout.near_m:
+                cost += rollout.clearance_weight * (rollout.near_m - clear) ** 2
             if clear < 0.0:
                 cost += 1.0
             for axis in range(3):
-                cost += weights[2] * (v[axis] - before[axis]) ** 2
+                cost += rollout.change_weight * (v[axis] - before[axis]) ** 2
             costs[k] += cost / steps
             before[:] = v
-    shares = np.exp((costs.min() - costs) / temperature)
+    shares = np.exp((costs.min() - costs) / rollout.temperature)
     shares /= shares.sum()
     plan = np.zeros((steps, 3))
     for k in range(samples):

@@ -37,13 +37,18 @@ class Path:
         return Pose2D(*self.poses[-1].tolist())
 
     def progress_m(self) -> FloatArray:
-        """Way up to each pose (N,), turns included by TURN_M_PER_RAD."""
-        steps = np.diff(self.poses, axis=0)
-        ways = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.abs(steps[:, 2])
-        return np.concatenate([[0.0], np.cumsum(ways)])
+        """Distance (m) up to each pose (N,), turns included by TURN_M_PER_RAD."""
+        return progress_m(self.poses)
+
+
+def progress_m(poses: FloatArray) -> FloatArray:
+    """Distance (m) along poses (N, 3) with continuous yaw up to each of them (N,), turns included by TURN_M_PER_RAD."""
+    steps = np.diff(poses, axis=0)
+    lengths = np.hypot(steps[:, 0], steps[:, 1]) + TURN_M_PER_RAD * np.abs(steps[:, 2])
+    return np.concatenate([[0.0], np.cumsum(lengths)])[: len(poses)]
 
 
 def path_length(path: Path) -> float:
-    """Metres travelled along a path, turns left out."""
+    """Length (m) of a path without its turns."""
     steps = np.diff(path.poses[:, :2], axis=0)
     return float(np.sum(np.hypot(steps[:, 0], steps[:, 1])))

@@ -10,11 +10,10 @@ import numpy as np
 
 from skills.api import FreeSpace
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.navigate.obstacles import with_discs
 from skills.perception.people import SeenPerson
 from skills.quantities import Delay, Length, Margin, Speed
 from skills.robot import FloatArray, Pose2D
-
-__all__ = ["Pace", "PaceManager", "SpaceOptions", "WithPeople", "outline_distance_m", "spaced"]
 
 
 @dataclass(frozen=True)
@@ -41,25 +40,10 @@ class SpaceOptions:
     away_m: Length = 0.3
 
 
-@dataclass(frozen=True)
-class WithPeople:
-    """A costmap in which each person (x, y, radius in m) takes up a disc beyond what sensors see of them."""
-
-    costmap: FreeSpace
-    discs: FloatArray
-
-    def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """Distance from each (x, y) row to the nearest obstacle or disc."""
-        points = np.asarray(points_W, dtype=np.float64)
-        offsets = points[:, None, :2] - self.discs[None, :, :2]
-        nearest = np.min(np.linalg.norm(offsets, axis=2) - self.discs[None, :, 2], axis=1)
-        return np.asarray(np.minimum(self.costmap.clearance_m(points), nearest))
-
-
 def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence[SeenPerson]) -> FloatArray:
     """Distances (N, people) from the outline at poses (N, 3) to people's axes."""
     places = np.array([one.place_W for one in people], dtype=np.float64).reshape(-1, 2)
-    centres = disc_centres(footprint, poses)
+    centres = disc_centres(footprint.discs, poses)
     offsets = np.linalg.norm(centres[:, :, None, :] - places[None, None, :, :], axis=3)
     return np.asarray(np.min(offsets - footprint.discs[None, :, 2:3], axis=1))
 
@@ -77,7 +61,7 @@ def spaced(
         return costmap
     least = np.min(outline_distance_m(footprint, pose_array(fixed), people), axis=0) - slack_m
     radii = np.clip(least, 0.0, room_m)
-    return WithPeople(costmap, np.column_stack([[one.place_W for one in people], radii]))
+    return with_discs(costmap, np.column_stack([[one.place_W for one in people], radii]))
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from skills.api import NO_WORK_COUNTER, FreeSpace, PlanningError, WorkCounter
 from skills.geometry import wrap
 from skills.navigate.differential import CELL_SHARE, Links, courses, drives, links
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_at
-from skills.navigate.lattice import Lattice, Needs, Space, cost_to_go, lattice_moves, search
-from skills.navigate.motion_cost import TURNING_RADIUS_M, Weights, segment_cost
+from skills.navigate.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
+from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
+from skills.navigate.motion_cost import TURNING_RADIUS_M, Needs, Space, Weights, segment_cost
 from skills.navigate.path import Path
 from skills.navigate.smoothing import clearances, densify, relax, shortcut
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
@@ -23,6 +23,9 @@ from skills.robot import BaseKind, FloatArray, Pose2D
 
 FIELD_CELL_M = 0.05
 STEP_M = 0.06
+_SHORTCUT_POSES = 25
+_RELAX_ROUNDS = 60
+_RELAX_CLEARANCE_M = 0.25
 
 
 class NoWayError(PlanningError):
@@ -58,7 +61,7 @@ class LatticePlanner:
 
     def weights(self, footprint: Footprint) -> Weights:
         """The numbers that a motion's cost depends on, for the compiled loops."""
-        return (
+        return Weights(
             self.forward_m_s,
             self.backward_m_s,
             self.lateral_m_s,
@@ -85,9 +88,9 @@ class LatticePlanner:
 
 @dataclass(frozen=True)
 class Problem:
-    """A costmap sampled around start and goal, with all that a plan needs: a snapshot, safe to plan in a thread."""
+    """Input of one plan: the clearance sampled around start and goal; a snapshot, safe to plan on in a thread."""
 
-    space: Space
+    field: ClearanceField
     footprint: Footprint
     start: Pose2D
     goal: Pose2D
@@ -127,13 +130,11 @@ def problem_of(
     low = np.minimum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) - margin_m
     high = np.maximum([start.x_m, start.y_m], [goal.x_m, goal.y_m]) + margin_m
     xs, ys = (np.arange(low[axis], high[axis] + FIELD_CELL_M, FIELD_CELL_M) for axis in (0, 1))
-    points = np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2)
-    field = costmap.clearance_m(points).reshape(len(ys), len(xs)).astype(np.float32)
-    rows, columns = _used(field.max(axis=1)), _used(field.max(axis=0))
-    field = field[rows, columns]
-    frame = (FIELD_CELL_M, float(xs[columns.start]), float(ys[rows.start]))
-    space = Space(np.ascontiguousarray(field), frame, footprint.discs, options.weights(footprint))
-    return Problem(space, footprint, start, goal, options, work)
+    values = clearance_on_grid(costmap, xs, ys).astype(np.float32)
+    rows, columns = _used(values.max(axis=1)), _used(values.max(axis=0))
+    corner = float(xs[columns.start]), float(ys[rows.start])
+    field = ClearanceField(np.ascontiguousarray(values[rows, columns]), FIELD_CELL_M, *corner, footprint.discs)
+    return Problem(field, footprint, start, goal, options, work)
 
 
 def _used(best: NDArray[np.float32]) -> slice:
@@ -155,12 +156,12 @@ def solve(problem: Problem) -> Path:
 
 def _solve(problem: Problem) -> Path:
     """The cheapest way with the margin that is wanted."""
-    needs = _needs(problem)
+    space = Space(problem.field, _needs(problem), problem.options.weights(problem.footprint))
     _check_goal(problem)
     for yaw0_rad in (0.0, problem.goal.yaw_rad) if problem.sideways else (0.0,):
-        rough = _search(problem, needs, yaw0_rad)
+        rough = _search(problem, space, yaw0_rad)
         if rough is not None:
-            return _smooth(problem, rough, needs)
+            return _smooth(problem, space, rough)
     places = f"from {_place(problem.start)} to {_place(problem.goal)}"
     raise NoWayError(f"There is no way {places} that the robot fits through{_because(problem.footprint)}.")
 
@@ -175,14 +176,9 @@ def _place(pose: Pose2D) -> str:
     return f"({pose.x_m:.2f}, {pose.y_m:.2f})"
 
 
-def _clearance(problem: Problem, pose: Pose2D) -> float:
-    space = problem.space
-    return clearance_at(space.field, space.frame, space.discs, pose.x_m, pose.y_m, pose.yaw_rad)
-
-
 def _needs(problem: Problem) -> Needs:
     """The clearance wanted; around a blocked start, what the start itself has."""
-    options, clearance = problem.options, _clearance(problem, problem.start)
+    options, clearance = problem.options, clearance_at(problem.field, *_row(problem.start))
     if clearance < -options.deepest_start_m:
         raise PlanningError(f"The robot stands in something at {_place(problem.start)}, so no way can begin there.")
     escape = min(options.margin_m, clearance - 0.015)
@@ -190,7 +186,7 @@ def _needs(problem: Problem) -> Needs:
 
 
 def _check_goal(problem: Problem) -> None:
-    clearance = _clearance(problem, problem.goal)
+    clearance = clearance_at(problem.field, *_row(problem.goal))
     if clearance >= problem.options.margin_m:
         return
     needed = f"would have {clearance:.2f} m to the nearest thing there and needs {problem.options.margin_m:.2f} m"
@@ -200,32 +196,26 @@ def _check_goal(problem: Problem) -> None:
 
 def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:
     """The lattice with the goal on one of its places, over the whole field; the goal's row and column."""
-    cell, (resolution, x0, y0) = problem.options.cell_m, problem.space.frame
-    cell *= 1.0 if problem.sideways else CELL_SHARE
-    rows, columns = problem.space.field.shape
-    row, column = int((problem.goal.y_m - y0) / cell), int((problem.goal.x_m - x0) / cell)
-    above = int((y0 + (rows - 1) * resolution - problem.goal.y_m) / cell)
-    beside = int((x0 + (columns - 1) * resolution - problem.goal.x_m) / cell)
-    corner = (problem.goal.x_m - column * cell, problem.goal.y_m - row * cell)
+    field, goal = problem.field, problem.goal
+    cell = problem.options.cell_m * (1.0 if problem.sideways else CELL_SHARE)
+    rows, columns = field.values.shape
+    row, column = int((goal.y_m - field.y0_m) / cell), int((goal.x_m - field.x0_m) / cell)
+    above = int((field.y0_m + (rows - 1) * field.cell_m - goal.y_m) / cell)
+    beside = int((field.x0_m + (columns - 1) * field.cell_m - goal.x_m) / cell)
+    corner = (goal.x_m - column * cell, goal.y_m - row * cell)
     shape = (row + above + 1, column + beside + 1)
     yaws, _ = _courses(problem.options.headings if problem.sideways else None)
     return Lattice(*corner, cell, yaw0_rad + yaws, *shape, len(yaws)), row, column
 
 
-def _segment(problem: Problem, a: FloatArray, b: FloatArray, need: float) -> float:
-    space = problem.space
-    return segment_cost(space.field, space.frame, space.discs, a, b, need, space.weights)
+def _row(pose: Pose2D) -> FloatArray:
+    """The pose as x, y (m), yaw (rad)."""
+    return np.array([pose.x_m, pose.y_m, pose.yaw_rad])
 
 
-def _poses(problem: Problem) -> tuple[FloatArray, FloatArray]:
-    """Starts and goal as rows x, y, yaw."""
-    start, goal = (np.array([p.x_m, p.y_m, p.yaw_rad]) for p in (problem.start, problem.goal))
-    return start, goal
-
-
-def _seeds(problem: Problem, lattice: Lattice, needs: Needs) -> Links:
-    """Lattice states next to the start that it can be left to."""
-    start, turn = _poses(problem)[0], 2.0 * math.pi / lattice.headings
+def _seeds(space: Space, lattice: Lattice, start: FloatArray) -> Links:
+    """The lattice states next to the start that a free segment leads to."""
+    turn = 2.0 * math.pi / lattice.headings
     column, row = (start[0] - lattice.x0_m) / lattice.cell_m, (start[1] - lattice.y0_m) / lattice.cell_m
     k = math.floor((start[2] - lattice.yaws_rad[0]) / turn)
     seeds: Links = {}
@@ -234,20 +224,20 @@ def _seeds(problem: Problem, lattice: Lattice, needs: Needs) -> Links:
             for heading in (k, k + 1):
                 yaw = lattice.yaws_rad[0] + heading * turn
                 pose = np.array([lattice.x0_m + j * lattice.cell_m, lattice.y0_m + i * lattice.cell_m, yaw])
-                cost = _segment(problem, start, pose, needs.escape_margin_m)
+                cost = segment_cost(space, start, pose, space.needs.escape_margin_m)
                 if math.isfinite(cost):
                     seeds[(i * lattice.columns + j) * lattice.headings + heading % lattice.headings] = (cost, ())
     return seeds
 
 
-def _final_turns(problem: Problem, lattice: Lattice, goal_cell: int) -> Links:
+def _final_turns(space: Space, lattice: Lattice, goal: FloatArray, goal_cell: int) -> Links:
     """Turns at the goal from each heading to the goal's, by one heading's width at most."""
-    goal, turn = _poses(problem)[1], 2.0 * math.pi / lattice.headings
+    turn = 2.0 * math.pi / lattice.headings
     turns: Links = {}
     for k in range(lattice.headings):
-        off = wrap(float(lattice.yaws_rad[k]) - problem.goal.yaw_rad)
+        off = wrap(float(lattice.yaws_rad[k]) - float(goal[2]))
         if abs(off) < turn:
-            cost = _segment(problem, goal + np.array([0.0, 0.0, off]), goal, problem.options.margin_m)
+            cost = segment_cost(space, goal + np.array([0.0, 0.0, off]), goal, space.needs.margin_m)
             turns[goal_cell * lattice.headings + k] = (cost, ())
     return turns
 
@@ -265,29 +255,19 @@ def _rows(found: Links) -> FloatArray:
     return np.array(sorted((float(state), cost) for state, (cost, _) in found.items()), dtype=np.float64).reshape(-1, 2)
 
 
-def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | None:
+def _search(problem: Problem, space: Space, yaw0_rad: float) -> FloatArray | None:
     """Lattice poses from start to goal with continuous yaw, None when there is no way."""
     lattice, row, column = _lattice(problem, yaw0_rad)
-    start, goal = _poses(problem)
+    start, goal = _row(problem.start), _row(problem.goal)
     if problem.sideways:
-        seeds, ends = _seeds(problem, lattice, needs), _final_turns(problem, lattice, row * lattice.columns + column)
+        seeds = _seeds(space, lattice, start)
+        ends = _final_turns(space, lattice, goal, row * lattice.columns + column)
     else:
-        seeds = links(problem.space, lattice, start, needs, to_pose=False)
-        ends = links(problem.space, lattice, goal, needs, to_pose=True)
-    to_go = cost_to_go(problem.space, lattice, row, column, problem.footprint.inscribed_m)
+        seeds, ends = links(space, lattice, start, to_pose=False), links(space, lattice, goal, to_pose=True)
+    to_go = cost_to_go(space, lattice, row, column, problem.footprint.inscribed_m)
     expansions = np.zeros(1, dtype=np.int64)
     _, moves = _courses(problem.options.headings if problem.sideways else None)
-    states = search(
-        problem.space,
-        lattice,
-        moves,
-        to_go,
-        _rows(seeds),
-        _rows(ends),
-        needs,
-        problem.options.greed,
-        expansions,
-    )
+    states = search(space, lattice, moves, to_go, _rows(seeds), _rows(ends), problem.options.greed, expansions)
     problem.work.count("planner_expansions", int(expansions[0]))
     if len(states) == 0:
         return None
@@ -301,12 +281,12 @@ def _search(problem: Problem, needs: Needs, yaw0_rad: float) -> FloatArray | Non
     return np.ascontiguousarray(poses)
 
 
-def _smooth(problem: Problem, rough: FloatArray, needs: Needs) -> Path:
-    """Shortcut, fill in and relax."""
-    knots = shortcut(problem.space, rough, needs, 25, problem.sideways)
-    if not problem.sideways:
-        poses = densify(drives(problem.space, knots, needs), STEP_M)
-        return Path(poses, clearances(problem.space, poses))
-    band = relax(problem.space, densify(knots, STEP_M), 60, problem.options.margin_m, 0.25)
-    poses = densify(band, STEP_M)
-    return Path(poses, clearances(problem.space, poses))
+def _smooth(problem: Problem, space: Space, rough: FloatArray) -> Path:
+    """The rough path with shortcuts, relaxed like an elastic band, or with rounded corners for a differential base."""
+    knots = shortcut(space, rough, _SHORTCUT_POSES, problem.sideways)
+    if problem.sideways:
+        knots = relax(space, densify(knots, STEP_M), _RELAX_ROUNDS, problem.options.margin_m, _RELAX_CLEARANCE_M)
+    else:
+        knots = drives(space, knots)
+    poses = densify(knots, STEP_M)
+    return Path(poses, clearances(space, poses))

@@ -8,13 +8,12 @@ import numpy as np
 
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
-from skills.navigate.lattice import Needs, Space
-from skills.navigate.motion_cost import drive_cost, segment_cost
+from skills.navigate.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost
 from skills.robot import FloatArray
 
 
 @compiled
-def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int, sideways: bool) -> FloatArray:
+def shortcut(space: Space, poses: FloatArray, window: int, sideways: bool) -> FloatArray:
     """The cheapest choice of (N, 3) poses to go through in straight lines, skipping at most `window` at a time.
 
     The first and the last are kept; yaws must be continuous. A base that cannot go sideways turns to each line first.
@@ -25,12 +24,11 @@ def shortcut(space: Space, poses: FloatArray, needs: Needs, window: int, sideway
     best[0] = 0.0
     for j in range(1, count):
         for i in range(max(0, j - window), j):
-            near = math.hypot(poses[i, 0] - needs.x_m, poses[i, 1] - needs.y_m) < needs.escape_m
-            need = needs.escape_margin_m if near else needs.margin_m
+            need = clearance_needed(space, poses[i, 0], poses[i, 1])
             if sideways:
-                cost = segment_cost(space.field, space.frame, space.discs, poses[i], poses[j], need, space.weights)
+                cost = segment_cost(space, poses[i], poses[j], need)
             else:
-                cost = drive_cost(space.field, space.frame, space.discs, poses[i], poses[j], need, space.weights)[0]
+                cost = drive_cost(space, poses[i], poses[j], need)[0]
             if j - i == 1:
                 cost = min(cost, 1e6)
             if best[i] + cost < best[j]:
@@ -49,7 +47,7 @@ def densify(poses: FloatArray, step_m: float) -> FloatArray:
     counts = np.empty(len(poses) - 1, dtype=np.int64)
     for n in range(len(counts)):
         way = math.hypot(poses[n + 1, 0] - poses[n, 0], poses[n + 1, 1] - poses[n, 1])
-        counts[n] = max(1, math.ceil((way + 0.6 * abs(poses[n + 1, 2] - poses[n, 2])) / step_m))
+        counts[n] = max(1, math.ceil((way + TURNING_RADIUS_M * abs(poses[n + 1, 2] - poses[n, 2])) / step_m))
     dense = np.empty((counts.sum() + 1, 3))
     dense[0], row = poses[0], 1
     for n in range(len(counts)):
@@ -69,7 +67,7 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
     count = poses.shape[0]
     clearance = np.empty(count)
     for n in range(count):
-        clearance[n] = clearance_at(space.field, space.frame, space.discs, poses[n, 0], poses[n, 1], poses[n, 2])
+        clearance[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])
     for _ in range(rounds):
         for n in range(1, count - 1):
             x = 0.5 * poses[n, 0] + 0.25 * (poses[n - 1, 0] + poses[n + 1, 0])
@@ -80,7 +78,7 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
                 gx, gy = _uphill(space, x, y, yaw)
                 push = 0.02 * (wide_m - clearance[n]) / wide_m
                 x, y = x + push * gx, y + push * gy
-            new = clearance_at(space.field, space.frame, space.discs, x, y, yaw)
+            new = clearance_at(space.field, x, y, yaw)
             if new >= min(margin_m, clearance[n]):
                 poses[n, 0], poses[n, 1], poses[n, 2], clearance[n] = x, y, yaw, new
     return poses
@@ -101,10 +99,10 @@ def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
 def _uphill(space: Space, x: float, y: float, yaw: float) -> tuple[float, float]:
     """Direction in which the clearance grows, length up to 1."""
     h = 0.03
-    gx = clearance_at(space.field, space.frame, space.discs, x + h, y, yaw)
-    gx -= clearance_at(space.field, space.frame, space.discs, x - h, y, yaw)
-    gy = clearance_at(space.field, space.frame, space.discs, x, y + h, yaw)
-    gy -= clearance_at(space.field, space.frame, space.discs, x, y - h, yaw)
+    gx = clearance_at(space.field, x + h, y, yaw)
+    gx -= clearance_at(space.field, x - h, y, yaw)
+    gy = clearance_at(space.field, x, y + h, yaw)
+    gy -= clearance_at(space.field, x, y - h, yaw)
     size = max(math.hypot(gx, gy), 2.0 * h)
     return gx / size, gy / size
 
@@ -114,5 +112,5 @@ def clearances(space: Space, poses: FloatArray) -> FloatArray:
     """Clearance (m) of the footprint at each of (N, 3) poses."""
     values = np.empty(poses.shape[0])
     for n in range(poses.shape[0]):
-        values[n] = clearance_at(space.field, space.frame, space.discs, poses[n, 0], poses[n, 1], poses[n, 2])
+        values[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])
     return values

@@ -155,7 +155,7 @@ def least_apart_m(robots: Mapping[str, ScriptedRobot]) -> float:
     placed = []
     for robot in robots.values():
         footprint = Footprint.of(robot.capabilities())
-        placed.append((disc_centres(footprint, pose_array([robot.pose]))[0], footprint.discs[:, 2]))
+        placed.append((disc_centres(footprint.discs, pose_array([robot.pose]))[0], footprint.discs[:, 2]))
     least = math.inf
     for number, (centres, radii) in enumerate(placed):
         for others, other_radii in placed[number + 1 :]:

@@ -3,27 +3,26 @@ import math
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import signed_distance
+from skills.estimate.grid_map import GridMap
 from skills.mapping.closures import Window, find_pose
 from skills.robot import Pose2D
 
 CELL_M = 0.05
-FRAME = (CELL_M, 0.0, 0.0)
 
 
-def field(*boxes: tuple[float, float, float, float]) -> np.ndarray:
+def field(*boxes: tuple[float, float, float, float]) -> GridMap:
     occupied = np.zeros((200, 240), dtype=np.bool_)
     for x0, y0, x1, y1 in boxes:
         occupied[round(y0 / CELL_M) : round(y1 / CELL_M), round(x0 / CELL_M) : round(x1 / CELL_M)] = True
-    return signed_distance(occupied, CELL_M)
+    return GridMap(occupied, CELL_M, (0.0, 0.0))
 
 
 ROOM = ((1.0, 1.0, 9.0, 1.1), (1.0, 7.0, 9.0, 7.1), (1.0, 1.0, 1.1, 7.1), (9.0, 1.0, 9.1, 7.1), (3.0, 1.0, 4.0, 2.0))
 
 
-def seen_from(distance: np.ndarray, pose: Pose2D) -> np.ndarray:
+def seen_from(grid: GridMap, pose: Pose2D) -> np.ndarray:
     """The surface cells as seen from a pose."""
-    rows, columns = np.nonzero(np.abs(distance) < CELL_M)
+    rows, columns = np.nonzero(np.abs(grid.distance) < CELL_M)
     x, y = (columns + 0.5) * CELL_M - pose.x_m, (rows + 0.5) * CELL_M - pose.y_m
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return np.column_stack([c * x + s * y, -s * x + c * y])[::4]
@@ -31,8 +30,8 @@ def seen_from(distance: np.ndarray, pose: Pose2D) -> np.ndarray:
 
 @pytest.mark.parametrize("true", [Pose2D(5.0, 4.0, 0.1), Pose2D(6.3, 5.2, -0.15)])
 def test_finds_the_pose_in_a_wide_window(true):
-    distance = field(*ROOM)
-    found = find_pose(distance, FRAME, seen_from(distance, true), Pose2D(5.5, 4.5, 0.0), Window(2.0, 0.3))
+    grid = field(*ROOM)
+    found = find_pose(grid, seen_from(grid, true), Pose2D(5.5, 4.5, 0.0), Window(2.0, 0.3))
     assert found is not None
     assert math.hypot(found.pose.x_m - true.x_m, found.pose.y_m - true.y_m) < 0.1
     assert abs(found.pose.yaw_rad - true.yaw_rad) < math.radians(2.0)
@@ -40,10 +39,11 @@ def test_finds_the_pose_in_a_wide_window(true):
 
 
 def test_equals_the_best_of_an_exhaustive_search():
-    distance = field(*ROOM)
-    points = seen_from(distance, Pose2D(5.0, 4.0, 0.0))
-    found = find_pose(distance, FRAME, points, Pose2D(5.3, 4.3, 0.0), Window(0.8, 0.0))
+    grid = field(*ROOM)
+    points = seen_from(grid, Pose2D(5.0, 4.0, 0.0))
+    found = find_pose(grid, points, Pose2D(5.3, 4.3, 0.0), Window(0.8, 0.0))
     assert found is not None
+    distance = grid.distance
     half = 0.05  # the search ends at squares of 0.1 m, whose middles it scores
     steps = np.arange(-0.75, 0.76, 2 * half)
     scores = []
@@ -57,14 +57,14 @@ def test_equals_the_best_of_an_exhaustive_search():
 
 
 def test_a_corridor_has_rivals():
-    distance = field((1.0, 3.0, 11.0, 3.1), (1.0, 5.0, 11.0, 5.1))
+    grid = field((1.0, 3.0, 11.0, 3.1), (1.0, 5.0, 11.0, 5.1))
     x = np.arange(-2.0, 2.0, 0.05)
     points = np.vstack([np.column_stack([x, np.full(len(x), side)]) for side in (-1.0, 1.0)])
-    found = find_pose(distance, FRAME, points, Pose2D(6.0, 4.05, 0.0), Window(2.0, 0.05))
+    found = find_pose(grid, points, Pose2D(6.0, 4.05, 0.0), Window(2.0, 0.05))
     assert found is not None and found.rival_score > 0.9 * found.score
 
 
 def test_nothing_is_found_where_nothing_fits():
-    distance = field(*ROOM)
+    grid = field(*ROOM)
     circle = 0.8 * np.column_stack([np.cos(np.arange(0, 6.2, 0.05)), np.sin(np.arange(0, 6.2, 0.05))])
-    assert find_pose(distance, FRAME, circle, Pose2D(6.0, 4.5, 0.0), Window(1.0, 0.2)) is None
+    assert find_pose(grid, circle, Pose2D(6.0, 4.5, 0.0), Window(1.0, 0.2)) is None

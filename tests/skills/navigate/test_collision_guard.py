@@ -42,7 +42,7 @@ class Drive:
 
     def gap_m(self, there):
         """From the outline to the axis of the person."""
-        centres = disc_centres(FOOTPRINT, pose_array([self.bench.robot.pose]))[0]
+        centres = disc_centres(FOOTPRINT.discs, pose_array([self.bench.robot.pose]))[0]
         return float(np.min(np.linalg.norm(centres - there, axis=1) - FOOTPRINT.discs[:, 2]))
 
     def nearest_while_moving_m(self):

@@ -12,7 +12,8 @@ import pytest
 from executive.run.traffic_table import TrafficTable
 from skills.api import LocalisationEstimate, SkillContext
 from skills.navigate.footprint import Footprint
-from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_that_suits, reachable, with_bodies
+from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_that_suits, reachable
+from skills.navigate.obstacles import with_outlines
 from skills.robot import FloatArray, Pose2D, Robot
 from skills.stack import LocalController
 
@@ -39,21 +40,21 @@ def test_a_body_takes_up_its_discs() -> None:
     """| from the body's middle | clearance |
     | 1.5 m ahead | 1.0 |
     | in it | -0.3 at a disc's centre |"""
-    costmap = with_bodies(Open(), [(DISCS, np.array([[1.0, 0.0, 0.0]]))])
+    costmap = with_outlines(Open(), [(DISCS, np.array([[1.0, 0.0, 0.0]]))])
     clearance = costmap.clearance_m(np.array([[2.5, 0.0], [1.2, 0.0]]))
     assert clearance == pytest.approx([1.0, -0.3])
 
 
 def test_a_body_is_turned_with_its_pose() -> None:
     """A quarter turn puts the front disc to the left."""
-    costmap = with_bodies(Open(), [(DISCS, np.array([[0.0, 0.0, np.pi / 2.0]]))])
+    costmap = with_outlines(Open(), [(DISCS, np.array([[0.0, 0.0, np.pi / 2.0]]))])
     assert costmap.clearance_m(np.array([[0.0, 1.0]])) == pytest.approx([0.5])
 
 
 def test_nobody_about_leaves_the_costmap_as_it_is() -> None:
     """A robot alone plans as it always did."""
     costmap = Open()
-    assert with_bodies(costmap, []) is costmap
+    assert with_outlines(costmap, []) is costmap
 
 
 def test_places_behind_a_wall_are_not_reached() -> None:
@@ -180,7 +181,7 @@ def test_who_clears_a_reserved_way_is_no_obstacle_to_a_plan_that_found_none(
 
 def test_a_body_is_covered_to_its_corners() -> None:
     """The corner of an oblong lies beyond its round middle, and counts as well."""
-    costmap = with_bodies(Open(), [(FOOTPRINT.discs, np.zeros((1, 3)))])
+    costmap = with_outlines(Open(), [(FOOTPRINT.discs, np.zeros((1, 3)))])
     assert costmap.clearance_m(np.array([[0.65, 0.25]])) == pytest.approx([0.1], abs=0.02)
 
 

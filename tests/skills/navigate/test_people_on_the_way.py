@@ -57,7 +57,7 @@ class Drive:
         """From the outline to the axis of the nearest person or thing that was not surveyed."""
         there = [box for box in self.bench.robot.boxes if box.z1 == person_at(0.0, 0.0).z1]
         centres = np.array([(0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)) for box in there]).reshape(-1, 2)
-        discs = disc_centres(FOOTPRINT, pose_array([self.bench.robot.pose]))[0]
+        discs = disc_centres(FOOTPRINT.discs, pose_array([self.bench.robot.pose]))[0]
         offsets = np.linalg.norm(discs[:, None] - centres[None], axis=2) - FOOTPRINT.discs[:, 2:3]
         return float(np.min(offsets, initial=math.inf))
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from skills.navigate.footprint import Footprint
-from skills.navigate.people_space import PaceManager, SpaceOptions, WithPeople, outline_distance_m, spaced
+from skills.navigate.obstacles import with_discs
+from skills.navigate.people_space import PaceManager, SpaceOptions, outline_distance_m, spaced
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
@@ -106,7 +107,7 @@ def test_a_slow_errand_is_not_made_faster():
 
 
 def test_people_take_up_room_in_the_costmap():
-    costmap = WithPeople(Open(), np.array([[1.0, 0.0, 0.5], [9.0, 0.0, 0.5]]))
+    costmap = with_discs(Open(), np.array([[1.0, 0.0, 0.5], [9.0, 0.0, 0.5]]))
     assert costmap.clearance_m(np.array([[3.0, 0.0], [1.0, 0.3], [50.0, 0.0]])) == pytest.approx([1.5, -0.2, 5.0])
 
 

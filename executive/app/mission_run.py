@@ -42,7 +42,7 @@ from plant.worlds.world import World
 from skills.api import PlanningError, Publish, Worker
 from skills.estimate.grid_map import load_grid_map
 from skills.faults.fault_words import parse_fault
-from skills.faults.faulty_robot import FaultyRobot, with_faults
+from skills.faults.faulty_robot import FaultyRobot, inject_faults
 from skills.files.errors import InputError
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
@@ -169,7 +169,7 @@ def entry_for(prepared: Prepared, backend: Backend, durable: Durable | None) -> 
     faults = [each for each in every if not each.over_by(clock.now())]  # a resumed run may be past some faults
     return replace(
         entry,
-        robot=with_faults(entry.robot, clock, faults, since_s=0.0),
+        robot=inject_faults(entry.robot, clock, faults, since_s=0.0),
         after=prepared.after,
         speaker_W=prepared.speaker_W,
     )

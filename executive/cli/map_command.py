@@ -157,13 +157,13 @@ class _Building:
     def result(self) -> dict[str, Any]:
         """Saves the grids; returns the result as JSON values. Raises InputError."""
         from plant.referee.truth import trajectory_error_m
-        from skills.mapping.map_folder import save_grids, surveyed
+        from skills.mapping.map_folder import map_grids, save_grids
 
         mapper = self._mapper
         if not mapper.keyframes:
             raise InputError("no map was made", hint="look at the robot's LiDAR")
         with writing(self._out, _OTHER):
-            path = save_grids(self._out, surveyed(mapper))
+            path = save_grids(self._out, map_grids(mapper))
         self._draw()
         pairs = [
             (pose, self._true[round(frame.stamp_s, 4)])
@@ -174,7 +174,7 @@ class _Building:
             "world": self._world.name,
             "seed": self._seed,
             "map": str(path),
-            "distance_m": round(mapper.way_m, 2),
+            "distance_m": round(mapper.driven_m, 2),
             "loop_closures": len(mapper.graph.closures),
             "sim_time_s": round(self._simulation.clock.now(), 2),
             "wall_time_s": round(time.monotonic() - self._begun_s, 2),
@@ -185,7 +185,7 @@ class _Building:
         mapper, goal = self._mapper, self._survey.goal
         purpose = "" if goal is None else f", to {goal[0]}"
         self._console.print(
-            f"{now_s:6.0f} s  {mapper.way_m:6.1f} m  {len(mapper.keyframes)} keyframes, "
+            f"{now_s:6.0f} s  {mapper.driven_m:6.1f} m  {len(mapper.keyframes)} keyframes, "
             f"{len(mapper.graph.closures)} loops{purpose}",
             markup=False,
         )
@@ -197,7 +197,7 @@ class _Building:
             return
         goal = self._survey.goal
         picture = map_picture(
-            self._survey.known()[0], self._mapper.graph, self._mapper.pose, None if goal is None else goal[1]
+            self._survey.known_grid()[0], self._mapper.graph, self._mapper.pose, None if goal is None else goal[1]
         )
         draft = self._out / f".{PICTURE}"
         write_picture(draft, picture)

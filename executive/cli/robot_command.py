@@ -36,7 +36,7 @@ from skills.quantities import Delay, Port, Seed
 from skills.robot import Clock, LeaseError, Pose2D, Robot
 from skills.stack import default_stack
 from skills.teleop.driver import Teleop, TeleopOptions
-from skills.teleop.keys import KEYS, asked_by, read_asked
+from skills.teleop.keys import KEYS, axis_values, read_axis_values
 
 HOLDER: Final = "teleop"
 SAVE_KEY: Final = "p"
@@ -139,7 +139,7 @@ class TerminalKeys:
 
     def press(self, key: str) -> None:
         """Asks for what the key means; save with its key; any other stops the robot."""
-        self._hands.ask(asked_by([key]))
+        self._hands.ask(axis_values([key]))
         if key == SAVE_KEY:
             try:
                 self._say(self._save(None))
@@ -152,7 +152,7 @@ def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene 
 
     def ask(values: Mapping[str, Any]) -> str:
         try:
-            hands.ask(read_asked(values))
+            hands.ask(read_axis_values(values))
         except ValueError as error:
             raise RefusedError(str(error)) from error
         return ""

@@ -48,9 +48,9 @@ class SteppingAside:
             return
         self._due_s = self._context.clock.now() + _LOOK_S
         here, footprint = self._context.pose(), self._skill.outline()
-        if not self._giving.in_whose_way(here, footprint):
+        if not self._giving.blocked_robots(here, footprint):
             return
-        place = self._giving.waiting_place(self._context.costmap, footprint, here)
+        place = self._giving.waiting_pose(self._context.costmap, footprint, here)
         if place is not None:
             self._skill = Navigate(self._context)
             self._skill.begin(NavigateInputs(place))

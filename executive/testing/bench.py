@@ -17,7 +17,7 @@ from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.fault_words import Fault, parse_fault
-from skills.faults.faulty_robot import with_faults
+from skills.faults.faulty_robot import inject_faults
 from skills.robot import Capabilities, Clock, Robot
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
 from skills.testing.clock import VirtualClock
@@ -90,7 +90,7 @@ class SkillBench:
 
     def add_faults(self, *faults: Fault) -> None:
         """Injects faults."""
-        self.robot = with_faults(self.robot, self.clock, faults)
+        self.robot = inject_faults(self.robot, self.clock, faults)
         self._context = replace(self._context, robot=self.robot)
 
     def leaf(self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None) -> SkillLeaf:

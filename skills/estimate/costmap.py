@@ -1,4 +1,4 @@
-"""The costmap of a mapped place: the surveyed keep-out grid and the obstacle layer of what the sensors see now."""
+"""The costmap of a mapped place: the surveyed keep-out grid and a layer of obstacles that the sensors see."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.estimate.compiled import compiled, distances
 from skills.estimate.grid_map import GridMap
-from skills.estimate.scan_points import SelfFilter, in_body_axes, outside_discs, placed_points, scan_points, sensor_pose
+from skills.estimate.scan_points import (
+    SelfFilter,
+    outside_discs,
+    placed_points,
+    points_in_body_axes,
+    scan_points,
+    sensor_pose,
+)
 from skills.geometry import compose
 from skills.quantities import Count, Delay, Height, Length, Margin
 from skills.robot import FloatArray, Pose2D, Robot, Scan
@@ -120,7 +127,7 @@ class LayeredCostmap:
         """Takes in (N, 3) points of a depth camera, without those on the floor."""
         if self._X_WB is None or self._filter is None or len(points_W) == 0:
             return
-        own = self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
+        own = self._filter.foreign(points_in_body_axes(points_W, self._X_WB), np.empty((0, 3)))
         points = self._outside_robots(self._unexplained(points_W[own]))
         if len(points) == 0:
             return
@@ -160,7 +167,7 @@ class LayeredCostmap:
         points = self._unexplained(placed_points(points_F, X_WF))
         if len(points):
             holding = robot.gripper().holding
-            points = points[own.foreign(in_body_axes(points, X_WF), own.arm_F(robot, scan), holding=holding)]
+            points = points[own.foreign(points_in_body_axes(points, X_WF), own.arm_F(robot, scan), holding=holding)]
         self._returns_W = points
         points = self._outside_robots(points)
         times = (scan.stamp_s, options.confirm_s, options.memory_s)
@@ -175,7 +182,7 @@ class LayeredCostmap:
         if len(active) == 0:
             return False
         heights = self._height_m[active[:, 0], active[:, 1]]
-        centres_F = in_body_axes(np.column_stack([self._layer.centres(active), heights]), X_WF)
+        centres_F = points_in_body_axes(np.column_stack([self._layer.centres(active), heights]), X_WF)
         gone = active[clear_cells(scan, centres_F, self._layer.resolution_m)]
         self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
         return len(gone) > 0

@@ -22,7 +22,7 @@ _HEIGHTS_M = (0.7, 1.3)
 
 @dataclass(frozen=True)
 class LocaliserOptions:
-    """Matches scans to the surveyed grid, within `height_band_m` above the floor (the grid's own where None).
+    """Scan matching on the surveyed grid, within `height_band_m` above the floor (the grid's own where None).
 
     `initial_sigma` is the spread of the given start pose in x, y (m) and yaw (rad); `unsure_sigma` and
     `unsure_radius_m` apply instead where the robot may have been moved since. Odometry is expected to err by
@@ -59,7 +59,7 @@ class LocaliserOptions:
 
 
 class ScanMatchingLocaliser:
-    """Follows the pose by odometry and corrects it with every new scan; implements `skills.api.Localiser`.
+    """Localiser by odometry, corrected with every new scan; implements `skills.api.Localiser`.
 
     `initial` is X_WB at the first update; where it is None, the localiser waits to `accept` an estimate. The estimate
     says `localised` once a scan has agreed with the map, and no longer when several in a row do not; the localiser then
@@ -204,7 +204,7 @@ class ScanMatchingLocaliser:
         self._localised = self._localised and self._poor_scans < self._options.lost_scans
 
     def _frozen(self, scan: Scan) -> bool:
-        """Returns whether a scan repeats an earlier one, noise and all, although the robot has moved since."""
+        """Returns whether a scan repeats an earlier one, noise included, although the robot has moved since."""
         if self._scan is None or not scan.repeats(self._scan):
             self._scan = scan
             return False
@@ -278,7 +278,7 @@ _START_VARIANCE = 1e-4
 
 @dataclass(frozen=True)
 class DeadReckoning:
-    """Trusts odometry and needs no map: goals are relative to the start, and the error grows with the distance.
+    """Odometry alone, without a map: goals are relative to the start, and the error grows with the distance.
 
     Odometry is expected to err by `drift_per_m` of the distance and by `yaw_drift_rad_per_m`.
     """
@@ -298,14 +298,14 @@ class OdometryLocaliser:
         self._start, self._options = start, options or DeadReckoning()
         self._X_WO = start
         self._last: Pose2D | None = None
-        self._way_m = 0.0
+        self._driven_m = 0.0
         self._stamp_s = -math.inf
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate; its covariance grows with the distance from the start."""
-        along = self._options.drift_per_m * self._way_m
-        yaw = self._options.yaw_drift_rad_per_m * self._way_m
-        across = 0.5 * yaw * self._way_m
+        along = self._options.drift_per_m * self._driven_m
+        yaw = self._options.yaw_drift_rad_per_m * self._driven_m
+        across = 0.5 * yaw * self._driven_m
         variance = np.array([along**2 + across**2, along**2 + across**2, yaw**2]) + _START_VARIANCE
         return LocalisationEstimate(self._stamp_s, self._X_WO.transform(), np.diag(variance), self._last is not None)
 
@@ -316,5 +316,5 @@ class OdometryLocaliser:
             self._X_WO = compose(self._start, inverse(odometry.pose))
             self._last = odometry.pose
         step = relative(self._last, odometry.pose)
-        self._way_m += math.hypot(step.x_m, step.y_m)
+        self._driven_m += math.hypot(step.x_m, step.y_m)
         self._last, self._stamp_s = odometry.pose, odometry.stamp_s

@@ -24,7 +24,7 @@ _MOST_AT_REST = 3
 
 @dataclass(frozen=True)
 class MonteCarloOptions:
-    """A particle filter finds the place of the robot, scan matching the pose in that place.
+    """Monte Carlo localisation: a particle filter finds the place of the robot, scan matching the pose in it.
 
     Particles are weighed after each `update_m` of driving or `update_rad` of a turn; at rest, while the place is
     unknown, every `patience_scans` scans, but a few times only, since all these scans err alike. The place is known
@@ -197,12 +197,12 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         hypotheses = [compose(self._X_WO, self._X_OB)] if self._placed else []
         if particles.surprise > options.surprise or not self._localised:
             hypotheses += [each.pose for each in self._hypotheses(points_F, beams)]
-        drawn = [particles.around(pose, _SPREAD, options.injected) for pose in hypotheses]
+        drawn = [particles.sample_around(pose, _SPREAD, options.injected) for pose in hypotheses]
         return np.concatenate(drawn) if drawn else None
 
     def _hypotheses(self, points_F: FloatArray, beams: FloatArray) -> list[Match]:
         """The best of some random poses, refined by scan matching."""
-        best = self._filter.likely(self._own.draws, self._own.hypotheses, beams)
+        best = self._filter.likeliest_poses(self._own.draws, self._own.hypotheses, beams)
         surfaces, options = self._surfaces, self._options.matching
         found = [match(surfaces, points_F, Pose2D(*pose), _BASIN, options) for pose in best.tolist()]
         return [each for each in found if each.inlier_share >= self._options.lost_share]

@@ -107,18 +107,18 @@ class ParticleFilter:
 
     def place(self, mean: Pose2D, covariance: FloatArray) -> None:
         """Puts all particles around a pose."""
-        self._replace(self.around(mean, covariance, self._options.min_particles))
+        self._replace(self.sample_around(mean, covariance, self._options.min_particles))
 
     def scatter(self) -> None:
         """Spreads the greatest number of particles evenly over the map."""
-        self._replace(self.anywhere(self._options.max_particles))
+        self._replace(self.sample_anywhere(self._options.max_particles))
 
-    def around(self, mean: Pose2D, covariance: FloatArray, count: int) -> FloatArray:
+    def sample_around(self, mean: Pose2D, covariance: FloatArray, count: int) -> FloatArray:
         """Poses (count, 3) drawn around a pose."""
         drawn = self._rng.standard_normal((count, 3)) @ np.linalg.cholesky(covariance).T
         return np.asarray(drawn + [mean.x_m, mean.y_m, mean.yaw_rad])
 
-    def anywhere(self, count: int) -> FloatArray:
+    def sample_anywhere(self, count: int) -> FloatArray:
         """Poses (count, 3) drawn evenly from the free cells."""
         free = np.empty((0, 2))
         while len(free) < count:
@@ -128,9 +128,9 @@ class ParticleFilter:
         places = free[:count, ::-1] * self._grid.resolution_m + self._grid.origin_m
         return np.column_stack([places, self._rng.uniform(-math.pi, math.pi, count)])
 
-    def likely(self, draws: int, count: int, points_F: FloatArray) -> FloatArray:
+    def likeliest_poses(self, draws: int, count: int, points_F: FloatArray) -> FloatArray:
         """The likeliest `count` poses (count, 3) of `draws` random ones, at most one for each place and heading."""
-        drawn = self.anywhere(draws)
+        drawn = self.sample_anywhere(draws)
         drawn = drawn[np.argsort(-self.log_likelihoods(drawn, points_F), kind="stable")]
         _, first = np.unique(_bins(drawn, MODE_RADIUS_M, MODE_TURN_RAD), return_index=True)
         return np.asarray(drawn[np.sort(first)[:count]])
@@ -138,9 +138,9 @@ class ParticleFilter:
     def move(self, step: Pose2D) -> None:
         """Moves each particle by a step of odometry, in the body frame, with the odometry's errors."""
         options = self._options
-        way, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
-        along = options.roughening_m + options.drift_per_m * way
-        yaw = options.roughening_rad + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
+        distance, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
+        along = options.roughening_m + options.drift_per_m * distance
+        yaw = options.roughening_rad + options.yaw_drift_rad_per_m * distance + options.yaw_drift_per_rad * turn
         noise = self._rng.standard_normal(self.poses.shape) * (along, along, yaw)
         dx, dy = step.x_m + noise[:, 0], step.y_m + noise[:, 1]
         c, s = np.cos(self.poses[:, 2]), np.sin(self.poses[:, 2])

@@ -15,9 +15,9 @@ from skills.estimate.compiled import bilinear, compiled
 from skills.estimate.grid_map import GridMap
 from skills.estimate.scan_points import (
     SelfFilter,
-    in_body_axes,
     outside_discs,
     placed_points,
+    points_in_body_axes,
     scan_points,
     sensor_pose,
 )
@@ -41,7 +41,7 @@ _FACE_M = 0.15
 
 @dataclass(frozen=True)
 class RollingCostmapOptions:
-    """No map: obstacles that the LiDAR sees between the heights and within max_range_m; unseen ground may be crossed.
+    """Costmap without a map: obstacles of the LiDAR between the heights and within max_range_m; unseen ground is free.
 
     Each beam adds `hit` to the log odds of the cell in which it ends, and takes `miss` from the cells that it passes at
     the height of the obstacle seen there (Moravec and Elfes 1985). The window is `window_m` wide and moves once the
@@ -128,7 +128,7 @@ class RollingCostmap:
         """Takes in (N, 3) points of a depth camera, without those on the floor."""
         if self._corner_m is None or self._filter is None or len(points_W) == 0:
             return
-        points = points_W[self._filter.foreign(in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
+        points = points_W[self._filter.foreign(points_in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
         cells, first, counts = np.unique(self._cells(points), axis=0, return_index=True, return_counts=True)
         enough = (counts >= self._options.min_points_per_cell) & self._inside(cells)
         rows, columns = cells[enough].T

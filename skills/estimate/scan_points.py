@@ -101,7 +101,7 @@ def segment_distance(points: FloatArray, start: FloatArray, end: FloatArray) -> 
     return np.asarray(np.linalg.norm(points - start - share[:, None] * along, axis=1))
 
 
-def in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
+def points_in_body_axes(points_W: FloatArray, X_WB: Pose2D) -> FloatArray:
     """World points (N, 3) in the axes of a planar pose; heights stay above the floor."""
     c, s = np.cos(X_WB.yaw_rad), np.sin(X_WB.yaw_rad)
     dx, dy = points_W[:, 0] - X_WB.x_m, points_W[:, 1] - X_WB.y_m

@@ -1,1 +1,1 @@
-"""Faults by name, injected around any robot: in tests of skills, and in runs from the command line."""
+"""Faults by name, injected into any robot: in tests of skills, and in runs from the command line."""

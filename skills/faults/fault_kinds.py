@@ -1,4 +1,4 @@
-"""The faults that can be injected by name: what each pattern of words does to the calls of a robot's verbs."""
+"""Kinds of faults that can be injected by name: patterns of words, and their effects on a robot's verbs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Capabilities, CommandState, CommandStatus, FrameTree, Image, Joints, NoImageError, Robot
 
 THIEF: Final = "the tablet"
-"""Who takes the lease in "lease taken"."""
+"""Name of the holder in "lease taken"."""
 
 VERBS: Final = (
     "capabilities", "odometry", "imu", "scan", "image", "joints", "gripper", "battery", "faults",
@@ -39,7 +39,7 @@ _OTHER_WORDS: Final[Mapping[str, str]] = {
 
 @dataclass
 class Call:
-    """One call of a verb: `proceed` makes it; `memory` is the fault's own, kept from call to call."""
+    """One call of a verb: `proceed` makes it; the fault's own `memory` lasts from call to call."""
 
     robot: Robot
     verb: str
@@ -49,15 +49,15 @@ class Call:
 
     @property
     def asked(self) -> tuple[Any, ...]:
-        """What is asked: the verb, and for pictures the camera and what the picture is to hold."""
+        """Key of the reading: the verb, and for pictures the camera and the wanted parts of the picture."""
         return (self.verb, *self.arguments) if self.verb == "image" else (self.verb,)
 
 
 @dataclass(frozen=True)
 class Effect:
-    """What a fault does: to which verbs, and `act(call)` while it is on; `watch(result, call)` sees the calls before.
+    """Effect of a fault on verbs: `act(call)` while it is on; `watch(result, call)` sees the calls before.
 
-    Calls of the verbs in `always` go to `act` at all times. What happens `once` is over then, though it stays on.
+    Calls of the verbs in `always` go to `act` at all times. A fault that happens `once` is over once it has begun.
     """
 
     verbs: frozenset[str]
@@ -69,10 +69,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A fault by name: the words (a pattern with named groups), an example, and the effect of a match.
+    """Kind of fault: its words (a pattern with named groups), an example, its meaning, and the effect of a match.
 
-    Raises ValueError from `effect` when the words match but name nothing that there is. `random` are the words by which
-    it is drawn at random, with {camera}, {sensor}, {motion}, {metres}, {span} and {at}; without, it never is.
+    `effect` raises ValueError when the words match but name an unknown verb. `random` is the template for random draws,
+    with {camera}, {sensor}, {motion}, {metres}, {span} and {at}; a kind without it is never drawn.
     """
 
     pattern: str
@@ -83,11 +83,11 @@ class FaultKind:
 
 
 class InjectedFault(RuntimeError):  # noqa: N818 - it stands for any defect of a driver
-    """What a verb raises under "VERB raises"."""
+    """Error that a verb raises under "VERB raises"."""
 
 
 def verb_of(word: str) -> str:
-    """The verb that a word names. Raises ValueError."""
+    """Returns the verb that a word names. Raises ValueError, with a hint, when there is none."""
     verb = _OTHER_WORDS.get(word, word)
     if verb not in VERBS:
         known = (*VERBS, *_OTHER_WORDS)
@@ -106,7 +106,7 @@ def _among(match: re.Match[str], verbs: tuple[str, ...]) -> frozenset[str]:
 
 
 def _freezes(match: re.Match[str]) -> Effect:
-    """The last reading stays."""
+    """The fault that repeats the last reading."""
 
     def watch(result: Any, call: Call) -> None:
         call.memory[call.asked] = result
@@ -120,13 +120,13 @@ def _freezes(match: re.Match[str]) -> Effect:
 
 
 def _sensors(match: re.Match[str]) -> frozenset[str]:
-    """The sense verb that the words name, or all."""
+    """The sense verb that the words name, or all of them."""
     everything = match["verb"] in ("sensors", "everything")
     return frozenset(SENSE_VERBS) if everything else _among(match, SENSE_VERBS)
 
 
 def _drops_out(match: re.Match[str]) -> Effect:
-    """There are no new readings, and no pictures at all."""
+    """The fault that gives no new readings, and no pictures at all."""
     frozen = _freezes(match)
 
     def act(call: Call) -> Any:
@@ -137,36 +137,16 @@ def _drops_out(match: re.Match[str]) -> Effect:
     return replace(frozen, act=act)
 
 
-def _raises(match: re.Match[str]) -> Effect:
-    def act(call: Call) -> Any:
-        raise InjectedFault(f"{call.verb} does not answer")
-
-    return Effect(frozenset((verb_of(match["verb"]),)), act)
-
-
-def _dies(_: re.Match[str]) -> Effect:
-    """The robot's driver has stopped."""
-
-    def act(call: Call) -> Any:
-        raise InjectedFault(f"{call.verb} does not answer")
-
-    return Effect(frozenset(VERBS), act)
+def _raise(call: Call) -> Any:
+    raise InjectedFault(f"{call.verb} does not answer")
 
 
 def _refuses(match: re.Match[str]) -> Effect:
-    return _answered(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order"))
+    return _answer(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order"))
 
 
-def _never_ends(match: re.Match[str]) -> Effect:
-    return _answered(match, CommandStatus(CommandState.RUNNING))
-
-
-def _is_stopped(match: re.Match[str]) -> Effect:
-    return _answered(match, CommandStatus(CommandState.STOPPED, "an emergency stop"))
-
-
-def _answered(match: re.Match[str], status: CommandStatus) -> Effect:
-    """The verb's commands are not carried out, and have this status for ever."""
+def _answer(match: re.Match[str], status: CommandStatus) -> Effect:
+    """The fault by which a verb's commands do nothing, and have this status for ever."""
 
     def act(call: Call) -> Any:
         made_up = call.memory.setdefault("ids", set())
@@ -180,7 +160,7 @@ def _answered(match: re.Match[str], status: CommandStatus) -> Effect:
 
 
 def _reads(verb: str, change: Callable[[Any], Any]) -> Effect:
-    """The verb's answers are changed."""
+    """The fault that changes the answers of a verb."""
     return Effect(frozenset((verb,)), lambda call: change(call.proceed()))
 
 
@@ -203,17 +183,8 @@ def _black(_: re.Match[str]) -> Effect:
     return _reads("image", blackened)
 
 
-def _missing(_: re.Match[str]) -> Effect:
-    return _reads("scan", lambda scan: None)
-
-
-def _garbage(match: re.Match[str]) -> Effect:
-    """Numbers become NaN."""
-    return Effect(_among(match, SENSE_VERBS), lambda call: _spoiled(call.proceed()))
-
-
 def _spoiled(reading: Any) -> Any:
-    """The reading with every float that is not its stamp made NaN."""
+    """The reading with NaN for every float except its stamp."""
     if not dataclasses.is_dataclass(reading) or isinstance(reading, type):
         return reading
     names = (each.name for each in dataclasses.fields(reading) if each.name != "stamp_s")
@@ -232,14 +203,27 @@ def _nan_like(value: Any) -> Any:
     return value
 
 
-def _pulled(match: re.Match[str]) -> Effect:
-    """The joints hold against a force at the hand."""
+def joints_under_pull(joints: Joints, capabilities: Capabilities, force_n: float = 15.0) -> Joints:
+    """The readings with joint efforts that hold against a force straight ahead on the held object."""
+    model, gripper = arm_model(capabilities), capabilities.gripper
+    p_HT = np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
+    q_rad = np.array([joints.position_rad[name] for name in model.names])
+    extra_nm = -force_n * levers_m(model, q_rad, p_HT)[0]
+    added = dict(zip(model.names, extra_nm.tolist(), strict=True))
+    return replace(joints, effort_nm={name: nm + added.get(name, 0.0) for name, nm in joints.effort_nm.items()})
+
+
+def _pull(match: re.Match[str]) -> Effect:
     force_n = float(match["force"])
-    return Effect(frozenset(("joints",)), lambda call: pulled(call.proceed(), call.robot.capabilities(), force_n))
+
+    def act(call: Call) -> Any:
+        return joints_under_pull(call.proceed(), call.robot.capabilities(), force_n)
+
+    return Effect(frozenset(("joints",)), act)
 
 
 def _jumps(match: re.Match[str]) -> Effect:
-    """Dead reckoning is off wherever it is told: by itself, with scans, and with pictures."""
+    """The fault that shifts dead reckoning in odometry, scans and pictures."""
     ahead = RigidTransform(np.array([float(match["metres"]), 0.0, 0.0]))
 
     def act(call: Call) -> Any:
@@ -253,16 +237,8 @@ def _jumps(match: re.Match[str]) -> Effect:
     return Effect(frozenset(("odometry", "scan", "image")), act)
 
 
-def _battery(match: re.Match[str]) -> Effect:
-    return _reads("battery", lambda reading: replace(reading, charge=float(match["percent"]) / 100.0))
-
-
-def _reports(match: re.Match[str]) -> Effect:
-    return _reads("faults", lambda faults: (*faults, match["fault"]))
-
-
 def _lease(_: re.Match[str]) -> Effect:
-    """Another takes the lease, once."""
+    """The fault by which another holder takes the lease, once."""
 
     def act(call: Call) -> Any:
         if "taken" not in call.memory:
@@ -273,7 +249,7 @@ def _lease(_: re.Match[str]) -> Effect:
 
 
 def _loses(_: re.Match[str]) -> Effect:
-    """What the gripper holds falls, once: for a while the gripper closes too weakly for anything."""
+    """The fault by which the held object falls, once: for a while the gripper closes too weakly for any object."""
 
     def act(call: Call) -> Any:
         reading, lease, memory = call.robot.gripper(), call.robot.lease_holder(), call.memory
@@ -306,7 +282,12 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         _drops_out,
         "{sensor}: dropout {span}",
     ),
-    FaultKind(r"(?P<verb>\w+)(?: verb)? raises", "drive raises at 2 s", "a verb raises an exception", _raises),
+    FaultKind(
+        r"(?P<verb>\w+)(?: verb)? raises",
+        "drive raises at 2 s",
+        "a verb raises an exception",
+        lambda match: Effect(frozenset((verb_of(match["verb"]),)), _raise),
+    ),
     FaultKind(
         r"(?P<verb>\w+) refuses",
         "arm refuses",
@@ -317,15 +298,15 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(
         r"(?P<verb>\w+) never ends",
         "stand never ends",
-        "commands stay under way and do nothing",
-        _never_ends,
+        "commands stay RUNNING and do nothing",
+        lambda match: _answer(match, CommandStatus(CommandState.RUNNING)),
         "{motion} never ends {span}",
     ),
     FaultKind(
         r"(?P<verb>\w+) is stopped",
         "arm is stopped at 1 s",
         "commands are stopped at once",
-        _is_stopped,
+        lambda match: _answer(match, CommandStatus(CommandState.STOPPED, "an emergency stop")),
         "{motion} is stopped {span}",
     ),
     FaultKind(
@@ -355,13 +336,24 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         _black,
         "{camera}: is black {span}",
     ),
-    FaultKind(r"(?:scan|lidar) is missing", "scan is missing", "there is no scan", _missing, "lidar is missing {span}"),
-    FaultKind(r"(?P<verb>\w+) returns garbage", "joints returns garbage", "a sensor's numbers are NaN", _garbage),
+    FaultKind(
+        r"(?:scan|lidar) is missing",
+        "scan is missing",
+        "there is no scan",
+        lambda _: _reads("scan", lambda scan: None),
+        "lidar is missing {span}",
+    ),
+    FaultKind(
+        r"(?P<verb>\w+) returns garbage",
+        "joints returns garbage",
+        "a sensor's numbers are NaN",
+        lambda match: Effect(_among(match, SENSE_VERBS), lambda call: _spoiled(call.proceed())),
+    ),
     FaultKind(
         r"hand is pulled with (?P<force>\d+(?:\.\d+)?) N",
         "hand is pulled with 15 N at 6 s",
-        "the arm's joints feel somebody who pulls straight ahead at what the hand holds",
-        _pulled,
+        "the arm's joints feel a person who pulls the held object straight ahead",
+        _pull,
     ),
     FaultKind(
         r"odometry jumps (?P<metres>-?\d+(?:\.\d+)?) m",
@@ -374,25 +366,20 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         r"battery falls to (?P<percent>\d+(?:\.\d+)?) ?%",
         "battery falls to 5 % at 3 s",
         "the battery says that it has so much left",
-        _battery,
+        lambda match: _reads("battery", lambda reading: replace(reading, charge=float(match["percent"]) / 100.0)),
     ),
     FaultKind(
-        r"robot reports (?P<fault>\w[\w -]*?)", "robot reports motor too hot at 2 s", "`faults` holds it", _reports
+        r"robot reports (?P<fault>\w[\w -]*?)",
+        "robot reports motor too hot at 2 s",
+        "`faults` holds it",
+        lambda match: _reads("faults", lambda faults: (*faults, match["fault"])),
     ),
-    FaultKind(r"robot dies", "robot dies at 20 s", "no verb is answered any more: each raises an exception", _dies),
-    FaultKind(r"lease taken", "lease taken at 4 s", "somebody else takes the lease, once", _lease),
+    FaultKind(
+        r"robot dies",
+        "robot dies at 20 s",
+        "no verb is answered any more: each raises an exception",
+        lambda _: Effect(frozenset(VERBS), _raise),
+    ),
+    FaultKind(r"lease taken", "lease taken at 4 s", "another holder takes the lease, once", _lease),
 )
 """All faults that come with the project."""
-
-
-PULL_N = 15.0
-
-
-def pulled(joints: Joints, capabilities: Capabilities, force_n: float = PULL_N) -> Joints:
-    """The same readings with the efforts that hold against a force straight ahead."""
-    model, gripper = arm_model(capabilities), capabilities.gripper
-    p_HT = np.array([0.0 if gripper is None else gripper.grip_x_m, 0.0, 0.0])
-    q_rad = np.array([joints.position_rad[name] for name in model.names])
-    extra_nm = -force_n * levers_m(model, q_rad, p_HT)[0]
-    added = dict(zip(model.names, extra_nm.tolist(), strict=True))
-    return replace(joints, effort_nm={name: nm + added.get(name, 0.0) for name, nm in joints.effort_nm.items()})

@@ -1,8 +1,8 @@
-"""The words of faults: what to a robot goes wrong, and when. `docs/reference/faults.md` lists the kinds.
+"""Words of faults: the kind of fault and its time. `docs/reference/faults.md` lists the kinds.
 
-A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at their head, and perhaps when it is on:
-`at T s` or `from T s` (and ever after), `from T s to U s`, `5 s at T s`, `after N calls` (of the verbs concerned), or
-nothing (always).
+A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at their head, and perhaps a time: `at T s` or
+`from T s` (and ever after), `from T s to U s`, `5 s at T s`, `after N calls` (of the verbs concerned), or no time
+(always).
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ _SPAN: Final = re.compile(
 )
 _PREFIX: Final = re.compile(r"(?P<sensor>\w+)(?:\.(?P<source>[\w-]+))?: ?(?P<words>.+)")
 _STREAM: Final = 11
+"""Stream of the seed for random faults."""
 _FIRST_S, _LAST_S = 5.0, 90.0
 _MOTIONS: Final = ("arm", "base", "body")
 
@@ -42,7 +43,7 @@ _MOTIONS: Final = ("arm", "base", "body")
 class Fault:
     """A fault by its words: its effect, on from `from_s` until before `to_s`, after `calls` calls.
 
-    Of the pictures, it concerns those of one `source` only, where that is given.
+    With a `source`, it concerns only the pictures of that camera.
     """
 
     words: str
@@ -53,14 +54,14 @@ class Fault:
     source: str | None = None
 
     def over_by(self, now_s: float) -> bool:
-        """Returns whether it is over at a time; one that happens once is, when it has begun before."""
+        """Returns whether the fault is over at a time; one that happens once is over when it has begun before."""
         return now_s >= self.to_s or (self.effect.once and now_s > self.from_s)
 
 
 def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cameras: Sequence[str] = ()) -> Fault:
-    """The fault of these words. `cameras` are the robot's, where it is known.
+    """Parses the words of a fault. `cameras` are the robot's, where the robot is known.
 
-    Raises ValueError: no kind has such words, or they name something that the robot does not have; with the hint.
+    Raises ValueError, with a hint, when no kind has such words or the robot has no such camera.
     """
     plain = _SPAN.sub(_seconds, " ".join(words.split()))
     prefix = _PREFIX.fullmatch(plain)
@@ -82,13 +83,13 @@ def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cam
 
 
 def _seconds(match: re.Match[str]) -> str:
-    """A duration with other units in seconds; as it is where it is none."""
+    """A duration of any unit in seconds; other text unchanged."""
     seconds = seconds_in(match[0])
     return match[0] if seconds is None else f"{seconds:.12g} s"
 
 
 def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
-    """From when until when the fault is on. Raises ValueError."""
+    """Start and end of the fault (s). Raises ValueError when the words contradict each other."""
     from_s, to_s = float(when["from"] or 0.0), float(when["to"] or math.inf)
     if when["lasts"] is not None:
         if when["to"] is not None or when["calls"] is not None:
@@ -100,7 +101,7 @@ def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
 
 
 def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
-    """Raises ValueError unless the effect is one on pictures, and the source one of the robot's, where it is known."""
+    """Raises ValueError unless the effect is on pictures and the source is a camera of the robot."""
     if effect.verbs != {"image"}:
         raise ValueError(f"'.{source}' names a camera, and this fault is none of a camera; leave '.{source}' out")
     if cameras and source not in cameras:
@@ -112,9 +113,9 @@ def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
 def random_faults(
     count: int, seed: int, cameras: Sequence[str], kinds: Sequence[FaultKind] = STANDARD_FAULTS
 ) -> tuple[str, ...]:
-    """The words of so many faults, drawn from a seed among the kinds that a robot may live through, in order of time.
+    """Draws the words of `count` faults by a seed, among the kinds marked as random; in order of time.
 
-    The first n of a seed are the same, however many are drawn.
+    A larger count adds faults to those of a smaller one.
     """
     rng = np.random.default_rng([seed, _STREAM])
     drawable = [kind.random for kind in kinds if kind.random]
@@ -123,7 +124,7 @@ def random_faults(
 
 
 def _drawn(template: str, cameras: Sequence[str], rng: np.random.Generator) -> tuple[float, str]:
-    """One fault of a kind: its time (s) and its words."""
+    """Draws one fault of a kind: its time (s) and its words."""
     images = [f"camera.{source}" for source in cameras] or ["camera"]
     at_s = round(float(rng.uniform(_FIRST_S, _LAST_S)), 1)
     values = {

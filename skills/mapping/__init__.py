@@ -1,1 +1,1 @@
-"""Maps that the robot makes itself: scan matching, pose graph, occupancy, exploration."""
+"""Maps that the robot makes: scan matching, pose graph, occupancy, exploration."""

@@ -1,8 +1,7 @@
-"""Search for the place of a scan in a submap: branch and bound over places, at many headings.
+"""Search for the pose of a scan in a submap: branch and bound over positions, at many headings.
 
-The bound comes from the distance field itself: nowhere in a square does a point come nearer to a surface than its
-distance at the middle less half the diagonal (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, 2016, use a
-pyramid of grids for the same).
+The bound comes from the distance field: nowhere in a square is a point nearer to a surface than its distance at the
+middle less half the diagonal (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, 2016, use a pyramid of grids).
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ _FINEST_M = 0.1
 
 @dataclass(frozen=True)
 class Window:
-    """Half the width of the square (m) and half the span of headings (rad) that are searched."""
+    """Search window: half the width of the square (m) and half the span of headings (rad)."""
 
     place_m: float
     yaw_rad: float
@@ -30,7 +29,7 @@ class Window:
 
 @dataclass(frozen=True)
 class Found:
-    """The best pose, how well it fits (0 to 1), and how well the best fits that is another place."""
+    """The best pose, its score (0 to 1), and the score of the best pose at another place."""
 
     pose: Pose2D
     score: float
@@ -77,7 +76,7 @@ def _branch_and_bound(
     away: tuple[float, float],
     away_m: float,
 ) -> FloatArray:
-    """Score, x, y, yaw of the best pose above `least`, at least away_m from a place; the score `least` when none is."""
+    """Score, x, y, yaw of the best pose at least `away_m` from `away`; the score `least` when none is better."""
     best = np.array([least, 0.0, 0.0, 0.0])
     turned = np.empty((points.shape[0], 2))
     stack = np.empty((256, 3))
@@ -121,7 +120,7 @@ def _bound(
     reach: float,
     least: float,
 ) -> float:
-    """The most that points can score with their origin within `slack` of (x, y); stops once that is below `least`."""
+    """Greatest score of the points with their origin within `slack` of (x, y); 0 once that is below `least`."""
     rows, columns = distance.shape
     total, count = 0.0, points.shape[0]
     for n in range(count):

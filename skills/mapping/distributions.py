@@ -1,9 +1,9 @@
-"""Matching of points to a submap of normal distributions (Biber and Strasser, 2003: the NDT).
+"""Submap of normal distributions (NDT: Biber and Strasser, 2003), to which scans are matched.
 
-Each cell keeps the moments of the points in the 3 x 3 cells about it. Where these lie on a line, the distance across it
-counts (point to line), and only there, so that a submap of noisy scans has surfaces much finer than the noise, and the
-pattern of the beams does not hold the robot where it is. Surfaces that
-face different ways are kept apart by quarters, so that the two sides of a thin wall are not one.
+Each cell holds the moments of the points in the 3 x 3 cells about it. Only where these lie on a line, the distance
+across it counts (point to line), so that a submap of noisy scans has surfaces much finer than the noise, and the
+pattern of the beams does not pull. Each quarter of directions that a surface can face has its own moments, so that the
+two sides of a thin wall stay apart.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from skills.robot import FloatArray, Pose2D
 CELL_M = 0.1
 _QUARTERS = 4
 _LEAST_SPREAD_M = 0.05
-"""A line has at least this standard deviation along it; the noise of the range alone has less."""
+"""Least standard deviation along a line; the noise of the range alone has less."""
 _QUARTER_RAD = 0.5 * math.pi
 Moments = NDArray[np.float32]
 
 
 class Distributions:
-    """A submap about the origin of its own frame A, `half_m` to all sides."""
+    """Submap about the origin of its own frame A, `half_m` to all sides; implements `Surfaces`."""
 
     def __init__(self, half_m: float = 30.0) -> None:
         cells = math.ceil(2.0 * half_m / CELL_M)
@@ -34,7 +34,7 @@ class Distributions:
         self._moments: Moments = np.zeros((cells, cells, _QUARTERS, 6), dtype=np.float32)
 
     def add(self, points_F: FloatArray, X_AF: Pose2D) -> None:
-        """Adds the points (N, 3) of a scan taken at a pose: x, y, and the direction that the surface faces (rad)."""
+        """Adds points (N, 3) of a scan at a pose: x, y, and the direction in which the surface faces (rad)."""
         _add(self._moments, self._low_m, points_F, np.array([X_AF.x_m, X_AF.y_m, X_AF.yaw_rad]))
 
     def linearise(
@@ -46,7 +46,7 @@ class Distributions:
 
 @compiled
 def _add(moments: Moments, low: float, points: FloatArray, pose: FloatArray) -> None:
-    """The loop of `Distributions.add`: count, x, y, xx, xy, yy, seen from each cell's own centre."""
+    """The loop of `Distributions.add`: count, x, y, xx, xy, yy, relative to each cell's centre."""
     cells = moments.shape[0]
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for n in range(points.shape[0]):

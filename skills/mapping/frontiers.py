@@ -1,4 +1,4 @@
-"""Frontiers: where free ground ends at ground that was never seen (Yamauchi, A Frontier-Based Approach, 1997)."""
+"""Frontiers between free and unseen ground (Yamauchi, A Frontier-Based Approach, 1997)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,16 @@ from skills.estimate.grid_map import GridMap
 from skills.robot import FloatArray
 
 _STEP: Final = 2
-"""Every so many cells of the grid are searched."""
+"""Cells of the grid for each searched one, along both axes."""
 _TIGHT_FACTOR: Final = 5.0
+"""Cost of a metre among cells too tight to stand in."""
+_BEGINNING_M: Final = 0.8
+"""Within this cost of its start the robot may stand anywhere."""
 
 
 @dataclass(frozen=True)
 class Frontier:
-    """A stretch of the border to the unknown: its nearest cell, where to stand for it, and the way there (m)."""
+    """Stretch of the border to the unknown: its nearest cell, where to stand for it, and the distance there (m)."""
 
     at: tuple[float, float]
     stand: tuple[float, float]
@@ -31,9 +34,9 @@ class Frontier:
 
 
 class Ground:
-    """What can be reached on a grid whose unknown cells are blocked, from a place (x, y).
+    """The ground that the robot can reach from a position (x, y) on a grid whose unknown cells are blocked.
 
-    The robot's middle needs `clear_m` to all that is blocked; frontiers end the ground that was `explored`.
+    The robot's middle needs `clear_m` of clearance; frontiers bound the `explored` cells.
     """
 
     def __init__(
@@ -52,15 +55,18 @@ class Ground:
         self._stands = stands & np.isfinite(self.cost_m)
 
     def frontiers(self, *, least_m: float, within_m: float) -> list[Frontier]:
-        """All that are at least so long and within so far of where the robot can stand; the nearest first."""
+        """Frontiers at least `least_m` long and within `within_m` of where the robot can stand, nearest first."""
         beside = cv2.dilate((~self._explored).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
         border = self._explored & beside & (self._grid.distance > 0.1)
         _, labels = cv2.connectedComponents(border.astype(np.uint8), connectivity=8)
         rows, columns = np.nonzero(labels)
         found = []
-        for label, cells in _grouped(labels[rows, columns].astype(np.int32), np.column_stack([rows, columns])):
+        values = labels[rows, columns]
+        order = np.argsort(values, kind="stable")
+        _, firsts = np.unique(values[order], return_index=True)
+        for cells in np.split(np.column_stack([rows, columns])[order], firsts[1:]):
             length_m = len(cells) * self._grid.resolution_m
-            if label == 0 or length_m < least_m:
+            if length_m < least_m:
                 continue
             nearest = self._nearest(cells, within_m)
             if nearest is not None:
@@ -68,7 +74,7 @@ class Ground:
         return sorted(found, key=lambda each: each.cost_m)
 
     def stands_near(self, x: float, y: float, *, most: int, apart_m: float) -> list[tuple[float, float]]:
-        """Reachable places nearest to a point, the nearest first, at least so far apart."""
+        """Reachable positions near a point, nearest first, at most `most` and at least `apart_m` apart."""
         xy = self._grid.centres(np.argwhere(self._stands) * _STEP)
         xy = xy[np.argsort(np.hypot(xy[:, 0] - x, xy[:, 1] - y), kind="stable")]
         chosen: list[tuple[float, float]] = []
@@ -78,7 +84,7 @@ class Ground:
         return chosen
 
     def cost_to(self, x: float, y: float) -> float:
-        """The way (m) to a place; infinite when it cannot be reached."""
+        """Distance (m) to drive to a position; infinite when it cannot be reached."""
         row, column = self._grid.cells(np.array([(x, y)]))[0] // _STEP
         rows, columns = self.cost_m.shape
         return float(self.cost_m[row, column]) if 0 <= row < rows and 0 <= column < columns else math.inf
@@ -86,7 +92,7 @@ class Ground:
     def _nearest(
         self, cells: NDArray[np.int64], within_m: float
     ) -> tuple[tuple[float, float], tuple[float, float], float] | None:
-        """The cell of a frontier with the shortest way, where to stand for it, and that way."""
+        """The nearest cell of a frontier, where to stand for it, and the distance there."""
         coarse = np.minimum(cells // _STEP, np.array(self.cost_m.shape) - 1)
         costs = self.cost_m[coarse[:, 0], coarse[:, 1]]
         best = int(np.argmin(costs))
@@ -100,20 +106,13 @@ class Ground:
         return (float(at[0]), float(at[1])), (float(stand[0]), float(stand[1])), float(costs[best])
 
 
-def _grouped(labels: NDArray[np.int32], cells: NDArray[np.int64]) -> list[tuple[int, NDArray[np.int64]]]:
-    """The cells of each label."""
-    order = np.argsort(labels, kind="stable")
-    values, firsts = np.unique(labels[order], return_index=True)
-    return list(zip(values.tolist(), np.split(cells[order], firsts[1:]), strict=True))
-
-
 @compiled
 def _spread(
     stands: NDArray[np.bool_], free: NDArray[np.bool_], row: int, column: int, cell_m: float
 ) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Dijkstra from a cell: cost (m) of each free cell, and the last cell on the way there where the robot can stand.
+    """Cost (m) of each free cell by Dijkstra, and the last cell on the path there where the robot can stand.
 
-    Cells too tight to stand in are dearer; once among them, the way does not come out again.
+    Cells too tight to stand in cost more; a path among them does not come out again.
     """
     rows, columns = free.shape
     cost = np.full((rows, columns), np.inf)
@@ -128,14 +127,14 @@ def _spread(
         i, j = index // columns, index % columns
         if here > cost[i, j]:
             continue
-        begin = here < 0.8
+        begin = here < _BEGINNING_M
         for a in range(max(0, i - 1), min(rows, i + 2)):
             for b in range(max(0, j - 1), min(columns, j + 2)):
                 if not free[a, b] or (stands[a, b] and not stands[i, j] and not begin):
                     continue
-                way = math.hypot(a - i, b - j) * cell_m * (1.0 if stands[a, b] or begin else _TIGHT_FACTOR)
-                if here + way < cost[a, b]:
-                    cost[a, b] = here + way
+                length = math.hypot(a - i, b - j) * cell_m * (1.0 if stands[a, b] or begin else _TIGHT_FACTOR)
+                if here + length < cost[a, b]:
+                    cost[a, b] = here + length
                     stand[a, b] = a * columns + b if stands[a, b] or begin else stand[i, j]
                     heapq.heappush(heap, (cost[a, b], a * columns + b))
     return cost, stand

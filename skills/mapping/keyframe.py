@@ -1,4 +1,4 @@
-"""Keyframes: LiDAR revolutions that a map keeps, thinned out and without the robot's own body."""
+"""Keyframes: LiDAR revolutions that a map stores, thinned out and without the robot's own body."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from skills.estimate.scan_points import SelfFilter, scan_points, sensor_pose
 from skills.robot import FloatArray, Pose2D, Robot, Scan, unit_rays
 
 BAND_M = (0.5, 1.6)
-"""Heights (m) of the points that scans are matched by."""
+"""Band of heights (m) of the points that scans are matched by."""
 _NEIGHBOURS: Final = 32
 
 
 @dataclass(frozen=True)
 class Keyframe:
-    """A scan and where the odometry had the robot.
+    """A stored scan and its pose by odometry.
 
     `ranges_m` is (rings, azimuths) float32 with NaN for no return; `rotation` (3, 3) and `translation` (3,) are the
     LiDAR's pose in the levelled body frame F; `points_F` (N, 3) are the points that scans are matched by: x, y, and
-    the direction (rad) that the surface there faces.
+    the direction (rad) in which the surface faces.
     """
 
     stamp_s: float
@@ -58,7 +58,7 @@ class Keyframe:
 
 
 def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float) -> FloatArray:
-    """At most so many points of a scan in the band that scans are matched by, as `Keyframe.points_F` has them."""
+    """At most `most` points of a scan in the band that scans are matched by, as in `Keyframe.points_F`."""
     points = scan_points(scan, azimuths=azimuths, heights_m=BAND_M, max_range_m=max_range_m)
     chosen = np.arange(len(points))
     if len(points) > most:
@@ -70,10 +70,10 @@ def matching_points(scan: Scan, *, azimuths: int, most: int, max_range_m: float)
 
 @compiled
 def _facing(points: FloatArray, chosen: NDArray[np.int64]) -> FloatArray:
-    """The direction (rad) that the surface at each chosen point faces: across the points about it, towards the sensor.
+    """Direction (rad) in which the surface at each chosen point faces: across the points about it, towards the sensor.
 
-    The points are ordered by azimuth. NaN where those about a point make no line, or are of one column only: their
-    spread is the noise of the range.
+    The points are ordered by azimuth. NaN where the points about one make no line, or are of one column only, so that
+    their spread is the noise of the range.
     """
     count = points.shape[0]
     facing = np.empty(chosen.shape[0])

@@ -1,4 +1,4 @@
-"""A map on disk: both grids in the `map_server` form, the pose graph, and the keyframes from which it goes on."""
+"""A map on disk: both grids in the `map_server` form, the pose graph, and the keyframes for a later session."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from skills.robot import Pose2D
 
 RESOLUTION_M: Final = 0.025
 LAYER_M: Final = 0.025
-"""Sizes of the grid's cells, across and up."""
+"""Height of a layer of the grid."""
 GRAPH_FILE: Final = "pose_graph.json"
 KEYFRAMES_FILE: Final = "keyframes.npz"
 MOST_GRAPH_BYTES: Final = 100_000_000
 MOST_KEYFRAMES_BYTES: Final = 4_000_000_000
-_AGAIN: Final = "copy the whole folder, or name another --out"
+_HINT: Final = "copy the whole folder, or name another --out"
 _SHAPES: Final[Mapping[str, tuple[int, int | None]]] = {
     "ranges_mm": (3, None),
     "elevations_rad": (1, None),
@@ -42,23 +42,24 @@ _SHAPES: Final[Mapping[str, tuple[int, int | None]]] = {
     "odometry": (2, 3),
     "points": (3, 3),
 }
-"""How many dimensions each array has, and the length of the last."""
-_FREE, _OCCUPIED = 0.45, 0.65
+"""Number of dimensions of each array, and the length of the last one."""
+_FREE = 0.45
+_OCCUPIED = 0.65
 _SLIM_M: Final = 0.2
-"""Less than half the body's width."""
+"""Radius of a disc that is narrower than any body."""
 
 
 @dataclass(frozen=True)
-class Surveyed:
-    """Both grids of a map: probabilities (rows from the south up; 0.5 where nothing was observed), and their place."""
+class MapGrids:
+    """Both grids of a map: probabilities (rows from the south up; 0.5 where nothing was observed), and their corner."""
 
     probabilities: Mapping[str, NDArray[np.float32]]
     observed: Mapping[str, NDArray[np.bool_]]
     origin_m: tuple[float, float]
 
 
-def surveyed(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> Surveyed:
-    """Both grids of all keyframes at their optimised poses, cut to what was observed.
+def map_grids(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> MapGrids:
+    """Both grids of all keyframes at their optimised poses, cropped to the observed cells.
 
     Keep-out ground that the body cannot reach counts as unknown.
     """
@@ -75,7 +76,7 @@ def surveyed(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> Surveyed:
     origin_m = tuple(
         start + first.start * resolution_m for start, first in zip(grid.origin_m, (cut[1], cut[0]), strict=True)
     )
-    return Surveyed(
+    return MapGrids(
         {band: probability[cut] for band, (probability, _) in bands.items()},
         {band: observed[cut] for band, (_, observed) in bands.items()},
         (origin_m[0], origin_m[1]),
@@ -85,17 +86,17 @@ def surveyed(mapper: Mapper, resolution_m: float = RESOLUTION_M) -> Surveyed:
 def _hollow(
     free: NDArray[np.bool_], origin_m: tuple[float, float], resolution_m: float, poses: Sequence[Pose2D]
 ) -> NDArray[np.bool_]:
-    """The free cells that no body reaches from where the robot was: under tables, between specks of furniture."""
-    room = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * resolution_m > _SLIM_M
-    _, parts = cv2.connectedComponents(room.astype(np.uint8))
+    """Returns whether each free cell is out of reach from the robot's poses, as under tables."""
+    clear = cv2.distanceTransform(free.astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * resolution_m > _SLIM_M
+    _, parts = cv2.connectedComponents(clear.astype(np.uint8))
     columns, rows = ((pose_array(poses)[:, :2] - origin_m) / resolution_m).astype(int).T
     reached = np.isin(parts, np.setdiff1d(parts[rows, columns], [0]))
     away = cv2.distanceTransform((~reached).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * resolution_m
     return np.asarray(free & (away > _SLIM_M + resolution_m))
 
 
-def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M) -> Path:
-    """Writes `scan` and `keepout` as PGM and YAML; the path of the scan map's YAML. Raises OSError."""
+def save_grids(folder: Path, grids: MapGrids, resolution_m: float = RESOLUTION_M) -> Path:
+    """Writes `scan` and `keepout` as PGM and YAML; returns the path of the scan map's YAML. Raises OSError."""
     for band, probability in grids.probabilities.items():
         grey = np.where(grids.observed[band], np.rint(254.0 * (1.0 - probability)), 128.0).astype(np.uint8)
         rows, columns = grey.shape
@@ -111,7 +112,7 @@ def save_grids(folder: Path, grids: Surveyed, resolution_m: float = RESOLUTION_M
 
 
 def save_graph(folder: Path, mapper: Mapper) -> None:
-    """Writes pose graph and keyframes, from which `load_mapper` goes on. Raises OSError."""
+    """Writes the pose graph and the keyframes, which `load_mapper` reads. Raises OSError."""
     frames, graph = mapper.keyframes, mapper.graph
     document = _GraphFile(
         form=1,
@@ -137,8 +138,8 @@ def save_graph(folder: Path, mapper: Mapper) -> None:
     for row, frame in zip(points, frames, strict=True):
         row[: len(frame.points_F)] = frame.points_F
     millimetres = np.stack([np.nan_to_num(1000.0 * frame.ranges_m, nan=0.0) for frame in frames])
-    draft = folder / f".{KEYFRAMES_FILE}"
-    with draft.open("wb") as file:
+    partial = folder / f".{KEYFRAMES_FILE}"
+    with partial.open("wb") as file:
         np.savez_compressed(
             file,
             ranges_mm=millimetres.clip(0.0, 65535.0).astype(np.uint16),
@@ -149,7 +150,7 @@ def save_graph(folder: Path, mapper: Mapper) -> None:
             odometry=np.array([(f.X_OF.x_m, f.X_OF.y_m, f.X_OF.yaw_rad) for f in frames]),
             points=points,
         )
-    draft.replace(folder / KEYFRAMES_FILE)
+    partial.replace(folder / KEYFRAMES_FILE)
     _write(folder / GRAPH_FILE, document.model_dump_json(by_alias=True).encode())
 
 
@@ -181,7 +182,7 @@ class _SubmapFile(_FilePart):
 
 
 class _GraphFile(_FilePart):
-    """What `save_graph` writes of the pose graph."""
+    """The file of the pose graph."""
 
     form: Literal[1]
     poses: list[Triple] = Field(min_length=1)
@@ -205,35 +206,32 @@ class _GraphFile(_FilePart):
 
 
 def load_mapper(folder: Path, options: MapperOptions | None = None) -> Mapper:
-    """A mapper with all that `save_graph` wrote; it does not know yet where the robot is.
+    """Reads a mapper that `save_graph` wrote; it localises the robot on the map before it goes on.
 
-    Raises:
-        InputError: a file is missing or damaged, or the two do not belong together.
+    Raises InputError when a file is missing or damaged, or when the two do not belong together.
     """
     graph_file, keyframes_file = folder / GRAPH_FILE, folder / KEYFRAMES_FILE
     try:
-        told = _GraphFile.model_validate_json(read_text(graph_file, most_bytes=MOST_GRAPH_BYTES, hint=_AGAIN))
+        stored = _GraphFile.model_validate_json(read_text(graph_file, most_bytes=MOST_GRAPH_BYTES, hint=_HINT))
     except ValidationError as error:
         where, why, _ = first_error(error.errors())
         what = f"it is no pose graph ({': '.join(filter(None, ('.'.join(map(str, where)), why)))})"
-        raise InputError(what, hint=_AGAIN, file=graph_file) from error
-    plain_file(keyframes_file, most_bytes=MOST_KEYFRAMES_BYTES, hint=_AGAIN)
+        raise InputError(what, hint=_HINT, file=graph_file) from error
+    plain_file(keyframes_file, most_bytes=MOST_KEYFRAMES_BYTES, hint=_HINT)
     try:
         with zipfile.ZipFile(keyframes_file) as packed:
             if sum(part.file_size for part in packed.infolist()) > MOST_KEYFRAMES_BYTES:
-                raise InputError("its keyframes unfold to too much", hint=_AGAIN, file=keyframes_file)
-        with np.load(keyframes_file, allow_pickle=False) as kept:
-            frames = _frames(dict(kept), told.stamps_s)
+                raise InputError("its keyframes unfold to too much", hint=_HINT, file=keyframes_file)
+        with np.load(keyframes_file, allow_pickle=False) as arrays:
+            frames = _frames(dict(arrays), stored.stamps_s)
     except (OSError, ValueError, KeyError, IndexError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise InputError(
-            f"it is no recording of keyframes ({error})"[:300], hint=_AGAIN, file=keyframes_file
-        ) from error
-    graph = PoseGraph([Pose2D(*pose) for pose in told.poses], [edge.edge() for edge in told.edges])
+        raise InputError(f"it is no recording of keyframes ({error})"[:300], hint=_HINT, file=keyframes_file) from error
+    graph = PoseGraph([Pose2D(*pose) for pose in stored.poses], [edge.edge() for edge in stored.edges])
     submaps = [
         Submap(each.anchor, None, {index: Pose2D(*pose) for index, pose in each.members.items()})
-        for each in told.submaps
+        for each in stored.submaps
     ]
-    return Mapper.going_on(graph, frames, submaps, options)
+    return Mapper.from_map(graph, frames, submaps, options)
 
 
 def _frames(arrays: Mapping[str, Any], stamps_s: list[float]) -> list[Keyframe]:
@@ -260,7 +258,7 @@ def _frames(arrays: Mapping[str, Any], stamps_s: list[float]) -> list[Keyframe]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Puts a file in its place when it is whole."""
-    draft = path.with_name(f".{path.name}")
-    draft.write_bytes(content)
-    draft.replace(path)
+    """Writes a file, which appears only when it is whole."""
+    partial = path.with_name(f".{path.name}")
+    partial.write_bytes(content)
+    partial.replace(path)

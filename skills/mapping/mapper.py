@@ -1,9 +1,9 @@
 """Simultaneous localisation and mapping from LiDAR and odometry: submaps, keyframes, loop closures.
 
-Each scan is matched to the current submap from where odometry has the robot. A keyframe is kept every
-few decimetres and joins the pose graph by its pose in the submap; it also goes into the submap that follows, which
-takes over when the current one is full (as in Hess et al., 2016). Keyframes are looked for in old submaps as well: what
-is found counts once another keyframe agrees with it.
+Each scan is matched to the current submap from the pose by odometry. A keyframe is stored every few decimetres and
+joins the pose graph by its pose in the submap; it also goes into the next submap, which takes over when the current one
+is full (as in Hess et al., 2016). Keyframes are searched for in old submaps as well; a closure counts once another
+keyframe agrees with it.
 """
 
 from __future__ import annotations
@@ -28,17 +28,19 @@ from skills.mapping.pose_graph import Edge, PoseGraph
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
 _FIELD_CELL_M = 0.05
+_SEARCH_POINTS = 150
+"""Points by which a submap is searched; all of them refine the pose."""
 
 
 @dataclass(frozen=True)
 class MapperOptions:
-    """Distances in metres, angles in radians.
+    """Options of the mapper; distances in metres, angles in radians.
 
-    A scan is matched every `period_s`. A keyframe is kept after `keyframe_m` or `keyframe_rad`; a submap is full after
-    `submap_m` of way. Odometry is expected to err by `drift_per_m` of each step (with much more, the beams' pattern
-    holds the robot back in bare corridors), by `yaw_drift_rad_per_m` of the way and `yaw_drift_per_rad` of a turn.
-    Scans of which the submap explains less than `least_share` do not count. Loops are looked for every `closure_m`,
-    within `closure_window` plus `window_per_m` of the way since the last one found.
+    A scan is matched every `period_s`. A keyframe is stored after `keyframe_m` or `keyframe_rad`; a submap is full
+    after `submap_m`. Odometry is expected to err by `drift_per_m` of each step (with much more, the beams' pattern
+    holds the robot back in bare corridors), by `yaw_drift_rad_per_m` and by `yaw_drift_per_rad` of a turn. Scans of
+    which the submap explains less than `least_share` do not count. Loops are searched for every `closure_m`, within
+    `closure_window` plus `window_per_m` for each metre since the last closure.
     """
 
     azimuths: int = 450
@@ -77,18 +79,18 @@ class MapperOptions:
 
 @dataclass
 class Submap:
-    """Keyframes matched to one another: `anchor` is the one whose frame it has; `members` their poses in it."""
+    """Keyframes matched to one another: `anchor` is the keyframe whose frame it has, `members` are the poses in it."""
 
     anchor: int
     distributions: Distributions | None
     members: dict[int, Pose2D]
-    way_m: float = 0.0
+    driven_m: float = 0.0
 
 
 class Mapper:
-    """Makes a map while the robot drives; `start` is where the robot stands at first, in the map's frame.
+    """Mapper of one drive; `start` is the robot's first pose in the map's frame.
 
-    `revision` counts how often earlier poses were corrected; `blind_since_s` is since when no scan could be used.
+    `revision` counts corrections of earlier poses; `blind_since_s` is the time since which no scan could be used.
     """
 
     def __init__(self, start: Pose2D, options: MapperOptions | None = None) -> None:
@@ -98,7 +100,7 @@ class Mapper:
         self.keyframes: list[Keyframe] = []
         self.submaps: list[Submap] = []
         self.revision = 0
-        self.way_m = 0.0
+        self.driven_m = 0.0
         self.dropped = 0
         self.blind_since_s: float | None = None
         self._filter: SelfFilter | None = None
@@ -116,10 +118,10 @@ class Mapper:
         self._joint: Edge | None = None
 
     @staticmethod
-    def going_on(
+    def from_map(
         graph: PoseGraph, keyframes: list[Keyframe], submaps: list[Submap], options: MapperOptions | None = None
     ) -> Mapper:
-        """A mapper that goes on from an earlier map, from where that began."""
+        """Creates a mapper that continues an earlier map from its first pose."""
         mapper = Mapper(graph.poses[0], options)
         mapper.graph, mapper.keyframes, mapper.submaps = graph, keyframes, submaps
         mapper._returning = True
@@ -127,18 +129,18 @@ class Mapper:
 
     @property
     def pose(self) -> Pose2D:
-        """X_WF: where the robot is on the map."""
+        """The robot's pose X_WF on the map."""
         if not self._active:
             return self._start
         return compose(self.graph.poses[self._current.anchor], self._X_AF)
 
     @property
-    def way_since_closure_m(self) -> float:
-        """How far the robot has driven since it last recognised a place."""
-        return self.way_m - self._closed_at_m
+    def since_closure_m(self) -> float:
+        """Distance (m) driven since the last loop closure."""
+        return self.driven_m - self._closed_at_m
 
     def estimate(self) -> LocalisationEstimate:
-        """The pose as a localiser gives it."""
+        """The pose as a localisation estimate."""
         X_WO = compose(self.pose, inverse(self._X_OF)).transform()
         stamp_s = -math.inf if self._scan is None else self._scan.stamp_s
         seeing = bool(self._active) and self.blind_since_s is None
@@ -167,11 +169,12 @@ class Mapper:
             self.blind_since_s = scan.stamp_s if self.blind_since_s is None else self.blind_since_s
             return
         self.blind_since_s = None
-        if not self._active or self._keyframe_is_due():
-            self._keep(Keyframe.of(scan, points_F, self._filter, robot))
+        driven_m, turn_rad = self._since_keyframe
+        if not self._active or driven_m > options.keyframe_m or turn_rad > options.keyframe_rad:
+            self._add_keyframe(Keyframe.of(scan, points_F, self._filter, robot))
 
     def _recognised(self, points_F: FloatArray) -> bool:
-        """Find the robot on the map that it goes on from, about where that began; its keyframe then joins the graph."""
+        """Localises the robot on the map to continue, about its first pose; returns whether that worked."""
         options, first = self._options, self.graph.poses[0]
         for submap in sorted(self.submaps, key=lambda each: self._off_m(each, first))[: options.recognised_in]:
             guess = relative(self.graph.poses[submap.anchor], first)
@@ -187,23 +190,23 @@ class Mapper:
         return self._active[0]
 
     def _frozen(self, scan: Scan) -> bool:
-        """Returns whether a scan repeats the last one, noise and all, although the robot has moved."""
+        """Returns whether a scan repeats the last one, noise included, although the robot moved."""
         last = self._scan
         return last is not None and scan.repeats(last) and has_moved(last, scan)
 
     def _predict(self, step: Pose2D) -> None:
-        """Moves along with odometry, and lets the spread grow."""
+        """Moves the pose along with odometry and increases its covariance."""
         options = self._options
-        way, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
+        step_m, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         old, self._X_AF = self._X_AF, compose(self._X_AF, step)
-        along = 5e-4 + options.drift_per_m * way
-        yaw = 1e-3 + options.yaw_drift_rad_per_m * way + options.yaw_drift_per_rad * turn
+        along = 5e-4 + options.drift_per_m * step_m
+        yaw = 1e-3 + options.yaw_drift_rad_per_m * step_m + options.yaw_drift_per_rad * turn
         self._covariance = moved_covariance(self._covariance, old, self._X_AF, along, yaw)
-        self.way_m += way
-        self._since_keyframe = (self._since_keyframe[0] + way, self._since_keyframe[1] + turn)
+        self.driven_m += step_m
+        self._since_keyframe = (self._since_keyframe[0] + step_m, self._since_keyframe[1] + turn)
 
     def _matched(self, points_F: FloatArray) -> bool:
-        """Matches a scan to the current submap; False when it explains too little."""
+        """Matches a scan to the current submap; returns whether that explains enough of the scan."""
         if not self._active:
             return not self._returning or self._recognised(points_F)
         distributions = self._current.distributions
@@ -214,15 +217,11 @@ class Mapper:
         self._X_AF, self._covariance = found.pose, found.covariance
         return True
 
-    def _keyframe_is_due(self) -> bool:
-        way, turn = self._since_keyframe
-        return way > self._options.keyframe_m or turn > self._options.keyframe_rad
-
-    def _keep(self, frame: Keyframe) -> None:
-        """A new keyframe: into the submaps and the graph; then look for a loop."""
+    def _add_keyframe(self, frame: Keyframe) -> None:
+        """Adds a keyframe to the submaps and the graph, and searches for a loop."""
         index = len(self.keyframes)
         self.keyframes.append(frame)
-        way, self._since_keyframe = self._since_keyframe[0], (0.0, 0.0)
+        driven_m, self._since_keyframe = self._since_keyframe[0], (0.0, 0.0)
         if not self._active:
             self.graph.poses.append(self._start)
             self.graph.edges.extend([] if self._joint is None else [self._joint])
@@ -233,14 +232,14 @@ class Mapper:
         self.graph.edges.append(Edge(current.anchor, index, self._X_AF, self._at_least(self._covariance)))
         current.members[index] = self._X_AF
         self._add_to(current, index)
-        current.way_m += way
+        current.driven_m += driven_m
         for follower in self._active[1:]:
             follower.members[index] = relative(current.members[follower.anchor], self._X_AF)
             self._add_to(follower, index)
-            follower.way_m += way
+            follower.driven_m += driven_m
         self._change_submaps(index)
-        if self.way_m - self._tried_at_m > self._options.closure_m:
-            self._tried_at_m = self.way_m
+        if self.driven_m - self._tried_at_m > self._options.closure_m:
+            self._tried_at_m = self.driven_m
             self._close_loops(index)
 
     def _add_to(self, submap: Submap, index: int) -> None:
@@ -254,9 +253,9 @@ class Mapper:
         self._active.append(submap)
 
     def _change_submaps(self, index: int) -> None:
-        """Begins the next submap when the current one is half full; go over to it when it is full."""
+        """Begins the next submap when the current one is half full, and changes to it when that is full."""
         current, options = self._current, self._options
-        full = max(current.way_m / options.submap_m, len(current.members) / options.submap_keyframes)
+        full = max(current.driven_m / options.submap_m, len(current.members) / options.submap_keyframes)
         if len(self._active) == 1 and full > 0.5:
             self._begin_submap(index)
         elif len(self._active) > 1 and full > 1.0:
@@ -269,21 +268,21 @@ class Mapper:
             self._begin_submap(index)
 
     def _at_least(self, covariance: FloatArray) -> FloatArray:
-        """A covariance that is no smaller than what systematic errors allow."""
+        """The covariance enlarged by systematic errors."""
         place, yaw = self._options.least_sigma_m, self._options.least_sigma_rad
         return np.asarray(covariance + np.diag([place**2, place**2, yaw**2]))
 
     # ---- loop closures
 
     def _close_loops(self, index: int) -> None:
-        """Looks for a keyframe in the nearest old submap; take in what another one confirms."""
-        found = self._found_in_old(index)
+        """Searches for a keyframe in the nearest old submap; accepts closures that agree with one another."""
+        found = self._closure_of(index)
         if found is None:
             return
         self._pending = [
-            edge for edge in self._pending if self._way_between(edge.second, index) < self._options.agree_within_m
+            edge for edge in self._pending if self._distance_between(edge.second, index) < self._options.agree_within_m
         ]
-        agreeing = [edge for edge in self._pending if self._agree(edge, found)]
+        agreeing = [edge for edge in self._pending if self._agrees(edge, found)]
         if not agreeing:
             self._pending.append(found)
             return
@@ -291,18 +290,18 @@ class Mapper:
         self._take_in([*agreeing, found])
 
     def _take_in(self, edges: list[Edge]) -> None:
-        """Optimise with new closures; what the rest then contradicts goes out again."""
+        """Optimises the graph with new closures, and removes closures that the rest contradicts."""
         self.graph.edges.extend(edges)
         self.graph.optimise()
         self.dropped += len(self.graph.drop_outliers(self._options.most_sigmas))
         self.revision += 1
-        self._closed_at_m = self.way_m
+        self._closed_at_m = self.driven_m
 
-    def _way_between(self, first: int, second: int) -> float:
+    def _distance_between(self, first: int, second: int) -> float:
         return sum(math.hypot(b.x_m - a.x_m, b.y_m - a.y_m) for a, b in pairwise(self.graph.poses[first : second + 1]))
 
-    def _agree(self, edge: Edge, other: Edge) -> bool:
-        """Returns whether two closures give the same loop: once around both, and the way between them, leads back."""
+    def _agrees(self, edge: Edge, other: Edge) -> bool:
+        """Returns whether two closures agree: the poses along both and between them form a closed loop."""
         if edge.second == other.second:
             return False
         poses = self.graph.poses
@@ -312,16 +311,16 @@ class Mapper:
         options = self._options
         return math.hypot(off.x_m, off.y_m) < options.agree_m and abs(off.yaw_rad) < options.agree_rad
 
-    def _found_in_old(self, index: int) -> Edge | None:
-        """The keyframe's pose in the nearest submap that is neither current nor just left."""
+    def _closure_of(self, index: int) -> Edge | None:
+        """The closure of a keyframe with the nearest old submap, None when it is not found there."""
         submap = self._nearest_old(index)
         if submap is None:
             return None
         options = self._options
-        way = self.way_since_closure_m
+        driven_m = self.since_closure_m
         window = Window(
-            min(options.widest.place_m, options.closure_window.place_m + options.window_per_m.place_m * way),
-            min(options.widest.yaw_rad, options.closure_window.yaw_rad + options.window_per_m.yaw_rad * way),
+            min(options.widest.place_m, options.closure_window.place_m + options.window_per_m.place_m * driven_m),
+            min(options.widest.yaw_rad, options.closure_window.yaw_rad + options.window_per_m.yaw_rad * driven_m),
         )
         guess = relative(self.graph.poses[submap.anchor], self.graph.poses[index])
         found = self.find_in(submap, self.keyframes[index].points_F, guess, window)
@@ -330,24 +329,24 @@ class Mapper:
         return Edge(submap.anchor, index, found.pose, self._at_least(found.covariance), closure=True)
 
     def _nearest_old(self, index: int) -> Submap | None:
-        """The submap with the keyframe nearest to a keyframe, within reach."""
+        """The old submap with the keyframe nearest to a keyframe, None when none is within reach."""
         here = self.graph.poses[index]
         old = [submap for submap in self.submaps if max(submap.members) < self._current.anchor]
         near = min(old, key=lambda each: self._off_m(each, here), default=None)
         return near if near is not None and self._off_m(near, here) < self._options.closure_reach_m else None
 
     def _off_m(self, submap: Submap, here: Pose2D) -> float:
-        """How far a pose is from the nearest keyframe of a submap."""
+        """Distance (m) from a pose to the nearest keyframe of a submap."""
         places = (self.graph.poses[member] for member in submap.members)
         return min(math.hypot(place.x_m - here.x_m, place.y_m - here.y_m) for place in places)
 
     def find_in(self, submap: Submap, points_F: FloatArray, guess: Pose2D, window: Window) -> Match | None:
-        """Where a scan's points fit into a submap, clearly and nowhere else in the window."""
+        """Searches for a scan's pose in a submap; None unless the scan fits clearly at one place of the window only."""
         options = self._options
-        distributions = self.rebuilt(submap)
+        distributions = self.distributions_of(submap)
         points_A = np.vstack([_placed(self.keyframes[i].points_F, pose) for i, pose in submap.members.items()])
         grid = _hit_grid(points_A)
-        few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 150)])
+        few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // _SEARCH_POINTS)])
         coarse = find_pose(grid, few, guess, window, least=options.closure_score)
         if coarse is None or coarse.rival_score > options.rival_share * coarse.score:
             return None
@@ -355,8 +354,8 @@ class Mapper:
         found = match(distributions, points_F, coarse.pose, wide, options.matching)
         return found if found.inlier_share >= options.closure_share else None
 
-    def rebuilt(self, submap: Submap) -> Distributions:
-        """The distributions of a submap; a full one does not keep them."""
+    def distributions_of(self, submap: Submap) -> Distributions:
+        """The distributions of a submap, computed again where a full submap has dropped them."""
         if submap.distributions is not None:
             return submap.distributions
         distributions = Distributions()
@@ -371,7 +370,7 @@ def _placed(points_F: FloatArray, X_AF: Pose2D) -> FloatArray:
 
 
 def _hit_grid(points: FloatArray) -> GridMap:
-    """The cells that points hit."""
+    """Grid of the cells in which points lie."""
     low = points.min(axis=0) - 1.0
     columns, rows = np.ceil((points.max(axis=0) + 1.0 - low) / _FIELD_CELL_M).astype(int)
     occupied = np.zeros((rows, columns), dtype=np.bool_)

@@ -1,7 +1,7 @@
 """Occupancy in layers of height: log-odds of every cell, from rays traced through the grid (Moravec and Elfes, 1985).
 
-A beam that passes over a low table says nothing of the table's own layer, so both stay right in one grid; the two maps
-that the robot needs are bands of its layers.
+A beam that passes over a low table does not touch the table's layer, so both stay right in one grid. The two maps that
+the robot needs are bands of its layers.
 """
 
 from __future__ import annotations
@@ -20,21 +20,29 @@ from skills.robot import FloatArray, Pose2D
 LOWEST_M: Final = 0.05
 HIGHEST_M: Final = 1.3
 BANDS_M: Final = {"scan": (0.7, 1.3), "keepout": (0.05, 1.0)}
-"""The heights that each map speaks of."""
+"""Band of heights (m) of each map."""
 UNIT: Final = 0.2
 """Log-odds of one step of a cell's value."""
-_HIT, _MISS, _MOST = 4, -2, 120
+_HIT = 4
+"""Change of a cell's value where a beam ends."""
+_MISS = -2
+"""Change of a cell's value where a beam passes."""
+_MOST = 120
 _OCCUPIED = 4
+"""Least value of an occupied cell."""
 _SURE = 8
+"""Least value of a cell that is surely occupied."""
 _FRINGE_M: Final = 0.075
+"""Distance to which the noise of the ranges fills cells beside an occupied one."""
 _BLOCK_M: Final = 8.0
+"""Step by which the grid grows."""
 Values = NDArray[np.int8]
 
 
 class LayeredOccupancy:
-    """A grid that grows with what is inserted. `values` is (layers, rows, columns) of log-odds in steps of UNIT.
+    """Occupancy grid that grows with each keyframe. `values` (layers, rows, columns) are log-odds in steps of UNIT.
 
-    A table top fills no layer that is higher than it is thick: beams pass below it in the same layer.
+    Layers must be thinner than a table top, since beams pass below it in a thicker one.
     """
 
     def __init__(self, resolution_m: float, max_range_m: float = 8.0, *, layer_m: float = 0.05) -> None:
@@ -43,7 +51,7 @@ class LayeredOccupancy:
         self.values: Values = np.zeros((round((HIGHEST_M - LOWEST_M) / layer_m), 0, 0), dtype=np.int8)
 
     def insert(self, frame: Keyframe, X_WF: Pose2D, *, stride: int = 1, first: int = 0) -> None:
-        """Trace the beams of every `stride`-th column, from the `first` on, of a keyframe that was taken at a pose."""
+        """Traces the beams of every `stride`-th column, from the `first` on, of a keyframe at a pose."""
         self._reach(X_WF)
         c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -60,7 +68,7 @@ class LayeredOccupancy:
         )
 
     def probability(self, band: str) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        """The probability that a cell is occupied anywhere in a band's heights, and whether it was observed at all."""
+        """Probability that a cell is occupied anywhere in a band of heights, and whether it was observed at all."""
         layers = self.values[self._layers(BANDS_M[band])]
         observed = (layers != 0).any(axis=0)
         odds = self._greatest(layers).astype(np.float32) * np.float32(UNIT)
@@ -68,7 +76,7 @@ class LayeredOccupancy:
         return np.where(observed, probability, 0.5).astype(np.float32), observed
 
     def ground(self, window: tuple[slice, slice], low_m: float) -> tuple[NDArray[np.bool_], ...]:
-        """Of a window of cells: which are occupied for the body, which were observed, and which of these below low_m.
+        """Returns whether each cell of a window is occupied for the body, was observed, and was observed below low_m.
 
         Occupied cells count as observed below.
         """
@@ -90,14 +98,14 @@ class LayeredOccupancy:
         return rows, columns
 
     def _layers(self, band_m: tuple[float, float]) -> slice:
-        """The layers that lie in a band of heights by more than half."""
+        """The layers of which more than half lies in a band of heights."""
         first, last = ((height - LOWEST_M) / self._layer_m for height in band_m)
         return slice(math.floor(first + 0.5), math.ceil(last - 0.5))
 
     def _greatest(self, layers: Values) -> Values:
-        """The greatest value of the layers that were observed; -128 where none was.
+        """Greatest value of the observed layers; -128 where none was observed.
 
-        What is hardly occupied beside what surely is, is the noise of its ranges, and counts as free.
+        A cell that is hardly occupied beside one that surely is comes from the noise of ranges, and counts as free.
         """
         greatest = np.where(layers == 0, np.int8(-128), layers).max(axis=0)
         sure = (greatest >= _SURE).astype(np.uint8)
@@ -106,7 +114,7 @@ class LayeredOccupancy:
         return np.asarray(np.where(beside, np.minimum(greatest, np.int8(_MISS)), greatest), dtype=np.int8)
 
     def _reach(self, X_WF: Pose2D) -> None:
-        """Grows so that all within the range of a pose lies on the grid."""
+        """Grows the grid to cover all cells within the range of a pose."""
         rows, columns = self.values.shape[1:]
         need = [
             (

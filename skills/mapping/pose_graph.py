@@ -1,4 +1,4 @@
-"""The pose graph: where all keyframes are, given what the scans say of pairs of them. Solved by GTSAM."""
+"""The pose graph of the keyframes and the measurements between pairs of them, solved by GTSAM."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from skills.geometry import relative
 from skills.robot import FloatArray, Pose2D
 
 _HUBER_SIGMAS = 1.5
+"""Residual, in standard deviations, above which a closure loses weight."""
 
 
 class MappingExtraMissingError(ImportError):
@@ -20,7 +21,7 @@ class MappingExtraMissingError(ImportError):
 
 @dataclass(frozen=True)
 class Edge:
-    """Keyframe `second` as seen from keyframe `first`, with its covariance; a `closure` may be taken out again."""
+    """Measured pose of keyframe `second` in the frame of `first`, with covariance; a `closure` may be removed again."""
 
     first: int
     second: int
@@ -29,14 +30,14 @@ class Edge:
     closure: bool = False
 
     def sigmas(self, poses: list[Pose2D]) -> float:
-        """How far the poses are off the measurement, in standard deviations (Mahalanobis)."""
+        """Distance of the poses from the measurement, in standard deviations (Mahalanobis)."""
         off = relative(self.measured, relative(poses[self.first], poses[self.second]))
         error = np.array([off.x_m, off.y_m, off.yaw_rad])
         return math.sqrt(float(error @ np.linalg.solve(self.covariance, error)))
 
 
 class PoseGraph:
-    """Poses of keyframes in the map's frame; the first stays where it is."""
+    """Poses of keyframes in the map's frame and the edges between them; the first pose is fixed."""
 
     def __init__(self, poses: list[Pose2D] | None = None, edges: list[Edge] | None = None) -> None:
         self.poses: list[Pose2D] = poses or []
@@ -48,12 +49,14 @@ class PoseGraph:
         return [edge for edge in self.edges if edge.closure]
 
     def optimise(self) -> None:
-        """Moves the poses to where all edges fit best: first plainly, then with Huber's loss for closures."""
+        """Moves the poses to where all edges fit best: first by least squares, then with Huber's loss for closures."""
         for robust in (False, True) if self.closures else (False,):
-            self.poses = self._solved(robust)
+            solved = gtsam_module().LevenbergMarquardtOptimizer(self._factors(robust), self._values()).optimize()
+            found = (solved.atPose2(index) for index in range(len(self.poses)))
+            self.poses = [Pose2D(pose.x(), pose.y(), pose.theta()) for pose in found]
 
     def drop_outliers(self, most_sigmas: float) -> list[Edge]:
-        """Takes out closures that the rest contradicts, the worst first, and optimise again; those taken out."""
+        """Removes and returns closures that the rest contradicts, the worst first; optimises after each."""
         dropped: list[Edge] = []
         while self.closures:
             worst = max(self.closures, key=lambda edge: edge.sigmas(self.poses))
@@ -65,7 +68,7 @@ class PoseGraph:
         return dropped
 
     def covariance(self, index: int) -> FloatArray:
-        """The marginal covariance of a pose, x, y (m) and yaw (rad) in its own axes."""
+        """Marginal covariance of a pose over x, y (m) and yaw (rad), in its own axes."""
         gtsam = gtsam_module()
         marginals = gtsam.Marginals(self._factors(False), self._values())
         return np.asarray(marginals.marginalCovariance(index))
@@ -91,14 +94,9 @@ class PoseGraph:
             factors.add(gtsam.BetweenFactorPose2(edge.first, edge.second, seen, model))
         return factors
 
-    def _solved(self, robust: bool) -> list[Pose2D]:
-        solved = gtsam_module().LevenbergMarquardtOptimizer(self._factors(robust), self._values()).optimize()
-        found = (solved.atPose2(index) for index in range(len(self.poses)))
-        return [Pose2D(pose.x(), pose.y(), pose.theta()) for pose in found]
-
 
 def gtsam_module() -> Any:
-    """GTSAM, imported when it is needed. Raises MappingExtraMissingError."""
+    """The GTSAM module, imported on demand. Raises MappingExtraMissingError when it is not installed."""
     try:
         import gtsam
     except ImportError as error:

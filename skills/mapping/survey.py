@@ -1,4 +1,4 @@
-"""A survey: the robot drives about, by frontiers or along a route, and makes its map meanwhile."""
+"""Survey: the robot maps while it drives to frontiers or along a route."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from skills.geometry import relative
 from skills.mapping.frontiers import Frontier, Ground
 from skills.mapping.mapper import Mapper
 from skills.mapping.occupancy import LayeredOccupancy
+from skills.navigate.base import EXPIRY_S
 from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
 from skills.robot import CommandState, FloatArray, Lease, Pose2D, Robot
 
 _ROUNDS = 1
-"""So many times, once back at the start, the frontiers that were given up are tried again."""
-_EXPIRY_S = 0.3
+"""Rounds, once back at the start, in which abandoned frontiers are tried again."""
 _FRONTIER_M = 0.3
 _FRONTIER_CELLS = 8
-"""A frontier is one as long as so many cells within _FRONTIER_M were not seen near the floor."""
+"""A frontier counts as explored once fewer cells than this within _FRONTIER_M are unseen near the floor."""
 _FAR_STAND_M = 2.5
-"""Frontiers are looked at from so near at least."""
+"""Greatest distance from which a frontier is viewed."""
 
 
 @dataclass(frozen=True)
 class SurveyOptions:
-    """Metres, m/s and seconds of the robot's clock.
+    """Options of a survey, in metres, m/s and seconds of the robot's clock.
 
-    Ground counts as explored within `explored_m`. The robot goes back to a known place when the standard deviation of
-    its own place passes `unsure_m`, once `back_after_m` were driven since the last loop. Before a loop is closed, a
-    known wall may be seen beside its place: that is nothing in the way.
+    Ground counts as explored within `explored_m`. The robot returns to a known place when the standard deviation of its
+    position passes `unsure_m`, once `back_after_m` were driven since the last loop. Before a loop is closed, a known
+    wall may appear beside its place; the costmap's `explained_m` allows for that.
     """
 
     resolution_m: float = 0.05
@@ -67,8 +67,11 @@ class SurveyOptions:
     controller: FollowerOptions = field(default_factory=FollowerOptions)
 
 
+_NO_PATH = "no free path leads on or back to the start"
+
+
 class Purpose(enum.Enum):
-    """What the robot drives for."""
+    """Purpose of a drive."""
 
     FRONTIER = "a frontier"
     ROUTE = "the route"
@@ -84,7 +87,10 @@ class _Goal:
 
 
 class Survey:
-    """Call `tick` after each advance of the clock until `done`; `trouble` says why it ended early, if it did."""
+    """Survey of a place by one robot. Call `tick` after each advance of the clock until `done`.
+
+    `trouble` is the reason of an early end.
+    """
 
     def __init__(
         self,
@@ -96,7 +102,7 @@ class Survey:
         route: Sequence[tuple[float, float]] | None = None,
         options: SurveyOptions | None = None,
     ) -> None:
-        """Without a `route` (points in the map's frame, m) it explores by frontiers. In the end it goes `home`."""
+        """Explores by frontiers unless there is a `route` (points in the map's frame, m); ends at `home`."""
         self._robot, self._lease, self.mapper = robot, lease, mapper
         self._options = options or SurveyOptions()
         self._home = home
@@ -126,11 +132,11 @@ class Survey:
 
     @property
     def goal(self) -> tuple[str, Pose2D] | None:
-        """What the robot drives for now, and where to."""
+        """Purpose and goal of the present drive, None when there is none."""
         return None if self._goal is None else (self._goal.purpose.value, self._goal.pose)
 
     def tick(self, now_s: float) -> None:
-        """Takes in what the robot senses, and drives on."""
+        """Takes in the robot's sensor readings and drives on."""
         self.mapper.update(self._robot)
         options = self._options
         if self._blind(now_s) or not self.mapper.keyframes:
@@ -142,9 +148,9 @@ class Survey:
             self._looked_s = now_s
             self._costmap.update(self._robot, self.mapper.estimate())
         if corrected and self._goal is not None:
-            self._whole = LayeredCostmap(self.known()[0])
+            self._whole = LayeredCostmap(self.known_grid()[0])
             self._begin(self._goal, now_s)
-        if self._goal is None or self._seen(self._goal, now_s):
+        if self._goal is None or self._is_explored(self._goal, now_s):
             self._choose(now_s)
         if not self.done:
             self._drive(now_s)
@@ -155,7 +161,7 @@ class Survey:
         self._robot.stop(lease=self._lease)
 
     def _blind(self, now_s: float) -> bool:
-        """Stand while the LiDAR gives nothing to go by; end when that lasts."""
+        """Stands while the LiDAR gives no usable scan, and ends when that lasts; returns whether the robot stands."""
         scan = self._robot.scan()
         self._begun_s = now_s if self._begun_s is None else self._begun_s
         seen_s = self._begun_s if scan is None else scan.stamp_s
@@ -174,9 +180,9 @@ class Survey:
     # ---- the map so far
 
     def _refresh(self, now_s: float, *, force: bool) -> None:
-        """Brings the grid for driving up to date, and about the robot the costmap."""
+        """Updates the grid for driving, and the costmap about the robot."""
         mapper, options = self.mapper, self._options
-        due = mapper.way_m - self._refreshed[0] > options.refresh_m or now_s - self._refreshed[1] > options.refresh_s
+        due = mapper.driven_m - self._refreshed[0] > options.refresh_m or now_s - self._refreshed[1] > options.refresh_s
         if not force and not (due and len(self._inserted) < len(mapper.keyframes)):
             return
         if self._moved():
@@ -184,21 +190,21 @@ class Survey:
         for index in range(len(self._inserted), len(mapper.keyframes)):
             self._grid.insert(mapper.keyframes[index], mapper.graph.poses[index], stride=2)
             self._inserted.append(mapper.graph.poses[index])
-        self._refreshed = mapper.way_m, now_s
-        self._costmap = LayeredCostmap(self.known(options.around_m)[0], options.costmap)
+        self._refreshed = mapper.driven_m, now_s
+        self._costmap = LayeredCostmap(self.known_grid(options.around_m)[0], options.costmap)
 
     def _moved(self) -> bool:
-        """Returns whether keyframes have been corrected by more than the grid for driving stands."""
+        """Returns whether keyframes were corrected by more than the grid for driving tolerates."""
         if self.mapper.revision == self._revision:
             return False
         self._revision = self.mapper.revision
         pairs = zip(self._inserted, self.mapper.graph.poses, strict=False)
         return any(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) > self._options.moved_m for a, b in pairs)
 
-    def known(self, around_m: float | None = None) -> tuple[GridMap, BoolGrid]:
-        """The keep-out grid as known so far, or of it what lies about the robot, and which cells were explored.
+    def known_grid(self, around_m: float | None = None) -> tuple[GridMap, BoolGrid]:
+        """The keep-out grid so far, or its part about the robot, and whether each cell is explored.
 
-        Explored is what was seen near the floor, too; where the robot itself stood is free.
+        Explored cells were also seen near the floor. Cells where the robot stood are free.
         """
         grid, poses = self._grid, [*self._inserted, self.mapper.pose]
         shape = grid.values.shape[1:]
@@ -220,8 +226,8 @@ class Survey:
 
     # ---- goals
 
-    def _seen(self, goal: _Goal, now_s: float) -> bool:
-        """Returns whether a frontier is none any more, looked at when the costmap has been refreshed."""
+    def _is_explored(self, goal: _Goal, now_s: float) -> bool:
+        """Returns whether the goal is a frontier that has been explored; checked when the costmap was refreshed."""
         if goal.purpose is not Purpose.FRONTIER or self._refreshed[1] != now_s:
             return False
         window = self._grid.window(*goal.about, _FRONTIER_M)
@@ -229,17 +235,18 @@ class Survey:
         return int(np.count_nonzero(~low)) < _FRONTIER_CELLS
 
     def _choose(self, now_s: float) -> None:
-        """The next goal, or the end."""
+        """Chooses the next goal, or ends."""
         self._goal = None
         self._refresh(now_s, force=True)
-        pose, (known, explored) = self.mapper.pose, self.known()
+        pose, (known, explored) = self.mapper.pose, self.known_grid()
         self._whole = LayeredCostmap(known)
         ground = Ground(known, explored, (pose.x_m, pose.y_m), clear_m=self._options.clear_m)
         if self._unsure() and (goal := self._loop_goal(ground)) is not None:
             self._explored_since_loop = False
             if self._begin(goal, now_s):
                 return
-        while (goal := self._next_goal(ground)) is not None:
+        next_goal = self._frontier_goal if self._route is None else self._route_goal
+        while (goal := next_goal(ground)) is not None:
             if self._begin(goal, now_s):
                 return
             self._refused.append(goal.about)
@@ -247,18 +254,12 @@ class Survey:
         if not self._at(home.pose):
             if self._begin(home, now_s):
                 return
-            self._lost_way()
+            self.trouble = _NO_PATH
         self.stop()
         self.done = True
 
-    def _lost_way(self) -> None:
-        self.trouble = "there is no way on, nor back to the start, that the robot fits through"
-
-    def _next_goal(self, ground: Ground) -> _Goal | None:
-        return self._frontier_goal(ground) if self._route is None else self._route_goal(ground)
-
     def _frontier_goal(self, ground: Ground) -> _Goal | None:
-        """The nearest frontier that was not tried."""
+        """The nearest frontier that was not tried, None when there is none."""
         options, self._given_up = self._options, False
         for frontier in ground.frontiers(least_m=options.frontier_m, within_m=options.frontier_within_m):
             if any(math.dist(frontier.at, tried) < options.tried_m for tried in (*self._tried, *self._refused)):
@@ -271,7 +272,7 @@ class Survey:
         return None
 
     def _before(self, frontier: Frontier, ground: Ground) -> Pose2D | None:
-        """Where the body has room before a frontier, as near as can be, on this side of walls."""
+        """The pose nearest to a frontier where the body has clearance, on this side of walls."""
         others = ground.stands_near(*frontier.at, most=16, apart_m=0.25)
         for stand in (frontier.stand, *others):
             near = math.dist(stand, frontier.at) < _FAR_STAND_M
@@ -282,7 +283,7 @@ class Survey:
         return None
 
     def _route_goal(self, ground: Ground) -> _Goal | None:
-        """As near to the next point of the route as is known to be free."""
+        """The free pose nearest to the next point of the route, None at its end."""
         assert self._route is not None
         here, near_m = (self.mapper.pose.x_m, self.mapper.pose.y_m), self._options.route_tolerance_m
         while self._route:
@@ -300,7 +301,7 @@ class Survey:
         return None
 
     def _loop_goal(self, ground: Ground) -> _Goal | None:
-        """The nearest place of an old submap."""
+        """The nearest pose of an old submap, None when there is none."""
         mapper = self.mapper
         newest = mapper.submaps[-3].anchor if len(mapper.submaps) > 3 else 0
         old = [pose for pose in mapper.graph.poses[:newest] if math.isfinite(ground.cost_to(pose.x_m, pose.y_m))]
@@ -310,15 +311,15 @@ class Survey:
         return _Goal(Purpose.LOOP, pose, (pose.x_m, pose.y_m))
 
     def _unsure(self) -> bool:
-        """Returns whether the robot should recognise a place before it goes on."""
+        """Returns whether the robot should close a loop before it goes on."""
         mapper, options = self.mapper, self._options
-        if mapper.way_since_closure_m < options.back_after_m or not self._explored_since_loop:
+        if mapper.since_closure_m < options.back_after_m or not self._explored_since_loop:
             return False
         covariance = mapper.graph.covariance(len(mapper.graph.poses) - 1)
         return math.sqrt(float(covariance[0, 0] + covariance[1, 1])) > options.unsure_m
 
     def _standing(self, stand: tuple[float, float], towards: tuple[float, float]) -> Pose2D | None:
-        """A pose at a place with room for the body, as nearly facing a point as can be."""
+        """A pose at a position where the body has clearance, turned to a point as far as possible."""
         assert self._whole is not None
         facing = math.atan2(towards[1] - stand[1], towards[0] - stand[0])
         turns = np.array([0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2, 1.57, -1.57, 2.2, -2.2, 2.8, -2.8, math.pi])
@@ -330,7 +331,7 @@ class Survey:
     # ---- driving
 
     def _begin(self, goal: _Goal, now_s: float) -> bool:
-        """Plans a path to a goal; False when there is none."""
+        """Plans a path to a goal; returns whether there is one."""
         assert self._whole is not None
         options = self._options
         problem = options.planner.problem(
@@ -349,7 +350,7 @@ class Survey:
         return True
 
     def _drive(self, now_s: float) -> None:
-        """One command along the path; a new path when the robot is stuck or off it."""
+        """Sends one command along the path; plans again when the robot is stuck or off the path."""
         if self._goal is None or self._follower is None or self._costmap is None:
             self.stop()
             return
@@ -365,13 +366,13 @@ class Survey:
             self._replan(now_s)
             return
         self._last = np.array(drive.velocity)
-        command = self._robot.drive(*drive.velocity, until_s=now_s + _EXPIRY_S, lease=self._lease)
+        command = self._robot.drive(*drive.velocity, until_s=now_s + EXPIRY_S, lease=self._lease)
         status = self._robot.command_status(command)
         if status.state is CommandState.REFUSED:
             self.trouble, self.done = f"the robot refused to drive: {status.reason}", True
 
     def _arrived(self) -> None:
-        """At a goal; what could not be reached before is tried again, as more is known now."""
+        """Ends a drive at its goal; goals that could not be reached are tried again, since more is known now."""
         assert self._goal is not None
         self._refused.clear()
         if self._goal.purpose is not Purpose.LOOP:
@@ -387,20 +388,19 @@ class Survey:
         self._robot.stop(lease=self._lease)
 
     def _replan(self, now_s: float) -> None:
-        """Plan again; after three times give the goal up."""
+        """Plans again; abandons the goal after three times."""
         goal = self._goal
         assert goal is not None
         self._failures += 1
         self._last = np.zeros(3)
         self._refresh(now_s, force=True)
-        self._whole = LayeredCostmap(self.known()[0])
+        self._whole = LayeredCostmap(self.known_grid()[0])
         if self._failures < 3 and self._begin(goal, now_s):
             return
         self._tried.append(goal.about)
         self._refused.append(goal.about)
         if goal.purpose is Purpose.HOME:
-            self._lost_way()
-            self.done = True
+            self.trouble, self.done = _NO_PATH, True
         self._goal = None
 
     def _at(self, pose: Pose2D) -> bool:
@@ -411,18 +411,18 @@ class Survey:
 def _stood(
     poses: Sequence[Pose2D], shape: tuple[int, ...], origin_m: tuple[float, float], cell_m: float, radius_m: float
 ) -> BoolGrid:
-    """The cells under the body's middle at some poses."""
+    """The cells about the body's middle at some poses."""
     x, y, yaw = pose_array(poses).T
-    shown = np.zeros(shape, dtype=np.uint8)
+    marked = np.zeros(shape, dtype=np.uint8)
     for reach_m in (-0.25, 0.0, 0.25):
         row = np.floor((y + reach_m * np.sin(yaw) - origin_m[1]) / cell_m).astype(int)
         column = np.floor((x + reach_m * np.cos(yaw) - origin_m[0]) / cell_m).astype(int)
         inside = (row >= 0) & (column >= 0) & (row < shape[0]) & (column < shape[1])
-        shown[row[inside], column[inside]] = 1
+        marked[row[inside], column[inside]] = 1
     size = 2 * math.ceil(radius_m / cell_m) + 1
-    return np.asarray(cv2.dilate(shown, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))) > 0)
+    return np.asarray(cv2.dilate(marked, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))) > 0)
 
 
 def _beyond(here: tuple[float, float], stand: tuple[float, float], point: tuple[float, float]) -> tuple[float, float]:
-    """What to face at a place on a route: the route's point, or ahead where that is the place itself."""
+    """The point to face on a route: the route's next point, or ahead where that is the position itself."""
     return point if math.dist(stand, point) > 0.1 else (2.0 * stand[0] - here[0], 2.0 * stand[1] - here[1])

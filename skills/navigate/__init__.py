@@ -1,1 +1,1 @@
-"""Going to a place: a planned path, followed with checks."""
+"""Navigation of the base: plans paths, follows them and checks them."""

@@ -1,4 +1,4 @@
-"""The footprint of a robot as its arm stands now, with what the gripper holds, projected onto the floor."""
+"""The footprint of a robot with its arm and the held object, projected onto the floor."""
 
 from __future__ import annotations
 
@@ -15,21 +15,25 @@ from skills.robot import FloatArray
 
 LINK_RADIUS_M = 0.06
 _APART_M = 0.06
+"""Distance between the discs along a link."""
 _TOLERANCE_M = 0.02
+"""Discs that stick out less than this count as part of the body."""
 _CHANGED_M = 0.05
+"""Growth from which on a path must be planned again."""
 
 
 class ArmFootprint:
     """The body's footprint, extended by discs where the arm or the held object sticks out of it.
 
-    The stowed arm counts as part of the body. Heights are left out: what is above an obstacle counts as in its way,
-    except where the robot stands already: there, what sticks out ends before what the costmap shows.
+    The stowed arm counts as part of the body. Heights are ignored, so an arm above an obstacle counts as in collision,
+    except where the robot stands already: there, discs end before the obstacles of the costmap.
     """
 
     def __init__(self, context: SkillContext) -> None:
         capabilities = context.robot.capabilities()
         self._context, self._body = context, Footprint.of(capabilities)
-        self._model = arm_model(capabilities) if _has_arm(context) else None
+        has_arm = capabilities.arm is not None and capabilities.gripper is not None and capabilities.description
+        self._model = arm_model(capabilities) if has_arm else None
         self._gripper = capabilities.gripper
         self._box = np.array([np.min(capabilities.footprint_m, axis=0), np.max(capabilities.footprint_m, axis=0)])
         if self._model is not None:
@@ -39,19 +43,19 @@ class ArmFootprint:
 
     @property
     def _tip_m(self) -> float:
-        """Where the last disc of the hand has its middle, along the fingers."""
+        """Distance (m) of the hand's last disc along the fingers."""
         return 0.0 if self._gripper is None else max(0.0, self._gripper.tip_x_m - LINK_RADIUS_M)
 
     def now(self) -> Footprint:
-        """The footprint for a drive that begins now."""
+        """The footprint with the arm's present joint angles."""
         arm, held = self._outside(self._arm_discs()), self._outside(self._held_discs())
         discs = self._clipped(np.vstack([arm, held]))
         if len(discs) == 0:
             return self._body
-        return self._body.extended(discs, "the object that it carries" if len(held) else "its arm")
+        return self._body.with_discs(discs, "the object that it carries" if len(held) else "its arm")
 
     def outgrows(self, planned: Footprint) -> bool:
-        """Whether the robot by now reaches noticeably farther than the footprint that a path was planned for."""
+        """Returns whether the robot now reaches noticeably beyond the footprint for which a path was planned."""
         now = self.now()
         if now is self._body:
             return False
@@ -60,14 +64,14 @@ class ArmFootprint:
         return bool(np.any(np.min(apart, axis=1) > _CHANGED_M))
 
     def _arm_discs(self) -> FloatArray:
-        """The arm's links from above, rows of x, y, radius; none while the robot does not know its arm's angles."""
+        """The arm's links from above, rows of x, y, radius; none while the joint angles are unknown."""
         q_rad = self._q_rad()
         if self._model is None or q_rad is None:
             return np.empty((0, 3))
         return _link_discs(self._model, q_rad, self._tip_m)
 
     def _held_discs(self) -> FloatArray:
-        """The held object from above; where its size is not known, all that the gripper may hold."""
+        """The held object from above; the largest that the gripper can hold where its size is unknown."""
         q_rad = self._q_rad()
         if self._model is None or self._gripper is None or q_rad is None or not self._context.robot.gripper().holding:
             return np.empty((0, 3))
@@ -85,13 +89,13 @@ class ArmFootprint:
         return q_rad if np.all(np.isfinite(q_rad)) else None
 
     def _outside(self, discs: FloatArray) -> FloatArray:
-        """Those that stick out of the body with its stowed arm."""
+        """The discs that stick out of the body with its stowed arm."""
         low, high = discs[:, :2] - discs[:, 2:], discs[:, :2] + discs[:, 2:]
         out = np.any((low < self._box[0] - _TOLERANCE_M) | (high > self._box[1] + _TOLERANCE_M), axis=1)
         return np.asarray(discs[out])
 
     def _clipped(self, discs: FloatArray) -> FloatArray:
-        """No farther than to what is under them, or beside them, where the robot stands."""
+        """The discs, shrunk to the clearance that the costmap shows where the robot stands."""
         if len(discs) == 0:
             return discs
         pose = self._context.pose()
@@ -99,11 +103,6 @@ class ArmFootprint:
         centres_W = discs[:, :2] @ np.array([[c, s], [-s, c]]) + (pose.x_m, pose.y_m)
         radii = np.minimum(discs[:, 2], self._context.costmap.clearance_m(centres_W) - 0.01)
         return np.column_stack([discs[:, :2], radii])[radii > 0.01]
-
-
-def _has_arm(context: SkillContext) -> bool:
-    capabilities = context.robot.capabilities()
-    return capabilities.arm is not None and capabilities.gripper is not None and bool(capabilities.description)
 
 
 def _link_discs(model: ArmModel, q_rad: FloatArray, tip_m: float) -> FloatArray:
@@ -121,7 +120,7 @@ def _between(start: FloatArray, end: FloatArray) -> FloatArray:
 
 
 def _box_discs(X_BH: RigidTransform, corners_H: FloatArray) -> FloatArray:
-    """Discs over the box about some corners, cut into parts of about the same length to all sides."""
+    """Discs over the box about some corners, cut into nearly cubic parts."""
     low, high = corners_H.min(axis=0), corners_H.max(axis=0)
     counts = np.maximum(1, np.ceil((high - low) / max(float(np.sort(high - low)[1]), 2.0 * _APART_M))).astype(int)
     half = 0.5 * (high - low) / counts

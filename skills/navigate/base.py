@@ -1,4 +1,4 @@
-"""Driving the base for a skill: one command after another, each short-lived, and all of them ended at the end."""
+"""Drive commands for skills: each one is short-lived, and the last one ends with the skill."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from skills.robot import CommandId, CommandState
 from skills.routine import Routine, RoutineSkill, SkillFailure
 
 EXPIRY_S = 0.3
-"""A drive command lives so long (s) unless the next one replaces it."""
+"""Lifetime (s) of a drive command unless the next one replaces it."""
 
 
 class Base:
-    """Sends drive commands under a context's lease and remembers the last; `accepted` once the robot took one.
+    """Sender of drive commands under a context's lease.
 
-    `patience` is with a robot that refuses them.
+    `accepted` becomes True once the robot accepts a command, `patience` bounds how long a robot may refuse them.
     """
 
     def __init__(self, context: SkillContext) -> None:
@@ -36,7 +36,7 @@ class Base:
         self.last_velocity = np.array(velocity)
 
     def refusal(self) -> str | None:
-        """Why the robot refused the last command, None when it did not."""
+        """Reason why the robot refused the last command, None when it did not."""
         if self._command is None:
             return None
         status = self._context.robot.command_status(self._command)
@@ -46,15 +46,15 @@ class Base:
         self.patience.over()
         return None
 
-    def asks_again(self) -> bool:
-        """Asks a robot that refused once more, by a command to stand; False when patience or the lease is gone."""
+    def ask_again(self) -> bool:
+        """Asks a robot that refused again, by a command to stand; False when patience or the lease is gone."""
         if self._context.robot.lease_holder() != self._context.lease or not self.patience.is_left():
             return False
         self.drive((0.0, 0.0, 0.0))
         return True
 
     def stop(self) -> None:
-        """Stops the last command, if it still runs, and nothing else."""
+        """Stops the last command, if it still runs, and no other motion."""
         self.last_velocity = np.zeros(3)
         if self._command is None:
             return
@@ -64,14 +64,14 @@ class Base:
 
 
 class MovingSkill(RoutineSkill[InputsT]):
-    """A routine that moves the base at a velocity for a time; `end` stops it."""
+    """Routine that moves the base at a velocity for a time; `end` stops the base."""
 
     def __init__(self, context: SkillContext) -> None:
         super().__init__(context)
         self._base = Base(context)
 
     def begin(self, inputs: InputsT) -> None:
-        """Forgets an earlier attempt and prepares a new one."""
+        """Starts a new attempt; see `RoutineSkill.begin`."""
         super().begin(inputs)
         self._base = Base(self.context)
 
@@ -81,7 +81,7 @@ class MovingSkill(RoutineSkill[InputsT]):
         super().suspend()
 
     def end(self) -> None:
-        """Stops what this skill set in motion."""
+        """Stops the base; see `RoutineSkill.end`."""
         self._base.stop()
         super().end()
 
@@ -94,9 +94,9 @@ class MovingSkill(RoutineSkill[InputsT]):
         settle_s: float = 0.5,
         enough: Callable[[], bool] = lambda: False,
     ) -> Routine[None]:
-        """Moves at a body-frame velocity (m/s, m/s, rad/s) for a time, or until it is `enough`; then rest.
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) for a time, or until `enough` returns True; then rests.
 
-        Raises SkillFailure: the robot refused.
+        Raises SkillFailure when the robot refuses to drive.
         """
         end_s = self.context.clock.now() + for_s
         while self.context.clock.now() < end_s and not enough():
@@ -105,12 +105,12 @@ class MovingSkill(RoutineSkill[InputsT]):
         yield from self.pause(settle_s, "coming to rest")
 
     def drive(self, velocity: tuple[float, float, float], running: Running) -> Routine[float]:
-        """Moves at a body-frame velocity for one tick; for how long (s) the robot refused to. Raises SkillFailure."""
+        """Moves at a body-frame velocity for one tick; returns how long (s) the robot refused. Raises SkillFailure."""
         self._base.drive(velocity)
         yield running
         begun_s = self.context.clock.now()
         while (refusal := self._base.refusal()) is not None:
-            if not self._base.asks_again():
+            if not self._base.ask_again():
                 raise SkillFailure(Cause.EXECUTION, f"The robot refused to drive: {refusal}.")
             yield Running(f"{running.message}; the robot refuses to drive: {refusal}")
         return self.context.clock.now() - begun_s

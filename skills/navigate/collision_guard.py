@@ -1,6 +1,6 @@
-"""Stops the robot before what moves into its way, or stands in it so suddenly that no costmap knows of it yet.
+"""Collision guard: stops the robot before moving obstacles, and before obstacles that no costmap knows yet.
 
-Others plan and follow; this looks at the last LiDAR revolution only, and stops as hard as the robot can.
+The guard uses the last LiDAR revolution only, and stops as hard as the robot can.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ _STEP_S = 0.1
 
 @dataclass(frozen=True)
 class GuardOptions:
-    """The robot stands while something that moves would come within `margin_m` of it in the next `horizon_s`.
+    """Collision guard: the robot stands while a moving obstacle would come within `margin_m` in the next `horizon_s`.
 
-    It is taken to drive on along its path, to gain speed at `acceleration_m_s2` up to its limit, or to go on as it does
-    now for `coasting_s`. What moves slower than `slow_m_s` does not count, nor what follows: from behind it, in its
-    own direction within `follows_rad`. Returns that nothing explains stop it where
-    `least_points` of them lie within `touch_m` of the ground that it covers until it stands: after `reaction_s`, at
-    `stop_m_s2`. It goes on once all has been clear for `clear_s`.
+    The guard assumes that the robot drives on along its path and accelerates at `acceleration_m_s2` up to its limit, or
+    keeps its velocity for `coasting_s`. Obstacles slower than `slow_m_s` do not count, nor those that follow: from
+    behind, in the robot's direction within `follows_rad`. Unexplained returns stop the robot where `least_points` of
+    them lie within `touch_m` of the ground that it covers until it stands: after `reaction_s`, at `stop_m_s2`. The
+    robot goes on once its path has been clear for `clear_s`.
     """
 
     horizon_s: Duration = 1.3
@@ -49,7 +49,7 @@ class GuardOptions:
 
 
 class CollisionGuard:
-    """Tells from tick to tick whether the robot must stand, and because of what. Idle without unexplained returns."""
+    """Guard that decides at each tick whether the robot must stand; idle without unexplained returns."""
 
     def __init__(self, context: SkillContext, footprint: Footprint, options: GuardOptions | None = None) -> None:
         self._context, self.footprint = context, footprint
@@ -58,7 +58,7 @@ class CollisionGuard:
         self._danger_s, self._place_W = -math.inf, (0.0, 0.0)
 
     def danger(self, here: Pose2D, follower: LocalController, most_m_s: float) -> Place | None:
-        """The place (x, y) of what the robot, on its path at most_m_s at most, would run into; None when it may go."""
+        """Position (x, y) of the obstacle that the robot would hit at most_m_s at most; None when it may go on."""
         costmap, now_s = self._context.costmap, self._context.clock.now()
         if not isinstance(costmap, ReturnsView):
             return None
@@ -70,7 +70,7 @@ class CollisionGuard:
         return self._place_W if now_s - self._danger_s < self._options.clear_s else None
 
     def _suddenly_ahead(self, here: Pose2D, returns_W: FloatArray) -> Place | None:
-        """Returns on the ground that the robot covers until it stands."""
+        """Position of unexplained returns on the ground that the robot covers until it stands, None without any."""
         velocity, options = self._velocity_W(here), self._options
         speed = float(np.linalg.norm(velocity[:2]))
         if len(returns_W) < options.least_points or speed < 0.05:
@@ -86,7 +86,7 @@ class CollisionGuard:
     def _crossing(
         self, here: Pose2D, follower: LocalController, most_m_s: float, moving: tuple[Moving, ...], now_s: float
     ) -> Place | None:
-        """Where the first thing is that moves into the way."""
+        """Position of the first obstacle that moves into the path, None when there is none."""
         options = self._options
         moving = tuple(one for one in moving if math.hypot(*one.velocity_W) >= options.slow_m_s)
         if not moving:
@@ -105,11 +105,11 @@ class CollisionGuard:
         return None
 
     def _follows(self, one: Moving, here: Pose2D, on_path: FloatArray) -> bool:
-        """Returns whether something comes from behind the robot and goes where it goes: standing would not help."""
-        way = on_path[-1, :2] - on_path[0, :2]
-        if float(np.linalg.norm(way)) < 0.05:
+        """Returns whether a moving obstacle follows the robot from behind, so that standing would not help."""
+        shift = on_path[-1, :2] - on_path[0, :2]
+        if float(np.linalg.norm(shift)) < 0.05:
             return False
-        towards = way / np.linalg.norm(way)
+        towards = shift / np.linalg.norm(shift)
         behind = float((np.array(one.place_W) - (here.x_m, here.y_m)) @ towards) < -0.5 * self.footprint.width_m
         aligned = float(np.array(one.velocity_W) @ towards) > math.cos(self._options.follows_rad) * math.hypot(
             *one.velocity_W
@@ -137,7 +137,7 @@ class CollisionGuard:
 
 
 def _coasting(here: Pose2D, velocity_W: FloatArray, times: FloatArray) -> FloatArray:
-    """Poses (N, 3) of a body that goes on as it does."""
+    """Poses (N, 3) of a body that keeps its velocity."""
     return np.array([here.x_m, here.y_m, here.yaw_rad]) + times[:, None] * velocity_W
 
 

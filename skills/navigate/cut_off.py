@@ -1,4 +1,4 @@
-"""What cuts the robot off from a goal: doors that it saw closed, or anything else that leaves no gap."""
+"""Goals out of reach: doors that the robot saw closed, and regions without a gap between them."""
 
 from __future__ import annotations
 
@@ -19,19 +19,25 @@ from skills.robot import FloatArray, Pose2D
 
 _CELL_M = 0.05
 _AROUND_M = 8.0
+"""Margin of the ground that is examined about robot and goals."""
 _NEAR_M = 0.3
+"""Radius within which a blocked robot looks for its region."""
 _BESIDE_M = (0.4, 0.55, 0.7, 0.9)
+"""Distances from a door at which its two sides are looked up."""
 _FEW_RAYS = 50
 _PANEL_M = 0.05
+"""Half the thickness of a closed door."""
 _JUDGED_M = 1.5
+"""Distance from which a doorway is seen well enough to trust the obstacles in it."""
 _JAMB_M = 0.3
 _THROUGH_M = 0.6
+"""Length of free ground to both sides of an open door."""
 _PERSON_M = np.stack(np.meshgrid(*2 * [np.arange(-0.5, 0.51, _CELL_M)]), axis=-1).reshape(-1, 2)
 
 
 @dataclass(frozen=True)
 class DoorOptions:
-    """How the robot judges the doors on its map while it drives.
+    """Detection of closed doors on the map while the robot drives.
 
     A scan shows a door from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is closed
     while all its gaps are narrower than `closed_m`. Where closed doors leave no path, the robot looks again every
@@ -46,7 +52,7 @@ class DoorOptions:
 
 
 class DoorWatch:
-    """Remembers which doors of the map the robot saw closed, until it sees them open."""
+    """Memory of the doors that the robot saw closed, until it sees them open."""
 
     def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
         self._context = context
@@ -75,7 +81,7 @@ class DoorWatch:
                 self._closed.pop(door, None)
 
     def costmap(self, costmap: FreeSpace) -> FreeSpace:
-        """The costmap, with the closed doors in it as long as they are not seen open."""
+        """The costmap with the closed doors as obstacles."""
         if not self._closed:
             return costmap
         turns = [(door, door.through_rad) for door in self._closed]
@@ -83,7 +89,7 @@ class DoorWatch:
         return with_segments(costmap, panels, _PANEL_M)
 
     def forget_distant(self, here: Pose2D) -> bool:
-        """Forgets what was seen in doorways too far away to be judged, once another door is closed; whether it did.
+        """Clears the costmap in distant doorways once another door is closed; returns whether a cell was cleared.
 
         A door that is seen in part, through another door, may leave a gap that looks too narrow.
         """
@@ -97,7 +103,7 @@ class DoorWatch:
     def regions(
         self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> Regions:
-        """Where a disc as wide as the robot can move, all doors open but those that were seen closed, and no people."""
+        """The regions in which a disc as wide as the robot can move, without people and with all other doors open."""
         axes = [door.axis(_THROUGH_M, 0.5 * _CELL_M) for door in self._context.doors if door not in self._closed]
         discs = [np.array(place) + _PERSON_M for place in people_W]
         return Regions(
@@ -108,10 +114,10 @@ class DoorWatch:
             np.concatenate([np.empty((0, 2)), *axes, *discs]),
         )
 
-    def in_the_way(
+    def blocking_doors(
         self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> tuple[Doorway, ...]:
-        """The closed doors without which there would be a path to one of the goals; none where one is reachable."""
+        """The closed doors that block every path to the goals; none where a goal is reachable."""
         if not self._closed:
             return ()
         regions = self.regions(footprint, here, goals, people_W)
@@ -122,7 +128,7 @@ class Regions:
     """The connected regions of the ground in which a disc as wide as the robot can move.
 
     A goal outside the robot's region is certainly out of reach; one inside may still be, since the robot is longer. The
-    places `free_W` (N, 2) count as free, whatever the costmap says.
+    points `free_W` (N, 2) count as free in any case.
     """
 
     def __init__(
@@ -146,12 +152,12 @@ class Regions:
 
     @property
     def cut_off(self) -> bool:
-        """Returns whether the robot's region is known, and none of the goals lies in it."""
+        """Returns whether the robot's region is known and contains none of the goals."""
         here = self._near((self._here.x_m, self._here.y_m))
         return bool(here) and not any(here & self._at((goal.x_m, goal.y_m)) for goal in self._goals)
 
     def doors_between(self, doors: Sequence[Doorway]) -> tuple[Doorway, ...]:
-        """The closed doors on a path that leads to a goal through such doors; none where there is no such path."""
+        """The doors on a path that leads to a goal through `doors`; none where there is no such path."""
         begin = self._near((self._here.x_m, self._here.y_m))
         ends = set[int]().union(*(self._at((goal.x_m, goal.y_m)) for goal in self._goals))
         joins = {door: sides for door in doors if len(sides := self._sides(door)) == 2}
@@ -173,14 +179,14 @@ class Regions:
         return frozenset(found)
 
     def _at(self, place_W: tuple[float, float], off_m: float = 0.0) -> set[int]:
-        """The regions at a place, or within a distance of it."""
+        """The regions at a point, or within off_m of it."""
         ((y, x),) = self._cell(np.array([place_W])).tolist()
         far = round(off_m / _CELL_M)
         near = self._labels[max(0, y - far) : max(0, y + far + 1), max(0, x - far) : max(0, x + far + 1)]
         return set(np.unique(near).tolist()) - {0}
 
     def _cell(self, places_W: FloatArray) -> NDArray[np.int64]:
-        """The (row, column) of each place."""
+        """The (row, column) of each point."""
         return np.asarray(np.round((places_W - self._corner) / _CELL_M)[:, ::-1].astype(np.int64))
 
     def _near(self, place_W: tuple[float, float]) -> set[int]:
@@ -188,18 +194,18 @@ class Regions:
 
 
 def _on_a_path(joins: dict[Doorway, frozenset[int]], ends: set[int]) -> dict[Doorway, frozenset[int]]:
-    """The doors that are left once those that lead to dead ends are taken away."""
+    """The doors that remain once those that lead to dead ends are removed."""
     left = dict(joins)
     while True:
         sides = [side for each in left.values() for side in each]
         dead = {side for side in sides if sides.count(side) == 1} - ends
-        kept = {door: each for door, each in left.items() if not each & dead}
-        if len(kept) == len(left):
-            return kept
-        left = kept
+        rest = {door: each for door, each in left.items() if not each & dead}
+        if len(rest) == len(left):
+            return rest
+        left = rest
 
 
-def closed_sentence(doors: Sequence[Doorway], goal: Pose2D) -> str:
+def closed_doors_sentence(doors: Sequence[Doorway], goal: Pose2D) -> str:
     """ "The doors between the hall and the kitchen, and between the kitchen and the study, are closed ..."."""
     between = [f"between the {one} and the {other}" for one, other in (door.between for door in doors)]
     no_path = f"so no path leads to ({goal.x_m:.2f}, {goal.y_m:.2f})"

@@ -1,4 +1,4 @@
-"""Paths of a base with two driven wheels: straights ahead or back, turns on the spot, and arcs that round corners."""
+"""Paths of a differential base: straights ahead or back, turns on the spot, and arcs that round corners."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from skills.navigate.smoothing import clearances
 from skills.robot import FloatArray
 
 CELL_SHARE = 0.5
-"""The lattice of such a base is so much finer: it cannot shift to the middle of a door."""
+"""Size of the lattice's cells as a share of the usual one, since the base cannot shift to the middle of a door."""
 _LONG_STEPS = 4
+"""Cells of a long move for each of a short one."""
 _LEGS_M = np.arange(0.2, 2.1, 0.2)
 _RADII_M = (0.8, 0.6, 0.4, 0.25)
 _SHARPEST_RAD = 2.0
@@ -25,7 +26,7 @@ _ARC_STEP_M = 0.05
 
 
 def courses() -> tuple[FloatArray, NDArray[np.int64]]:
-    """Yaws (headings,) along which straights lead from place to place of a lattice, and moves (headings, M, 3).
+    """Yaws (headings,) along which straights lead from cell to cell of a lattice, and moves (headings, M, 3).
 
     The moves are short and long steps ahead and back, and turns to the next heading (see `lattice_moves`).
     """
@@ -41,11 +42,11 @@ def courses() -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 Links = dict[int, tuple[float, tuple[FloatArray, ...]]]
-"""By the index of a lattice state: the cost between it and a pose off the lattice, and poses on the way."""
+"""Cost between each lattice state, by index, and a pose off the lattice, with the poses between them."""
 
 
 def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) -> Links:
-    """How states of the lattice are reached from a pose, or the pose from them.
+    """The links from a pose to states of the lattice, or back from them to the pose.
 
     From the pose the robot goes straight as far as it likes, since it may have no clearance to turn where it stands.
     """
@@ -60,13 +61,13 @@ def links(space: Space, lattice: Lattice, pose: FloatArray, *, to_pose: bool) ->
 
 
 def _straights(space: Space, pose: FloatArray) -> Iterator[tuple[float, FloatArray]]:
-    """Poses straight ahead and behind as far as it is free, and what going there costs; the pose itself first."""
+    """The pose itself, then poses straight ahead and behind as far as they are free, each with the cost to it."""
     yield 0.0, pose
     ahead = np.array([math.cos(pose[2]), math.sin(pose[2]), 0.0])
     for sign in (1.0, -1.0):
         cost, before = 0.0, pose
-        for way_m in sign * _LEGS_M:
-            via = pose + way_m * ahead
+        for leg_m in sign * _LEGS_M:
+            via = pose + leg_m * ahead
             cost += segment_cost(space, before, via, clearance_needed(space, via[0], via[1]))
             if not math.isfinite(cost):
                 break
@@ -75,7 +76,7 @@ def _straights(space: Space, pose: FloatArray) -> Iterator[tuple[float, FloatArr
 
 
 def _around(lattice: Lattice, pose: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """The states next to a pose: four places, two headings each."""
+    """The states next to a pose: four cells, two headings each."""
     row, column = (pose[1] - lattice.y0_m) / lattice.cell_m, (pose[0] - lattice.x0_m) / lattice.cell_m
     k = int(np.searchsorted(lattice.yaws_rad, pose[2] % math.tau, side="right")) - 1
     for i in {math.floor(row + 1e-6), math.ceil(row - 1e-6)}:
@@ -88,8 +89,8 @@ def _around(lattice: Lattice, pose: FloatArray) -> Iterator[tuple[int, FloatArra
                 yield (i * lattice.columns + j) * lattice.headings + heading, place
 
 
-def drives(space: Space, knots: FloatArray) -> FloatArray:
-    """Poses (N, 3) of the path through some knots: turn, straight, turn; corners are rounded where that is free."""
+def driven_poses(space: Space, knots: FloatArray) -> FloatArray:
+    """Poses (N, 3) of the path through knots: turn, straight, turn; corners are rounded where the arc is free."""
     legs = _legs(space, knots)
     places = [legs[0][0], *(end for _, end, _ in legs)]
     poses = [knots[0]]
@@ -99,10 +100,10 @@ def drives(space: Space, knots: FloatArray) -> FloatArray:
             poses.append(np.array([*(poses[-1][:2]), yaw]))
         arc = None
         if n + 1 < len(legs):
-            room_m = min(
+            free_m = min(
                 float(np.linalg.norm(end - begin)) - trimmed_m, 0.5 * float(np.linalg.norm(places[n + 2] - end))
             )
-            arc = _rounded(space, legs[n], legs[n + 1], room_m)
+            arc = _rounded(space, legs[n], legs[n + 1], free_m)
         trimmed_m = 0.0
         if arc is None:
             poses.append(np.array([*end, yaw]))
@@ -118,7 +119,7 @@ _Leg = tuple[FloatArray, FloatArray, float]
 
 
 def _legs(space: Space, knots: FloatArray) -> list[_Leg]:
-    """The straights between knots, each from a place to a place with the yaw on it, the yaws continuous."""
+    """The straights between knots, each with its two ends and the yaw on it; yaws are continuous."""
     legs: list[_Leg] = []
     yaw = float(knots[0, 2])
     for a, b in pairwise(knots):
@@ -131,15 +132,15 @@ def _legs(space: Space, knots: FloatArray) -> list[_Leg]:
     return legs or [(knots[0, :2], knots[0, :2], yaw)]
 
 
-def _rounded(space: Space, first: _Leg, second: _Leg, room_m: float) -> list[FloatArray] | None:
-    """The widest arc from one straight to the next, None where they turn back or no arc is free."""
+def _rounded(space: Space, first: _Leg, second: _Leg, free_m: float) -> list[FloatArray] | None:
+    """The widest free arc from one straight to the next, None where they turn back or no arc is free."""
     (_, corner, yaw), (_, _, yaw_after) = first, second
     turn = yaw_after - yaw
     towards = [np.subtract(leg[1], leg[0]) @ (math.cos(leg[2]), math.sin(leg[2])) for leg in (first, second)]
     if towards[0] * towards[1] <= 0.0 or not 1e-3 < abs(turn) < _SHARPEST_RAD:
         return None
     course = yaw if towards[0] > 0.0 else yaw + math.pi
-    widest = room_m / math.tan(0.5 * abs(turn))
+    widest = free_m / math.tan(0.5 * abs(turn))
     for radius in (radius for radius in (min(_RADII_M[0], widest), *_RADII_M) if 0.1 <= radius <= widest):
         count = 1 + math.ceil(radius * abs(turn) / _ARC_STEP_M)
         yaws = yaw + np.linspace(0.0, turn, count + 1)

@@ -1,4 +1,4 @@
-"""Following of a path, with brakes for what comes into the way.
+"""Path follower that brakes for obstacles.
 
 A base that cannot go sideways follows by the law of Kanayama, Kimura, Miyazaki and Noguchi, "A Stable Tracking Control
 Method for an Autonomous Mobile Robot", 1990, and turns on the spot where its path does.
@@ -20,17 +20,21 @@ from skills.robot import BaseKind, FloatArray, Pose2D
 from skills.world_model import FreeSpace
 
 _CORNER_M_S = 0.12
+"""Speed at the corners of a base that cannot go sideways."""
 _ACROSS_GAIN = 4.0
 _FACING_RAD = 0.5
+"""Heading error beyond which such a base turns on the spot."""
+_AT_END_M = 0.02
+_RESERVE_M = 0.1
 
 
 @dataclass(frozen=True)
 class FollowerOptions:
-    """Follows a path with brakes for obstacles: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
+    """Path follower with brakes for obstacles: speeds (m/s, rad/s), accelerations (m/s^2, rad/s^2), gain (1/s).
 
-    A mission may ask for less than `max_speed_m_s`, and not for more.
-    `lead_s` looks ahead for the base's lag; closer than `touch_m` counts as in the way, looked for `look_m` ahead;
-    between `near_m` and `wide_m` of clearance the speed falls from full to near_speed_m_s.
+    A mission may ask for less than `max_speed_m_s`, and not for more. `lead_s` compensates the base's lag. An obstacle
+    closer than `touch_m` to the outline within the next `look_m` blocks the path. Between `wide_m` and `near_m` of
+    clearance the speed falls from full to near_speed_m_s.
     """
 
     max_speed_m_s: Speed = 0.8
@@ -52,15 +56,15 @@ class FollowerOptions:
     period_s: Duration = 0.05
 
     def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> PathFollower:
-        """A follower of one path, at most so fast."""
+        """Creates a follower of one path with a speed limit."""
         return PathFollower(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
 
 
 @dataclass(frozen=True)
 class Drive:
-    """One tick's answer: a body-frame velocity, the way still to go (m, turns included), how far off the path (m).
+    """Command of one tick: a body-frame velocity, the rest of the path (m, turns included), the distance from it (m).
 
-    `blocked_at` is the world (x, y) of what stands in the way ahead, None when the way is clear.
+    `blocked_at` is the world (x, y) of the obstacle that blocks the path ahead, None when it is clear.
     """
 
     velocity: tuple[float, float, float]
@@ -70,7 +74,7 @@ class Drive:
 
 
 class PathFollower:
-    """Follows one path. Hold one per path; `command` is to be called once a tick."""
+    """Follower of one path. Call `command` once a tick."""
 
     def __init__(self, path: Path, footprint: Footprint, options: FollowerOptions | None = None) -> None:
         self._options = options or FollowerOptions()
@@ -84,7 +88,7 @@ class PathFollower:
 
     @property
     def length_m(self) -> float:
-        """The whole way, turns included."""
+        """Length of the path (m), turns included."""
         return float(self._progress[-1])
 
     def command(
@@ -95,15 +99,15 @@ class PathFollower:
         costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
-        """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,).
+        """The command at a world pose and a body velocity, after the velocity commanded `last` (3,).
 
-        Along the path at most_m_s at most; at 0 the robot stands.
+        The speed is at most most_m_s; at 0 the robot stands.
         """
         here = np.array([pose.x_m, pose.y_m, pose.yaw_rad])
         off_path_m = self._project(here)
         along = float(self._progress[self._index])
         now_m = float(footprint_clearance_m(costmap, self._footprint, here[None, :])[0])
-        free_m, blocked_at = self._free_way(costmap, now_m)
+        free_m, blocked_at = self._free_distance(costmap, now_m)
         in_time = math.sqrt(2.0 * self._options.braking_m_s2 * free_m)
         by_clearance = float(speed_by_clearance(now_m, self._options))
         speed = min(float(self._limits[self._index]), in_time, by_clearance, most_m_s)
@@ -129,12 +133,12 @@ class PathFollower:
         return np.array([np.interp(along, self._progress, poses[:, axis]) for axis in range(3)])
 
     def _wanted(self, here: FloatArray, along: float, speed: float) -> FloatArray:
-        """Body-frame velocity: along the path, and back to it."""
+        """Body-frame velocity along the path and back to it."""
         options = self._options
         lead = max(speed * options.lead_s, 0.01)
         target, after = self._at(along), self._at(along + lead)
         forward = (after - target) / lead * speed
-        if self.length_m - along < 0.02:
+        if self.length_m - along < _AT_END_M:
             target, forward = self._path.poses[-1], np.zeros(3)
         error = target - here
         error[2] = wrap(error[2])
@@ -146,23 +150,23 @@ class PathFollower:
         return np.array([c * world[0] + s * world[1], -s * world[0] + c * world[1], world[2]])
 
     def _clip(self, velocity: FloatArray) -> FloatArray:
-        """Scales down to the speed limits, keeping the direction."""
+        """Scales a velocity down to the speed limits; the direction stays."""
         options = self._options
         ahead = options.max_speed_m_s if velocity[0] >= 0.0 else options.backward_m_s
         share = np.abs(velocity) / np.array([ahead, options.lateral_m_s, options.turn_rad_s])
         return np.asarray(velocity / max(1.0, float(np.max(share))))
 
     def _slew(self, velocity: FloatArray, last: FloatArray) -> FloatArray:
-        """Keeps to the accelerations; slowing down may be twice as quick."""
+        """Limits the change of a velocity to the accelerations; slowing down may be twice as quick."""
         options = self._options
         most = np.array([options.acceleration_m_s2, options.acceleration_m_s2, options.turn_acceleration_rad_s2])
         most = most * options.period_s * np.where(np.abs(velocity) < np.abs(last), 2.0, 1.0)
         return np.asarray(last + np.clip(velocity - last, -most, most))
 
-    def _free_way(self, costmap: FreeSpace, now_m: float) -> tuple[float, tuple[float, float] | None]:
-        """Way (m) that is free ahead, less a reserve, and the place of the first thing in it.
+    def _free_distance(self, costmap: FreeSpace, now_m: float) -> tuple[float, tuple[float, float] | None]:
+        """Free distance (m) ahead, less a reserve, and the position of the first obstacle in it.
 
-        A robot that has but now_m of clearance need only not get worse.
+        A robot with a clearance of only now_m blocks itself only where the clearance gets smaller.
         """
         options = self._options
         end = int(np.searchsorted(self._progress, self._progress[self._index] + options.look_m))
@@ -172,19 +176,15 @@ class PathFollower:
         if len(blocked) == 0:
             return options.look_m, None
         first = int(blocked[0])
-        way = self._progress[self._index + 2 * first] - self._progress[self._index]
-        return max(0.0, float(way) - 0.1), self._culprit(costmap, poses[first])
-
-    def _culprit(self, costmap: FreeSpace, pose: FloatArray) -> tuple[float, float]:
-        """Where on the outline at a pose something is touched."""
-        centres = disc_centres(self._footprint.discs, pose[None, :])[0]
+        free_m = self._progress[self._index + 2 * first] - self._progress[self._index]
+        centres = disc_centres(self._footprint.discs, poses[first : first + 1])[0]
         worst = int(np.argmin(costmap.clearance_m(centres) - self._footprint.discs[:, 2]))
-        return float(centres[worst, 0]), float(centres[worst, 1])
+        return max(0.0, float(free_m) - _RESERVE_M), (float(centres[worst, 0]), float(centres[worst, 1]))
 
     def _brake(self, velocity: FloatArray, here: FloatArray, costmap: FreeSpace) -> FloatArray:
-        """The velocity, or as much of it as brings the outline into nothing within the next half second.
+        """The velocity, or the part of it with which the outline touches no obstacle within the next half second.
 
-        Half of it is tried, then what leads back to the path without going ahead, then standing still.
+        Tries half of it, then only sideways motion and turns, then standing still.
         """
         shares = np.array([[1.0, 1.0, 1.0], [0.5, 0.5, 0.5], [0.0, 1.0, 1.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         tried = velocity * shares
@@ -197,18 +197,18 @@ class PathFollower:
         return tried[safe[0]] if len(safe) else np.zeros(3)
 
     def ahead(self, way_m: float) -> FloatArray:
-        """The path's poses (N, 3) from where the robot was last, so far on."""
+        """Poses (N, 3) of the next way_m of the path."""
         end = int(np.searchsorted(self._progress, self._progress[self._index] + way_m))
         return self._path.poses[self._index : end + 1]
 
     def pose_after(self, way_m: float) -> Pose2D:
-        """The path's pose so far on from where the robot was last."""
+        """The path's pose way_m ahead of the robot."""
         x, y, yaw = self._at(min(self.length_m, float(self._progress[self._index]) + way_m)).tolist()
         return Pose2D(x, y, wrap(yaw))
 
 
 def speed_by_clearance(clearance_m: FloatArray | float, options: FollowerOptions) -> FloatArray:
-    """Speed (m/s) that a clearance allows."""
+    """Speed limit (m/s) at a clearance."""
     share = np.clip((np.asarray(clearance_m) - options.near_m) / (options.wide_m - options.near_m), 0.0, 1.0)
     slow = min(options.near_speed_m_s, options.max_speed_m_s)
     return np.asarray(slow + share * (options.max_speed_m_s - slow))
@@ -219,8 +219,8 @@ def tracking_velocity(
 ) -> FloatArray:
     """Body-frame velocity of a base that cannot go sideways.
 
-    The path's pose there heads to yaw_rad and moves at `forward` (vx, vy, wz) in the world; `error` is from `here` to
-    it. Far off that heading the base turns on the spot.
+    The target pose on the path heads to yaw_rad and moves at `forward` (vx, vy, wz) in the world; `error` leads from
+    `here` to it. Far off that heading the base turns on the spot.
     """
     c, s = math.cos(here[2]), math.sin(here[2])
     ahead, left, turn = c * error[0] + s * error[1], -s * error[0] + c * error[1], float(error[2])
@@ -232,7 +232,7 @@ def tracking_velocity(
 
 
 def corners_of(path: Path) -> NDArray[np.int64]:
-    """Where the path goes over from moving to turning on the spot or back, or from ahead to back: indices of poses."""
+    """Indices of the poses where a path changes between driving ahead, driving back, and turning on the spot."""
     steps = np.diff(path.poses, axis=0)
     yaw = path.poses[:-1, 2]
     ahead = np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]
@@ -246,16 +246,16 @@ def speed_limits(
     options: FollowerOptions,
     corners: NDArray[np.int64] | None = None,
 ) -> FloatArray:
-    """Speed along the path (m/s of progress) at each pose: by direction, by clearance, and in time for what comes.
+    """Speed limit along the path (m/s of progress) at each pose: by direction, clearance, and braking for later limits.
 
-    At `corners` (indices) the base all but stands.
+    At `corners` (indices) the base almost stands.
     """
     steps = np.diff(path.poses, axis=0)
-    ways = np.maximum(np.diff(progress_m), 1e-9)
+    lengths = np.maximum(np.diff(progress_m), 1e-9)
     yaw = path.poses[:-1, 2]
-    ahead = (np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]) / ways
-    aside = np.abs(-np.sin(yaw) * steps[:, 0] + np.cos(yaw) * steps[:, 1]) / ways
-    turn = np.abs(steps[:, 2]) / ways
+    ahead = (np.cos(yaw) * steps[:, 0] + np.sin(yaw) * steps[:, 1]) / lengths
+    aside = np.abs(-np.sin(yaw) * steps[:, 0] + np.cos(yaw) * steps[:, 1]) / lengths
+    turn = np.abs(steps[:, 2]) / lengths
     by_clearance = speed_by_clearance(path.clearance_m[:-1], options)
     lengthwise = np.where(ahead >= 0.0, options.max_speed_m_s, options.backward_m_s) / np.maximum(np.abs(ahead), 1e-6)
     sideways = options.lateral_m_s / np.maximum(aside, 1e-6)
@@ -266,5 +266,5 @@ def speed_limits(
     if corners is not None:
         limits[corners] = np.minimum(limits[corners], _CORNER_M_S)
     for n in range(len(limits) - 2, -1, -1):
-        limits[n] = min(limits[n], math.sqrt(limits[n + 1] ** 2 + 2.0 * options.braking_m_s2 * ways[n]))
+        limits[n] = min(limits[n], math.sqrt(limits[n + 1] ** 2 + 2.0 * options.braking_m_s2 * lengths[n]))
     return np.asarray(limits)

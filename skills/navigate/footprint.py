@@ -1,4 +1,4 @@
-"""The robot's standing outline, covered by discs, and its clearance from what a costmap knows."""
+"""The robot's outline as discs, and its clearance from the obstacles of a costmap."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D
 from skills.world_model import FreeSpace
 
 SAFE_MARGIN_M = 0.06
-"""The clearance (m) that a standing or driven pose should keep: map and tracking errors fit into it."""
+"""Clearance (m) of a standing or driven pose that covers map and tracking errors."""
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """An upright rectangle in the body frame, as discs: rows of x, y, radius (m), and how the base under it moves.
+    """Outline of the robot in the body frame, as discs: rows of x, y, radius (m), with the kind of base.
 
     The discs lie inside of the outline, radius 0 at the corners, so the clearance of all of them is that of the
     rectangle, within about a centimetre. More discs cover what sticks out of the rectangle, which `beyond` names.
@@ -34,26 +34,26 @@ class Footprint:
 
     @staticmethod
     def of(capabilities: Capabilities) -> Footprint:
-        """The footprint that a robot says it has, the arm left out (see `skills.navigate.arm_footprint`)."""
+        """Creates the footprint of a robot without its arm (see `skills.navigate.arm_footprint`)."""
         outline = Footprint.round(capabilities.footprint_m) or Footprint.rectangle(capabilities.footprint_m)
         return replace(outline, base_kind=capabilities.base_kind)
 
     @staticmethod
     def round(corners: Sequence[tuple[float, float]]) -> Footprint | None:
-        """One disc about the body's origin where the corners (x, y), eight at least, lie on a circle; else None."""
+        """Creates one disc about the body's origin where at least eight corners (x, y) lie on a circle; else None."""
         distances = np.hypot(*np.transpose(corners))
         radius = float(distances.max())
         if len(corners) < 8 or float(distances.min()) < 0.97 * radius:
             return None
         return Footprint(np.array([[0.0, 0.0, radius]]), 2.0 * radius, 2.0 * radius)
 
-    def extended(self, discs: FloatArray, beyond: str) -> Footprint:
-        """This footprint and more discs, of what `beyond` names."""
+    def with_discs(self, discs: FloatArray, beyond: str) -> Footprint:
+        """This footprint with more discs, which `beyond` names."""
         return replace(self, discs=np.vstack([self.discs, discs]), beyond=beyond)
 
     @staticmethod
     def rectangle(corners: Sequence[tuple[float, float]]) -> Footprint:
-        """The bounding rectangle of outline corners (x, y)."""
+        """Creates the bounding rectangle of outline corners (x, y)."""
         low, high = np.min(corners, axis=0), np.max(corners, axis=0)
         length, width = (float(v) for v in high - low)
         middle, long_axis = (low + high) / 2.0, 0 if length >= width else 1
@@ -79,7 +79,7 @@ class Footprint:
 
     @property
     def extent_m(self) -> tuple[float, float]:
-        """Length and width (m) with what sticks out."""
+        """Length and width (m) of all discs."""
         low = np.min(self.discs[:, :2] - self.discs[:, 2:], axis=0)
         length, width = np.max(self.discs[:, :2] + self.discs[:, 2:], axis=0) - low
         return float(length), float(width)
@@ -98,14 +98,14 @@ def disc_centres(discs: FloatArray, poses: FloatArray) -> FloatArray:
 
 
 def footprint_clearance_m(costmap: FreeSpace, footprint: Footprint, poses: FloatArray) -> FloatArray:
-    """Distance (m) from the outline to the nearest obstacle at (N, 3) poses x, y, yaw; negative when it is touched."""
+    """Distance (m) from the outline to the nearest obstacle at (N, 3) poses x, y, yaw; negative in collision."""
     centres = disc_centres(footprint.discs, poses)
     clearance = costmap.clearance_m(centres.reshape(-1, 2)).reshape(centres.shape[:2])
     return np.asarray(np.min(clearance - footprint.discs[:, 2], axis=1))
 
 
 def footprint_clear(costmap: FreeSpace, footprint: Footprint, pose: Pose2D, margin_m: float = SAFE_MARGIN_M) -> bool:
-    """Returns whether the robot can stand at a pose with at least margin_m to everything."""
+    """Returns whether the robot can stand at a pose with at least margin_m of clearance."""
     return bool(footprint_clearance_m(costmap, footprint, pose_array([pose]))[0] >= margin_m)
 
 

@@ -1,9 +1,9 @@
-"""Right of way among robots: what the others' bodies and ways take up, where to stop short, and where to step aside.
+"""Right of way among robots: obstacles from other robots and their reserved paths, where to stop, where to wait aside.
 
-Prioritised planning (Erdmann and Lozano-Perez, "On Multiple Moving Objects", 1987) with the priority that PIBT inherits
+Prioritised planning (Erdmann and Lozano-Perez, "On Multiple Moving Objects", 1987) with the inherited priority of PIBT
 (Okumura, Machida, Defago and Tamura, "Priority Inheritance with Backtracking for Iterative Multi-Agent Path Finding",
-2022): who goes first reserves a way even where one stands who goes later, who then has to clear it, and where that one
-cannot, the two change turns. Waiting places lie off the union of the ways that are reserved.
+2022): a robot that goes first reserves its path even through one that goes later, which then has to clear it. Where
+that robot cannot, the two swap priorities. Waiting poses lie off all reserved paths.
 """
 
 from __future__ import annotations
@@ -26,25 +26,29 @@ from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
 from skills.traffic import Neighbour
 
-_WAY_STEP_M = 0.12
+_PATH_STEP_M = 0.12
+"""Distance between the poses by which a reserved path is avoided."""
 _CELL_M = 0.1
 _YAWS = 8
+"""Headings that are tried at each waiting position."""
 _SLACK_M = 0.03
 _UNSURE_M = 0.04
+"""Growth of another robot's outline, for the errors of both poses."""
 _AT_ONCE = 200
-_ANEW_M = 0.6
+"""Positions that are checked in one call of the costmap."""
+_BESIDE_TRIED_M = 0.6
 _ABOUT_M = 1.2
 _BODY_M = 0.3
 
 
 @dataclass(frozen=True)
 class GivingWayOptions:
-    """Distances are between outlines (m), times on the robot's clock (s).
+    """Right of way: distances between outlines (m), times on the robot's clock (s).
 
-    A way that comes within `apart_m` of one that is reserved waits for it, `short_m` before. Who goes first waits for
-    one who stands within `room_m` of the next `room_look_m` of its way, for `patience_s` at most; then the two change
-    turns. A waiting place lies `aside_m` off reserved ways, and within `reach_m`; so many `places` are tried. The way
-    on is looked for every `again_s`, and what robots keep from going counts as failed after `blocked_patience_s`.
+    A robot stops `short_m` before its path comes within `apart_m` of a reserved one. A robot that goes first waits for
+    one that stands within `room_m` of the next `room_look_m` of its path, for `patience_s` at most; then the two swap
+    priorities. A waiting pose lies `aside_m` off reserved paths, and within `reach_m`; at most `places` are tried. The
+    robot plans again every `again_s`, and fails after `blocked_patience_s` behind other robots.
     """
 
     apart_m: Margin = 0.15
@@ -61,87 +65,87 @@ class GivingWayOptions:
 
 
 class Avoided(enum.Enum):
-    """What of the other robots a plan leads around, beside all that stands in the costmap."""
+    """Parts of the other robots that a plan avoids, besides the obstacles of the costmap."""
 
-    WAYS = "ways"  # their bodies, and the ways that are reserved against us
-    BODIES = "bodies"  # their bodies: the robot stops before a reserved way
-    WORKING = "working"  # only those that do not clear a way which is reserved
+    PATHS = "paths"  # their bodies, and their reserved paths with priority over this robot
+    BODIES = "bodies"  # their bodies: the robot stops before a reserved path
+    WORKING = "working"  # only the bodies of robots that do not clear a reserved path
 
 
 class GivingWay:
-    """One navigation among other robots. With none about, every answer is that of a robot alone."""
+    """Right of way of one navigation; without other robots, no answer restricts it."""
 
     def __init__(self, context: SkillContext, options: GivingWayOptions) -> None:
         self._traffic, self._options = context.traffic, options
         self._clock = context.clock
-        self._making_room_since_s: float | None = None
+        self._waiting_since_s: float | None = None
 
     def begin(self) -> None:
-        """Asks for the right to go, from now on."""
+        """Claims a turn in the order of the robots."""
         self._traffic.release()
         self._traffic.claim()
 
     def end(self) -> None:
-        """Gives everything back."""
+        """Releases the turn and the reserved path."""
         self._traffic.release()
 
-    def announce(self, follower: LocalController, footprint: Footprint) -> None:
-        """Tells what is left of the way."""
+    def reserve_path(self, follower: LocalController, footprint: Footprint) -> None:
+        """Reserves the rest of the path."""
         self._traffic.announce(follower.ahead(math.inf), footprint.discs)
 
-    def stand(self, pose: Pose2D, footprint: Footprint) -> None:
-        """Tells that the robot stays where it is for now."""
+    def reserve_pose(self, pose: Pose2D, footprint: Footprint) -> None:
+        """Reserves only the pose where the robot stands."""
         self._traffic.announce(np.array([[pose.x_m, pose.y_m, pose.yaw_rad]]), footprint.discs)
 
-    def wish(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
-        """Reserve the goal while there is no way to it, so that one who stands on it and comes later steps aside."""
+    def reserve_goal(self, pose: Pose2D, goal: Pose2D, footprint: Footprint) -> None:
+        """Reserves the goal while no path leads to it, so that a robot with a later turn steps aside."""
         self._traffic.announce(pose_array([pose, goal]), footprint.discs)
 
     def others(self) -> Sequence[Neighbour]:
-        """All others that were heard of lately."""
+        """All other robots that reported lately."""
         return self._traffic.others()
 
-    def ahead_of_us(self) -> Sequence[Neighbour]:
-        """Those who go first, and go somewhere."""
+    def robots_with_priority(self) -> Sequence[Neighbour]:
+        """The other robots with priority and a path."""
         return [one for one in self._traffic.others() if one.first and one.path is not None]
 
     def costmap(self, costmap: FreeSpace, avoided: Avoided) -> FreeSpace:
-        """The costmap with that of the others which is to be avoided."""
+        """The costmap with the avoided parts of other robots."""
         others = [one for one in self._traffic.others() if avoided is not Avoided.WORKING or not _will_move(one)]
         with_others = with_outlines(costmap, [(one.discs, one.pose[None, :]) for one in others], _UNSURE_M)
-        if avoided is not Avoided.WAYS:
+        if avoided is not Avoided.PATHS:
             return with_others
-        return with_outlines(with_others, [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
+        return with_outlines(with_others, [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
 
-    def less(self, avoided: Avoided) -> Avoided | None:
-        """What is avoided instead when there was no way around more; None: nothing less would help."""
-        if avoided is Avoided.WAYS and self.ahead_of_us():
+    def less_avoided(self, avoided: Avoided) -> Avoided | None:
+        """The next smaller set to avoid after no path was found; None when that would not help."""
+        if avoided is Avoided.PATHS and self.robots_with_priority():
             return Avoided.BODIES
         if avoided is not Avoided.WORKING and any(_will_move(one) for one in self._traffic.others()):
             return Avoided.WORKING
         return None
 
     def let_pass(self, names: Sequence[str]) -> None:
-        """Changes turns with robots for which we should have made way and cannot."""
+        """Swaps priorities with robots that this one cannot make way for."""
         for name in names:
             self._traffic.let_pass(name)
 
     def conflict_m(self, follower: LocalController, footprint: Footprint) -> tuple[float, str] | None:
-        """How far (m) it is along the path to where it meets a reserved way, and whose; None: it meets none."""
+        """Distance (m) along the path to the first reserved path, and its robot's name; None without a conflict."""
         ahead = follower.ahead(self._options.look_m)
         found: tuple[float, str] | None = None
-        for one in self.ahead_of_us():
-            ways = with_outlines(NoObstacles(), [(one.discs, _thinned(one))])
-            met = np.flatnonzero(footprint_clearance_m(ways, footprint, ahead) < self._options.apart_m)
+        for one in self.robots_with_priority():
+            paths = with_outlines(NoObstacles(), [(one.discs, _thinned(one))])
+            met = np.flatnonzero(footprint_clearance_m(paths, footprint, ahead) < self._options.apart_m)
             if len(met):
-                way_m = float(progress_m(ahead)[met[0]])
-                found = (way_m, one.name) if found is None or way_m < found[0] else found
+                met_m = float(progress_m(ahead)[met[0]])
+                found = (met_m, one.name) if found is None or met_m < found[0] else found
         return found
 
-    def room_for(self, follower: LocalController, footprint: Footprint) -> str | None:
-        """Who is to make way and stands near ahead, so that we wait a while; None: nobody does.
+    def robot_to_wait_for(self, follower: LocalController, footprint: Footprint) -> str | None:
+        """Name of the robot ahead that has to make way, for which this one waits; None when there is none.
 
-        Once that has taken too long, turns are changed.
+        Swaps priorities with a robot that takes too long.
         """
         ahead = follower.ahead(self._options.room_look_m)
         for one in self._traffic.others():
@@ -151,44 +155,45 @@ class GivingWay:
             clearance = footprint_clearance_m(body, footprint, ahead)
             if clearance.min() < min(self._options.room_m, float(clearance[0]) - 0.02):
                 now_s = self._clock.now()
-                since_s = self._making_room_since_s = self._making_room_since_s or now_s
+                since_s = self._waiting_since_s = self._waiting_since_s or now_s
                 if now_s - since_s < self._options.patience_s:
                     return one.name
                 self.let_pass([one.name])
                 return None
-        self._making_room_since_s = None
+        self._waiting_since_s = None
         return None
 
-    def somebody_goes(self) -> bool:
-        """Returns whether another robot is on its way."""
+    def another_drives(self) -> bool:
+        """Returns whether another robot has a path."""
         return any(one.path is not None for one in self._traffic.others())
 
     def is_robot(self, place_W: tuple[float, float]) -> bool:
-        """Returns whether another robot covers a place (x, y), or ends just before it."""
+        """Returns whether another robot covers a point (x, y), or ends just before it."""
         bodies = self.costmap(NoObstacles(), Avoided.BODIES)
         return bool(bodies.clearance_m(np.array([place_W]))[0] < _BODY_M)
 
     def name_at(self, place_W: tuple[float, float] | None) -> str | None:
-        """The robot that stands about a place (x, y); None: nobody."""
+        """Name of the robot that stands about a point (x, y), None when there is none."""
         if place_W is None:
             return None
         about = (one.name for one in self._traffic.others() if math.dist(place_W, one.pose[:2].tolist()) < _ABOUT_M)
         return next(about, None)
 
-    def in_whose_way(self, here: Pose2D, footprint: Footprint) -> Sequence[str]:
-        """Those who have reserved a way where the robot stands."""
-        return [one.name for one in self.ahead_of_us() if self._in_way_of(one, here, footprint)]
+    def blocked_robots(self, here: Pose2D, footprint: Footprint) -> Sequence[str]:
+        """Names of the robots whose reserved path leads through this one."""
+        names, pose = [], pose_array([here])
+        for one in self.robots_with_priority():
+            path = with_outlines(NoObstacles(), [(one.discs, _thinned(one)[1:])])
+            if footprint_clearance_m(path, footprint, pose)[0] < self._options.apart_m:
+                names.append(one.name)
+        return names
 
-    def _in_way_of(self, one: Neighbour, here: Pose2D, footprint: Footprint) -> bool:
-        way = with_outlines(NoObstacles(), [(one.discs, _thinned(one)[1:])])
-        return bool(footprint_clearance_m(way, footprint, pose_array([here]))[0] < self._options.apart_m)
-
-    def waiting_place(
+    def waiting_pose(
         self, costmap: FreeSpace, footprint: Footprint, here: Pose2D, tried: Sequence[Pose2D] = ()
     ) -> Pose2D | None:
-        """The nearest pose that can be reached and lies off all reserved ways; None: there is none.
+        """The nearest reachable pose off all reserved paths, None when there is none.
 
-        Places beside those that were `tried` are left out.
+        Leaves out positions beside the `tried` poses.
         """
         options = self._options
         n = int(2.0 * options.reach_m / _CELL_M) + 1
@@ -197,25 +202,25 @@ class GivingWay:
         x, y = np.meshgrid(xs, ys)
         everything = self.costmap(costmap, Avoided.BODIES)
         free = clearance_on_grid(everything, xs, ys) > footprint.inscribed_m + SAFE_MARGIN_M
-        ways = with_outlines(NoObstacles(), [(one.discs, _thinned(one)) for one in self.ahead_of_us()])
-        aside = clearance_on_grid(ways, xs, ys) > footprint.inscribed_m + options.aside_m
+        paths = with_outlines(NoObstacles(), [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
+        aside = clearance_on_grid(paths, xs, ys) > footprint.inscribed_m + options.aside_m
         for other in tried:
-            aside &= np.hypot(x - other.x_m, y - other.y_m) > _ANEW_M
+            aside &= np.hypot(x - other.x_m, y - other.y_m) > _BESIDE_TRIED_M
         yaws = here.yaw_rad + np.arange(_YAWS) * (2.0 * math.pi / _YAWS)
 
         def suits(places: FloatArray) -> Pose2D | None:
             poses = np.column_stack([np.repeat(places, _YAWS, axis=0), np.tile(yaws, len(places))])
-            room = footprint_clearance_m(everything, footprint, poses) > SAFE_MARGIN_M + _SLACK_M
-            good = np.flatnonzero(room & (footprint_clearance_m(ways, footprint, poses) > options.aside_m))
+            clear = footprint_clearance_m(everything, footprint, poses) > SAFE_MARGIN_M + _SLACK_M
+            good = np.flatnonzero(clear & (footprint_clearance_m(paths, footprint, poses) > options.aside_m))
             return Pose2D(*poses[good[0]].tolist()) if len(good) else None
 
-        cells = [cell for cell in reachable(free, (n // 2, n // 2)) if aside[cell] and sum(cell) % 2 == 0]
+        cells = [cell for cell in reachable_cells(free, (n // 2, n // 2)) if aside[cell] and sum(cell) % 2 == 0]
         rows, columns = np.array(cells, dtype=np.int64).reshape(-1, 2).T
-        return first_that_suits(np.column_stack([x[rows, columns], y[rows, columns]]), suits)
+        return first_suitable_pose(np.column_stack([x[rows, columns], y[rows, columns]]), suits)
 
 
-def reachable(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int, int]]:
-    """Cells (row, column) that can be reached over free ones, nearest first. The beginning counts as free."""
+def reachable_cells(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int, int]]:
+    """Cells (row, column) that free cells connect to `begin`, nearest first; `begin` itself counts as free."""
     seen, order, queue = {begin}, [begin], deque([begin])
     rows, columns = free.shape
     while queue:
@@ -228,8 +233,8 @@ def reachable(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int
     return order
 
 
-def first_that_suits(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D | None]) -> Pose2D | None:
-    """The first pose that suits at places (N, 2), many of which are looked at together; None: there is none."""
+def first_suitable_pose(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D | None]) -> Pose2D | None:
+    """The first pose that `suits` returns for positions (N, 2), checked in batches; None when there is none."""
     for begin in range(0, len(places_W), _AT_ONCE):
         if (place := suits(places_W[begin : begin + _AT_ONCE])) is not None:
             return place
@@ -237,17 +242,16 @@ def first_that_suits(places_W: FloatArray, suits: Callable[[FloatArray], Pose2D 
 
 
 def _will_move(one: Neighbour) -> bool:
-    """Returns whether a robot goes on by itself, or clears a way that is reserved against it."""
+    """Returns whether a robot drives on by itself, or clears a reserved path."""
     return one.yields or (one.first and one.path is not None)
 
 
 def _thinned(one: Neighbour) -> FloatArray:
-    """The poses that a robot still covers: where it is, and its way, not closer than needed."""
-    way = one.path if one.path is not None else np.empty((0, 3))
-    along = progress_m(way)
-    kept, last = [one.pose], -math.inf
-    for pose, at in zip(way, along, strict=True):
-        if at - last >= _WAY_STEP_M:
-            kept.append(pose)
-            last = float(at)
-    return np.vstack([*kept, way[-1:]])
+    """The poses that a robot still covers, thinned out: its own and those of its path."""
+    path = one.path if one.path is not None else np.empty((0, 3))
+    chosen, last_m = [one.pose], -math.inf
+    for pose, at_m in zip(path, progress_m(path), strict=True):
+        if at_m - last_m >= _PATH_STEP_M:
+            chosen.append(pose)
+            last_m = float(at_m)
+    return np.vstack([*chosen, path[-1:]])

@@ -1,4 +1,4 @@
-"""A* over a lattice of places and headings, deterministic and compiled."""
+"""A* over a lattice of cells and headings, deterministic and compiled."""
 
 from __future__ import annotations
 
@@ -17,8 +17,12 @@ from skills.robot import FloatArray
 IntArray = NDArray[np.int64]
 
 
+_CHECK_M = 0.12
+"""Distance between the clearance checks along a move."""
+
+
 class Lattice(NamedTuple):
-    """Places at (x0_m + column * cell_m, y0_m + row * cell_m), headings at yaws_rad (headings,), increasing."""
+    """Lattice of points (x0_m + column * cell_m, y0_m + row * cell_m) and headings yaws_rad (headings,), increasing."""
 
     x0_m: float
     y0_m: float
@@ -30,9 +34,9 @@ class Lattice(NamedTuple):
 
 
 def lattice_moves(headings: int) -> IntArray:
-    """Moves (headings, M, 3) from each heading: columns, rows, headings.
+    """Moves (headings, M, 3) from each heading, as changes of column, row and heading.
 
-    Sixteen directions, each also with a turn to either side, and turns.
+    They are sixteen directions, each also with a turn to either side, and turns.
     """
     flat = [(1, 0), (1, 1), (2, 1), (1, 2)]
     steps = {(sx * a, sy * b) for dx, dy in flat for a, b in ((dx, dy), (dy, dx)) for sx in (1, -1) for sy in (1, -1)}
@@ -42,7 +46,7 @@ def lattice_moves(headings: int) -> IntArray:
 
 @compiled
 def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, inscribed_m: float) -> FloatArray:
-    """Least seconds from each place to the goal for a disc of the inscribed radius; infinite where there is no way."""
+    """Least seconds from each cell to the goal for a disc of the inscribed radius; infinite where there is no path."""
     field, weights = space.field, space.weights
     values, least_m = field.values, inscribed_m - field.cell_m
     rows, columns = lattice.rows, lattice.columns
@@ -63,8 +67,8 @@ def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, 
             continue
         for a in range(max(0, i - 1), min(rows, i + 2)):
             for b in range(max(0, j - 1), min(columns, j + 2)):
-                way = math.hypot(a - i, b - j) * lattice.cell_m / weights.forward_m_s
-                new = here + way * factor[a, b]
+                seconds = math.hypot(a - i, b - j) * lattice.cell_m / weights.forward_m_s
+                new = here + seconds * factor[a, b]
                 if new < cost[a, b]:
                     cost[a, b] = new
                     heapq.heappush(heap, (new, a * columns + b))
@@ -82,7 +86,7 @@ def search(
     greed: float,
     expansions: IntArray,
 ) -> IntArray:
-    """State indices from a seed to an end, empty when there is no way; adds to `expansions` (1,).
+    """State indices from a seed to an end, empty when there is no path; adds to `expansions` (1,).
 
     A state's index is (row * columns + column) * headings + heading. `seeds` are rows of state index and cost so far,
     `ends` rows of state index, increasing, and cost from there to the goal.
@@ -149,7 +153,7 @@ def _seconds(lattice: Lattice, moves: IntArray, weights: Weights) -> FloatArray:
 
 @compiled
 def _turn(lattice: Lattice, k: int, change: int | np.int64) -> float:
-    """Radians from a heading to the one `change` farther, by at most half a turn."""
+    """Angle (rad) from a heading to the one `change` steps on, at most half a turn."""
     off = lattice.yaws_rad[(k + change) % lattice.headings] - lattice.yaws_rad[k]
     return float((off + math.pi) % (2.0 * math.pi) - math.pi)
 
@@ -168,7 +172,7 @@ def _expand(
     reached_states: IntArray,
     reached_totals: FloatArray,
 ) -> int:
-    """Writes the states that moves from a state reach more cheaply than before, and their costs; returns how many."""
+    """Writes the states that a state reaches at a lower cost than before, and their costs; returns their number."""
     headings, columns = lattice.headings, lattice.columns
     cell, k = index // headings, index % headings
     i, j = cell // columns, cell % columns
@@ -207,14 +211,15 @@ def _move_cost(
     need: float,
     seconds: float,
 ) -> float:
-    """Cost of one move, checked at its end (kept in `clear`), and in between unless both ends have enough to spare."""
+    """Cost of one move, checked at its end (stored in `clear`), and between the ends unless both have clearance."""
     if math.isnan(clear[new]):
         clear[new] = clearance_at(space.field, there[0], there[1], there[2])
     if clear[new] < need:
         return math.inf
-    way = math.hypot(there[0] - here[0], there[1] - here[1]) + space.weights.turning_radius_m * abs(there[2] - here[2])
-    steps = math.ceil(way / 0.12)
-    if clear_here + clear[new] - way < 2.0 * need:
+    shift, turn = math.hypot(there[0] - here[0], there[1] - here[1]), abs(there[2] - here[2])
+    length = shift + space.weights.turning_radius_m * turn
+    steps = math.ceil(length / _CHECK_M)
+    if clear_here + clear[new] - length < 2.0 * need:
         for n in range(1, steps):
             t = n / steps
             pose = here + t * (there - here)
@@ -225,7 +230,7 @@ def _move_cost(
 
 @compiled
 def _ahead(to_go: FloatArray, lattice: Lattice, index: int | np.int64) -> float:
-    """The cost to go from a state's place."""
+    """Cost to go from a state's cell."""
     cell = index // lattice.headings
     return float(to_go[cell // lattice.columns, cell % lattice.columns])
 

@@ -80,10 +80,10 @@ def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> flo
     point of the outline moves farther than that; at least 6 cm.
     """
     dx, dy, dyaw = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    way = max(1e-9, math.hypot(dx, dy) + space.weights.turning_radius_m * abs(dyaw))
+    length = max(1e-9, math.hypot(dx, dy) + space.weights.turning_radius_m * abs(dyaw))
     cost, gone, spare = 0.0, 0.0, 0.0
     while gone < 1.0:
-        part = min(1.0 - gone, max(_PLAIN_STEP_M, min(_LONGEST_STEP_M, spare)) / way)
+        part = min(1.0 - gone, max(_PLAIN_STEP_M, min(_LONGEST_STEP_M, spare)) / length)
         gone = 1.0 if part >= 1.0 - gone else gone + part
         least = clearance_at(space.field, a[0] + gone * dx, a[1] + gone * dy, a[2] + gone * dyaw)
         if least < need:

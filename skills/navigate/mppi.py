@@ -1,4 +1,4 @@
-"""Model-predictive path integral control: the path follower, with its next velocity chosen by sampled rollouts.
+"""Model-predictive path integral control: a path follower that chooses its velocity by sampled rollouts.
 
 Williams, Aldrich and Theodorou, "Model Predictive Path Integral Control", 2017.
 """
@@ -28,7 +28,9 @@ from skills.robot import FloatArray, Pose2D
 
 _CELL_M = 0.08
 _HALF_M = 2.8
+"""Half the width of the sampled clearance."""
 _NOISES = 8
+"""Sets of noise, used in turn."""
 _NEAR_GOAL_M = 0.3
 _CORNER_M_S = 0.15
 """Slower than this a base that cannot go sideways is at a corner of its path."""
@@ -38,10 +40,10 @@ _CORNER_M_S = 0.15
 class MppiOptions(FollowerOptions):
     """Model-predictive path integral control: follows a path by sampled rollouts, within the path follower's limits.
 
-    Of `samples` rollouts, `steps` times `step_s` long, those of little cost weigh more, the more so the lower the
-    `temperature`. Cost is the distance from where the path leads by then (m squared, a radian counting `yaw_m`),
+    Of `samples` rollouts, `steps` times `step_s` long, those of low cost weigh more, the more so the lower the
+    `temperature`. The cost is the squared distance from the path's pose at that time (a radian counting `yaw_m`),
     clearance below `near_m` with `clearance_weight`, and change of velocity with `change_weight`. Near the goal, while
-    something blocks the path, and at the corners of a base that cannot go sideways, it is the path follower.
+    an obstacle blocks the path, and at the corners of a base that cannot go sideways, the path follower drives.
     """
 
     samples: Count = 200
@@ -55,12 +57,12 @@ class MppiOptions(FollowerOptions):
     change_weight: Factor = 0.02
 
     def build(self, path: Path, footprint: Footprint, *, max_speed_m_s: float) -> MppiController:
-        """A controller of one path, at most so fast."""
+        """Creates a controller of one path with a speed limit."""
         return MppiController(path, footprint, replace(self, max_speed_m_s=min(self.max_speed_m_s, max_speed_m_s)))
 
 
 class MppiController(PathFollower):
-    """Follows one path. Equal inputs give equal velocities: the noise is drawn once, from a fixed seed."""
+    """Controller of one path. Equal inputs give equal velocities, since the noise comes from a fixed seed."""
 
     def __init__(self, path: Path, footprint: Footprint, options: MppiOptions | None = None) -> None:
         self._mppi = options or MppiOptions()
@@ -76,7 +78,7 @@ class MppiController(PathFollower):
         costmap: FreeSpace,
         most_m_s: float = math.inf,
     ) -> Drive:
-        """As the path follower's, with the velocity of the weighted rollouts where the way ahead is free."""
+        """See `PathFollower.command`; the velocity is that of the weighted rollouts where the path ahead is free."""
         plain = super().command(pose, velocity, last, costmap, most_m_s)
         if plain.remaining_m < _NEAR_GOAL_M or plain.blocked_at is not None or not any(plain.velocity):
             self._plan = None
@@ -97,7 +99,7 @@ class MppiController(PathFollower):
         return replace(plain, velocity=(float(safe[0]), float(safe[1]), float(safe[2])))
 
     def _reference(self, here: FloatArray, most_m_s: float) -> tuple[FloatArray, FloatArray]:
-        """Where the path leads at each step (steps, 3), and the body-frame velocities that lead there."""
+        """The path's poses at each step (steps, 3), and the body-frame velocities that lead there."""
         options, along = self._mppi, float(self._progress[self._index])
         poses = np.empty((options.steps + 1, 3))
         poses[0] = self._at(along)
@@ -127,7 +129,7 @@ class MppiController(PathFollower):
         return _Rollout(limits, rates * options.step_s, *weights, options.near_m, options.step_s, options.temperature)
 
     def _shifted(self, plan: FloatArray) -> FloatArray:
-        """The last plan as it looks a control period later."""
+        """The last plan, shifted by one control period."""
         share = min(1.0, self._mppi.period_s / self._mppi.step_s)
         return np.ascontiguousarray((1.0 - share) * plan + share * np.vstack([plan[1:], plan[-1:]]))
 

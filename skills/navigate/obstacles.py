@@ -1,4 +1,4 @@
-"""Costmaps with obstacles that no sensor of this robot shows: discs, outlines of other robots, closed doors."""
+"""Costmaps with added obstacles: discs about people, outlines of other robots, closed doors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A planned path: closely spaced poses."""
+"""Planned paths: closely spaced poses, and the distance along them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from skills.robot import FloatArray, Pose2D
 
 TURN_M_PER_RAD = 0.4
-"""A turn of one radian counts as so many metres of progress along a path."""
+"""Metres of progress along a path for a turn of one radian."""
 
 
 @dataclass(frozen=True)
 class Path:
     """Poses (N, 3) x, y (m), yaw (rad, continuous, not wrapped) in the world frame, at most some centimetres apart.
 
-    `clearance_m` (N,) is the footprint's clearance that the planner saw at each.
+    `clearance_m` (N,) is the footprint's clearance at each pose when the path was planned.
     """
 
     poses: FloatArray

@@ -1,4 +1,4 @@
-"""Keeping distance to people: how fast the robot may go near them, and how much room they get."""
+"""Distance to people: speed limits near them, and clearance in plans."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from skills.robot import FloatArray, Pose2D
 
 @dataclass(frozen=True)
 class SpaceOptions:
-    """Distances are from the robot's outline to a person's upright axis.
+    """Speeds near people, and distances from the robot's outline to a person's upright axis.
 
-    From `far_m` to `near_m` the speed falls from full to near_m_s, less so where the way leads away by `away_m`. A way
-    that leads nearer than `stop_m`, and not to a goal so near, is waited on for `patience_s`, then gone at `pass_m_s`;
-    the patience begins anew after `forget_s` without anybody near.
-    Plans keep `room_m` where start and goal leave so much, and `least_room_m` where there is no other way.
+    From `far_m` to `near_m` the speed falls from full to near_m_s, less so where the path leads away by `away_m`. Where
+    the path comes nearer than `stop_m`, and the goal does not, the robot waits for `patience_s`, then passes at
+    `pass_m_s`; the patience starts again after `forget_s` without anybody near. Plans keep `room_m` where start and
+    goal leave so much, and `least_room_m` where no other path exists.
     """
 
     far_m: Length = 2.5
@@ -41,14 +41,14 @@ class SpaceOptions:
 
 
 def outline_distance_m(footprint: Footprint, poses: FloatArray, people: Sequence[SeenPerson]) -> FloatArray:
-    """Distances (N, people) from the outline at poses (N, 3) to people's axes."""
+    """Distances (N, people) in metres from the outline at poses (N, 3) to people's axes."""
     places = np.array([one.place_W for one in people], dtype=np.float64).reshape(-1, 2)
     centres = disc_centres(footprint.discs, poses)
     offsets = np.linalg.norm(centres[:, :, None, :] - places[None, None, :, :], axis=3)
     return np.asarray(np.min(offsets - footprint.discs[None, :, 2:3], axis=1))
 
 
-def spaced(
+def with_people(
     costmap: FreeSpace,
     footprint: Footprint,
     fixed: Sequence[Pose2D],
@@ -56,7 +56,7 @@ def spaced(
     room_m: float,
     slack_m: float = 0.05,
 ) -> FreeSpace:
-    """The costmap with room_m about people, less where the robot must be nearer: at the `fixed` poses."""
+    """The costmap with discs of room_m about people, smaller where a `fixed` pose of the robot is nearer."""
     if not people:
         return costmap
     least = np.min(outline_distance_m(footprint, pose_array(fixed), people), axis=0) - slack_m
@@ -66,9 +66,9 @@ def spaced(
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast the robot may go (m/s) because of a person, and who it is.
+    """Speed limit (m/s) because of a person, and that person.
 
-    `waiting` while it stands for them; `overdue` once that has taken so long that another way should be looked for.
+    `waiting` while the robot stands for the person; `overdue` once it should plan another path.
     """
 
     most_m_s: float = math.inf
@@ -78,7 +78,7 @@ class Pace:
 
 
 class PaceManager:
-    """Tells the pace from tick to tick; remembers how long it was waited."""
+    """Pace near people at each tick; remembers how long the robot has waited."""
 
     def __init__(self, footprint: Footprint, options: SpaceOptions | None = None) -> None:
         self.footprint = footprint
@@ -90,17 +90,17 @@ class PaceManager:
     def pace(
         self, now_s: float, here: Pose2D, ahead: FloatArray, people: Sequence[SeenPerson], most_m_s: float, goal: Pose2D
     ) -> Pace:
-        """The pace for a robot `here` whose way leads over poses `ahead` (N, 3), at most_m_s when nobody is near.
+        """The pace of a robot `here` with the path `ahead` (N, 3), most_m_s when nobody is near.
 
-        Near the `goal` people are come as near to as that asks for, without waiting.
+        The robot does not wait for people who are as near to the `goal` as to the path.
         """
         if not people:
             return self._nobody(now_s)
         now_m = outline_distance_m(self.footprint, pose_array([here]), people)[0]
-        on_the_way_m = outline_distance_m(self.footprint, ahead, people)
-        then_m = np.min(on_the_way_m, axis=0)
-        leads_away = on_the_way_m[-1] > now_m + self._options.away_m
-        least_m = np.where(leads_away, on_the_way_m[-1], np.minimum(now_m, then_m))
+        on_path_m = outline_distance_m(self.footprint, ahead, people)
+        then_m = np.min(on_path_m, axis=0)
+        leads_away = on_path_m[-1] > now_m + self._options.away_m
+        least_m = np.where(leads_away, on_path_m[-1], np.minimum(now_m, then_m))
         nearest = int(np.argmin(least_m))
         if least_m[nearest] >= self._options.far_m:
             return self._nobody(now_s)
@@ -113,7 +113,7 @@ class PaceManager:
         return Pace(self._by_distance(float(least_m[nearest]), most_m_s), people[nearest])
 
     def _close(self, now_s: float, person: SeenPerson) -> Pace:
-        """Somebody is too near to the way: wait, then go past slowly."""
+        """The pace for a person too near to the path: first standing, then slow."""
         if self._passing:
             return Pace(self._options.pass_m_s, person)
         self._waiting_since_s = now_s if self._waiting_since_s is None else self._waiting_since_s

@@ -1,4 +1,4 @@
-"""Planning of a way for the whole footprint, over place and heading."""
+"""Path planning for the whole footprint, over position and heading."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skills.api import NO_WORK_COUNTER, FreeSpace, PlanningError, WorkCounter
 from skills.geometry import wrap
-from skills.navigate.differential import CELL_SHARE, Links, courses, drives, links
+from skills.navigate.differential import CELL_SHARE, Links, courses, driven_poses, links
 from skills.navigate.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
 from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
 from skills.navigate.motion_cost import TURNING_RADIUS_M, Needs, Space, Weights, segment_cost
@@ -23,25 +23,29 @@ from skills.robot import BaseKind, FloatArray, Pose2D
 
 FIELD_CELL_M = 0.05
 STEP_M = 0.06
+"""Distance between the poses of a path."""
 _SHORTCUT_POSES = 25
+"""Poses that one shortcut may skip."""
 _RELAX_ROUNDS = 60
 _RELAX_CLEARANCE_M = 0.25
+"""Clearance below which the relaxation pushes poses off obstacles."""
+_NOISE_M = 0.015
+"""Loss of clearance that a plan from a blocked start may bring."""
 
 
-class NoWayError(PlanningError):
-    """Start and goal are free, but nothing that the robot fits through joins them."""
+class NoPathError(PlanningError):
+    """Start and goal are free, but no path for the robot joins them."""
 
 
 @dataclass(frozen=True)
 class LatticePlanner:
-    """A lattice over place and heading, searched for the whole footprint, then smoothed.
+    """A lattice over position and heading, searched for the whole footprint, then smoothed.
 
-    Speeds (m/s, rad/s) say how dear each way of moving is. Poses keep `margin_m`, or `least_margin_m` where there is no
-    way with more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. A start that is
-    blocked by noise may be left through poses that are no worse, within `escape_m`. The search covers the box about
-    start and goal, `around_m` wider to all sides.
-    A base that cannot go sideways gets a path of straights, arcs and turns on the spot, whatever `lateral_m_s` and
-    `headings` say, on places half of `cell_m` apart.
+    Speeds (m/s, rad/s) set the cost of each motion. Poses keep `margin_m`, or `least_margin_m` where no path keeps
+    more; nearer than `soft_m` to an obstacle the cost grows up to (1 + soft_weight) fold. A path may leave a start that
+    noise blocks, through poses that are no worse, within `escape_m`. The search covers the box about start and goal,
+    `around_m` wider to all sides. A base that cannot go sideways gets a path of straights, arcs and turns on the spot,
+    on cells half of `cell_m` wide; `lateral_m_s` and `headings` have no effect on it.
     """
 
     forward_m_s: Speed = 0.8
@@ -60,7 +64,7 @@ class LatticePlanner:
     around_m: Margin = 8.0
 
     def weights(self, footprint: Footprint) -> Weights:
-        """The numbers that a motion's cost depends on, for the compiled loops."""
+        """The weights of a motion's cost."""
         return Weights(
             self.forward_m_s,
             self.backward_m_s,
@@ -81,7 +85,7 @@ class LatticePlanner:
         max_speed_m_s: float,
         work: WorkCounter = NO_WORK_COUNTER,
     ) -> Callable[[], Path]:
-        """Samples the costmap now; the call that comes back plans on that sample, and raises PlanningError."""
+        """Samples the costmap now; returns a function that plans on that sample, or raises PlanningError."""
         options = replace(self, forward_m_s=min(self.forward_m_s, max_speed_m_s))
         return partial(solve, problem_of(costmap, footprint, start, goal, options, self.around_m, work))
 
@@ -106,14 +110,14 @@ class Problem:
 def plan_path(
     costmap: FreeSpace, footprint: Footprint, start: Pose2D, goal: Pose2D, options: LatticePlanner | None = None
 ) -> Path:
-    """The cheapest way from start to goal that the footprint can go. Raises PlanningError.
+    """Plans the cheapest path from start to goal for the footprint. Raises PlanningError when there is none.
 
-    The path begins and ends exactly at start and goal. A start that is a little in collision may be left.
+    The path begins and ends exactly at start and goal. It may leave a start that is slightly in collision.
     """
     used = options or LatticePlanner()
     try:
         return solve(problem_of(costmap, footprint, start, goal, used))
-    except NoWayError:
+    except NoPathError:
         return solve(problem_of(costmap, footprint, start, goal, used, margin_m=8.0))
 
 
@@ -138,13 +142,13 @@ def problem_of(
 
 
 def _used(best: NDArray[np.float32]) -> slice:
-    """The stretch between the first and the last free place, and one more to either side."""
+    """The indices from the first to the last free sample, and one more to either side."""
     free = np.flatnonzero(best > 0.0)
     return slice(max(0, int(free[0]) - 1), int(free[-1]) + 2) if len(free) else slice(0, 2)
 
 
 def solve(problem: Problem) -> Path:
-    """The cheapest way, smoothed, with less margin where there is none with more. Raises PlanningError."""
+    """Plans with the wanted margin, or the least one where that fails. Raises PlanningError when both fail."""
     options = problem.options
     try:
         return _solve(problem)
@@ -155,7 +159,7 @@ def solve(problem: Problem) -> Path:
 
 
 def _solve(problem: Problem) -> Path:
-    """The cheapest way with the margin that is wanted."""
+    """Plans with the margin of the options."""
     space = Space(problem.field, _needs(problem), problem.options.weights(problem.footprint))
     _check_goal(problem)
     for yaw0_rad in (0.0, problem.goal.yaw_rad) if problem.sideways else (0.0,):
@@ -163,11 +167,11 @@ def _solve(problem: Problem) -> Path:
         if rough is not None:
             return _smooth(problem, space, rough)
     places = f"from {_place(problem.start)} to {_place(problem.goal)}"
-    raise NoWayError(f"There is no way {places} that the robot fits through{_because(problem.footprint)}.")
+    raise NoPathError(f"There is no path {places} that the robot fits through{_because(problem.footprint)}.")
 
 
 def _because(footprint: Footprint) -> str:
-    """What makes the robot larger than its body; empty when nothing does."""
+    """Clause on what makes the robot larger than its body, empty when nothing does."""
     length, width = footprint.extent_m
     return f": {footprint.beyond} makes it {length:.2f} m long and {width:.2f} m wide" if footprint.beyond else ""
 
@@ -177,11 +181,11 @@ def _place(pose: Pose2D) -> str:
 
 
 def _needs(problem: Problem) -> Needs:
-    """The clearance wanted; around a blocked start, what the start itself has."""
+    """Required clearance; around a blocked start, that of the start itself."""
     options, clearance = problem.options, clearance_at(problem.field, *_row(problem.start))
     if clearance < -options.deepest_start_m:
-        raise PlanningError(f"The robot stands in something at {_place(problem.start)}, so no way can begin there.")
-    escape = min(options.margin_m, clearance - 0.015)
+        raise PlanningError(f"The robot stands in an obstacle at {_place(problem.start)}, so no path can begin there.")
+    escape = min(options.margin_m, clearance - _NOISE_M)
     return Needs(options.margin_m, escape, options.escape_m, problem.start.x_m, problem.start.y_m)
 
 
@@ -189,13 +193,13 @@ def _check_goal(problem: Problem) -> None:
     clearance = clearance_at(problem.field, *_row(problem.goal))
     if clearance >= problem.options.margin_m:
         return
-    needed = f"would have {clearance:.2f} m to the nearest thing there and needs {problem.options.margin_m:.2f} m"
-    why = "would stand in something there, or off the map" if clearance < 0.0 else needed
+    needed = f"would have {clearance:.2f} m to the nearest obstacle there and needs {problem.options.margin_m:.2f} m"
+    why = "would stand in an obstacle there, or off the map" if clearance < 0.0 else needed
     raise PlanningError(f"The goal {_place(problem.goal)} is blocked: the robot {why}{_because(problem.footprint)}.")
 
 
 def _lattice(problem: Problem, yaw0_rad: float) -> tuple[Lattice, int, int]:
-    """The lattice with the goal on one of its places, over the whole field; the goal's row and column."""
+    """The lattice over the whole field with the goal in a cell, and the goal's row and column."""
     field, goal = problem.field, problem.goal
     cell = problem.options.cell_m * (1.0 if problem.sideways else CELL_SHARE)
     rows, columns = field.values.shape
@@ -244,19 +248,19 @@ def _final_turns(space: Space, lattice: Lattice, goal: FloatArray, goal_cell: in
 
 @lru_cache(maxsize=4)
 def _courses(headings: int | None) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Yaws and moves of a lattice with so many headings, or of one for a base that cannot go sideways (None)."""
+    """Yaws and moves of a lattice with so many headings; None for a base that cannot go sideways."""
     if headings is None:
         return courses()
     return np.asarray(np.arange(headings) * (2.0 * math.pi / headings)), lattice_moves(headings)
 
 
 def _rows(found: Links) -> FloatArray:
-    """State index and cost, by index."""
+    """Rows of state index and cost, in order of the index."""
     return np.array(sorted((float(state), cost) for state, (cost, _) in found.items()), dtype=np.float64).reshape(-1, 2)
 
 
 def _search(problem: Problem, space: Space, yaw0_rad: float) -> FloatArray | None:
-    """Lattice poses from start to goal with continuous yaw, None when there is no way."""
+    """Lattice poses from start to goal with continuous yaw, None when there is no path."""
     lattice, row, column = _lattice(problem, yaw0_rad)
     start, goal = _row(problem.start), _row(problem.goal)
     if problem.sideways:
@@ -287,6 +291,6 @@ def _smooth(problem: Problem, space: Space, rough: FloatArray) -> Path:
     if problem.sideways:
         knots = relax(space, densify(knots, STEP_M), _RELAX_ROUNDS, problem.options.margin_m, _RELAX_CLEARANCE_M)
     else:
-        knots = drives(space, knots)
+        knots = driven_poses(space, knots)
     poses = densify(knots, STEP_M)
     return Path(poses, clearances(space, poses))

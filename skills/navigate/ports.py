@@ -1,4 +1,4 @@
-"""What the navigate skill takes and gives: all that a tree is compiled from."""
+"""Inputs, outputs and causes of the navigate skill, from which a tree is compiled."""
 
 from __future__ import annotations
 
@@ -6,11 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from skills.api import (
-    Cause,
-    Part,
-    Skill,
-)
+from skills.api import Cause, Part, Skill
 from skills.quantities import Coordinate, Length, Speed, Turn
 from skills.robot import Pose2D
 
@@ -19,7 +15,8 @@ from skills.robot import Pose2D
 class NavigateInputs:
     """The goal (the body's pose in the world), tolerances and the maximum speed.
 
-    Poses at `nearby_m`, forward and left of the goal, will do as well: a failure is final only if none can be reached.
+    Poses at `nearby_m`, forward and left of the goal, count as reached too: a failure is final only if none is
+    reachable.
     """
 
     goal: Pose2D

@@ -15,10 +15,10 @@ from skills.robot import FloatArray, Image, NoImageError, Scan
 
 @dataclass(frozen=True)
 class WatchOptions:
-    """The cameras that look ahead are asked in turn, one picture each `period_s`, which arrives after `latency_s`.
+    """Low obstacles: the front cameras take pictures in turn, one each `period_s`, which arrives after `latency_s`.
 
-    Of each row about `columns` pixels are used. Kept are points between the heights above the floor and within
-    `reach_m` of the camera.
+    About `columns` pixels of each row are used, and points between the heights above the floor and within `reach_m` of
+    the camera.
     """
 
     period_s: Duration = 0.35
@@ -29,7 +29,7 @@ class WatchOptions:
 
 
 class LowObstacleWatch:
-    """Feeds the context's costmap with depth points while its `step` is called."""
+    """Watch for obstacles below the LiDAR: adds points of the front depth cameras to the costmap."""
 
     def __init__(self, context: SkillContext, options: WatchOptions | None = None) -> None:
         self._context = context
@@ -42,7 +42,7 @@ class LowObstacleWatch:
         self._X_WO = RigidTransform()
 
     def step(self) -> None:
-        """Takes in a picture that has arrived, if one has; ask for the next when its time has come. Never blocks."""
+        """Takes in a picture that has arrived, and asks for the next one when that is due. Never blocks."""
         if self._job is not None:
             if self._job.done():
                 job, self._job = self._job, None
@@ -63,12 +63,12 @@ class LowObstacleWatch:
             lambda: robot.image(source, visual=False),
             lambda image: (low_points(image, options), image.stamp_s),
             latency_s=options.latency_s,
-            name=f"look for low things by {source}",
+            name=f"look for low obstacles by {source}",
         )
 
 
 def low_points(image: Image, options: WatchOptions) -> FloatArray:
-    """Points (N, 3) in the odom frame that a depth picture shows low above the floor and near."""
+    """Points (N, 3) of a depth picture in the odom frame that are low above the floor and near."""
     stride = max(1, image.depth_m.shape[1] // options.columns)
     depth = image.depth_m[::stride, ::stride].astype(np.float64)
     rows, columns = np.nonzero((depth > 0.0) & (depth < options.reach_m))
@@ -83,9 +83,9 @@ def low_points(image: Image, options: WatchOptions) -> FloatArray:
 
 @dataclass(frozen=True)
 class ScanHealthOptions:
-    """A scan may be `old_s` old, and a share of at least `least_valid` of its ranges must be valid.
+    """Health of the LiDAR: a scan may be `old_s` old, and at least `least_valid` of its ranges must be valid.
 
-    One that repeats the last, noise and all, counts as that one.
+    A scan that repeats the last one, noise included, is as old as that one.
     """
 
     old_s: Delay = 0.5
@@ -93,7 +93,7 @@ class ScanHealthOptions:
 
 
 class ScanHealth:
-    """Looks at the newest scan whenever it is asked. Content where the costmap does not live on LiDAR returns."""
+    """Check of the newest scan; passes where the costmap does not use LiDAR returns."""
 
     def __init__(self, context: SkillContext, options: ScanHealthOptions | None = None) -> None:
         self._context, self._options = context, options or ScanHealthOptions()
@@ -101,7 +101,7 @@ class ScanHealth:
         self._last: Scan | None = None
 
     def trouble(self) -> str | None:
-        """What is wrong with the LiDAR, in a sentence; None when nothing is."""
+        """Sentence on what is wrong with the LiDAR, None when nothing is."""
         if not self._needed:
             return None
         scan, now_s = self._context.robot.scan(), self._context.clock.now()

@@ -33,12 +33,12 @@ _EARLY = 0.4
 """The robot begins to stop within this share of the goal's tolerances."""
 
 
-class _InTheWay(Exception):  # noqa: N818 - no program error
-    """The robot stands on paths that the robots `of` these names have reserved."""
+class _OnReservedPath(Exception):  # noqa: N818 - no program error
+    """The robot stands on paths that other robots have reserved."""
 
-    def __init__(self, of: Sequence[str]) -> None:
+    def __init__(self, robots: Sequence[str]) -> None:
         super().__init__()
-        self.of = of
+        self.robots = robots
 
 
 @dataclass
@@ -121,10 +121,10 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         while not isinstance(stage, Succeeded):
             try:
                 stage = yield from stage()
-            except _InTheWay as way:
+            except _OnReservedPath as error:
                 self._base.stop()
-                self._planning.go_aside(way.of, forget=True)
-                yield Running(f"making way for {', '.join(way.of)}")
+                self._planning.go_aside(error.robots, forget=True)
+                yield Running(f"making way for {', '.join(error.robots)}")
                 self._around.look(self._base.last_velocity)
                 stage = self._plan
         return stage
@@ -149,11 +149,11 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
             self._base.stop()
             if self._placed:
                 return Failed(Cause.EXECUTION, "The robot lost its place: its scans no longer agree with the map.")
-            return Failed(Cause.PRECONDITION, "The robot does not know where it is, so no way can be planned.")
+            return Failed(Cause.PRECONDITION, "The robot does not know where it is, so no path can be planned.")
         refusal = self._base.refusal()
         if refusal is None:
             return None
-        if self._base.asks_again():
+        if self._base.ask_again():
             self._progress.best_s = self._now()
             return Running(f"standing: the robot refuses to drive: {refusal}")
         return Failed(self._refusal_cause, f"The robot refused to drive: {refusal}.")
@@ -169,13 +169,13 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     def _tick(self, message: str, progress: float | None = None, *, waits_aside: bool = False) -> Routine[None]:
         """Waits for the next tick and updates the surroundings.
 
-        Raises _InTheWay when the robot stands on a reserved path, unless it is going aside already.
+        Raises _OnReservedPath when the robot stands on a reserved path, unless it is going aside already.
         """
         yield Running(message, progress)
         if waits_aside or self._planning.aside is None:
             first = self._planning.robots_blocked()
             if first:
-                raise _InTheWay(first)
+                raise _OnReservedPath(first)
         self._around.look(self._base.last_velocity)
 
     def _localise(self) -> Routine[_Stage]:
@@ -246,12 +246,12 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
                 yield from self._tick(*self._goes_on(answer))
 
     def _wait_aside(self) -> Routine[_Stage]:
-        """Stands at a waiting place until no other robot comes past, then plans on."""
+        """Stands at a waiting pose until no other robot comes past, then plans to the goal again."""
         robots = self._around.robots
         while True:
-            robots.stand(self.context.pose(), self._around.footprint)
+            robots.reserve_pose(self.context.pose(), self._around.footprint)
             self._progress.best_s = self._now()
-            if not robots.ahead_of_us() or self._now() >= self._planning.wait_until_s:
+            if not robots.robots_with_priority() or self._now() >= self._planning.wait_until_s:
                 break
             yield from self._tick("waiting aside for another robot to pass", waits_aside=True)
         self._planning.go_on()
@@ -285,10 +285,10 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
             return None
         self._base.stop()
         self._progress.best_s = self._now()
-        return f"standing, since something comes into the way at {place_text(danger_W)}"
+        return f"standing, since an obstacle comes into the path at {place_text(danger_W)}"
 
     def _drive(self) -> tuple[Drive, str | None]:
-        """Sends the next velocity; returns it with whom the robot waits for, or None. Raises SkillFailure."""
+        """Sends the next velocity; returns it with the message while the robot waits, or None. Raises SkillFailure."""
         follower, goal = self._follower, self._planning.goal
         pace = self._around.pace(follower, self._inputs.max_speed_m_s, goal)
         most_m_s, waits = self._give_way()
@@ -302,25 +302,25 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         waits = self._waits(f"waiting for a person at {place_text(place_W)}")
         self._planning.obstacle_W = place_W
         if pace.overdue and not self._planning.under_way:
-            waits = self._replan(f"Somebody stays in the way at {place_text(place_W)}.")
+            waits = self._replan(f"A person stays in the path at {place_text(place_W)}.")
         return answer, waits
 
     def _give_way(self) -> tuple[float, str | None]:
         """The speed that reserved paths allow (m/s), and the message while the robot waits for another."""
         robots, footprint, options = self._around.robots, self._around.footprint, self.options.giving_way
-        robots.announce(self._follower, footprint)
+        robots.reserve_path(self._follower, footprint)
         if self._planning.aside is not None:
             return math.inf, None
         conflict = robots.conflict_m(self._follower, footprint)
         if conflict is None:
-            name = robots.room_for(self._follower, footprint)
+            name = robots.robot_to_wait_for(self._follower, footprint)
             return (math.inf, None) if name is None else (0.0, self._waits(f"waiting for {name} to make way"))
-        way_m, name = conflict
-        left_m = way_m - options.short_m
+        conflict_m, name = conflict
+        left_m = conflict_m - options.short_m
         if left_m > 0.02:
             return math.sqrt(2.0 * _BRAKING_M_S2 * left_m), None
         if not self._planning.under_way and self._now() >= self._around_due_s:
-            self._planning.avoided, self._around_due_s = Avoided.WAYS, self._now() + 2.0 * options.again_s
+            self._planning.avoided, self._around_due_s = Avoided.PATHS, self._now() + 2.0 * options.again_s
             self._planning.ask()
         return 0.0, self._waits(f"waiting for {name} to pass")
 
@@ -332,7 +332,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
 
     def _waiting_sentence(self) -> str:
         obstacle_W = self._planning.obstacle_W
-        return f"waiting for the way to become free at {place_text(obstacle_W) if obstacle_W else 'ahead'}"
+        return f"waiting for the path to become free at {place_text(obstacle_W) if obstacle_W else 'ahead'}"
 
     def _goes_on(self, answer: Drive) -> tuple[str, float | None]:
         """Plans again when the path fails; returns the message and the progress, 0 to 1."""
@@ -341,7 +341,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         if not self._planning.under_way:
             if trouble is not None:
                 return self._replan(trouble), None
-            if self._lacks_clearance() or self._around.outgrown():
+            if self._lacks_clearance() or self._around.outgrows_footprint():
                 self._planning.ask(self._pose_then())
         return f"on the way, {answer.remaining_m:.1f} m to go", done
 
@@ -352,11 +352,11 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         else:
             self._planning.obstacle_W = answer.blocked_at
             if not self._blocked.is_left():
-                return f"The way is blocked by something seen at {place_text(answer.blocked_at)}."
+                return f"The path is blocked by an obstacle at {place_text(answer.blocked_at)}."
         if answer.off_path_m > self.context.stack.controller.lost_path_m:
             return f"The robot is {answer.off_path_m:.2f} m off its path."
         stuck = self._now() - self._progress.best_s > self.options.stuck_s
-        return "The robot does not get on." if stuck else None
+        return "The robot makes no progress." if stuck else None
 
     def _lacks_clearance(self) -> bool:
         """Returns whether obstacles leave the path too little clearance; checked every `review_s`."""
@@ -378,7 +378,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self._progress.restart(self._now())
         self._blocked.over()
         self._planning.plan_again(why, self._pose_then())
-        return f"{why} Planning a way around."
+        return f"{why} Planning another path."
 
     def _pose_then(self) -> Pose2D | None:
         """The pose on the path where a plan that is requested now will arrive; None when the robot is off the path."""

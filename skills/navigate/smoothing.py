@@ -1,4 +1,4 @@
-"""From the lattice's steps to a smooth path: shortcuts, then relaxation like an elastic band, always checked."""
+"""Smoothing of a lattice path: shortcuts, then relaxation like an elastic band, with clearance checked throughout."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from skills.robot import FloatArray
 
 @compiled
 def shortcut(space: Space, poses: FloatArray, window: int, sideways: bool) -> FloatArray:
-    """The cheapest choice of (N, 3) poses to go through in straight lines, skipping at most `window` at a time.
+    """The cheapest subset of poses (N, 3) to join by straight lines, each skipping at most `window` poses.
 
-    The first and the last are kept; yaws must be continuous. A base that cannot go sideways turns to each line first.
+    The first and the last pose stay; yaws must be continuous. A base that cannot go sideways turns to each line first.
     """
     count = poses.shape[0]
     best = np.full(count, np.inf)
@@ -33,21 +33,21 @@ def shortcut(space: Space, poses: FloatArray, window: int, sideways: bool) -> Fl
                 cost = min(cost, 1e6)
             if best[i] + cost < best[j]:
                 best[j], came[j] = best[i] + cost, i
-    kept = np.zeros(count, dtype=np.bool_)
+    chosen = np.zeros(count, dtype=np.bool_)
     j = count - 1
     while j >= 0:
-        kept[j] = True
+        chosen[j] = True
         j = came[j]
-    return poses[kept]
+    return poses[chosen]
 
 
 @compiled
 def densify(poses: FloatArray, step_m: float) -> FloatArray:
-    """The same way with poses at most step_m apart (a radian counting 0.6 m)."""
+    """The same path with poses at most step_m apart (a radian counting 0.6 m)."""
     counts = np.empty(len(poses) - 1, dtype=np.int64)
     for n in range(len(counts)):
-        way = math.hypot(poses[n + 1, 0] - poses[n, 0], poses[n + 1, 1] - poses[n, 1])
-        counts[n] = max(1, math.ceil((way + TURNING_RADIUS_M * abs(poses[n + 1, 2] - poses[n, 2])) / step_m))
+        length = math.hypot(poses[n + 1, 0] - poses[n, 0], poses[n + 1, 1] - poses[n, 1])
+        counts[n] = max(1, math.ceil((length + TURNING_RADIUS_M * abs(poses[n + 1, 2] - poses[n, 2])) / step_m))
     dense = np.empty((counts.sum() + 1, 3))
     dense[0], row = poses[0], 1
     for n in range(len(counts)):
@@ -59,9 +59,9 @@ def densify(poses: FloatArray, step_m: float) -> FloatArray:
 
 @compiled
 def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m: float) -> FloatArray:
-    """Pulls poses between their neighbours, turns them along the way, pushes them off what is nearer than wide_m.
+    """Pulls poses between their neighbours, turns them along the path, pushes them off obstacles nearer than wide_m.
 
-    The ends stay. A pose moves only where its clearance stays above margin_m or does not get worse.
+    The ends stay. A pose moves only where its clearance stays above margin_m or does not get smaller.
     """
     poses = poses.copy()
     count = poses.shape[0]
@@ -86,7 +86,7 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
 
 @compiled
 def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
-    """How far the way's direction at a pose lies from yaw; 0 where it does not go roughly ahead."""
+    """Angle from yaw to the path's direction at a pose; 0 where the path does not lead roughly ahead."""
     first, last = max(0, n - 2), min(poses.shape[0] - 1, n + 2)
     dx, dy = poses[last, 0] - poses[first, 0], poses[last, 1] - poses[first, 1]
     if math.hypot(dx, dy) < 0.1:
@@ -97,7 +97,7 @@ def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
 
 @compiled
 def _uphill(space: Space, x: float, y: float, yaw: float) -> tuple[float, float]:
-    """Direction in which the clearance grows, length up to 1."""
+    """Direction in which the clearance grows, with a length up to 1."""
     h = 0.03
     gx = clearance_at(space.field, x + h, y, yaw)
     gx -= clearance_at(space.field, x - h, y, yaw)

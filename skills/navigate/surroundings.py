@@ -11,7 +11,7 @@ from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
-from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, spaced
+from skills.navigate.people_space import Pace, PaceManager, SpaceOptions, with_people
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
 from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway
@@ -26,9 +26,9 @@ from skills.stack import LocalController
 class NavigateOptions:
     """Patience and bounds of the skill, times in seconds of the robot's clock.
 
-    Every `review_s` the path is checked `review_m` ahead, and planned anew, while driving, where something blocks it.
-    While people are near, and for `after_person_s` (longer than a costmap remembers them), plans that fail are tried
-    again without being counted, up to person_patience_s.
+    Every `review_s` the robot checks its path `review_m` ahead, and plans again, while driving, where it is blocked.
+    While people are near, and for `after_person_s` (longer than a costmap remembers them), failed plans do not count,
+    up to person_patience_s.
     """
 
     planning_latency_s: Delay = 0.3
@@ -58,7 +58,7 @@ _OUTLINE_PERIOD_S = 0.5
 
 
 class Surroundings:
-    """What the sensors show around the robot during one trip.
+    """State of the robot's surroundings, by its sensors, during one trip.
 
     Plans and checks use `footprint`; plans keep `room_m` from people.
     """
@@ -90,7 +90,7 @@ class Surroundings:
         self.footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
         self._measured_s = self._context.clock.now()
 
-    def outgrown(self) -> bool:
+    def outgrows_footprint(self) -> bool:
         """Returns whether the arm or its load now reaches beyond `footprint`; measured every _OUTLINE_PERIOD_S."""
         if self._context.clock.now() < self._measured_s + _OUTLINE_PERIOD_S:
             return False
@@ -109,9 +109,9 @@ class Surroundings:
         return True
 
     def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
-        """The costmap with closed doors, robots, and as much room around people as `here` and the goal allow."""
+        """The costmap with closed doors, robots, and as much clearance around people as `here` and the goal allow."""
         costmap = self.robots.costmap(self.doors.costmap(self._context.costmap), avoided)
-        return spaced(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
+        return with_people(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
 
     def danger(self, follower: LocalController, most_m_s: float) -> tuple[float, float] | None:
         """The point (x, y) of an obstacle for which the robot must stop at once; None when there is none."""
@@ -125,13 +125,13 @@ class Surroundings:
     def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
         """The closed doors that leave no path to any of the goals."""
         people_W = [one.place_W for one in self.persons()]
-        return self.doors.in_the_way(self.footprint, self._context.pose(), goals, people_W)
+        return self.doors.blocking_doors(self.footprint, self._context.pose(), goals, people_W)
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
-        """Returns whether none of the goals can be reached for sure."""
+        """Returns whether all goals are certainly out of reach."""
         return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
 
     def clear_obstacles(self) -> bool:
-        """Clears the obstacle layer of the costmap; whether there was anything to clear."""
+        """Clears the obstacle layer of the costmap; returns whether a cell was cleared."""
         costmap = self._context.costmap
         return isinstance(costmap, ForgettingCostmap) and bool(costmap.forget_seen())

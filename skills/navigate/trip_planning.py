@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from skills.api import Cause, ForgettingCostmap, Job, SkillContext
 from skills.geometry import compose
-from skills.navigate.cut_off import closed_sentence
+from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
 from skills.navigate.ports import NavigateInputs
@@ -58,7 +58,7 @@ class TripPlanning:
         self._tried: tuple[Pose2D, ...] = ()
         self._asked_due_s = -math.inf
         self.aside: Pose2D | None = None
-        self.avoided = Avoided.WAYS
+        self.avoided = Avoided.PATHS
         self.obstacle_W: tuple[float, float] | None = None
         self.wait_until_s = -math.inf
 
@@ -106,8 +106,8 @@ class TripPlanning:
 
     def plan_again(self, why: str, start: Pose2D | None) -> None:
         """Requests another plan, because the path failed for the reason `why`. Raises SkillFailure after too many."""
-        self._replans += not self._around.robots.somebody_goes()
-        self.avoided = Avoided.WAYS
+        self._replans += not self._around.robots.another_drives()
+        self.avoided = Avoided.PATHS
         if self._replans > self._options.replans:
             text = f"{why} Planning again {self._options.replans} times did not help."
             raise SkillFailure(Cause.EXECUTION, text)
@@ -121,7 +121,7 @@ class TripPlanning:
         if self._map_alone:  # nobody blocks this plan, so no path exists
             raise SkillFailure(Cause.PLANNING, why)
         waited, self._waited = self._waited, False
-        if waited and self.aside is None and self._around.robots.ahead_of_us():
+        if waited and self.aside is None and self._around.robots.robots_with_priority():
             return True
         if not (self._asks_for_less() or self._around.reduce_distance_to_people()):
             self._wait_or_give_up(why)
@@ -136,24 +136,24 @@ class TripPlanning:
         self._tried = () if forget else self._tried
         place = None
         if len(self._tried) < self._options.giving_way.places:
-            place = robots.waiting_place(context.costmap, self._around.footprint, context.pose(), self._tried)
+            place = robots.waiting_pose(context.costmap, self._around.footprint, context.pose(), self._tried)
         if place is None:
             robots.let_pass(first)
             self._asked_due_s = self._now() + self._options.giving_way.again_s
-        self.aside, self.avoided, self._waited = place, Avoided.WAYS, False
+        self.aside, self.avoided, self._waited = place, Avoided.PATHS, False
         self.ask()
 
     def go_on(self) -> None:
         """Plans to the goal again after waiting aside."""
         self.wait_until_s = self._now() + self._options.giving_way.again_s
-        self.aside, self.avoided, self._waited = None, Avoided.WAYS, True
+        self.aside, self.avoided, self._waited = None, Avoided.PATHS, True
         self.ask()
 
     def robots_blocked(self) -> Sequence[str]:
         """Names of the robots on whose reserved path this one stands; none for a while after it failed to go aside."""
         if self._now() < self._asked_due_s:
             return ()
-        return self._around.robots.in_whose_way(self._context.pose(), self._around.footprint)
+        return self._around.robots.blocked_robots(self._context.pose(), self._around.footprint)
 
     def _now(self) -> float:
         return self._context.clock.now()
@@ -169,10 +169,10 @@ class TripPlanning:
         robots = self._around.robots
         if self.aside is not None:
             self._tried = (*self._tried, self.aside)
-            self.go_aside(robots.in_whose_way(self._context.pose(), self._around.footprint))
+            self.go_aside(robots.blocked_robots(self._context.pose(), self._around.footprint))
             return True
-        less = robots.less(self.avoided)
-        self.avoided = less or Avoided.WAYS
+        less = robots.less_avoided(self.avoided)
+        self.avoided = less or Avoided.PATHS
         if less is not None:
             self.ask()
         return less is not None
@@ -190,8 +190,8 @@ class TripPlanning:
         if not may_go and self._looks_again():
             return
         if self.obstacle_W is None or self._replans >= self._options.replans:
-            who = self._around.robots.name_at(self.obstacle_W) or "something seen"
-            seen = f" The way is blocked by {who} at {place_text(self.obstacle_W)}." if self.obstacle_W else ""
+            who = self._around.robots.name_at(self.obstacle_W) or "an obstacle"
+            seen = f" The path is blocked by {who} at {place_text(self.obstacle_W)}." if self.obstacle_W else ""
             final = not may_go and self._around.cut_off(self._goals)
             raise SkillFailure(Cause.PLANNING, why + seen, final=final)
         self.wait_until_s = self._now() + self._options.replan_pause_s
@@ -199,12 +199,12 @@ class TripPlanning:
             self.ask(map_alone=True)
 
     def _waits_for_doors(self) -> bool:
-        """Whether to wait for closed doors that leave no path. Raises SkillFailure once patience with them is over."""
+        """Returns whether to wait for closed doors that leave no path. Raises SkillFailure once patience is over."""
         doors, options = self._around.closed_doors(self._goals), self._options.doors
         if not doors:
             return False
         if not self._closed.is_left():
-            raise SkillFailure(Cause.PLANNING, closed_sentence(doors, self._inputs.goal), final=True)
+            raise SkillFailure(Cause.PLANNING, closed_doors_sentence(doors, self._inputs.goal), final=True)
         self.obstacle_W = doors[0].middle_W
         self.wait_until_s = self._now() + options.look_s
         return True
@@ -226,13 +226,13 @@ class TripPlanning:
         return self._people.may_go(self._now(), self._options.person_patience_s)
 
     def _robot_may_go(self) -> bool:
-        """Whether another robot may block the path only for now; then the costmap's obstacle layer is cleared."""
+        """Returns whether another robot may block the path only for now; then clears the obstacle layer."""
         if self._around.robots.others():
             self._robots.note(self._now())
         if not self._robots.may_go(self._now(), self._options.giving_way.blocked_patience_s):
             return False
         self.obstacle_W = self.obstacle_W or (self.goal.x_m, self.goal.y_m)
-        self._around.robots.wish(self._context.pose(), self.goal, self._around.footprint)
+        self._around.robots.reserve_goal(self._context.pose(), self.goal, self._around.footprint)
         self._around.clear_obstacles()
         return True
 

@@ -1,1 +1,1 @@
-"""Driving body and arm by hand."""
+"""Teleoperation of body and arm."""

@@ -1,6 +1,6 @@
-"""Body, arm and gripper by hand, through the Robot protocol, within the limits that the skills keep.
+"""Teleoperation of body, arm and gripper through the Robot protocol, within the limits of the skills.
 
-Dead-man's switch: what is asked for counts `life_s` on the robot's clock. All commands expire by then, or end at rest.
+Dead-man's switch: keys count for `life_s` on the robot's clock. All commands expire by then, or end at rest.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from skills.robot import ArmTrajectory, CommandId, CommandState, FloatArray, Pos
 from skills.teleop.keys import BASE, GRIPPER, HAND, JOINTS, POSTURE
 
 _TAIL_POINTS = 5
+"""Points of a trajectory while the arm brakes."""
 _STILL_RAD_S = 1e-6
 
 
@@ -40,7 +41,7 @@ class ArmOptions:
 
 @dataclass(frozen=True)
 class ArmMotion:
-    """Joint angles and rates at a time (s), and that the arm brakes from there on, `braking_s` long."""
+    """Joint angles and rates at a time (s), from which on the arm brakes for `braking_s`."""
 
     at_s: float
     q_rad: FloatArray
@@ -57,7 +58,7 @@ class ArmMotion:
 
 
 class HandControl:
-    """Turns what is asked of the arm into motions; remembers the last one, from which the next one goes on."""
+    """Converter of axis values into arm trajectories, each of which continues the last one."""
 
     def __init__(self, model: ArmModel, options: ArmOptions) -> None:
         self._model, self._options = model, options
@@ -67,7 +68,7 @@ class HandControl:
     def next(
         self, asked: Mapping[str, float], now_s: float, q_measured_rad: FloatArray, scene: ArmScene
     ) -> ArmTrajectory | None:
-        """The trajectory from now on, None while nothing moves. `note` says why the arm does not go on."""
+        """The trajectory from now on, None while the arm rests; `note` is the reason why the arm stops."""
         options = self._options
         q, rate = (q_measured_rad, np.zeros(len(q_measured_rad)))
         if self._motion is not None:
@@ -78,14 +79,14 @@ class HandControl:
         wanted = _slewed(rate, self._wanted(asked, q), options.joint_rad_s2 * options.period_s)
         motion = self._moved(q, rate, wanted, now_s)
         if not self._free(q, motion, scene):
-            self.note = self.note or "the arm would touch something or pass a joint's limit"
+            self.note = self.note or "the arm would touch the robot or pass a joint's limit"
             motion = self._moved(q, rate, _slewed(rate, 0.0 * rate, options.joint_rad_s2 * options.period_s), now_s)
         self._motion = motion
         moves = max(np.max(np.abs(rate)), np.max(np.abs(motion.rate_rad_s))) > _STILL_RAD_S
         return _trajectory(q, motion, options.period_s) if moves else None
 
     def _wanted(self, asked: Mapping[str, float], q: FloatArray) -> FloatArray:
-        """Joint rates that what is asked for means."""
+        """Joint rates for the axis values."""
         joints = np.array([asked.get(axis, 0.0) for axis in JOINTS[: len(q)]])
         hand = np.array([asked.get(axis, 0.0) for axis in HAND])
         if np.any(joints) or not np.any(hand):
@@ -94,7 +95,7 @@ class HandControl:
         X_BH = self._model.X_BH(q)
         turn = RotationMatrix(RollPitchYaw(hand[3:] * options.hand_rad_s * options.period_s))
         place = X_BH.translation() + hand[:3] * options.hand_m_s * options.period_s
-        # Joints that stand at their limit, as those of a stowed arm, may leave it: hence no margin.
+        # No margin, so that joints at their limit, as in a stowed arm, can leave it.
         solution = self._model.nearest_inverse(RigidTransform(X_BH.rotation() @ turn, place), q, margin_rad=0.0)
         if solution is None or np.max(np.abs(solution - q)) > options.jump_rad:
             self.note = "the hand is at the end of the arm's reach"
@@ -118,7 +119,7 @@ class HandControl:
 
 
 def _slewed(rate: FloatArray, wanted: FloatArray, most: float) -> FloatArray:
-    """The rate that comes as near to the wanted one as the acceleration allows."""
+    """The rate nearest to the wanted one within the most change."""
     change = wanted - rate
     return np.asarray(rate + change * min(1.0, most / max(float(np.max(np.abs(change))), 1e-9)))
 
@@ -137,10 +138,10 @@ _ARM: frozenset[str] = frozenset((*HAND, *JOINTS))
 
 @dataclass(frozen=True)
 class TeleopOptions:
-    """What driving by hand keeps to; speeds and accelerations of the base are those of the path follower.
+    """Limits of teleoperation; speeds and accelerations of the base are those of the path follower.
 
-    The base keeps `margin_m` to what the costmap knows on the ground that it covers in `reaction_s` and while it brakes
-    at `stop_m_s2`.
+    The base keeps `margin_m` of clearance on the ground that it covers in `reaction_s` and while it brakes at
+    `stop_m_s2`.
     """
 
     life_s: Delay = 0.3
@@ -158,7 +159,7 @@ class TeleopOptions:
 
 @dataclass(frozen=True)
 class SavedPose:
-    """Where the robot was: the body in the world, the arm's joints and the gripper's opening (rad)."""
+    """Pose of the body in the world, the arm's joints and the gripper's opening (rad)."""
 
     base: Pose2D
     joints_rad: tuple[float, ...]
@@ -166,10 +167,10 @@ class SavedPose:
 
 
 class Teleop:
-    """Call `ask` whenever keys arrive, from any thread, and `tick` once each `period_s` of the robot's clock."""
+    """Teleoperation of one robot. Call `ask` when keys arrive, from any thread, and `tick` once each `period_s`."""
 
     def __init__(self, context: SkillContext, options: TeleopOptions | None = None) -> None:
-        """The context's lease is the right to move. Raises ValueError: the robot has an arm that cannot be moved."""
+        """Moves the robot under the context's lease. Raises ValueError when the arm's kinematics are not supported."""
         self._context, self._options = context, options or TeleopOptions()
         capabilities = context.robot.capabilities()
         self._base, self._footprint = Base(context), Footprint.of(capabilities)
@@ -184,17 +185,17 @@ class Teleop:
         self.note = ""
 
     def ask(self, asked: Mapping[str, float]) -> None:
-        """What hands ask for now, by axis, each from -1 to 1; nothing stops the robot."""
+        """Sets the values of the axes, each from -1 to 1; an empty mapping stops the robot."""
         self._asked = (dict(asked), self._context.clock.now())
 
     def pose(self) -> SavedPose:
-        """Where the robot is now, to be saved."""
+        """The robot's present pose, to be saved."""
         return SavedPose(
             self._context.pose(), tuple(self._q_rad().tolist()), max(0.0, self._context.robot.gripper().opening)
         )
 
     def tick(self) -> None:
-        """Sends the commands for the next period; `note` says what stands in the way of what is asked."""
+        """Sends the commands for the next period; `note` is the reason why the robot does not obey, if it does not."""
         asked, at_s = self._asked
         now_s, until_s = self._context.clock.now(), at_s + self._options.life_s
         alive = now_s + self._options.period_s <= until_s + 1e-9
@@ -225,11 +226,11 @@ class Teleop:
                 vx, vy, wz = (share * velocity).tolist()
                 self._base.drive((vx, vy, wz))
                 return
-        self.note = "something stands in the way of the body"
+        self.note = "an obstacle blocks the body"
         self._base.stop()
 
     def _clear(self, velocity: FloatArray) -> bool:
-        """Whether the ground is free that the body covers until it stands, or the body moves away from what is near."""
+        """Returns whether the ground that the body covers until it stands is free, or the clearance grows."""
         options, here = self._options, self._context.pose()
         until_s = options.reaction_s + float(np.hypot(*velocity[:2])) / (2.0 * options.stop_m_s2)
         times = np.linspace(0.0, until_s, 6)
@@ -282,7 +283,7 @@ class Teleop:
         self._commands.append(self._context.robot.stand(*self._posture, until_s=until_s, lease=lease))
 
     def _refusal(self) -> str:
-        """Why the robot refused one of the commands, empty when it took them all."""
+        """Reason why the robot refused one of the commands, empty when it accepted them all."""
         statuses = [self._context.robot.command_status(command) for command in self._commands]
         refused = next((one.reason for one in statuses if one.state is CommandState.REFUSED), "")
         return self._base.refusal() or refused

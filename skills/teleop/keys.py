@@ -1,4 +1,4 @@
-"""What keys and sticks ask for: values from -1 to 1 by the name of an axis."""
+"""Keys and sticks of teleoperation: values from -1 to 1 by the name of an axis."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _PAIRS: Final[Mapping[str, str]] = {
 KEYS: Final[Mapping[str, tuple[str, float]]] = {
     key: (axis, sign) for axis, pair in _PAIRS.items() for key, sign in zip(pair, (1.0, -1.0), strict=True)
 }
-"""The axis and the sign that each key stands for."""
+"""Axis and sign of each key."""
 
 
-def asked_by(keys: Iterable[str], sticks: Mapping[str, float] | None = None) -> dict[str, float]:
-    """What held keys and sticks ask for together, each axis within [-1, 1]; keys without a meaning do nothing."""
+def axis_values(keys: Iterable[str], sticks: Mapping[str, float] | None = None) -> dict[str, float]:
+    """Axis values of held keys and sticks together, each within [-1, 1]; keys without a meaning count as none."""
     asked = dict(sticks or {})
     for axis, sign in (KEYS[key] for key in keys if key in KEYS):
         asked[axis] = asked.get(axis, 0.0) + sign
     return {axis: max(-1.0, min(1.0, value)) for axis, value in asked.items() if value}
 
 
-def read_asked(values: Mapping[str, Any]) -> dict[str, float]:
-    """What a page asks for by `keys` (texts) and `axes` (names to numbers). Raises ValueError: it is no such thing."""
+def read_axis_values(values: Mapping[str, Any]) -> dict[str, float]:
+    """Reads axis values from a page's `keys` (texts) and `axes` (names to numbers). Raises ValueError for others."""
     keys, sticks = values.get("keys", []), values.get("axes", {})
     if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
         raise ValueError("keys must be a list of texts")
@@ -54,4 +54,4 @@ def read_asked(values: Mapping[str, Any]) -> dict[str, float]:
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if axis not in AXES or not number or not math.isfinite(value):
             raise ValueError(f"axis '{str(axis)[:40]}' must be a known one with a finite number")
-    return asked_by(keys, {axis: float(value) for axis, value in sticks.items()})
+    return axis_values(keys, {axis: float(value) for axis, value in sticks.items()})

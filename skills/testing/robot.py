@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from skills.faults.fault_kinds import pulled
+from skills.faults.fault_kinds import joints_under_pull
 from skills.geometry import compose
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.robot import (
@@ -196,7 +196,7 @@ class ScriptedRobot:
         still = dict.fromkeys(position, 0.0)
         joints = Joints(self._clock.now(), position, still, still)
         is_pulled = self._pulled_at_s is not None and joints.stamp_s >= self._pulled_at_s
-        return pulled(joints, self._capabilities) if is_pulled else joints
+        return joints_under_pull(joints, self._capabilities) if is_pulled else joints
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""

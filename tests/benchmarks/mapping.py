@@ -30,7 +30,7 @@ from plant.simulation import Simulation
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.geometry import compose, relative
-from skills.mapping.map_folder import save_graph, save_grids, surveyed
+from skills.mapping.map_folder import map_grids, save_graph, save_grids
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
 from skills.robot import CommandId, CommandState, CommandStatus, Pose2D
@@ -129,7 +129,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
             told += 20.0
             off = relative(plant.true, mapper.pose)
             print(
-                f"{plant.now():6.0f} s {mapper.way_m:6.1f} m  {len(mapper.keyframes)} keyframes  "
+                f"{plant.now():6.0f} s {mapper.driven_m:6.1f} m  {len(mapper.keyframes)} keyframes  "
                 f"{len(mapper.graph.closures)} closures  off {math.hypot(off.x_m, off.y_m):.3f} m "
                 f"{math.degrees(off.yaw_rad):.2f} deg  {made.goal and made.goal[0]}  own {own_s:.1f} s",
                 file=sys.stderr,
@@ -138,7 +138,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
     wall_s = time.perf_counter() - begun
     true = [truth[round(frame.stamp_s, 3)] for frame in mapper.keyframes]
     tick = time.process_time()
-    grids = surveyed(mapper)
+    grids = map_grids(mapper)
     render_s = time.process_time() - tick
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
@@ -150,7 +150,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
         "done": made.done,
         "trouble": made.trouble,
         "notes": made.notes,
-        "distance_m": round(mapper.way_m, 1),
+        "distance_m": round(mapper.driven_m, 1),
         "sim_time_s": round(plant.now(), 1),
         "wall_time_s": round(wall_s, 1),
         "trajectory_error_m": round(trajectory_error_m(mapper.graph.poses, true), 4),

@@ -26,7 +26,7 @@ from plant.diagram import LooseModel
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.description import HAND_LINK
 from plant.simulation import Simulation
-from skills.faults.faulty_robot import with_faults
+from skills.faults.faulty_robot import inject_faults
 from tests.visitors import OnMessage, OnTick
 
 FETCH = (
@@ -162,7 +162,7 @@ class LosesHalfway:
             return
         self._begun_s = progress.now_s if self._begun_s is None else self._begun_s
         if self._apart_m is None and progress.now_s > self._begun_s + self.BRINGS_S:
-            self._apart_m, self._robot = apart_m, with_faults(self._robot, self._clock, ["gripper loses it"])
+            self._apart_m, self._robot = apart_m, inject_faults(self._robot, self._clock, ["gripper loses it"])
 
 
 @pytest.mark.nightly

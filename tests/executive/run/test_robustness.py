@@ -23,7 +23,7 @@ from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.fault_kinds import VERBS, Effect
 from skills.faults.fault_words import Fault
-from skills.faults.faulty_robot import with_faults
+from skills.faults.faulty_robot import inject_faults
 from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
@@ -151,7 +151,7 @@ def spoilt_run(tmp_path, verb, kind, *, worker=LockStepWorker, limit_s=30.0):
     faults = [Fault(f"{verb} {kind}", Effect(frozenset({verb}), KINDS[kind][0]))] if kind else []
     plan = NodeSpec("skill", "alice/test", "use all", {"skill": UseAll, "limit_s": limit_s})
     entry = RunEntry(
-        CompiledTree("Alice", "test", (), plan), with_faults(robot, clock, faults), KnownPlace(), BlockCostmap()
+        CompiledTree("Alice", "test", (), plan), inject_faults(robot, clock, faults), KnownPlace(), BlockCostmap()
     )
     log = EventLog(tmp_path / "log.mcap", clock)
     try:

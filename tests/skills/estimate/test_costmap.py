@@ -15,13 +15,13 @@ def ticked(bench: Bench, ticks: int = 10) -> Bench:
     return bench
 
 
-def test_without_anything_unmapped_only_the_survey_counts():
+def test_without_unmapped_objects_only_the_survey_counts():
     bench = ticked(Bench(START), 40)
     assert len(bench.costmap.seen_m()) == 0
     assert bench.costmap.clearance_m(np.array([[3.0, 5.6]]))[0] == pytest.approx(1.4, abs=0.02)
 
 
-def test_a_person_in_the_way_is_seen():
+def test_a_person_in_the_path_is_seen():
     bench = ticked(Bench(START, unmapped=[PERSON]))
     assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05
     assert bench.costmap.clearance_m(AT_PERSON + [-0.5, 0.0])[0] == pytest.approx(0.5, abs=0.12)
@@ -50,26 +50,26 @@ def test_what_is_below_the_beams_stays_remembered_and_then_decays():
     assert bench.costmap.clearance_m(ahead)[0] > 0.5
 
 
-def test_single_depth_points_are_taken_for_noise():
+def test_single_depth_points_count_as_noise():
     bench = ticked(Bench(START))
     bench.costmap.add_points(np.array([[3.0, 5.4, 0.3], [3.5, 5.0, 0.3]]), bench.clock.now())
     assert len(bench.costmap.seen_m()) == 0
 
 
-def test_points_on_the_robot_itself_are_left_out():
+def test_points_on_the_robot_are_ignored():
     bench = ticked(Bench(START))
     on_body = np.tile([[1.8, 5.5, 0.4]], (20, 1))
     bench.costmap.add_points(on_body, bench.clock.now())
     assert len(bench.costmap.seen_m()) == 0
 
 
-def test_points_on_surveyed_furniture_are_left_out():
+def test_points_on_surveyed_furniture_are_ignored():
     bench = ticked(Bench(START))
     bench.costmap.add_points(np.tile([[5.0, 6.52, 0.4]], (20, 1)), bench.clock.now())
     assert len(bench.costmap.seen_m()) == 0
 
 
-def test_nothing_is_taken_in_while_the_robot_does_not_know_its_place():
+def test_scans_are_ignored_while_the_robot_is_not_localised():
     bench = Bench(START, unmapped=[PERSON], believed_start=Pose2D(8.0, 2.0, 1.0))
     bench.tick()
     bench.tick()
@@ -77,7 +77,7 @@ def test_nothing_is_taken_in_while_the_robot_does_not_know_its_place():
     assert len(bench.costmap.seen_m()) == 0
 
 
-def test_what_stands_where_another_robot_says_it_is_is_left_out_but_told():
+def test_returns_from_a_reported_robot_are_left_out_but_unexplained():
     bench = Bench(START, unmapped=[PERSON])
     bench.costmap.leave_out(np.array([[3.4, 5.4, 0.5]]))
     ticked(bench)

@@ -35,7 +35,7 @@ def test_top_row_of_the_picture_is_the_largest_y(tmp_path):
     assert grid.height_band_m == (0.7, 1.3)
 
 
-def test_world_and_cells_go_there_and_back(tmp_path):
+def test_world_and_cells_convert_both_ways(tmp_path):
     grid = load_grid_map(write_map(tmp_path))
     cells = np.array([[0, 0], [19, 29], [4, 11]])
     centres = grid.centres(cells)
@@ -128,7 +128,7 @@ def test_a_map_turned_by_any_angle_keeps_its_walls_in_place(tmp_path):
     assert grid.occupied[tuple(grid.cells(wall).T)].all()
 
 
-def test_scale_mode_takes_what_is_likelier(tmp_path):
+def test_scale_mode_takes_the_likelier_class(tmp_path):
     grid = load_grid_map(write_map(tmp_path, YAML + "mode: scale\n"))
     assert grid.unknown is not None and not grid.unknown.any()
     cv2.imwrite(str(tmp_path / "room.pgm"), np.full((4, 4), 120, dtype=np.uint8))

@@ -47,7 +47,7 @@ def test_error_stays_below_3_cm_and_1_degree_while_odometry_drifts():
     assert by_odometry_m > 0.04  # the bound above is no merit of odometry's
 
 
-def test_unmapped_things_near_the_robot_do_not_pull_the_pose():
+def test_unmapped_objects_near_the_robot_do_not_pull_the_pose():
     person = Box(2.3, 6.2, 2.7, 6.6, 0.0, 1.7)
     moved_cupboard = Box(4.5, 4.25, 5.6, 4.6, 0.0, 1.8)
     bench = Bench(Pose2D(1.5, 5.4, 0.0), unmapped=[person, moved_cupboard])
@@ -55,7 +55,7 @@ def test_unmapped_things_near_the_robot_do_not_pull_the_pose():
     assert errors[:, 0].max() < 0.03
 
 
-def test_a_start_believed_somewhat_wrong_is_corrected():
+def test_a_slightly_wrong_start_is_corrected():
     bench = Bench(START, believed_start=Pose2D(1.65, 1.85, 0.1))
     for _ in range(20):
         bench.tick()
@@ -80,7 +80,7 @@ def test_a_scan_is_used_once():
     assert np.array_equal(before.covariance, after.covariance)
 
 
-def test_covariance_shrinks_from_the_start_and_tells_the_size_of_errors():
+def test_covariance_shrinks_and_fits_the_errors():
     bench = Bench(START)
     for _ in range(20):
         bench.tick()
@@ -88,7 +88,7 @@ def test_covariance_shrinks_from_the_start_and_tells_the_size_of_errors():
     assert (sigma[:2] < 0.03).all() and (sigma[:2] > 0.001).all()
 
 
-def test_lost_when_carried_off_and_found_again_nearby():
+def test_a_carried_robot_is_lost_and_found_again_nearby():
     bench = Bench(START)
     for _ in range(10):
         bench.tick()
@@ -132,7 +132,7 @@ def test_equal_seeds_give_equal_estimates():
     assert poses[0] == poses[1]
 
 
-def test_pose_is_given_in_the_world_whatever_odometry_says():
+def test_pose_is_in_the_world_frame_for_any_odometry():
     bench = Bench(START)
     bench.robot.odometry_pose = Pose2D(5.0, -3.0, 2.0)
     for _ in range(4):
@@ -149,7 +149,7 @@ def surrounded_bench() -> tuple[Bench, np.ndarray]:
 
 
 @pytest.mark.parametrize("told", [True, False])
-def test_a_robot_amid_others_that_say_where_they_are_keeps_its_place(told: bool) -> None:
+def test_localisation_holds_among_robots_that_report_their_poses(told: bool) -> None:
     """Most of what it sees are the others: left out, the rest is enough; taken for walls, it is lost."""
     bench, discs_W = surrounded_bench()
     if told:
@@ -159,7 +159,7 @@ def test_a_robot_amid_others_that_say_where_they_are_keeps_its_place(told: bool)
     assert bench.localiser.estimate().localised == told
 
 
-def test_a_scan_of_nothing_but_other_robots_takes_no_place_away() -> None:
+def test_a_scan_of_other_robots_only_does_not_delocalise() -> None:
     """Localised first, then all is covered: the belief goes on by odometry."""
     bench = Bench(START)
     for _ in range(5):
@@ -176,7 +176,7 @@ def test_a_scan_of_nothing_but_other_robots_takes_no_place_away() -> None:
 CORRIDOR = Pose2D(1.5, 5.4, 0.3)
 
 
-def test_the_start_is_where_it_was_told_and_the_rest_is_odometry():
+def test_dead_reckoning_starts_at_the_given_pose_and_follows_odometry():
     bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False)
     bench.tick()
     assert bench.localiser.estimate().localised
@@ -186,7 +186,7 @@ def test_the_start_is_where_it_was_told_and_the_rest_is_odometry():
     assert bench.pose_error() == pytest.approx((0.0, 0.0), abs=1e-3)
 
 
-def test_it_is_less_sure_the_farther_it_has_gone():
+def test_covariance_grows_with_the_distance():
     bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False)
     bench.tick()
     before = bench.localiser.estimate().covariance
@@ -195,7 +195,7 @@ def test_it_is_less_sure_the_farther_it_has_gone():
     assert np.all(np.diag(bench.localiser.estimate().covariance) > np.diag(before))
 
 
-def test_a_start_that_is_not_known_is_the_origin():
+def test_an_unknown_start_is_the_origin():
     bench = Bench(CORRIDOR, component=DeadReckoning(), told=False, cameras=False)
     bench.tick()
     pose = bench.context().pose()

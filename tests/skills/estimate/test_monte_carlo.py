@@ -50,7 +50,7 @@ def test_while_driving_the_error_stays_below_3_cm_and_1_degree():
 
 
 @pytest.mark.parametrize("there", [Pose2D(8.0, 2.3, 2.0), Pose2D(3.3, 1.4, -1.0), Pose2D(6.2, 2.5, -2.5)])
-def test_kidnapped_it_notices_and_is_right_again_within_a_turn(there):
+def test_a_kidnapped_robot_is_localised_again_within_a_turn(there):
     bench = bench_at(START)
     tick(bench, 20)
     bench.robot.carry_off(there)
@@ -64,7 +64,7 @@ def test_kidnapped_it_notices_and_is_right_again_within_a_turn(there):
     assert bench.pose_error()[1] < math.radians(1.0)
 
 
-def test_started_anywhere_it_finds_out_while_it_turns():
+def test_a_robot_with_unknown_start_is_localised_while_it_turns():
     bench = bench_at(Pose2D(8.0, 2.3, 2.0), told=False)
     assert not bench.localiser.estimate().localised
     first = np.sqrt(np.diag(bench.localiser.estimate().covariance))
@@ -75,7 +75,7 @@ def test_started_anywhere_it_finds_out_while_it_turns():
     assert np.sqrt(np.diag(bench.localiser.estimate().covariance))[0] < 0.05
 
 
-def test_in_an_empty_symmetric_room_it_does_not_claim_to_know():
+def test_a_symmetric_room_does_not_localise_the_robot():
     bench = bench_at(Pose2D(2.0, 1.5, 0.3), surveyed=EMPTY_ROOM, told=False)
     for _ in range(200):
         tick(bench, 1, (0.0, 0.0, 0.5))
@@ -85,7 +85,7 @@ def test_in_an_empty_symmetric_room_it_does_not_claim_to_know():
     assert bench.localiser.search(scan, bench.localiser.estimate(), None) is None
 
 
-def test_where_places_look_alike_a_search_at_the_beginning_finds_the_one_where_it_is_expected():
+def test_a_first_search_among_similar_places_finds_the_expected_one():
     bench = bench_at(Pose2D(2.0, 1.5, 0.3), surveyed=EMPTY_ROOM)
     grid = grid_of(EMPTY_ROOM, (0.7, 1.3))
     bench.localiser = MonteCarloOptions().build(grid, Pose2D(2.05, 1.45, 0.3), surely=False)
@@ -96,7 +96,7 @@ def test_where_places_look_alike_a_search_at_the_beginning_finds_the_one_where_i
     assert bench.pose_error()[0] < 0.1
 
 
-def test_told_where_it_is_it_knows_also_in_an_empty_symmetric_room():
+def test_a_given_pose_localises_the_robot_in_a_symmetric_room():
     bench = bench_at(Pose2D(2.0, 1.5, 0.3), surveyed=EMPTY_ROOM)
     tick(bench, 100, (0.0, 0.0, 0.5))
     assert bench.localiser.estimate().localised
@@ -104,7 +104,7 @@ def test_told_where_it_is_it_knows_also_in_an_empty_symmetric_room():
 
 
 def blinded(bench):
-    """All ranges of the LiDAR are invalid from now on."""
+    """Makes all ranges of the LiDAR invalid from now on."""
     sense = bench.robot.scan
 
     def scan():
@@ -150,14 +150,14 @@ def test_a_dropout_of_scans_is_bridged_by_odometry():
     assert bench.pose_error()[0] < 0.03
 
 
-def test_unmapped_things_do_not_pull_the_pose():
+def test_unmapped_objects_do_not_pull_the_pose():
     person = Box(2.3, 6.2, 2.7, 6.6, 0.0, 1.7)
     moved_cupboard = Box(4.5, 4.25, 5.6, 4.6, 0.0, 1.8)
     bench = bench_at(START, unmapped=[person, moved_cupboard])
     assert drive_along_the_corridor(bench, 6.0)[20:, 0].max() < 0.03
 
 
-def test_an_accepted_estimate_is_where_the_particles_go():
+def test_particles_gather_at_an_accepted_estimate():
     bench = bench_at(START)
     tick(bench, 10)
     bench.robot.carry_off(Pose2D(8.0, 2.3, 2.0))
@@ -186,7 +186,7 @@ def test_equal_seeds_give_equal_estimates():
     assert poses[0] == poses[1]
 
 
-def test_not_sure_of_the_start_it_looks_around_there():
+def test_an_uncertain_start_is_searched_around():
     bench = bench_at(START)
     localiser = MonteCarloOptions().build(bench.localiser.grid, Pose2D(1.9, 5.0, 0.2), surely=False)
     for _ in range(60):

@@ -56,7 +56,7 @@ def test_scattered_particles_gather_where_the_robot_is_and_become_fewer():
 def test_in_an_empty_room_the_weight_stays_in_both_places_that_look_alike():
     particles, opposite = filter_on(WALLS), Pose2D(6.0 - HERE.x_m, 4.0 - HERE.y_m, HERE.yaw_rad + math.pi)
     particles.place(HERE, TIGHT)
-    particles.resample(particles.around(opposite, TIGHT, 400))
+    particles.resample(particles.sample_around(opposite, TIGHT, 400))
     pose = followed(particles, HERE, WALLS, updates=20)
     opposite = Pose2D(opposite.x_m, opposite.y_m, pose.yaw_rad + math.pi)
     masses = particles.mass_near(pose), particles.mass_near(opposite)
@@ -114,13 +114,13 @@ def test_injected_particles_take_over_when_they_fit():
     particles.place(HERE, TIGHT)
     for _ in range(3):
         particles.weigh(beams_at(there, ROOM))
-        particles.resample(particles.around(there, TIGHT, 20))
+        particles.resample(particles.sample_around(there, TIGHT, 20))
     particles.weigh(beams_at(there, ROOM))
     assert particles.mass_near(there) > 0.9
 
 
 def test_the_likeliest_of_random_poses_are_of_different_places():
-    poses = filter_on().likely(20_000, 5, beams_at(HERE, ROOM))
+    poses = filter_on().likeliest_poses(20_000, 5, beams_at(HERE, ROOM))
     assert poses.shape == (5, 3)
     near = np.hypot(poses[:, 0] - HERE.x_m, poses[:, 1] - HERE.y_m)
     assert near.min() < 0.3
@@ -133,7 +133,7 @@ def test_random_poses_stand_on_free_known_ground():
     unknown = np.zeros_like(grid.occupied)
     unknown[:, : grid.occupied.shape[1] // 2] = True
     half = GridMap(grid.occupied, grid.resolution_m, grid.origin_m, unknown)
-    poses = ParticleFilter(half, FilterOptions()).anywhere(500)
+    poses = ParticleFilter(half, FilterOptions()).sample_anywhere(500)
     cells = half.cells(poses)
     assert not unknown[cells[:, 0], cells[:, 1]].any()
     assert not grid.occupied[cells[:, 0], cells[:, 1]].any()

@@ -39,14 +39,14 @@ def test_a_gap_is_as_wide_as_it_is_in_spite_of_noise():
     assert free.max() - free.min() == pytest.approx(0.9, abs=0.09)
 
 
-def test_what_was_seen_before_is_remembered_after_it_is_out_of_sight():
+def test_obstacles_out_of_sight_are_remembered():
     bench = ticked(bench_of())
     bench.robot.push(7.0, 0.0, 0.0)
     ticked(bench)
     assert bench.costmap.clearance_m(np.array([[0.5, 4.05]]))[0] < 0.05
 
 
-def test_who_walks_away_is_cleared_and_ground_that_nothing_has_seen_is_only_a_little_free():
+def test_a_person_who_leaves_is_cleared_and_unseen_ground_is_a_little_free():
     bench = ticked(bench_of(PERSON))
     behind = np.array([[4.6, 5.4]])
     assert bench.costmap.clearance_m(np.array([[3.22, 5.4]]))[0] < 0.05
@@ -57,7 +57,7 @@ def test_who_walks_away_is_cleared_and_ground_that_nothing_has_seen_is_only_a_li
     assert bench.costmap.clearance_m(behind)[0] > RollingCostmapOptions().unknown_clearance_m
 
 
-def test_what_is_too_near_for_the_lidar_is_not_cleared():
+def test_obstacles_too_near_for_the_lidar_stay():
     beside = Box(1.2, 5.75, 1.4, 5.85, 0.0, 1.0)
     bench = ticked(bench_of(beside), 1)
     bench.robot.push(0.0, -0.5, 0.0)
@@ -67,7 +67,7 @@ def test_what_is_too_near_for_the_lidar_is_not_cleared():
     assert bench.costmap.clearance_m(np.array([[1.3, 5.78]]))[0] < 0.05
 
 
-def test_the_window_follows_the_robot_and_keeps_what_it_still_covers():
+def test_the_window_follows_the_robot_and_keeps_its_cells():
     bench = ticked(bench_of(window_m=8.0))
     before = bench.costmap.clearance_m(np.array([[4.0, 4.6]]))[0]
     bench.robot.push(3.0, 0.0, 0.0)
@@ -76,7 +76,7 @@ def test_the_window_follows_the_robot_and_keeps_what_it_still_covers():
     assert bench.costmap.clearance_m(np.array([[7.0, 6.9]]))[0] == pytest.approx(0.1, abs=0.06)
 
 
-def test_only_what_is_new_counts_as_unexplained():
+def test_only_new_obstacles_count_as_unexplained():
     bench = ticked(bench_of())
     assert len(bench.costmap.unexplained()[1]) < 20
     bench.robot.boxes.append(PERSON)
@@ -85,7 +85,7 @@ def test_only_what_is_new_counts_as_unexplained():
     assert np.count_nonzero(np.hypot(near[:, 0] - 3.3, near[:, 1] - 5.4) < 0.5) > 20
 
 
-def test_all_is_forgotten_on_request():
+def test_the_costmap_can_be_cleared():
     bench = ticked(bench_of())
     assert bench.costmap.forget_seen() > 100
     assert bench.costmap.clearance_m(np.array([[3.5, 4.05]]))[0] > 0.3

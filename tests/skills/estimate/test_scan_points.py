@@ -29,7 +29,7 @@ def test_arm_points_follow_the_joint_angles():
     assert points == pytest.approx(np.array([[0.3, 0.0, 0.2], [0.7, 0.0, 0.2], [0.7, 0.0, 0.55]]), abs=1e-9)
 
 
-def test_a_thing_held_out_in_front_is_the_robots_own_and_one_beyond_is_not():
+def test_a_held_object_is_the_robots_own_and_one_beyond_is_not():
     own = SelfFilter.of(capabilities())
     assert own.arm is not None
     arm = own.arm.points_B(joints(0.0, 0.0))
@@ -37,7 +37,7 @@ def test_a_thing_held_out_in_front_is_the_robots_own_and_one_beyond_is_not():
     assert own.foreign(points, arm).tolist() == [False, True, True]
 
 
-def test_the_body_is_left_out_also_without_an_arm():
+def test_body_points_are_filtered_also_without_an_arm():
     own = SelfFilter.of(capabilities(arm=False))
     assert own.arm is None
     assert own.foreign(np.array([[0.0, 0.2, 0.5], [0.0, 0.6, 0.5]]), np.empty((0, 3))).tolist() == [False, True]
@@ -49,7 +49,7 @@ def test_distance_from_a_segment_ends_at_its_ends():
     assert segment_distance(points, *ends) == pytest.approx([1.0, 1.0, 5.0])
 
 
-def test_what_is_about_the_hand_is_the_held_thing_while_it_holds():
+def test_points_about_a_holding_hand_are_the_held_object():
     own = SelfFilter(outline_m=(-0.5, 0.5, -0.25, 0.25))
     arm = np.array([[0.3, 0.0, 0.7], [0.8, 0.0, 0.7], [1.0, 0.0, 0.7]])
     beside_the_hand = np.array([[0.95, 0.3, 0.7]])

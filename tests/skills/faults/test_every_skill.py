@@ -1,4 +1,4 @@
-"""Each kind of fault with each skill, once: it ends well after waiting, or fails with the cause that the table gives.
+"""Each kind of fault with each skill: the skill succeeds after waiting, or fails with the cause of the table.
 
 Each skill does what the first test of its file says; the fault begins soon after it, and lasts 3 s where it may pass.
 """

@@ -1,4 +1,4 @@
-"""Faults by name: what they do, when they are on, and what is refused."""
+"""Faults by name: their effects, their times, and refused words."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 
 from skills.faults.fault_kinds import STANDARD_FAULTS, InjectedFault
 from skills.faults.fault_words import parse_fault, random_faults
-from skills.faults.faulty_robot import with_faults
+from skills.faults.faulty_robot import inject_faults
 from skills.robot import CommandState, NoImageError
 from skills.testing.blocks import ROOM
 from skills.testing.clock import VirtualClock
@@ -26,7 +26,7 @@ def faulty(clock, spot):
     """A robot with the given faults, and its lease."""
 
     def make(*faults):
-        robot = with_faults(ScriptedRobot(clock, capabilities=spot, blocks=ROOM), clock, faults)
+        robot = inject_faults(ScriptedRobot(clock, capabilities=spot, blocks=ROOM), clock, faults)
         return robot, robot.acquire_lease("test")
 
     return make
@@ -79,7 +79,7 @@ def test_a_frozen_camera_freezes_each_kind_of_picture_that_is_asked_for(clock):
             asked.append((visual, depth))
             return super().image(source, visual=visual, depth=depth), visual, depth
 
-    robot = with_faults(Cameras(clock, blocks=ROOM), clock, ("camera freezes at 1 s",))
+    robot = inject_faults(Cameras(clock, blocks=ROOM), clock, ("camera freezes at 1 s",))
     robot.image("frontleft", depth=False)
     clock.advance(2.0)
     for visual, depth in ((True, False), (False, True), (True, True), (False, True)):
@@ -199,7 +199,7 @@ def test_a_sensor_that_drops_out_gives_no_new_readings(faulty, clock):
     assert robot.scan().stamp_s == pytest.approx(3.1)
 
 
-def test_a_robot_tells_which_of_its_faults_are_on(faulty, clock):
+def test_a_robot_reports_its_active_faults(faulty, clock):
     robot, _ = faulty("lidar: dropout 2 s at 1 s", "joints freezes after 1 call")
     assert robot.faults_at_work() == ()
     robot.joints()
@@ -211,7 +211,9 @@ def test_a_robot_tells_which_of_its_faults_are_on(faulty, clock):
 
 def test_times_may_count_from_the_beginning_of_the_clock(clock, spot):
     clock.advance(5.0)
-    robot = with_faults(ScriptedRobot(clock, capabilities=spot), clock, ["gripper reports holding at 5 s"], since_s=0.0)
+    robot = inject_faults(
+        ScriptedRobot(clock, capabilities=spot), clock, ["gripper reports holding at 5 s"], since_s=0.0
+    )
     assert robot.gripper().holding
 
 
@@ -220,7 +222,7 @@ def test_times_may_count_from_the_beginning_of_the_clock(clock, spot):
     [("lease taken at 4 s", True), ("lease taken at 6 s", False), ("lidar freezes at 4 s", False),
      ("lidar: dropout 1 s at 4 s", True), ("lidar: dropout 2 s at 4 s", False)],
 )  # fmt: skip
-def test_what_is_over_does_not_come_again_after_a_restart(words, over):
+def test_a_fault_that_is_over_does_not_return_after_a_restart(words, over):
     assert parse_fault(words).over_by(5.0) is over
 
 
@@ -232,7 +234,7 @@ def test_random_faults_are_the_same_for_a_seed_and_are_faults():
     assert len({parse_fault(words, cameras=CAMERAS).effect.verbs for words in drawn}) > 4
 
 
-def test_more_random_faults_keep_those_that_fewer_have():
+def test_a_larger_count_of_random_faults_only_adds_faults():
     assert set(random_faults(2, 7, CAMERAS)) < set(random_faults(5, 7, CAMERAS))
 
 
@@ -259,7 +261,7 @@ def test_every_kind_that_is_drawn_parses_as_that_kind(kind):
         ("camra: dropout", "'camra' is no verb of the robot; did you mean 'camera'"),
     ],
 )
-def test_words_that_are_no_fault_are_refused_with_the_mend(words, message):
+def test_unknown_words_are_refused_with_a_hint(words, message):
     with pytest.raises(ValueError, match=message):
         parse_fault(words, cameras=("hand", "left"))
 
@@ -268,12 +270,12 @@ def test_words_that_are_no_fault_are_refused_with_the_mend(words, message):
 def holding(clock, spot):
     """A robot that holds a can and loses it at 1 s, and its lease."""
     inner = ScriptedRobot(clock, capabilities=spot, blocks=ROOM, start=Start(holding=True))
-    robot = with_faults(inner, clock, ["gripper loses it at 1 s"])
+    robot = inject_faults(inner, clock, ["gripper loses it at 1 s"])
     return robot, inner, robot.acquire_lease("test")
 
 
 def polled(robot, clock, duration_s):
-    """Whether the robot believed to hold something at each tick."""
+    """Returns whether the gripper reported holding at each tick."""
     seen = []
     for _ in range(round(duration_s / 0.05)):
         clock.advance(0.05)

@@ -37,7 +37,7 @@ def test_a_scan_is_aligned_to_a_centimetre():
     assert found.inlier_share > 0.9
 
 
-def test_along_a_bare_corridor_the_prior_stays_and_says_so():
+def test_along_a_bare_corridor_the_prior_stays_with_its_covariance():
     found = match(submap(end=False), walls(seed=99, end=False), Pose2D(0.15, 0.04, 0.0), SPREAD, MATCHING)
     assert abs(found.pose.x_m - 0.15) < 0.1 and abs(found.pose.y_m) < 0.01
     assert found.covariance[0, 0] > 100.0 * found.covariance[1, 1]

@@ -28,7 +28,7 @@ def test_the_opening_is_the_only_frontier():
     assert 2.0 < frontier.cost_m < 6.0
 
 
-def test_an_opening_shorter_than_asked_for_is_left_out():
+def test_an_opening_shorter_than_the_least_length_is_no_frontier():
     assert ground(width_m=0.3).frontiers(least_m=1.0, within_m=1.5) == []
 
 
@@ -39,7 +39,7 @@ def test_stands_come_nearest_first_and_apart():
     assert min(math.dist(a, b) for n, a in enumerate(stands) for b in stands[:n]) >= 0.25
 
 
-def test_the_way_counts_metres_and_is_endless_through_walls():
+def test_cost_is_in_metres_and_infinite_through_walls():
     whole = ground()
     assert math.isclose(whole.cost_to(2.5, 1.5), 1.0, abs_tol=0.11)
     assert math.isinf(whole.cost_to(6.0, 4.5))

@@ -44,7 +44,7 @@ def at(grid: LayeredOccupancy, band: str, x: float, y: float) -> tuple[float, bo
     return float(probability[row, column]), bool(observed[row, column])
 
 
-def test_beams_free_their_way_and_occupy_their_end():
+def test_beams_free_the_cells_they_pass_and_occupy_their_end():
     grid = LayeredOccupancy(0.05)
     for _ in range(3):
         grid.insert(frame(round_wall()), Pose2D(1.0, 2.0, 0.5))
@@ -101,13 +101,13 @@ def test_the_noise_of_ranges_does_not_thicken_a_wall():
 
 
 def before_the_wall(grid: LayeredOccupancy, cells: np.ndarray) -> int:
-    """How many of the cells lie more than 3 cm before the round wall."""
+    """Number of cells more than 3 cm before the round wall."""
     rows, columns = np.nonzero(cells)
     away = np.hypot((columns + 0.5) * 0.025 + grid.origin_m[0], (rows + 0.5) * 0.025 + grid.origin_m[1])
     return int(np.sum(away < 2.97))
 
 
-def test_no_return_tells_nothing():
+def test_a_beam_without_return_changes_nothing():
     grid = LayeredOccupancy(0.05)
     grid.insert(frame(np.full((len(ELEVATIONS), len(AZIMUTHS)), np.nan)), Pose2D(0.0, 0.0, 0.0))
     assert not grid.probability("scan")[1].any()

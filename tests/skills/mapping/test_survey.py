@@ -9,7 +9,7 @@ from planar_robot import TWO_ROOMS, Box, PlanarClock, PlanarRobot
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
 from skills.geometry import relative
-from skills.mapping.map_folder import load_mapper, save_graph, save_grids, surveyed
+from skills.mapping.map_folder import load_mapper, map_grids, save_graph, save_grids
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
 from skills.robot import Pose2D
@@ -64,7 +64,7 @@ def explored(tmp_path_factory) -> tuple[Trip, object]:
     trip.go_on(300.0)
     folder = tmp_path_factory.mktemp("map")
     save_graph(folder, trip.mapper)
-    save_grids(folder, surveyed(trip.mapper))
+    save_grids(folder, map_grids(trip.mapper))
     return trip, folder
 
 
@@ -160,15 +160,15 @@ def test_a_damaged_map_is_refused_in_its_file(explored, tmp_path, damage, file, 
     assert error.value.file == tmp_path / file
 
 
-def test_a_route_is_driven_and_what_cannot_be_reached_is_told():
+def test_a_route_is_driven_and_unreachable_points_are_reported():
     trip = Trip(route=[(4.0, 5.4), (4.25, 3.0), (3.0, 5.4)])
     trip.go_on(90.0)
     assert trip.survey.done
     assert [note for note in trip.survey.notes if "(4.2, 3.0)" in note]
-    assert trip.mapper.way_m > 4.0
+    assert trip.mapper.driven_m > 4.0
 
 
-def test_frontiers_that_were_given_up_are_tried_once_more_from_home():
+def test_abandoned_frontiers_are_tried_again_from_home():
     trip, drive, first = Trip(pose=Pose2D(1.0, 1.0, 0.0), boxes=SIDE_ROOM), PlanarRobot.drive, True
 
     def held(vx, vy, wz, *, until_s, lease):
@@ -191,18 +191,18 @@ def test_frontiers_that_were_given_up_are_tried_once_more_from_home():
 
 def side_room_seen(trip: Trip) -> float:
     """The share of the side room's free ground that is free on the map."""
-    true, (made, _) = grid_of(SIDE_ROOM, (0.05, 1.0)), trip.survey.known()
+    true, (made, _) = grid_of(SIDE_ROOM, (0.05, 1.0)), trip.survey.known_grid()
     free = true.centres(np.argwhere(true.distance > 0.3))
     free = free[(free > [3.4, 0.0]).all(axis=1) & (free < [6.0, 3.0]).all(axis=1)]
     rows, columns = made.cells(free).T
     return float(np.mean(~(made.occupied | made.unknown)[rows, columns]))
 
 
-def test_a_survey_that_does_not_get_home_says_so():
+def test_a_survey_that_cannot_return_reports_it():
     trip = Trip(route=[(2.0, 5.4)], home=Pose2D(30.0, 5.4, 0.0))
     trip.go_on(30.0)
     assert trip.survey.done
-    assert "nor back to the start" in trip.survey.trouble
+    assert "back to the start" in trip.survey.trouble
 
 
 @pytest.mark.parametrize("fault", ["blank", "frozen", "gone"])
@@ -223,5 +223,5 @@ def test_without_a_usable_scan_the_robot_stands_and_says_why(fault):
 
 
 def blank(scan):
-    """All ranges invalid."""
+    """Makes all ranges invalid."""
     return replace(scan, ranges_m=np.full_like(scan.ranges_m, np.nan))

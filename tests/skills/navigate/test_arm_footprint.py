@@ -1,4 +1,4 @@
-"""What sticks out of the body widens the footprint; a stowed arm leaves it as it is."""
+"""The arm and a held object widen the footprint; a stowed arm does not."""
 
 import math
 from dataclasses import replace
@@ -17,7 +17,7 @@ from skills.manipulation.arm.collision import Box as HeldBox
 from skills.manipulation.arm.poses import carry_configuration
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import Footprint
-from skills.navigate.planner import NoWayError, plan_path
+from skills.navigate.planner import NoPathError, plan_path
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
@@ -33,7 +33,7 @@ CARRYING = carry_configuration(
 
 
 def outline(q_rad, *, held_m=None, holding=False, costmap=None):
-    """The footprint with the arm at some angles, holding a box of this size about the fingers' middle."""
+    """The footprint with an arm at joint angles that holds a box about the fingers' middle."""
     context = context_of(ScriptedRobot(q=np.array(q_rad), holding=holding or held_m is not None), costmap=costmap)
     if held_m is not None:
         context.payload.corners_H = box_corners(HeldBox(RigidTransform([GRIPPER.grip_x_m, 0.0, 0.0]), held_m))
@@ -60,7 +60,7 @@ def test_the_arm_stretched_out_ahead_extends_the_front_only():
     assert np.array_equal(footprint.discs[: len(PLAIN.discs)], PLAIN.discs)
 
 
-def test_what_is_held_at_an_unknown_size_is_as_long_as_the_gripper_can_hold():
+def test_a_held_object_of_unknown_size_counts_as_the_largest_one():
     X_BH = MODEL.X_BH(CARRYING)
     tip_m = (X_BH @ [GRIPPER.grip_x_m, 0.0, 0.0])[0] + GRIPPER.length_m - GRIPPER.grip_x_m
     assert front_m(outline(CARRYING, holding=True).now()) == pytest.approx(tip_m)
@@ -77,19 +77,19 @@ def test_a_long_object_carried_across_is_covered_from_end_to_end(length_m):
 
 
 def narrowed(width_m, *more):
-    """Two rooms whose left door is so wide."""
+    """Two rooms with a left door of this width."""
     return LayeredCostmap(grid_of([*TWO_ROOMS, Box(2.0 + width_m, 4.0, 2.9, 4.1), *more], (0.05, 1.0)))
 
 
-def test_through_a_door_of_75_cm_nothing_long_is_carried_across_and_the_sentence_says_why():
+def test_a_long_object_does_not_pass_a_75_cm_door_and_the_message_says_why():
     costmap = narrowed(0.75)
     plan_path(costmap, outline(MODEL.stowed_rad, costmap=costmap).now(), LEFT_ROOM, RIGHT_ROOM)
     wide = outline(CARRYING, held_m=(0.03, 1.0, 0.03)).now()
-    with pytest.raises(NoWayError, match=r"fits through: the object that it carries makes it 1\.\d\d m long and 1\.0"):
+    with pytest.raises(NoPathError, match=r"fits through: the object that it carries makes it 1\.\d\d m long and 1\.0"):
         plan_path(costmap, wide, LEFT_ROOM, RIGHT_ROOM)
 
 
-def test_the_way_leads_through_the_wider_door_where_there_is_one():
+def test_the_path_leads_through_the_wider_door():
     surveyed = [box for box in TWO_ROOMS if (box.x0, box.y0) not in ((0.0, 4.0), (4.95, 0.0))]
     doors = [Box(0.0, 4.0, 0.3, 4.1), Box(1.05, 4.0, 2.0, 4.1), Box(2.9, 4.0, 7.0, 4.1)]  # 0.75 m and 0.9 m
     costmap = LayeredCostmap(grid_of([*surveyed, *doors], (0.05, 1.0)))
@@ -111,12 +111,12 @@ class Table:
         pass
 
 
-def test_where_the_robot_stands_already_nothing_under_its_arm_blocks_it():
+def test_obstacles_under_the_arm_do_not_block_the_pose_where_the_robot_stands():
     footprint = outline(AHEAD, costmap=Table()).now()
     assert front_m(footprint) < 0.7
 
 
-def test_away_from_the_table_the_arm_outgrows_what_was_planned_with():
+def test_away_from_the_table_the_arm_outgrows_the_planned_footprint():
     at_table, away = outline(AHEAD, costmap=Table()), outline(AHEAD)
     assert not at_table.outgrows(at_table.now())
     assert away.outgrows(at_table.now())
@@ -124,7 +124,7 @@ def test_away_from_the_table_the_arm_outgrows_what_was_planned_with():
     assert not outline(MODEL.stowed_rad).outgrows(away.now())
 
 
-def test_the_robots_own_arm_and_load_are_no_obstacle_in_its_way():
+def test_the_robots_arm_and_load_are_no_obstacles():
     own, held_m = SelfFilter.of(CAPABILITIES), (0.03, 0.6, 0.03)
     corners_H = box_corners(HeldBox(RigidTransform([GRIPPER.grip_x_m, 0.0, 0.0]), held_m))
     joints = ScriptedRobot(q=CARRYING).joints()
@@ -134,7 +134,7 @@ def test_the_robots_own_arm_and_load_are_no_obstacle_in_its_way():
 
 
 def drive_along_the_corridor(raised_from_x_m):
-    """Drive 7 m with an arm that is raised on the way; the bench, its last step and how often a path was planned."""
+    """Drives 7 m while the arm is raised; returns the bench, its last step and the number of plans."""
     bench = Bench(Pose2D(1.2, 5.4, 0.0), cameras=False)
     robot, capabilities = bench.robot, replace(CAPABILITIES, cameras=())
     robot.capabilities = lambda: capabilities
@@ -147,13 +147,13 @@ def drive_along_the_corridor(raised_from_x_m):
     return step, bench.worker.names.count("plan a path")
 
 
-def test_an_arm_that_is_raised_on_the_way_is_planned_for_once():
+def test_raising_the_arm_while_driving_causes_one_new_plan():
     step, plans = drive_along_the_corridor(raised_from_x_m=3.0)
     assert isinstance(step, Succeeded), step.message
     assert plans == 2
 
 
-def test_a_stowed_arm_makes_nothing_be_planned_anew():
+def test_a_stowed_arm_causes_no_new_plan():
     step, plans = drive_along_the_corridor(raised_from_x_m=math.inf)
     assert isinstance(step, Succeeded), step.message
     assert plans == 1

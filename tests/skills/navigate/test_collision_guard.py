@@ -1,4 +1,4 @@
-"""The robot stops for what moves into its way, and for what is in it all at once."""
+"""The collision guard stops the robot for moving obstacles, and for sudden ones."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ START, GOAL = Pose2D(1.2, 5.6, 0.0), Pose2D(8.5, 5.6, 0.0)
 
 
 class Drive:
-    """A drive along the corridor, with somebody who is at `place(time_s, robot_x)` or, while that is None, nowhere."""
+    """A drive along the corridor, with a person at `place(time_s, robot_x)` or, while that is None, without."""
 
     def __init__(self, place, *, options=None, most_s=60.0):
         self.bench = Bench(START, surveyed=TWO_ROOMS)
@@ -51,11 +51,11 @@ class Drive:
         return min((gap for gap, speed, _ in self.gaps[:through] if speed > 0.05), default=np.inf)
 
     def stood(self):
-        return [one for one in self.told if "something comes into the way" in one]
+        return [one for one in self.told if "an obstacle comes into the path" in one]
 
 
 class Crossing:
-    """Somebody who walks across once the robot has come to `from_x`, from y to y at a speed."""
+    """A person who walks across from y to y at a speed, once the robot has come to `from_x`."""
 
     def __init__(self, x, y0, y1, from_x, speed_m_s=1.2):
         self.x, self.y0, self.y1, self.from_x, self.speed_m_s, self.since_s = x, y0, y1, from_x, speed_m_s, None
@@ -68,13 +68,13 @@ class Crossing:
 
 
 @pytest.mark.parametrize("from_x", [2.0, 2.7, 3.3])
-def test_it_stands_while_somebody_crosses_and_goes_on(from_x):
+def test_robot_waits_while_a_person_crosses(from_x):
     drive = Drive(Crossing(4.0, 4.4, 6.7, from_x))
     assert drive.nearest_while_moving_m() > 0.25
     assert isinstance(drive.step, Succeeded)
 
 
-def test_it_brakes_harder_than_without_for_who_comes_from_nowhere_just_ahead():
+def test_guard_brakes_harder_for_a_person_who_appears_just_ahead():
     def just_ahead(now_s, x):
         return (4.6, 5.6) if x > 3.58 else None
 
@@ -89,17 +89,17 @@ def test_it_brakes_harder_than_without_for_who_comes_from_nowhere_just_ahead():
     assert drive.nearest_while_moving_m() > max(0.2, without.nearest_while_moving_m() + 0.03)
 
 
-def test_who_walks_beside_the_way_does_not_stop_it():
+def test_a_person_who_walks_beside_the_path_does_not_stop_the_robot():
     drive = Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5))
     assert not drive.stood() and isinstance(drive.step, Succeeded)
 
 
-def test_who_stands_beside_the_way_does_not_stop_it():
+def test_a_person_who_stands_beside_the_path_does_not_stop_the_robot():
     drive = Drive(lambda now_s, x: (4.6, 4.6))
     assert not drive.stood() and isinstance(drive.step, Succeeded)
 
 
-def test_who_walks_away_ahead_does_not_stop_it():
+def test_a_person_who_walks_away_ahead_does_not_stop_the_robot():
     drive = Drive(lambda now_s, x: (3.2 + 0.9 * now_s, 5.6) if now_s < 5.5 else None)
     assert not drive.stood() and isinstance(drive.step, Succeeded)
 
@@ -110,6 +110,6 @@ def test_the_margin_is_an_option():
     assert Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5), options=wide, most_s=15.0).stood()
 
 
-def test_who_follows_does_not_stop_it():
+def test_a_person_who_follows_does_not_stop_the_robot():
     drive = Drive(lambda now_s, x: (max(0.3, x - 1.2), 5.6))
     assert not drive.stood() and isinstance(drive.step, Succeeded)

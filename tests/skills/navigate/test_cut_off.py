@@ -1,4 +1,4 @@
-"""Closed doors: seen as such, told by name, and given up before; a person in a doorway is no closed door."""
+"""Closed doors are detected, named and end a drive; a person in a doorway is no closed door."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from planar_robot import Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.navigate.cut_off import DoorWatch, closed_sentence
+from skills.navigate.cut_off import DoorWatch, closed_doors_sentence
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.perception.doorway import Doorway
@@ -28,7 +28,7 @@ def context_of(bench, doors=(LEFT, RIGHT)):
 
 
 def go(bench, goal, *, limit_s=40.0, nearby_m=(), each=lambda: None):
-    """Run the skill as its leaf would; the last step."""
+    """Runs the skill; returns the last step."""
     skill = Navigate(context_of(bench))
     skill.begin(NavigateInputs(goal, nearby_m=nearby_m))
     begun_s = bench.clock.now()
@@ -68,16 +68,16 @@ def test_a_door_that_opens_is_no_longer_closed():
     assert doors.closed == ()
 
 
-def test_only_the_doors_that_bar_every_path_are_in_the_way():
+def test_only_doors_that_block_every_path_are_reported():
     bench, doors = watch(LEFT_PANEL, RIGHT_PANEL, start=Pose2D(5.0, 5.7, 0.0))
     assert set(doors.closed) == {LEFT, RIGHT}
     footprint = Footprint.of(bench.robot.capabilities())
-    assert doors.in_the_way(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
-    assert doors.in_the_way(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
-    assert doors.in_the_way(footprint, bench.robot.pose, (KITCHEN, Pose2D(9.0, 5.5, 0.0))) == ()
+    assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
+    assert doors.blocking_doors(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
+    assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN, Pose2D(9.0, 5.5, 0.0))) == ()
 
 
-def test_behind_a_closed_door_it_gives_up_soon_for_good_and_names_the_door():
+def test_behind_a_closed_door_the_failure_is_final_and_names_the_door():
     bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
     step = go(bench, KITCHEN)
     assert isinstance(step, Failed)
@@ -86,7 +86,7 @@ def test_behind_a_closed_door_it_gives_up_soon_for_good_and_names_the_door():
     assert bench.clock.now() < 15.0
 
 
-def test_a_door_that_opens_while_it_waits_is_gone_through():
+def test_robot_drives_through_a_door_that_opens_while_it_waits():
     bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
 
     def opens():
@@ -96,7 +96,7 @@ def test_a_door_that_opens_while_it_waits_is_gone_through():
     assert isinstance(go(bench, KITCHEN, each=opens), Succeeded)
 
 
-def test_a_goal_that_something_fences_in_is_given_up_for_good_with_all_poses_nearby():
+def test_failure_is_final_when_goal_and_nearby_poses_are_enclosed():
     fence = [Box(8.0, 4.1, 8.1, 7.0, 0.0, 1.7)]
     bench = Bench(Pose2D(5.5, 5.4, 0.0), unmapped=fence)
     step = go(bench, Pose2D(9.2, 5.5, 0.0), nearby_m=((-0.5, 0.0),))
@@ -111,15 +111,15 @@ def test_a_pose_nearby_that_can_be_reached_keeps_the_failure_from_being_final():
     assert go(bench, at_goal, nearby_m=((-1.2, 0.0),)).final is False
 
 
-def test_all_closed_doors_are_told_in_one_sentence():
-    told = closed_sentence((LEFT, RIGHT), KITCHEN)
+def test_one_sentence_names_all_closed_doors():
+    told = closed_doors_sentence((LEFT, RIGHT), KITCHEN)
     assert told == (
         "The doors between the study and the corridor, and between the corridor and the kitchen, are closed, "
         "so no path leads to (8.50, 2.00)."
     )
 
 
-def test_forgetting_within_discs_keeps_what_lies_elsewhere():
+def test_clearing_within_discs_leaves_other_obstacles():
     bench, _ = watch(RIGHT_PANEL, Box(5.2, 5.2, 5.6, 5.6, 0.0, 1.7))
     before = len(bench.costmap.seen_m())
     forgotten = bench.costmap.forget_seen(np.array([[7.45, 4.05, 0.8]]))

@@ -14,7 +14,7 @@ from skills.navigate.follower import FollowerOptions, corners_of, tracking_veloc
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.mppi import MppiOptions
 from skills.navigate.path import Path, path_length
-from skills.navigate.planner import LatticePlanner, NoWayError, plan_path
+from skills.navigate.planner import LatticePlanner, NoPathError, plan_path
 from skills.robot import BaseKind, Pose2D
 from tests.benchmarks.differential import BASE, drive
 
@@ -96,8 +96,8 @@ def test_corners_are_rounded_where_there_is_clearance():
     assert np.count_nonzero((np.abs(turns) > 0.02) & (np.abs(ahead) > 0.01)) > 20
 
 
-def test_no_way_is_told():
-    with pytest.raises(NoWayError, match="There is no way"):
+def test_a_missing_path_raises_an_error():
+    with pytest.raises(NoPathError, match="There is no path"):
         plan_path(costmap_of(*TWO_ROOMS, Box(2.0, 4.0, 2.9, 4.1)), BASE, LEFT_ROOM, RIGHT_ROOM)
     with pytest.raises(PlanningError, match="blocked"):
         plan_path(costmap_of(*TWO_ROOMS), BASE, LEFT_ROOM, Pose2D(1.0, 0.7, 0.0))
@@ -142,7 +142,7 @@ def test_corners_are_where_turning_begins_and_ends_and_where_the_direction_chang
     assert corners_of(Path(poses, np.ones(len(poses)))).tolist() == [1, 3, 4]
 
 
-def test_a_turn_too_short_for_the_path_is_made_all_the_same():
+def test_a_turn_on_the_spot_shorter_than_a_step_is_still_made():
     """A path of 0.04 rad on the spot, less than 2 cm long: the base turns to its end."""
     turn_rad = 0.04
     path = Path(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, turn_rad]]), np.full(2, 3.0))

@@ -18,7 +18,7 @@ def straight(length_m: float = 4.0, yaw_rad: float = 0.0, clearance_m: float = 1
     return Path(np.column_stack([x, np.full_like(x, 5.5), np.full_like(x, yaw_rad)]), np.full_like(x, clearance_m))
 
 
-def test_speed_falls_towards_the_goal_and_near_things():
+def test_speed_falls_towards_the_goal_and_near_obstacles():
     path, options = straight(), FollowerOptions()
     limits = speed_limits(path, path.progress_m(), options)
     assert limits[0] == pytest.approx(options.max_speed_m_s)
@@ -35,7 +35,7 @@ def test_going_sideways_or_backwards_is_slower():
         assert speed_limits(path, path.progress_m(), options).max() == pytest.approx(most)
 
 
-def test_off_to_the_left_it_steers_to_the_right():
+def test_robot_left_of_its_path_steers_to_the_right():
     costmap = LayeredCostmap(grid_of(TWO_ROOMS, (0.05, 1.0)))
     follower = PathFollower(straight(), FOOTPRINT)
     answer = follower.command(Pose2D(2.5, 5.6, 0.0), (0.5, 0.0, 0.0), np.array([0.5, 0.0, 0.0]), costmap)
@@ -51,7 +51,7 @@ def test_velocity_changes_no_faster_than_the_accelerations():
     assert answer.velocity[0] == pytest.approx(options.acceleration_m_s2 * options.period_s)
 
 
-def test_what_stands_ahead_is_named_and_braked_for():
+def test_robot_brakes_for_an_obstacle_ahead_and_reports_its_position():
     pillar = Box(3.6, 5.4, 3.8, 5.6)
     costmap = LayeredCostmap(grid_of([*TWO_ROOMS, pillar], (0.05, 1.0)))
     last = np.array([0.8, 0.0, 0.0])

@@ -1,4 +1,4 @@
-"""Tests of right of way: what a robot keeps clear of, where it stops short, and where it steps aside."""
+"""Right of way: reserved paths, where a robot stops, and where it waits aside."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 from executive.run.traffic_table import TrafficTable
 from skills.api import LocalisationEstimate, SkillContext
 from skills.navigate.footprint import Footprint
-from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_that_suits, reachable
+from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_suitable_pose, reachable_cells
 from skills.navigate.obstacles import with_outlines
 from skills.robot import FloatArray, Pose2D, Robot
 from skills.stack import LocalController
@@ -23,20 +23,20 @@ DISCS = np.array([[0.2, 0.0, 0.3], [-0.2, 0.0, 0.3]])
 
 @dataclass(frozen=True)
 class Open:
-    """A costmap with nothing within 5 m."""
+    """A costmap without obstacles within 5 m."""
 
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """The same everywhere."""
+        """5 m everywhere."""
         return np.full(len(points_W), 5.0)
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Nothing."""
+        """Ignores it."""
 
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Nothing."""
+        """Ignores it."""
 
 
-def test_a_body_takes_up_its_discs() -> None:
+def test_an_outline_occupies_its_discs() -> None:
     """| from the body's middle | clearance |
     | 1.5 m ahead | 1.0 |
     | in it | -0.3 at a disc's centre |"""
@@ -45,37 +45,37 @@ def test_a_body_takes_up_its_discs() -> None:
     assert clearance == pytest.approx([1.0, -0.3])
 
 
-def test_a_body_is_turned_with_its_pose() -> None:
+def test_an_outline_turns_with_its_pose() -> None:
     """A quarter turn puts the front disc to the left."""
     costmap = with_outlines(Open(), [(DISCS, np.array([[0.0, 0.0, np.pi / 2.0]]))])
     assert costmap.clearance_m(np.array([[0.0, 1.0]])) == pytest.approx([0.5])
 
 
-def test_nobody_about_leaves_the_costmap_as_it_is() -> None:
-    """A robot alone plans as it always did."""
+def test_no_other_robots_leave_the_costmap_unchanged() -> None:
+    """A single robot plans on the same costmap."""
     costmap = Open()
     assert with_outlines(costmap, []) is costmap
 
 
-def test_places_behind_a_wall_are_not_reached() -> None:
+def test_cells_behind_a_wall_are_not_reachable() -> None:
     """A wall in column 2 of three rows; only columns 0 and 1 are reached."""
     free = np.ones((3, 5), dtype=np.bool_)
     free[:, 2] = False
-    assert {column for _, column in reachable(free, (1, 0))} == {0, 1}
+    assert {column for _, column in reachable_cells(free, (1, 0))} == {0, 1}
 
 
-def test_places_are_reached_through_a_door_and_nearest_first() -> None:
+def test_cells_are_reached_through_a_door_nearest_first() -> None:
     """With a door in the wall's middle, the other side comes after the near one."""
     free = np.ones((3, 5), dtype=np.bool_)
     free[:, 2] = False
     free[1, 2] = True
-    cells = reachable(free, (1, 0))
+    cells = reachable_cells(free, (1, 0))
     assert len(cells) == 13
     assert cells.index((1, 1)) < cells.index((1, 2)) < cells.index((1, 3))
 
 
-def test_the_first_place_that_suits_is_taken() -> None:
-    """None where none suits."""
+def test_the_first_suitable_pose_is_taken() -> None:
+    """None where no position suits."""
     places = np.column_stack([np.arange(500.0), np.zeros(500)])
 
     def beyond(x_m: float) -> Pose2D | None:
@@ -83,14 +83,14 @@ def test_the_first_place_that_suits_is_taken() -> None:
             good = some[some[:, 0] > x_m]
             return Pose2D(float(good[0, 0]), 0.0, 0.0) if len(good) else None
 
-        return first_that_suits(places, suits)
+        return first_suitable_pose(places, suits)
 
     assert beyond(298.5) == Pose2D(299.0, 0.0, 0.0)
     assert beyond(600.0) is None
 
 
 class StraightOn:
-    """A controller whose path leads straight on along x from a place."""
+    """A controller with a straight path along x."""
 
     length_m = 4.0
 
@@ -116,8 +116,8 @@ def among(name: str) -> tuple[GivingWay, Footprint]:
     return giving, FOOTPRINT
 
 
-def test_a_robot_stops_short_of_a_way_that_is_reserved() -> None:
-    """Bob, 0.55 m long to the front, meets a way 0.25 m to each side of x = 3 at about 2.05 m, and names who has it."""
+def test_robot_stops_before_a_reserved_path() -> None:
+    """Bob, 0.55 m long to the front, meets a path 0.25 m to each side of x = 3 at about 2.05 m, and names its robot."""
     giving, footprint = among("bob")
     found = giving.conflict_m(cast(LocalController, StraightOn(0.0, 0.0)), footprint)
     assert found is not None and found[1] == "alice"
@@ -125,21 +125,21 @@ def test_a_robot_stops_short_of_a_way_that_is_reserved() -> None:
     assert giving.conflict_m(cast(LocalController, StraightOn(0.0, 4.0)), footprint) is None
 
 
-def test_a_robot_in_a_reserved_way_finds_a_place_off_it() -> None:
-    """| stands at | in the way | its waiting place |
+def test_robot_on_a_reserved_path_finds_a_waiting_pose_off_it() -> None:
+    """| stands at | blocks the path | its waiting pose |
     | (3, 0) | yes | at least 0.25 m off the way |
     | (0, 0) | no | - |"""
     giving, footprint = among("bob")
-    assert giving.in_whose_way(Pose2D(3.0, 0.0, 0.0), footprint) == ["alice"]
-    assert giving.in_whose_way(Pose2D(0.0, 0.0, 0.0), footprint) == []
-    place = giving.waiting_place(Open(), footprint, Pose2D(3.0, 0.0, 0.0))
-    assert place is not None and not giving.in_whose_way(place, footprint)
-    other = giving.waiting_place(Open(), footprint, Pose2D(3.0, 0.0, 0.0), tried=(place,))
+    assert giving.blocked_robots(Pose2D(3.0, 0.0, 0.0), footprint) == ["alice"]
+    assert giving.blocked_robots(Pose2D(0.0, 0.0, 0.0), footprint) == []
+    place = giving.waiting_pose(Open(), footprint, Pose2D(3.0, 0.0, 0.0))
+    assert place is not None and not giving.blocked_robots(place, footprint)
+    other = giving.waiting_pose(Open(), footprint, Pose2D(3.0, 0.0, 0.0), tried=(place,))
     assert other is not None and np.hypot(other.x_m - place.x_m, other.y_m - place.y_m) > 0.6
 
 
-def test_a_goal_that_is_wished_for_is_reserved() -> None:
-    """Alice wants to (6, 0), where Bob stands: he stands in her way, and not at (9, 0)."""
+def test_a_goal_without_a_path_can_be_reserved() -> None:
+    """Alice reserves (6, 0), where Bob stands: he blocks her there, and not at (9, 0)."""
     table = TrafficTable({"alice": FOOTPRINT.discs, "bob": FOOTPRINT.discs}, lambda: 0.0)
     table.report("alice", Pose2D(0.0, 0.0, 0.0))
     table.report("bob", Pose2D(6.0, 0.0, 0.0))
@@ -147,16 +147,16 @@ def test_a_goal_that_is_wished_for_is_reserved() -> None:
     alice, bob = (GivingWay(cast(SkillContext, view), GivingWayOptions()) for view in views)
     alice.begin()
     bob.begin()
-    alice.wish(Pose2D(0.0, 0.0, 0.0), Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
-    assert bob.in_whose_way(Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
-    assert not bob.in_whose_way(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)
+    alice.reserve_goal(Pose2D(0.0, 0.0, 0.0), Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert bob.blocked_robots(Pose2D(6.0, 0.0, 0.0), FOOTPRINT)
+    assert not bob.blocked_robots(Pose2D(9.0, 0.0, 0.0), FOOTPRINT)
 
 
 @pytest.mark.parametrize(
     ("bob_goes", "bob_idle", "less", "clearance_m"),
     [(True, False, Avoided.WORKING, 5.0), (False, True, Avoided.WORKING, 5.0), (False, False, None, None)],
 )
-def test_who_clears_a_reserved_way_is_no_obstacle_to_a_plan_that_found_none(
+def test_a_second_plan_ignores_robots_that_clear_a_reserved_path(
     bob_goes: bool, bob_idle: bool, less: Avoided | None, clearance_m: float | None
 ) -> None:
     """| bob | alice, who goes first, plans instead |
@@ -172,23 +172,21 @@ def test_who_clears_a_reserved_way_is_no_obstacle_to_a_plan_that_found_none(
     if bob_goes:
         bob.begin()
     table.rest("bob", idle=bob_idle)
-    assert alice.less(Avoided.WAYS) is less
+    assert alice.less_avoided(Avoided.PATHS) is less
     at_bob = np.array([[2.0, 0.0]])
     assert alice.costmap(Open(), Avoided.BODIES).clearance_m(at_bob)[0] < 0.0
     if less is not None:
         assert alice.costmap(Open(), less).clearance_m(at_bob) == pytest.approx([clearance_m])
 
 
-def test_a_body_is_covered_to_its_corners() -> None:
+def test_an_outline_is_covered_to_its_corners() -> None:
     """The corner of an oblong lies beyond its round middle, and counts as well."""
     costmap = with_outlines(Open(), [(FOOTPRINT.discs, np.zeros((1, 3)))])
     assert costmap.clearance_m(np.array([[0.65, 0.25]])) == pytest.approx([0.1], abs=0.02)
 
 
 @pytest.mark.parametrize(("place_W", "is_robot"), [((3.0, -1.2), True), ((3.5, -2.0), True), ((3.0, -0.8), False)])
-def test_what_a_camera_takes_for_a_person_where_a_robot_stands_is_that_robot(
-    place_W: tuple[float, float], is_robot: bool
-) -> None:
+def test_a_detected_person_where_a_robot_stands_is_that_robot(place_W: tuple[float, float], is_robot: bool) -> None:
     """Alice, 1.1 m by 0.5 m, stands at (3, -2) along y."""
     giving, _ = among("bob")
     assert giving.is_robot(place_W) is is_robot

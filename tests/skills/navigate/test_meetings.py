@@ -1,4 +1,4 @@
-"""Tests of robots that meet where only one fits: who clears the way, who waits, and that both arrive."""
+"""Robots that meet where only one fits: one makes way, and both arrive."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ def rooms() -> GridMap:
 
 
 @pytest.mark.parametrize("kinds", [(OBLONG, OBLONG), (ROUND, OBLONG)])
-def test_two_that_go_where_the_other_stands_behind_a_door_both_arrive(
+def test_two_robots_that_swap_places_through_a_door_both_arrive(
     rooms: GridMap, kinds: tuple[BaseKind, BaseKind]
 ) -> None:
-    """One clears the way and the goal region, the other passes, then the first follows; they never touch."""
+    """One robot backs out, the other passes, then the first follows; they never touch."""
     floor = Floor(rooms)
     floor.send("alice", Pose2D(2.4, 5.0, DOWN), Pose2D(2.5, 2.6, DOWN), base_kind=kinds[0])
     floor.send("bob", Pose2D(2.5, 2.6, UP), Pose2D(2.4, 5.0, UP), base_kind=kinds[1])
@@ -44,8 +44,8 @@ def test_two_that_go_where_the_other_stands_behind_a_door_both_arrive(
     assert floor.apart_m > 0.05
 
 
-def test_one_in_a_dead_end_goes_first_after_all(rooms: GridMap) -> None:
-    """Alice claims first and wants in; Bob has no waiting place behind him, so turns are changed."""
+def test_robots_swap_priority_when_one_is_stuck_in_a_dead_end(rooms: GridMap) -> None:
+    """Alice claims first and wants in; Bob has no waiting place behind him, so the two swap priorities."""
     floor = Floor(grid_of(DEAD_END, (0.05, 1.0)))
     floor.send("alice", Pose2D(6.2, 0.45, math.pi), Pose2D(1.0, 0.45, math.pi))
     floor.send("bob", Pose2D(1.0, 0.45, 0.0), Pose2D(6.5, 3.2, 0.0))
@@ -53,7 +53,7 @@ def test_one_in_a_dead_end_goes_first_after_all(rooms: GridMap) -> None:
     assert floor.apart_m > 0.05
 
 
-def test_one_that_has_nothing_to_do_clears_a_way_and_stays_there(rooms: GridMap) -> None:
+def test_an_idle_robot_clears_a_reserved_path_and_stays_aside(rooms: GridMap) -> None:
     """Bob arrives in a door first; Alice, who comes later, gets through it."""
     floor = Floor(rooms)
     floor.send("bob", Pose2D(7.4, 3.0, UP), Pose2D(7.45, 4.05, UP))
@@ -64,7 +64,7 @@ def test_one_that_has_nothing_to_do_clears_a_way_and_stays_there(rooms: GridMap)
     assert floor.apart_m > 0.05
 
 
-def test_one_that_has_nothing_to_do_and_is_in_nobodys_way_stays(rooms: GridMap) -> None:
+def test_an_idle_robot_off_all_paths_stays(rooms: GridMap) -> None:
     """Bob stands in the room; Alice passes above it."""
     floor = Floor(rooms)
     floor.send("bob", Pose2D(7.4, 1.5, UP), Pose2D(7.4, 1.5, UP))
@@ -73,8 +73,8 @@ def test_one_that_has_nothing_to_do_and_is_in_nobodys_way_stays(rooms: GridMap) 
     assert floor.robots["bob"].pose.y_m == pytest.approx(1.5, abs=0.1)
 
 
-def test_one_whose_goal_is_beyond_a_wall_does_not_wait_for_another_that_stands_about() -> None:
-    """Bob is in nobody's way; there is no way for Alice on the map, and three attempts are over soon."""
+def test_robot_without_any_path_on_the_map_does_not_wait_for_others() -> None:
+    """Bob blocks nobody; no path exists for Alice on the map, and three attempts are over soon."""
     floor = Floor(grid_of((*DEAD_END, Block(5.0, 0.0, 5.1, 0.9)), (0.05, 1.0)))
     floor.send("alice", Pose2D(1.0, 0.45, 0.0), Pose2D(6.5, 3.2, 0.0))
     floor.add("bob", Pose2D(3.5, 0.45, 0.0))

@@ -61,7 +61,7 @@ def test_equal_inputs_give_equal_velocities():
     assert np.array_equal(first, second)
 
 
-def test_at_speed_nought_it_stands():
+def test_robot_stands_at_speed_zero():
     answer = MppiController(straight(4.0), FOOTPRINT).command(
         Pose2D(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros(3), OPEN, 0.0
     )
@@ -69,7 +69,7 @@ def test_at_speed_nought_it_stands():
 
 
 @pytest.mark.parametrize("appears", [(), (Box(4.5, 5.0, 4.9, 5.4, 0.0, 1.7),)])
-def test_it_goes_through_two_doors_and_around_what_is_new_without_touching(appears):
+def test_robot_passes_two_doors_and_a_new_obstacle_without_contact(appears):
     bench = Bench(LEFT_ROOM, unmapped=appears, cameras=False)
     context = replace(bench.context(), stack=replace(default_stack(), controller=MppiOptions()))
     skill = Navigate(context)
@@ -82,7 +82,7 @@ def test_it_goes_through_two_doors_and_around_what_is_new_without_touching(appea
     assert bench.robot.least_clearance_m > 0.03
 
 
-def test_its_way_is_hardly_longer_than_the_path():
+def test_driven_distance_is_hardly_longer_than_the_path():
     costmap = LayeredCostmap(grid_of(TWO_ROOMS, (0.05, 1.0)))
     path = plan_path(costmap, FOOTPRINT, LEFT_ROOM, RIGHT_ROOM)
     bench = Bench(LEFT_ROOM, cameras=False)

@@ -24,7 +24,7 @@ def go(
     each: Callable[[], None] | None = None,
     options: NavigateOptions | None = None,
 ) -> tuple[Step, list[Step]]:
-    """Run the skill as its leaf would; the last step and all before."""
+    """Runs the skill; returns the last step and all before."""
     skill = Navigate(bench.context(), options)
     skill.begin(NavigateInputs(goal))
     begun_s, steps = bench.clock.now(), []
@@ -65,7 +65,7 @@ def test_a_base_that_cannot_go_sideways_gets_there_by_the_same_skill():
     assert bench.robot.least_clearance_m > 0.04
 
 
-def test_takes_about_the_time_that_the_way_needs():
+def test_drive_takes_about_the_time_of_its_path():
     bench = Bench(START)
     go(bench, OTHER_ROOM)
     assert bench.clock.now() < 25.0
@@ -91,7 +91,7 @@ def test_speed_stays_below_what_is_asked():
     assert 0.3 < fastest < 0.45
 
 
-def test_goes_around_a_thing_that_the_lidar_sees():
+def test_robot_drives_around_an_obstacle_that_the_lidar_sees():
     bench = Bench(START, unmapped=[Box(4.5, 5.0, 4.9, 5.4, 0.0, 1.7)])
     step, _ = go(bench, OTHER_ROOM)
     assert isinstance(step, Succeeded), step.message
@@ -99,7 +99,7 @@ def test_goes_around_a_thing_that_the_lidar_sees():
     assert bench.worker.names.count("plan a path") >= 2
 
 
-def test_goes_around_a_thing_too_low_for_the_lidar():
+def test_robot_drives_around_an_obstacle_too_low_for_the_lidar():
     bench = Bench(START, unmapped=[Box(4.5, 4.87, 4.9, 5.8, 0.0, 0.2)])
     step, _ = go(bench, OTHER_ROOM)
     assert isinstance(step, Succeeded), step.message
@@ -107,7 +107,7 @@ def test_goes_around_a_thing_too_low_for_the_lidar():
     assert bench.robot.images_taken > 10
 
 
-def test_without_cameras_a_low_thing_is_hit():
+def test_without_cameras_the_robot_hits_a_low_obstacle():
     """The world of the test before really needs the cameras."""
     bench = Bench(START, unmapped=[Box(4.5, 4.87, 4.9, 5.8, 0.0, 0.2)], cameras=False)
     go(bench, OTHER_ROOM)
@@ -128,12 +128,12 @@ def test_waits_for_a_person_who_walks_out_of_the_door():
     assert bench.robot.least_clearance_m > 0.03
 
 
-def test_door_that_stays_closed_is_a_planning_failure_that_names_the_place():
+def test_a_door_that_stays_closed_is_a_planning_failure_with_its_position():
     bench = Bench(START, unmapped=[Box(7.0, 4.0, 7.9, 4.1, 0.0, 2.0)])
     step, _ = go(bench, OTHER_ROOM)
     assert isinstance(step, Failed)
     assert step.cause is Cause.PLANNING
-    assert "blocked by something seen at (7." in step.message
+    assert "blocked by an obstacle at (7." in step.message
     assert bench.robot.least_clearance_m > 0.03
 
 
@@ -201,7 +201,7 @@ def test_begun_again_it_goes_to_the_new_goal():
     assert off_goal(bench, CORRIDOR)[0] < 0.1
 
 
-def test_not_knowing_its_place_is_a_failed_precondition():
+def test_a_robot_that_is_not_localised_fails_the_precondition():
     places = np.random.default_rng(5).uniform(20.0, 26.0, (60, 2))
     pillars = [Box(x, y, x + 0.15, y + 0.15) for x, y in places if math.hypot(x - 23.0, y - 23.0) > 1.0]
     bench = Bench(Pose2D(23.0, 23.0, 0.3), unmapped=pillars, believed_start=START)
@@ -218,7 +218,7 @@ def test_refused_from_the_start_is_a_failed_precondition():
     assert "motors off" in step.message
 
 
-def test_lease_taken_on_the_way_is_a_failure_in_execution():
+def test_a_lease_taken_while_driving_is_an_execution_failure():
     bench = Bench(START)
 
     def take() -> None:
@@ -230,7 +230,7 @@ def test_lease_taken_on_the_way_is_a_failure_in_execution():
     assert "lease" in step.message
 
 
-def test_held_fast_it_gives_up_with_a_reason():
+def test_a_robot_held_in_place_fails_with_a_reason():
     bench = Bench(START)
 
     def hold() -> None:
@@ -244,7 +244,7 @@ def test_held_fast_it_gives_up_with_a_reason():
     assert step.cause in (Cause.EXECUTION, Cause.PLANNING)  # odometry goes on, so the costmap gets ghosts
 
 
-def test_equal_seeds_go_equal_ways():
+def test_equal_seeds_give_equal_drives():
     poses = []
     for _ in range(2):
         bench = Bench(START, seed=3)
@@ -270,7 +270,7 @@ class WaitingWorker(NamingWorker):
         return job
 
 
-def test_the_way_is_the_same_whether_work_is_done_at_once_or_beside_the_ticks():
+def test_drive_is_equal_with_work_inline_or_in_a_thread():
     ways = []
     for worker in (NamingWorker, WaitingWorker):
         bench, way = Bench(START, unmapped=[Box(3.5, 3.4, 3.7, 3.6)]), []
@@ -282,7 +282,7 @@ def test_the_way_is_the_same_whether_work_is_done_at_once_or_beside_the_ticks():
     assert ways[0] == ways[1]
 
 
-def test_a_path_that_something_new_blocks_is_planned_anew_without_standing():
+def test_robot_plans_around_a_new_obstacle_without_standing():
     start, goal = Pose2D(1.2, 5.4, 0.0), Pose2D(8.6, 5.4, 0.0)
     bench = Bench(start, component=DeadReckoning(), cameras=False)
     bench.costmap = RollingCostmap()

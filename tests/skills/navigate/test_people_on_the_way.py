@@ -1,4 +1,4 @@
-"""Driving where people are: slower near them, waiting, around them, on again when they have gone."""
+"""Drives near people: slower, waiting, around them, and on once they have left."""
 
 import math
 from dataclasses import replace
@@ -19,7 +19,7 @@ START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(8.5, 5.4, 0.0)
 
 
 class Drive:
-    """One run along the corridor, with the speeds at each place, the distances to people, and what was told."""
+    """One run along the corridor, with speeds, distances to people, and messages."""
 
     def __init__(
         self,
@@ -84,7 +84,7 @@ def test_without_people_it_drives_as_without_a_detector(alone):
     assert alone.fastest(4.0, 5.0) == pytest.approx(0.8, abs=0.05)
 
 
-def test_it_goes_slower_past_somebody_and_faster_again_after(alone):
+def test_robot_slows_down_beside_a_person_and_speeds_up_again(alone):
     drive = Drive([person_at(4.5, 6.5)])
     assert isinstance(drive.step, Succeeded), drive.step.message
     assert drive.fastest(3.5, 4.3) < 0.5
@@ -93,7 +93,7 @@ def test_it_goes_slower_past_somebody_and_faster_again_after(alone):
     assert drive.seconds > alone.seconds + 2.0
 
 
-def test_it_goes_around_somebody_with_more_room_than_around_a_thing():
+def test_robot_keeps_more_clearance_to_a_person_than_to_an_object():
     person = person_at(6.4, 5.2)
     around_a_thing = Drive(unmapped=[person])
     around_a_person = Drive([person])
@@ -102,7 +102,7 @@ def test_it_goes_around_somebody_with_more_room_than_around_a_thing():
     assert around_a_person.nearest_m > max(0.6, around_a_thing.nearest_m + 0.05)
 
 
-def test_it_waits_for_who_stands_in_a_door_and_goes_on_when_they_have_gone():
+def test_robot_waits_for_a_person_in_a_door_and_drives_on_afterwards():
     def leaves(drive):
         if drive.bench.clock.now() > 15.0 and drive.people[0] in drive.bench.robot.boxes:
             drive.bench.robot.boxes.remove(drive.people[0])
@@ -113,18 +113,18 @@ def test_it_waits_for_who_stands_in_a_door_and_goes_on_when_they_have_gone():
     assert drive.bench.robot.least_clearance_m > 0.1
 
 
-def test_a_door_that_somebody_keeps_closed_is_a_planning_failure_after_long_patience():
+def test_a_door_blocked_by_a_person_is_a_planning_failure_after_long_patience():
     drive = Drive(
         [person_at(7.45, 4.0)], goal=Pose2D(7.5, 2.0, -math.pi / 2), options=NavigateOptions(person_patience_s=5.0)
     )
     assert isinstance(drive.step, Failed)
     assert drive.step.cause is Cause.PLANNING
-    assert "blocked by something seen at (" in drive.step.message
+    assert "blocked by an obstacle at (" in drive.step.message
     assert 20.0 < drive.seconds < 45.0
     assert drive.bench.robot.least_clearance_m > 0.1
 
 
-def test_it_stops_before_who_steps_into_the_way():
+def test_robot_stops_for_a_person_who_steps_into_its_path():
     person = person_at(6.9, 5.4)
 
     def steps_in(drive):
@@ -137,16 +137,16 @@ def test_it_stops_before_who_steps_into_the_way():
     assert drive.nearest_m > 0.55
 
 
-def test_it_comes_before_a_person_who_is_the_goal():
-    """A hand-over stands 1.5 m before somebody: reached slowly, not refused."""
+def test_robot_approaches_a_person_who_is_the_goal():
+    """A hand-over pose 1.5 m before a person is reached slowly, not refused."""
     drive = Drive([person_at(GOAL.x_m + 1.5 - 0.6, GOAL.y_m)], goal=Pose2D(GOAL.x_m - 0.6, GOAL.y_m, 0.0))
     assert isinstance(drive.step, Succeeded), drive.step.message
     assert drive.waited() == 0.0
     assert drive.fastest(7.3, 7.9) < 0.5
 
 
-def test_a_narrow_way_past_somebody_is_gone_slowly_and_not_given_up():
-    """In the corridor narrowed to 1.1 m beside them a disc of full room would close the way."""
+def test_robot_passes_a_person_slowly_in_a_narrow_passage():
+    """In a corridor of 1.1 m beside the person a disc of full size would block the path."""
     shelf = replace(TWO_ROOMS[-1], x0=4.0, x1=6.0, y0=6.05, y1=7.0)
     drive = Drive([person_at(5.0, 4.4)], surveyed=[shelf])
     assert isinstance(drive.step, Succeeded), drive.step.message

@@ -1,4 +1,4 @@
-"""How fast near people, and how much room they get."""
+"""Speed limits near people, and clearance to them."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 
 from skills.navigate.footprint import Footprint
 from skills.navigate.obstacles import with_discs
-from skills.navigate.people_space import PaceManager, SpaceOptions, outline_distance_m, spaced
+from skills.navigate.people_space import PaceManager, SpaceOptions, outline_distance_m, with_people
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
@@ -18,7 +18,7 @@ FULL_M_S = 0.8
 
 
 class Open:
-    """Nothing nearer than five metres."""
+    """A costmap without obstacles within five metres."""
 
     def clearance_m(self, points_W):
         return np.full(len(points_W), 5.0)
@@ -29,7 +29,7 @@ def person(x, y=0.0):
 
 
 def way(length_m=1.2):
-    """Straight ahead."""
+    """Poses straight ahead."""
     x = np.arange(0.0, length_m + 1e-9, 0.05)
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
 
@@ -55,13 +55,13 @@ def test_speed_falls_with_the_distance(aside_m, expected):
     assert not told.waiting
 
 
-def test_a_person_ahead_is_heeded_before_the_robot_is_near():
+def test_robot_slows_down_before_a_person_ahead_is_near():
     # 3.4 m ahead of the body: 2.85 m from the outline now, 1.65 m in 1.2 m
     told = pace(person(3.4))
     assert told.most_m_s == pytest.approx(0.3 + (1.65 - 1.0) / 1.5 * 0.5, abs=0.02)
 
 
-def test_it_waits_for_who_is_too_near_to_the_way_and_then_goes_past_slowly():
+def test_robot_waits_for_a_person_near_its_path_and_then_passes_slowly():
     manager, options = PaceManager(FOOTPRINT), SpaceOptions()
     told = [pace(person(2.0), manager=manager, now_s=0.1 * k) for k in range(60)]
     stood = [one for one in told if one.waiting]
@@ -72,7 +72,7 @@ def test_it_waits_for_who_is_too_near_to_the_way_and_then_goes_past_slowly():
     assert told[-1].most_m_s == options.pass_m_s
 
 
-def test_patience_begins_anew_when_nobody_was_near_for_a_while():
+def test_patience_starts_again_when_nobody_was_near_for_a_while():
     manager = PaceManager(FOOTPRINT)
     for k in range(60):
         pace(person(2.0), manager=manager, now_s=0.1 * k)
@@ -82,41 +82,41 @@ def test_patience_begins_anew_when_nobody_was_near_for_a_while():
     assert pace(person(2.0), manager=manager, now_s=12.1).waiting
 
 
-def test_a_way_that_leads_away_from_somebody_near_is_not_waited_on():
+def test_robot_does_not_wait_when_its_path_leads_away_from_a_person():
     backwards = way() * [-1.0, 1.0, 1.0]
     told = pace(person(1.2), ahead=backwards)
     assert not told.waiting
     assert 0.5 < told.most_m_s < 0.7
 
 
-def test_a_goal_right_before_somebody_is_come_to_slowly_without_waiting():
+def test_robot_reaches_a_goal_before_a_person_slowly_without_waiting():
     # at the goal 0.6 m from the outline to the axis
     told = pace(person(1.95), goal=Pose2D(0.8, 0.0, 0.0), ahead=way(0.8))
     assert not told.waiting
     assert told.most_m_s == pytest.approx(0.3)
 
 
-def test_who_is_behind_a_wall_of_distance_is_nobody():
+def test_a_distant_person_does_not_limit_the_speed():
     told = pace(person(8.0), person(0.0, 6.0))
     assert (told.most_m_s, told.person) == (math.inf, None)
 
 
-def test_a_slow_errand_is_not_made_faster():
+def test_a_low_speed_limit_stays():
     manager = PaceManager(FOOTPRINT)
     assert manager.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2, FAR_GOAL).most_m_s <= 0.2
 
 
-def test_people_take_up_room_in_the_costmap():
+def test_people_are_obstacles_in_the_costmap():
     costmap = with_discs(Open(), np.array([[1.0, 0.0, 0.5], [9.0, 0.0, 0.5]]))
     assert costmap.clearance_m(np.array([[3.0, 0.0], [1.0, 0.3], [50.0, 0.0]])) == pytest.approx([1.5, -0.2, 5.0])
 
 
-def test_room_is_left_for_where_the_robot_is_and_goes():
+def test_discs_about_people_leave_start_and_goal_free():
     # the outline is 0.45 m from the first person's axis and far from the second's
-    costmap = spaced(Open(), FOOTPRINT, (HERE, Pose2D(5.0, 0.0, 0.0)), [person(1.0), person(2.5, 3.0)], 0.5)
-    assert costmap.discs[:, 2] == pytest.approx([0.4, 0.5], abs=0.02)
+    costmap = with_people(Open(), FOOTPRINT, (HERE, Pose2D(5.0, 0.0, 0.0)), [person(1.0), person(2.5, 3.0)], 0.5)
+    assert costmap.clearance_m(np.array([[1.0, 0.0], [2.5, 3.0]])) == pytest.approx([-0.4, -0.5], abs=0.02)
 
 
-def test_without_people_the_costmap_is_as_it_was():
+def test_without_people_the_costmap_is_unchanged():
     costmap = Open()
-    assert spaced(costmap, FOOTPRINT, (HERE,), [], 0.5) is costmap
+    assert with_people(costmap, FOOTPRINT, (HERE,), [], 0.5) is costmap

@@ -12,7 +12,7 @@ from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.navigate.footprint import Footprint, footprint_clear, footprint_clearance_m, pose_array
 from skills.navigate.path import path_length
-from skills.navigate.planner import LatticePlanner, NoWayError, plan_path
+from skills.navigate.planner import LatticePlanner, NoPathError, plan_path
 from skills.robot import Pose2D
 
 FOOTPRINT = Footprint.rectangle(OUTLINE)
@@ -30,7 +30,7 @@ def test_clearance_of_the_outline_is_exact_at_sides_ends_and_corners():
     assert footprint_clearance_m(wall, FOOTPRINT, poses) == pytest.approx([0.25, 0.15, 0.7 - corner], abs=0.02)
 
 
-def test_way_leads_through_both_doors_and_clears_them():
+def test_path_leads_through_both_doors_with_clearance():
     costmap = costmap_of()
     path = plan_path(costmap, FOOTPRINT, LEFT_ROOM, RIGHT_ROOM)
     assert footprint_clearance_m(costmap, FOOTPRINT, path.poses).min() >= LatticePlanner().margin_m - 0.01
@@ -54,7 +54,7 @@ def test_poses_are_close_together_and_yaw_is_continuous():
     assert steps[:, 2].max() < 0.25
 
 
-def test_long_ways_are_gone_forwards():
+def test_long_paths_are_driven_forwards():
     path = plan_path(costmap_of(), FOOTPRINT, LEFT_ROOM, RIGHT_ROOM)
     steps = np.diff(path.poses, axis=0)
     ahead = np.cos(path.poses[:-1, 2]) * steps[:, 0] + np.sin(path.poses[:-1, 2]) * steps[:, 1]
@@ -71,27 +71,27 @@ def test_equal_problems_give_equal_paths():
     assert np.array_equal(first.poses, second.poses)
 
 
-def test_blocked_goal_is_said():
+def test_a_blocked_goal_raises_an_error():
     with pytest.raises(PlanningError, match=r"goal \(1\.00, 0\.70\) is blocked"):
         plan_path(costmap_of(), FOOTPRINT, LEFT_ROOM, Pose2D(1.0, 0.7, 0.0))
 
 
-def test_goal_off_the_map_is_said():
+def test_a_goal_off_the_map_raises_an_error():
     with pytest.raises(PlanningError, match="blocked"):
         plan_path(costmap_of(), FOOTPRINT, LEFT_ROOM, Pose2D(30.0, 2.0, 0.0))
 
 
-def test_closed_door_means_no_way():
-    with pytest.raises(NoWayError, match="There is no way"):
+def test_a_closed_door_leaves_no_path():
+    with pytest.raises(NoPathError, match="There is no path"):
         plan_path(costmap_of(Box(2.0, 4.0, 2.9, 4.1)), FOOTPRINT, LEFT_ROOM, RIGHT_ROOM)
 
 
-def test_door_narrower_than_the_robot_means_no_way():
-    with pytest.raises(NoWayError):
+def test_a_door_narrower_than_the_robot_leaves_no_path():
+    with pytest.raises(NoPathError):
         plan_path(costmap_of(Box(2.0, 4.0, 2.4, 4.1)), FOOTPRINT, LEFT_ROOM, RIGHT_ROOM)
 
 
-def test_start_a_little_in_collision_is_left():
+def test_a_path_leaves_a_start_slightly_in_collision():
     costmap = costmap_of()
     start = Pose2D(0.53, 2.0, 0.0)  # its rear is 2 cm in the wall
     assert not footprint_clear(costmap, FOOTPRINT, start, 0.0)
@@ -101,8 +101,8 @@ def test_start_a_little_in_collision_is_left():
     assert footprint_clearance_m(costmap, FOOTPRINT, path.poses[beyond]).min() > 0.04
 
 
-def test_start_deep_in_something_is_said():
-    with pytest.raises(PlanningError, match="stands in something"):
+def test_a_start_deep_in_an_obstacle_raises_an_error():
+    with pytest.raises(PlanningError, match="stands in an obstacle"):
         plan_path(costmap_of(), FOOTPRINT, Pose2D(1.0, 0.7, 0.0), RIGHT_ROOM)
 
 
@@ -126,7 +126,7 @@ def test_all_pairs_of_places_of_the_flat_can_be_planned():
         assert footprint_clearance_m(costmap, FOOTPRINT, path.poses).min() > 0.05
 
 
-def test_less_margin_is_taken_where_there_is_no_way_with_more():
+def test_the_least_margin_applies_where_no_path_keeps_more():
     costmap = costmap_of()
     with pytest.raises(PlanningError):
         plan_path(costmap, FOOTPRINT, LEFT_ROOM, RIGHT_ROOM, LatticePlanner(margin_m=0.25, least_margin_m=0.25))

@@ -6,7 +6,7 @@ from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.back_off.skill import BackOff, BackOffInputs
-from skills.faults.faulty_robot import with_faults
+from skills.faults.faulty_robot import inject_faults
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, WatchOptions, low_points
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
@@ -22,7 +22,7 @@ def test_the_bare_floor_gives_no_points():
     assert np.sum(np.abs(points[:, 1]) < 1.0) == 0  # further aside are the corridor's walls
 
 
-def test_points_lie_on_the_thing_in_the_odom_frame():
+def test_points_lie_on_the_object_in_the_odom_frame():
     bench = Bench(START, unmapped=[SHOE_BOX])
     bench.tick()
     points = low_points(bench.robot.image("frontleft"), WatchOptions())
@@ -32,17 +32,17 @@ def test_points_lie_on_the_thing_in_the_odom_frame():
     assert np.abs(points[:, 1]).max() < 0.25
 
 
-def test_cameras_are_asked_in_turn_and_not_more_often_than_said():
+def test_cameras_take_pictures_in_turn_within_their_period():
     bench = Bench(START, unmapped=[SHOE_BOX])
     watch = LowObstacleWatch(bench.context())
     for _ in range(40):
         bench.tick()
         watch.step()
-    assert set(bench.worker.names) == {"look for low things by frontleft", "look for low things by frontright"}
+    assert set(bench.worker.names) == {"look for low obstacles by frontleft", "look for low obstacles by frontright"}
     assert 4 <= bench.robot.images_taken <= 2.0 / WatchOptions().period_s + 1
 
 
-def test_the_costmap_learns_of_the_thing():
+def test_the_costmap_shows_the_object():
     bench = Bench(START, unmapped=[SHOE_BOX])
     watch = LowObstacleWatch(bench.context())
     for _ in range(20):
@@ -51,7 +51,7 @@ def test_the_costmap_learns_of_the_thing():
     assert bench.costmap.clearance_m(np.array([[2.85, 5.4]]))[0] < 0.05
 
 
-START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(4.0, 5.4, 0.0)
+DRIVE_START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(4.0, 5.4, 0.0)
 
 
 class Repeating:
@@ -73,8 +73,8 @@ class Repeating:
 
 def drive(*faults, wrap=None, seconds=20.0):
     """How a drive ends, where the robot stood when the LiDAR failed for half a second, and where at the end."""
-    bench = Bench(START, surveyed=TWO_ROOMS)
-    bench.robot = wrap(bench) if wrap else with_faults(bench.robot, bench.clock, faults)
+    bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
+    bench.robot = wrap(bench) if wrap else inject_faults(bench.robot, bench.clock, faults)
     bench.tick()
     skill = Navigate(bench.context())
     skill.begin(NavigateInputs(GOAL))
@@ -100,32 +100,32 @@ def driven_after(places, time_s):
         ("lidar returns garbage from 1.5 s", "ranges are invalid"),
     ],
 )
-def test_a_lidar_that_fails_on_the_way_is_told_and_the_robot_stands(fault, message):
+def test_robot_stands_and_reports_a_lidar_that_fails_while_driving(fault, message):
     step, places = drive(fault)
     assert isinstance(step, Failed) and step.cause is Cause.EXECUTION and message in step.message
     assert places[-1][0] < 9.0
     assert driven_after(places, 2.4) < 0.02
 
 
-def test_a_scan_that_is_repeated_with_new_stamps_is_told():
+def test_a_scan_repeated_with_new_stamps_is_reported():
     step, places = drive(wrap=lambda bench: Repeating(bench.robot, bench.clock, 1.5))
     assert isinstance(step, Failed) and step.cause is Cause.EXECUTION and "repeats its last scan" in step.message
     assert driven_after(places, 2.4) < 0.02
 
 
-def test_a_robot_without_scans_does_not_set_out():
+def test_a_robot_without_scans_does_not_start():
     step, places = drive("scan is missing")
     assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION and "gives no scans" in step.message
     assert driven_after(places, 0.0) == pytest.approx(0.0)
 
 
-def test_a_silence_of_a_moment_is_waited_for():
+def test_robot_waits_through_a_short_gap_of_scans():
     step, _ = drive("scan is missing from 1.5 s to 3 s")
     assert isinstance(step, Succeeded)
 
 
 def test_some_lost_returns_are_no_trouble():
-    bench = Bench(START, surveyed=TWO_ROOMS)
+    bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
     for _ in range(4):
         bench.tick()
     context = bench.context()
@@ -136,9 +136,9 @@ def test_some_lost_returns_are_no_trouble():
     assert ScanHealth(bench.context()).trouble() is None
 
 
-def test_it_does_not_back_off_blindly():
-    bench = Bench(START, surveyed=TWO_ROOMS)
-    bench.robot = with_faults(bench.robot, bench.clock, ["scan is missing"])
+def test_robot_does_not_back_off_without_scans():
+    bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
+    bench.robot = inject_faults(bench.robot, bench.clock, ["scan is missing"])
     skill = BackOff(bench.context())
     skill.begin(BackOffInputs())
     step = skill.step()

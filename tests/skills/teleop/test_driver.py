@@ -1,4 +1,4 @@
-"""Driving by hand with a scripted robot: limits, what stands around, and the dead-man's switch."""
+"""Teleoperation of a scripted robot: limits, obstacles, and the dead-man's switch."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ OUT = np.array([0.0, -1.6, 1.8, 0.0, 0.4, 0.0])
 
 
 class DrivenRobot(ScriptedRobot):
-    """Notes the velocities that it is sent, and until when."""
+    """Robot that records velocities and their expiry."""
 
     def drive(self, vx, vy, wz, *, until_s, lease):
         self.__dict__.setdefault("driven", []).append(((vx, vy, wz), until_s))
@@ -36,7 +36,7 @@ class FollowingRobot(DrivenRobot):
 
 
 class WallAhead(OpenFloor):
-    """A wall stands across x = `at_m`."""
+    """A costmap with a wall across x = `at_m`."""
 
     def __init__(self, at_m):
         self.at_m = at_m
@@ -51,7 +51,7 @@ def robot():
 
 
 def driven(robot, asked, seconds, costmap=None, keys_s=None):
-    """What the robot is sent in some seconds while keys are held, for `keys_s` at the longest."""
+    """Holds keys for some seconds, for `keys_s` at the longest; returns the teleoperation."""
     hands = Teleop(context_of(robot, costmap=costmap))
     for number in range(round(seconds / OPTIONS.period_s)):
         if keys_s is None or number * OPTIONS.period_s < keys_s:
@@ -84,7 +84,7 @@ def test_the_body_is_stopped_when_keys_stop_coming(robot):
     assert len(robot.driven) <= round((0.5 + OPTIONS.life_s) / OPTIONS.period_s)
 
 
-def test_the_body_stops_at_once_when_the_key_is_let_go(robot):
+def test_the_body_stops_at_once_when_the_key_is_released(robot):
     hands = driven(robot, {"forward": 1.0}, 0.5)
     count = len(robot.driven)
     hands.ask({})
@@ -95,7 +95,7 @@ def test_the_body_stops_at_once_when_the_key_is_let_go(robot):
 def test_the_body_does_not_drive_into_a_wall(robot):
     half_m = max(x for x, _ in CAPABILITIES.footprint_m)
     hands = driven(robot, {"forward": 1.0}, 1.0, costmap=WallAhead(half_m + 0.05))
-    assert "in the way" in hands.note
+    assert "blocks the body" in hands.note
     assert velocities(robot).size == 0
 
 
@@ -104,7 +104,7 @@ def test_the_body_may_leave_a_wall_that_it_touches(robot):
     assert velocities(robot)[-1, 0] == pytest.approx(-OPTIONS.base.backward_m_s)
 
 
-def test_what_the_robot_refuses_is_said(robot):
+def test_a_refused_command_is_reported(robot):
     robot.drive_answer = CommandStatus(CommandState.REFUSED, "the lease is held by 'mission'")
     assert "the lease is held" in driven(robot, {"forward": 1.0}, 0.2).note
 
@@ -176,7 +176,7 @@ def test_the_body_rises_within_its_range(robot):
     assert robot.height_m == pytest.approx(CAPABILITIES.height_range_m[1])
 
 
-def test_nothing_is_sent_when_nothing_is_asked(robot):
+def test_no_command_is_sent_without_keys(robot):
     driven(robot, {}, 1.0)
     assert not robot.arm_commands
     assert velocities(robot).size == 0

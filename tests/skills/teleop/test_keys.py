@@ -1,19 +1,19 @@
-"""What keys and sticks ask for."""
+"""Axis values of keys and sticks."""
 
 import math
 
 import pytest
 
-from skills.teleop.keys import AXES, KEYS, asked_by, read_asked
+from skills.teleop.keys import AXES, KEYS, axis_values, read_axis_values
 
 
 def test_keys_add_up_and_opposite_ones_cancel():
-    assert asked_by(["w", "a"]) == {"forward": 1.0, "turn": 1.0}
-    assert asked_by(["w", "s"]) == {}
+    assert axis_values(["w", "a"]) == {"forward": 1.0, "turn": 1.0}
+    assert axis_values(["w", "s"]) == {}
 
 
 def test_a_stick_and_a_key_together_stay_within_one():
-    assert asked_by(["w"], {"forward": 0.7, "turn": -0.25}) == {"forward": 1.0, "turn": -0.25}
+    assert axis_values(["w"], {"forward": 0.7, "turn": -0.25}) == {"forward": 1.0, "turn": -0.25}
 
 
 def test_every_axis_has_a_key_for_each_direction():
@@ -21,12 +21,12 @@ def test_every_axis_has_a_key_for_each_direction():
     assert len(KEYS) == 2 * len(AXES)
 
 
-def test_keys_without_a_meaning_ask_for_nothing():
-    assert asked_by([" ", "p", "\x1b"]) == {}
+def test_keys_without_a_meaning_have_no_effect():
+    assert axis_values([" ", "p", "\x1b"]) == {}
 
 
 def test_a_page_asks_by_keys_and_axes():
-    assert read_asked({"keys": ["w"], "axes": {"hand_z": -0.5}}) == {"forward": 1.0, "hand_z": -0.5}
+    assert read_axis_values({"keys": ["w"], "axes": {"hand_z": -0.5}}) == {"forward": 1.0, "hand_z": -0.5}
 
 
 @pytest.mark.parametrize(
@@ -41,6 +41,6 @@ def test_a_page_asks_by_keys_and_axes():
         {"axes": {"forward": "1"}},
     ],
 )
-def test_what_is_no_such_thing_is_refused(values):
+def test_invalid_axis_values_are_refused(values):
     with pytest.raises(ValueError, match="must be"):
-        read_asked(values)
+        read_axis_values(values)

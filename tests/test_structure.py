@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 811,
     "executive/app": 7419,
     "executive/cli": 3813,
-    "skills": 25181,
+    "skills": 25198,
     "plant": 11612,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 449, 73, 9

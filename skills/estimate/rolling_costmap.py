@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -193,7 +193,7 @@ class RollingCostmap:
             seen_past,
             directions,
             math.tan(float(np.min(scan.elevations_rad))),
-            (options.hit, options.miss, options.max_range_m),
+            _Gains(options.hit, options.miss, options.max_range_m),
             own,
         )
 
@@ -263,6 +263,14 @@ def _nearest(points: FloatArray, origin: FloatArray, weight: FloatArray, stride:
     return nearest
 
 
+class _Gains(NamedTuple):
+    """Change of the log odds where a beam ends and where it passes, and the range of the beams."""
+
+    hit: float
+    miss: float
+    range_m: float
+
+
 @compiled
 def _trace(
     odds: NDArray[np.float32],
@@ -275,13 +283,13 @@ def _trace(
     seen_past: NDArray[np.bool_],
     directions: FloatArray,
     slope: float,
-    gains: tuple[float, float, float],
+    gains: _Gains,
     own: tuple[float, float, float, float],
 ) -> None:
     """Lowers the odds along each column of beams and raises them half a cell behind its end, in place.
 
-    `frame` is the size of a cell and the corner, `gains` are hit, miss and range, `slope` is that of the lowest beam.
-    Ground under the robot (outline `own`) becomes known.
+    `frame` is the size of a cell and the corner, `slope` that of the lowest beam. Ground under the robot (outline
+    `own`) becomes known.
     """
     cell, x0, y0 = frame
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -290,7 +298,7 @@ def _trace(
     for n in range(directions.shape[0]):
         reach = nearest[n, 0]
         dx, dy = math.cos(pose[2] + directions[n]), math.sin(pose[2] + directions[n])
-        free_m = min(reach - 1.5 * cell, gains[2]) if seen_past[n] else 0.0
+        free_m = min(reach - 1.5 * cell, gains.range_m) if seen_past[n] else 0.0
         for k in range(int(free_m / (0.8 * cell))):
             r = (k + 0.5) * 0.8 * cell
             i, j = int((oy + r * dy - y0) / cell), int((ox + r * dx - x0) / cell)
@@ -298,15 +306,15 @@ def _trace(
                 break
             known[i, j] = True
             if origin[2] + slope * r < heights[i, j] or odds[i, j] <= 0.0:
-                odds[i, j] = max(odds[i, j] - gains[1], _LEAST)
-        if not reach < gains[2]:
+                odds[i, j] = max(odds[i, j] - gains.miss, _LEAST)
+        if not reach < gains.range_m:
             continue
         end = reach + 0.5 * cell
         i, j = int((oy + end * dy - y0) / cell), int((ox + end * dx - x0) / cell)
         if 0 <= i < rows and 0 <= j < columns:
             known[i, j] = True
-            odds[i, j] = min(odds[i, j] + gains[0], _MOST)
-            heights[i, j] = max(heights[i, j] if odds[i, j] > gains[0] else 0.0, nearest[n, 1])
+            odds[i, j] = min(odds[i, j] + gains.hit, _MOST)
+            heights[i, j] = max(heights[i, j] if odds[i, j] > gains.hit else 0.0, nearest[n, 1])
     for a in range(int((own[1] - own[0]) / (0.7 * cell)) + 1):
         for b in range(int((own[3] - own[2]) / (0.7 * cell)) + 1):
             x, y = own[0] + 0.7 * cell * a, own[2] + 0.7 * cell * b

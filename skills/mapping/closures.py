@@ -28,7 +28,7 @@ class Window:
 
 
 @dataclass(frozen=True)
-class Found:
+class SubmapMatch:
     """The best pose, its score (0 to 1), and the score of the best pose at another place."""
 
     pose: Pose2D
@@ -45,7 +45,7 @@ def find_pose(
     least: float = 0.4,
     reach_m: float = 0.25,
     rival_m: float = 0.5,
-) -> Found | None:
+) -> SubmapMatch | None:
     """The pose about a guess where points (N, 2 or more columns) fit a grid best, None when not better than `least`.
 
     A rival lies farther than rival_m away.
@@ -60,7 +60,7 @@ def find_pose(
         return None
     place, bar = (float(best[1]), float(best[2])), 0.8 * float(best[0])
     rival = _branch_and_bound(distance, frame, points_F, yaws, centre, window.place_m, bar, reach_m, place, rival_m)
-    return Found(Pose2D(place[0], place[1], float(best[3])), float(best[0]), float(rival[0]))
+    return SubmapMatch(Pose2D(place[0], place[1], float(best[3])), float(best[0]), float(rival[0]))
 
 
 @compiled

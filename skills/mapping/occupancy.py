@@ -7,7 +7,7 @@ the robot needs are bands of its layers.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import cv2
 import numpy as np
@@ -56,10 +56,9 @@ class LayeredOccupancy:
         c, s = math.cos(X_WF.yaw_rad), math.sin(X_WF.yaw_rad)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         sensor = turn @ frame.translation + np.array([X_WF.x_m, X_WF.y_m, 0.0])
-        place = (self.origin_m[0], self.origin_m[1], self.resolution_m, self._max_range_m, self._layer_m)
         _trace(
             self.values,
-            place,
+            _Frame(*self.origin_m, self.resolution_m, self._layer_m, self._max_range_m),
             frame.ranges_m[:, first::stride].copy(),
             frame.elevations_rad,
             frame.azimuths_rad[first::stride].copy(),
@@ -140,10 +139,20 @@ class LayeredOccupancy:
             self.origin_m = (low[0], low[1])
 
 
+class _Frame(NamedTuple):
+    """Corner of the grid, sizes of its cells and layers, and the range of the beams."""
+
+    x0_m: float
+    y0_m: float
+    cell_m: float
+    layer_m: float
+    range_m: float
+
+
 @compiled
 def _trace(
     values: Values,
-    place: tuple[float, float, float, float, float],
+    frame: _Frame,
     ranges: NDArray[np.float32],
     elevations: FloatArray,
     azimuths: FloatArray,
@@ -163,14 +172,14 @@ def _trace(
             dy = rotation[1, 0] * ca + rotation[1, 1] * sa + rotation[1, 2] * se
             dz = rotation[2, 0] * ca + rotation[2, 1] * sa + rotation[2, 2] * se
             flat = math.hypot(dx, dy)
-            end = min(r, place[3] / max(flat, 1e-3))
-            last_row = math.floor((sensor[1] + r * dy - place[1]) / place[2])
-            last_column = math.floor((sensor[0] + r * dx - place[0]) / place[2])
-            steps = math.floor(end * flat / place[2])
+            end = min(r, frame.range_m / max(flat, 1e-3))
+            last_row = math.floor((sensor[1] + r * dy - frame.y0_m) / frame.cell_m)
+            last_column = math.floor((sensor[0] + r * dx - frame.x0_m) / frame.cell_m)
+            steps = math.floor(end * flat / frame.cell_m)
             before_row, before_column, before_layer = -1, -1, -1
-            u, v = (sensor[0] - place[0]) / place[2], (sensor[1] - place[1]) / place[2]
-            w, du, dv = (sensor[2] - LOWEST_M) / place[4], dx / flat, dy / flat
-            dw = dz / flat * place[2] / place[4]
+            u, v = (sensor[0] - frame.x0_m) / frame.cell_m, (sensor[1] - frame.y0_m) / frame.cell_m
+            w, du, dv = (sensor[2] - LOWEST_M) / frame.layer_m, dx / flat, dy / flat
+            dw = dz / flat * frame.cell_m / frame.layer_m
             for n in range(steps):
                 height = w + (n + 0.5) * dw
                 if height < 0.0 or height >= layers:
@@ -182,7 +191,7 @@ def _trace(
                     continue
                 before_row, before_column, before_layer = row, column, layer
                 values[layer, row, column] = max(values[layer, row, column] + _MISS, -_MOST)
-            layer = math.floor((sensor[2] + r * dz - LOWEST_M) / place[4])
+            layer = math.floor((sensor[2] + r * dz - LOWEST_M) / frame.layer_m)
             if end == r and 0 <= layer < layers:
                 old = values[layer, last_row, last_column]
                 values[layer, last_row, last_column] = min(old + _HIT, _MOST)

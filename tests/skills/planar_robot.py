@@ -277,7 +277,7 @@ class NamingWorker(LockStepWorker):
 class Bench:
     """A robot among boxes with its estimators, advanced as the runner would do it. `surveyed` is what the maps know.
 
-    `component` makes the localiser, which is `told` where it starts, or not.
+    `component` makes the localiser, whose start is known or not.
     """
 
     def __init__(
@@ -290,14 +290,15 @@ class Bench:
         seed: int = 0,
         cameras: bool = True,
         component: LocaliserComponent | None = None,
-        told: bool = True,
+        start_known: bool = True,
         base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL,
     ) -> None:
         self.clock = PlanarClock()
         world = [*surveyed, *unmapped]
         self.robot = PlanarRobot(self.clock, world, start, seed=seed, cameras=cameras, base_kind=base_kind)
-        believed = (believed_start or start) if told else None
-        self.localiser = (component or LocaliserOptions()).build(grid_of(surveyed, (0.7, 1.3)), believed, surely=told)
+        believed = (believed_start or start) if start_known else None
+        grid = grid_of(surveyed, (0.7, 1.3))
+        self.localiser = (component or LocaliserOptions()).build(grid, believed, surely=start_known)
         self.costmap = LayeredCostmap(grid_of(surveyed, (0.05, 1.0)))
         self.worker = NamingWorker(self.clock)
         self.published: list[tuple[str, Mapping[str, Any]]] = []

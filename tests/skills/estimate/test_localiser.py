@@ -148,15 +148,15 @@ def surrounded_bench() -> tuple[Bench, np.ndarray]:
     return Bench(Pose2D(4.3, 5.6, 0.0), unmapped=others), np.array([[*middle, 0.6] for middle in middles])
 
 
-@pytest.mark.parametrize("told", [True, False])
-def test_localisation_holds_among_robots_that_report_their_poses(told: bool) -> None:
+@pytest.mark.parametrize("reported", [True, False])
+def test_localisation_holds_among_robots_that_report_their_poses(reported: bool) -> None:
     """Most of what it sees are the others: left out, the rest is enough; taken for walls, it is lost."""
     bench, discs_W = surrounded_bench()
-    if told:
+    if reported:
         bench.localiser.leave_out(discs_W)
     for _ in range(30):
         bench.tick()
-    assert bench.localiser.estimate().localised == told
+    assert bench.localiser.estimate().localised == reported
 
 
 def test_a_scan_of_other_robots_only_does_not_delocalise() -> None:
@@ -196,7 +196,7 @@ def test_covariance_grows_with_the_distance():
 
 
 def test_an_unknown_start_is_the_origin():
-    bench = Bench(CORRIDOR, component=DeadReckoning(), told=False, cameras=False)
+    bench = Bench(CORRIDOR, component=DeadReckoning(), start_known=False, cameras=False)
     bench.tick()
     pose = bench.context().pose()
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)

@@ -65,7 +65,7 @@ def test_a_kidnapped_robot_is_localised_again_within_a_turn(there):
 
 
 def test_a_robot_with_unknown_start_is_localised_while_it_turns():
-    bench = bench_at(Pose2D(8.0, 2.3, 2.0), told=False)
+    bench = bench_at(Pose2D(8.0, 2.3, 2.0), start_known=False)
     assert not bench.localiser.estimate().localised
     first = np.sqrt(np.diag(bench.localiser.estimate().covariance))
     assert first[0] > 1.0 and first[2] > 1.0
@@ -76,7 +76,7 @@ def test_a_robot_with_unknown_start_is_localised_while_it_turns():
 
 
 def test_a_symmetric_room_does_not_localise_the_robot():
-    bench = bench_at(Pose2D(2.0, 1.5, 0.3), surveyed=EMPTY_ROOM, told=False)
+    bench = bench_at(Pose2D(2.0, 1.5, 0.3), surveyed=EMPTY_ROOM, start_known=False)
     for _ in range(200):
         tick(bench, 1, (0.0, 0.0, 0.5))
         assert not bench.localiser.estimate().localised
@@ -172,7 +172,7 @@ def test_particles_gather_at_an_accepted_estimate():
 def test_where_nothing_fits_it_is_not_localised():
     spots = np.random.default_rng(5).uniform(20.0, 26.0, (60, 2))
     pillars = [Box(x, y, x + 0.15, y + 0.15) for x, y in spots if math.hypot(x - 23, y - 23) > 1]
-    bench = bench_at(Pose2D(23.0, 23.0, 0.3), surveyed=TWO_ROOMS, unmapped=pillars, told=False)
+    bench = bench_at(Pose2D(23.0, 23.0, 0.3), surveyed=TWO_ROOMS, unmapped=pillars, start_known=False)
     tick(bench, 100, (0.0, 0.0, 0.5))
     assert not bench.localiser.estimate().localised
 
@@ -180,7 +180,7 @@ def test_where_nothing_fits_it_is_not_localised():
 def test_equal_seeds_give_equal_estimates():
     poses = []
     for _ in range(2):
-        bench = bench_at(Pose2D(8.0, 2.3, 2.0), told=False)
+        bench = bench_at(Pose2D(8.0, 2.3, 2.0), start_known=False)
         tick(bench, 40, (0.0, 0.0, 0.5))
         poses.append(bench.context().pose())
     assert poses[0] == poses[1]

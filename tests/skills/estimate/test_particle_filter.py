@@ -86,10 +86,10 @@ def test_a_beam_that_no_particle_explains_is_skipped():
     assert off[0.3] != pytest.approx(off[0.0])
     particles = filter_on(skip_share=0.3, skip_m=0.3)
     particles.place(HERE, TIGHT)
-    kept = particles._explained(beams_at(HERE, (*ROOM, person)))
+    used = particles._explained(beams_at(HERE, (*ROOM, person)))
     blocked = np.hypot(*(beams_at(HERE, (*ROOM, person)) - beams_at(HERE, ROOM)).T) > 0.6
-    assert blocked.any() and not kept[blocked].any()
-    assert kept[~blocked].mean() > 0.8
+    assert blocked.any() and not used[blocked].any()
+    assert used[~blocked].mean() > 0.8
 
 
 def test_no_beam_is_skipped_where_most_of_them_are_unexplained():

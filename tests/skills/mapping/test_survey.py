@@ -120,8 +120,8 @@ def an_edge(**values):
 
 def change_arrays(**values):
     def change(folder):
-        with np.load(folder / "keyframes.npz") as kept:
-            arrays = dict(kept)
+        with np.load(folder / "keyframes.npz") as file:
+            arrays = dict(file)
         np.savez(folder / "keyframes.npz", **{**arrays, **values})
 
     return change
@@ -172,7 +172,7 @@ def test_abandoned_frontiers_are_tried_again_from_home():
     trip, drive, first = Trip(pose=Pose2D(1.0, 1.0, 0.0), boxes=SIDE_ROOM), PlanarRobot.drive, True
 
     def held(vx, vy, wz, *, until_s, lease):
-        """Something keeps the robot from the side room until it has been home."""
+        """Blocks the side room until the robot has been home."""
         nonlocal first
         purpose, pose = trip.survey.goal
         first = first and purpose != "the start"

@@ -26,9 +26,9 @@ class Drive:
         fixed = list(self.bench.robot.boxes)
         skill = Navigate(self.bench.context(), options)
         skill.begin(NavigateInputs(GOAL))
-        self.gaps, self.told, step = [], [], skill.step()
+        self.gaps, self.messages, step = [], [], skill.step()
         while isinstance(step, Running) and self.bench.clock.now() < most_s:
-            self.told.append(step.message)
+            self.messages.append(step.message)
             x, there = self.bench.robot.pose.x_m, None
             there = place(self.bench.clock.now(), x)
             self.bench.robot.boxes[:] = fixed if there is None else [*fixed, person_at(*there)]
@@ -51,7 +51,7 @@ class Drive:
         return min((gap for gap, speed, _ in self.gaps[:through] if speed > 0.05), default=np.inf)
 
     def stood(self):
-        return [one for one in self.told if "an obstacle comes into the path" in one]
+        return [one for one in self.messages if "an obstacle comes into the path" in one]
 
 
 class Crossing:
@@ -63,8 +63,8 @@ class Crossing:
     def __call__(self, now_s, robot_x):
         if robot_x >= self.from_x and self.since_s is None:
             self.since_s = now_s
-        way = 0.0 if self.since_s is None else min(abs(self.y1 - self.y0), self.speed_m_s * (now_s - self.since_s))
-        return self.x, self.y0 + np.sign(self.y1 - self.y0) * way
+        walked_m = 0.0 if self.since_s is None else min(abs(self.y1 - self.y0), self.speed_m_s * (now_s - self.since_s))
+        return self.x, self.y0 + np.sign(self.y1 - self.y0) * walked_m
 
 
 @pytest.mark.parametrize("from_x", [2.0, 2.7, 3.3])

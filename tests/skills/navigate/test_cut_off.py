@@ -112,8 +112,8 @@ def test_a_pose_nearby_that_can_be_reached_keeps_the_failure_from_being_final():
 
 
 def test_one_sentence_names_all_closed_doors():
-    told = closed_doors_sentence((LEFT, RIGHT), KITCHEN)
-    assert told == (
+    sentence = closed_doors_sentence((LEFT, RIGHT), KITCHEN)
+    assert sentence == (
         "The doors between the study and the corridor, and between the corridor and the kitchen, are closed, "
         "so no path leads to (8.50, 2.00)."
     )

@@ -127,7 +127,7 @@ def test_robot_stops_before_a_reserved_path() -> None:
 
 def test_robot_on_a_reserved_path_finds_a_waiting_pose_off_it() -> None:
     """| stands at | blocks the path | its waiting pose |
-    | (3, 0) | yes | at least 0.25 m off the way |
+    | (3, 0) | yes | at least 0.25 m off the path |
     | (0, 0) | no | - |"""
     giving, footprint = among("bob")
     assert giving.blocked_robots(Pose2D(3.0, 0.0, 0.0), footprint) == ["alice"]

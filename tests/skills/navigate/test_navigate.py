@@ -271,15 +271,15 @@ class WaitingWorker(NamingWorker):
 
 
 def test_drive_is_equal_with_work_inline_or_in_a_thread():
-    ways = []
+    drives = []
     for worker in (NamingWorker, WaitingWorker):
-        bench, way = Bench(START, unmapped=[Box(3.5, 3.4, 3.7, 3.6)]), []
+        bench, poses = Bench(START, unmapped=[Box(3.5, 3.4, 3.7, 3.6)]), []
         bench.worker = worker(bench.clock)
-        go(bench, CORRIDOR, each=lambda bench=bench, way=way: way.append(str(bench.robot.pose)))
-        ways.append((way, bench.worker.names))
+        go(bench, CORRIDOR, each=lambda bench=bench, poses=poses: poses.append(str(bench.robot.pose)))
+        drives.append((poses, bench.worker.names))
         bench.worker.close()
-    assert len(ways[0][0]) > 50
-    assert ways[0] == ways[1]
+    assert len(drives[0][0]) > 50
+    assert drives[0] == drives[1]
 
 
 def test_robot_plans_around_a_new_obstacle_without_standing():

@@ -40,10 +40,10 @@ class Drive:
         context = replace(self.bench.context(), detector=found) if detector else self.bench.context()
         skill = Navigate(context, options)
         skill.begin(NavigateInputs(goal))
-        self.speeds, self.told, self.nearest_m = [], [], math.inf
+        self.speeds, self.messages, self.nearest_m = [], [], math.inf
         step = skill.step()
         while isinstance(step, Running) and self.bench.clock.now() < 90.0:
-            self.told.append(step.message)
+            self.messages.append(step.message)
             self.bench.tick()
             if until is not None:
                 until(self)
@@ -54,7 +54,7 @@ class Drive:
         self.step = step
 
     def from_people_m(self):
-        """From the outline to the axis of the nearest person or thing that was not surveyed."""
+        """Distance (m) from the outline to the axis of the nearest person or unmapped object."""
         there = [box for box in self.bench.robot.boxes if box.z1 == person_at(0.0, 0.0).z1]
         centres = np.array([(0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1)) for box in there]).reshape(-1, 2)
         discs = disc_centres(FOOTPRINT.discs, pose_array([self.bench.robot.pose]))[0]
@@ -69,7 +69,7 @@ class Drive:
         return max(speed for x_m, speed in self.speeds if low_m <= x_m <= high_m)
 
     def waited(self):
-        return sum("waiting for a person" in one for one in self.told) * 0.05
+        return sum("waiting for a person" in one for one in self.messages) * 0.05
 
 
 @pytest.fixture(scope="module")

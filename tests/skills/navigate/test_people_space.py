@@ -28,7 +28,7 @@ def person(x, y=0.0):
     return SeenPerson((x, y), np.eye(2) * 0.01, 0.9, 0.0, HERE, 2)
 
 
-def way(length_m=1.2):
+def path_ahead(length_m=1.2):
     """Poses straight ahead."""
     x = np.arange(0.0, length_m + 1e-9, 0.05)
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
@@ -36,7 +36,7 @@ def way(length_m=1.2):
 
 def pace(*people, manager=None, now_s=0.0, ahead=None, goal=FAR_GOAL):
     manager = manager or PaceManager(FOOTPRINT)
-    return manager.pace(now_s, HERE, way() if ahead is None else ahead, people, FULL_M_S, goal)
+    return manager.pace(now_s, HERE, path_ahead() if ahead is None else ahead, people, FULL_M_S, goal)
 
 
 def test_distances_are_from_the_outline():
@@ -45,31 +45,31 @@ def test_distances_are_from_the_outline():
 
 
 @pytest.mark.parametrize(
-    # a person aside of the way: outline to axis (m) -> speed (m/s)
+    # a person beside the path: outline to axis (m) -> speed (m/s)
     ("aside_m", "expected"),
     [(3.0, math.inf), (2.5, math.inf), (1.75, 0.55), (1.0, 0.3), (0.85, 0.3)],
 )
 def test_speed_falls_with_the_distance(aside_m, expected):
-    told = pace(person(0.6, 0.25 + aside_m))
-    assert told.most_m_s == pytest.approx(expected, abs=0.02)
-    assert not told.waiting
+    result = pace(person(0.6, 0.25 + aside_m))
+    assert result.most_m_s == pytest.approx(expected, abs=0.02)
+    assert not result.waiting
 
 
 def test_robot_slows_down_before_a_person_ahead_is_near():
     # 3.4 m ahead of the body: 2.85 m from the outline now, 1.65 m in 1.2 m
-    told = pace(person(3.4))
-    assert told.most_m_s == pytest.approx(0.3 + (1.65 - 1.0) / 1.5 * 0.5, abs=0.02)
+    result = pace(person(3.4))
+    assert result.most_m_s == pytest.approx(0.3 + (1.65 - 1.0) / 1.5 * 0.5, abs=0.02)
 
 
 def test_robot_waits_for_a_person_near_its_path_and_then_passes_slowly():
     manager, options = PaceManager(FOOTPRINT), SpaceOptions()
-    told = [pace(person(2.0), manager=manager, now_s=0.1 * k) for k in range(60)]
-    stood = [one for one in told if one.waiting]
+    result = [pace(person(2.0), manager=manager, now_s=0.1 * k) for k in range(60)]
+    stood = [one for one in result if one.waiting]
     assert len(stood) == pytest.approx(10 * options.patience_s, abs=2)
     assert {one.most_m_s for one in stood} == {0.0}
     assert [one.overdue for one in stood].count(True) == 1
     assert stood[-1].overdue
-    assert told[-1].most_m_s == options.pass_m_s
+    assert result[-1].most_m_s == options.pass_m_s
 
 
 def test_patience_starts_again_when_nobody_was_near_for_a_while():
@@ -83,27 +83,27 @@ def test_patience_starts_again_when_nobody_was_near_for_a_while():
 
 
 def test_robot_does_not_wait_when_its_path_leads_away_from_a_person():
-    backwards = way() * [-1.0, 1.0, 1.0]
-    told = pace(person(1.2), ahead=backwards)
-    assert not told.waiting
-    assert 0.5 < told.most_m_s < 0.7
+    backwards = path_ahead() * [-1.0, 1.0, 1.0]
+    result = pace(person(1.2), ahead=backwards)
+    assert not result.waiting
+    assert 0.5 < result.most_m_s < 0.7
 
 
 def test_robot_reaches_a_goal_before_a_person_slowly_without_waiting():
     # at the goal 0.6 m from the outline to the axis
-    told = pace(person(1.95), goal=Pose2D(0.8, 0.0, 0.0), ahead=way(0.8))
-    assert not told.waiting
-    assert told.most_m_s == pytest.approx(0.3)
+    result = pace(person(1.95), goal=Pose2D(0.8, 0.0, 0.0), ahead=path_ahead(0.8))
+    assert not result.waiting
+    assert result.most_m_s == pytest.approx(0.3)
 
 
 def test_a_distant_person_does_not_limit_the_speed():
-    told = pace(person(8.0), person(0.0, 6.0))
-    assert (told.most_m_s, told.person) == (math.inf, None)
+    result = pace(person(8.0), person(0.0, 6.0))
+    assert (result.most_m_s, result.person) == (math.inf, None)
 
 
 def test_a_low_speed_limit_stays():
     manager = PaceManager(FOOTPRINT)
-    assert manager.pace(0.0, HERE, way(), [person(0.6, 2.0)], 0.2, FAR_GOAL).most_m_s <= 0.2
+    assert manager.pace(0.0, HERE, path_ahead(), [person(0.6, 2.0)], 0.2, FAR_GOAL).most_m_s <= 0.2
 
 
 def test_people_are_obstacles_in_the_costmap():

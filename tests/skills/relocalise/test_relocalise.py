@@ -133,7 +133,7 @@ def test_where_there_is_no_room_it_neither_turns_nor_drives():
 @pytest.mark.parametrize("seed", [0, 1])
 def test_started_in_one_of_two_rooms_that_look_alike_it_finds_out_which(seed):
     component = MonteCarloOptions(particles=FilterOptions(seed=seed))
-    bench = Bench(Pose2D(2.0, 1.5, 0.3), surveyed=TWIN_ROOMS, component=component, told=False)
+    bench = Bench(Pose2D(2.0, 1.5, 0.3), surveyed=TWIN_ROOMS, component=component, start_known=False)
     bench.tick()
     step, said = outcome(bench)
     assert isinstance(step, Succeeded), step

@@ -90,7 +90,7 @@ class QueueServer:
         if left is not None:
             raise interrupted_error(self._missions, left)
         aside = [
-            self._runner.set_aside(each, f"it was started {each.starts} times and broken off")
+            self._runner.set_aside(each, f"it was started {each.starts} times and interrupted")
             for each in interrupted
             if each.starts >= MOST_STARTS
         ]

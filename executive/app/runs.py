@@ -158,9 +158,9 @@ class MissionRuns:
         """
         if not mission.queued:
             for other in self._missions.missions(MissionState.RUNNING) if mission.state is MissionState.QUEUED else ():
-                what = f"broken off, and given up for mission {mission.id}"  # its world is replaced
+                what = f"interrupted, and given up for mission {mission.id}"  # its world is replaced
                 self._missions.finish(other.id, MissionState.CANCELLED, what)
-                self._screen.tell(f"Mission {other.id} ({other.request.name}) had been broken off; it is given up.")
+                self._screen.tell(f"Mission {other.id} ({other.request.name}) had been interrupted; it is given up.")
             return self._run(mission, prepared)
         try:
             return self._run(mission, prepared)
@@ -379,7 +379,7 @@ def _other_version(store: MissionStore, mission: StoredMission) -> InputError:
 
 def interrupted_error(missions: MissionStore, mission: StoredMission) -> InputError:
     """Returns the error that an interrupted mission must be resumed first."""
-    what = f"mission {mission.id} ({mission.request.name}) was broken off"
+    what = f"mission {mission.id} ({mission.request.name}) was interrupted"
     return InputError(what, hint="`errand resume` goes on with it and then with the queue", file=missions.path)
 
 

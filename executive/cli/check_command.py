@@ -1,4 +1,4 @@
-"""`errand check`: mission files validated and planned without running them."""
+"""`errand check` validates mission files and plans them without running them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def check(
 
 
 def to_json(checked: Sequence[Checked]) -> dict[str, Any]:
-    """All files as one object: `ok`, errors, warnings, the number of nodes, the commands, and an estimate of each."""
+    """Returns one object for all files: `ok`, errors, warnings, the number of nodes, commands, and estimates."""
     trees = [tree for one in checked for tree in one.trees]
     return {
         "ok": all(one.ok for one in checked),
@@ -55,7 +55,7 @@ def to_json(checked: Sequence[Checked]) -> dict[str, Any]:
 
 
 def _estimate_json(one: Checked) -> dict[str, Any]:
-    """The estimate of a file; `most_s` is null where nobody knows how long it may take."""
+    """Returns the estimate of a file; `most_s` is null if it has no upper limit."""
     taken = one.estimate
     return {
         "file": str(one.file),
@@ -73,7 +73,7 @@ def _error_json(error: InputError) -> dict[str, Any]:
 
 
 def _show(one: Checked, console: Console, *, verbose: bool) -> None:
-    """One line on the file; its errors, and with `verbose` its commands and its tree, below."""
+    """Prints a line on the file and its errors; with `verbose` also its commands and its tree."""
     mark = "[green]✓[/green]" if one.ok else "[red]✗[/red]"
     found = _in_words(one.estimate) if one.ok else count_text(len(one.errors), "error")
     console.print(f"{mark} [bold]{escape(one_line(str(one.file)))}[/bold]: {found}")
@@ -88,17 +88,15 @@ def _show(one: Checked, console: Console, *, verbose: bool) -> None:
 
 
 def _in_words(estimate: Estimate) -> str:
-    charge = f"{estimate.charge:.1%} of the battery" if estimate.charge <= 1.0 else "more than one charge"
-    return f"{_range_in_words(estimate)}, {estimate.distance_m:.0f} m of driving and {charge} when all goes well"
-
-
-def _range_in_words(estimate: Estimate) -> str:
-    """How long it takes: "about 2 min 05 s", "2 min 05 s to 5 min 10 s (1 to 3 rounds)"."""
+    """Formats an estimate; its time is "about 2 min 05 s" or "2 min 05 s to 5 min 10 s (1 to 3 rounds)"."""
     least = _minutes(estimate.duration_s)
     if round(estimate.spare_s if math.isfinite(estimate.spare_s) else 1.0) == 0:
-        return f"about {least}"
-    most = "or more" if math.isinf(estimate.spare_s) else f"to {_minutes(estimate.most_s)}"
-    return f"{least} {most} ({'; '.join(estimate.reasons)})"
+        time = f"about {least}"
+    else:
+        most = "or more" if math.isinf(estimate.spare_s) else f"to {_minutes(estimate.most_s)}"
+        time = f"{least} {most} ({'; '.join(estimate.reasons)})"
+    charge = f"{estimate.charge:.1%} of the battery" if estimate.charge <= 1.0 else "more than one charge"
+    return f"{time}, {estimate.distance_m:.0f} m of driving and {charge} when all goes well"
 
 
 def _minutes(duration_s: float) -> str:

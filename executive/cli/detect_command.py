@@ -1,4 +1,4 @@
-"""`errand detect`: what the detector sees in pictures."""
+"""`errand detect` finds objects in picture files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MOST_PIXELS_TOGETHER: Final = 8_000_000
 
 @dataclass(frozen=True)
 class PictureResult:
-    """A picture file, and where it is drawn: what was found, its share of the time (ms), or why it cannot be read."""
+    """Result for a picture file: detections and time (ms), or the error why it cannot be read."""
 
     file: Path
     drawing: Path | None
@@ -36,7 +36,7 @@ class PictureResult:
     error: InputError | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """As JSON values; `error` only where there is one."""
+        """Returns JSON values; with `error` only if there is one."""
         found = [
             {"class": one.class_name, "score": round(one.score, 4), "box": [round(value, 2) for value in one.box]}
             for one in self.found
@@ -47,29 +47,29 @@ class PictureResult:
 
 def detect(
     images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Pictures: PNG, JPEG, WebP, TIFF, BMP.")],
-    threshold: Annotated[float, quantity_option(Share, help="The least score that is reported.")] = 0.5,
-    model: Annotated[Path | None, typer.Option(help="Another detector's file; else the one of Errand.")] = None,
-    draw: Annotated[Path | None, typer.Option(help="A folder for the pictures with boxes drawn.")] = None,
+    threshold: Annotated[float, quantity_option(Share, help="Least score of a reported detection.")] = 0.5,
+    model: Annotated[Path | None, typer.Option(help="File of another detector.")] = None,
+    draw: Annotated[Path | None, typer.Option(help="Folder for the pictures with boxes.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Finds beer, coke, extinguishers, hammers, screwdrivers, wrenches, people, cylinders and cubes in pictures.
 
-    A picture that cannot be read does not keep the others from being looked at; the exit status is 2 then.
+    If a picture cannot be read, the others are processed nevertheless, and the exit status is 2.
     """
     detector = open_detector(model, DetectorOptions(threshold=threshold))
     names: Sequence[Path | None] = [None] * len(images) if draw is None else _drawing_names(images, draw)
-    looked = [one for group in _groups(zip(images, names, strict=True)) for one in _look(detector, group)]
-    for one in looked:
+    results = [one for group in _groups(zip(images, names, strict=True)) for one in _detect(detector, group)]
+    for one in results:
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)
     if not as_json:
-        _show(console_for(as_json), looked)
-    good = all(one.error is None for one in looked)
-    finish([one.to_json() for one in looked], as_json, good=good, otherwise=BAD_INPUT)
+        _show(console_for(as_json), results)
+    good = all(one.error is None for one in results)
+    finish([one.to_json() for one in results], as_json, good=good, otherwise=BAD_INPUT)
 
 
 def _groups(files: Iterable[tuple[Path, Path | None]]) -> Iterator[list[PictureResult]]:
-    """The files read, in groups that are looked at together: some pictures, or one that is very large."""
+    """Reads the files, and yields them in batches: several pictures, or a single very large one."""
     group, pixels = list[PictureResult](), 0
     for file, drawing in files:
         try:
@@ -85,8 +85,8 @@ def _groups(files: Iterable[tuple[Path, Path | None]]) -> Iterator[list[PictureR
         yield group
 
 
-def _look(detector: Detector, group: Sequence[PictureResult]) -> Iterator[PictureResult]:
-    """What is seen in each file, drawn where wished. Raises InputError when a drawing cannot be written."""
+def _detect(detector: Detector, group: Sequence[PictureResult]) -> Iterator[PictureResult]:
+    """Detects objects in a batch, and writes drawings. Raises InputError if a drawing cannot be written."""
     pictures = [one.picture for one in group if one.picture is not None]
     begun = time.perf_counter()
     found = iter(detector.detect(pictures))
@@ -102,7 +102,7 @@ def _look(detector: Detector, group: Sequence[PictureResult]) -> Iterator[Pictur
 
 
 def _drawing_names(images: Sequence[Path], folder: Path) -> Sequence[Path]:
-    """Where each picture is drawn: under its own name, numbered where two have the same."""
+    """Returns a file for each picture's drawing, under the picture's name; equal names get numbers."""
     names = list[Path]()
     for image in images:
         stems = [image.stem, *(f"{image.stem}-{k}" for k in range(2, len(images) + 1))]
@@ -110,9 +110,10 @@ def _drawing_names(images: Sequence[Path], folder: Path) -> Sequence[Path]:
     return names
 
 
-def _show(console: Console, looked: Sequence[PictureResult]) -> None:
+def _show(console: Console, results: Sequence[PictureResult]) -> None:
+    """Prints a table of the detections."""
     table = list[tuple[str, ...]]()
-    for one in looked:
+    for one in results:
         values = [(d.class_name, f"{d.score:.2f}", ", ".join(f"{value:.0f}" for value in d.box)) for d in one.found]
         rows = values or [("cannot be read" if one.error else "nothing", "", "")]
         for k, row in enumerate(rows):

@@ -1,6 +1,6 @@
-"""The command line: each command's module is imported when that command is asked for, and no sooner.
+"""Entry point of the command line, which imports the module of a command only when the command runs.
 
-Help and start-up would otherwise import the plant, the sentence parser and the detector for everything.
+Otherwise the help would import the plant, the sentence parser and the detector.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typer.main import get_command
 from skills.files.errors import MOST_LETTERS, InputError, listing, one_line
 
 _COLLECTED_AFTER: Final = (30_000, 20, 50)
-"""So many new objects, collections of young ones, and of middle-aged ones: imports make many objects that all stay."""
+"""Thresholds of the three generations of garbage collection; imports create many objects that all stay."""
 
 
 COMMANDS_GROUP: Final = "errand.commands"
@@ -37,7 +37,7 @@ _KNOWN: Final[Mapping[str, str]] = {"dataset": "errand-train"}
 
 @dataclass(frozen=True)
 class _Command:
-    """The module of a command, the function or `typer.Typer` in it, and its line in the help."""
+    """Command of Errand: its module, the function or `typer.Typer` in it, and its help."""
 
     module: str
     attribute: str
@@ -58,43 +58,43 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     ),
     "log": _Command("inspect_command", "log", "Print what each node of a run did and why, detections and the outcome."),
     "replay": _Command("inspect_command", "replay", "Show a run at any time of it: tree, map, pictures, events, 3D."),
-    "queue": _Command("queue_command", "queue", "Missions kept in a store, to be run one after another."),
-    "fleet": _Command("fleet_command", "fleet", "What is queued, given out among several robots."),
+    "queue": _Command("queue_command", "queue", "Store missions, and run them one after another."),
+    "fleet": _Command("fleet_command", "fleet", "Run the queued missions with several robots."),
     "resume": _Command("queue_command", "resume", "Resume the mission that was interrupted; then run its queue."),
     "evaluate": _Command(
         "evaluate_command",
         "evaluate",
-        "Run a scenario file, or a mission at many seeds; count claims and what the referee saw.",
+        "Run an evaluation file, or a mission at many seeds; count claims and the referee's verdicts.",
     ),
     "report": _Command("evaluate_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "stack": _Command("plugins_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
-    "map": _Command("map_command", "map_group", "Maps that the robot makes itself, by exploring or along a route."),
-    "world": _Command("world_command", "world", "Worlds made of any map, and how a world looks."),
-    "object": _Command("object_command", "object_group", "Objects of your own: any mesh becomes a model for worlds."),
-    "plugins": _Command("plugins_command", "plugins", "What other distributions add, and what of it is broken."),
+    "map": _Command("map_command", "map_group", "Maps that the robot builds itself, by exploring or along a route."),
+    "world": _Command("world_command", "world", "Worlds from any map, and drawings of worlds."),
+    "object": _Command("object_command", "object_group", "Objects of your own: import any mesh as a model."),
+    "plugins": _Command("plugins_command", "plugins", "List the plug-ins of other distributions, and errors in them."),
     "warm-up": _Command(
         "robot_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
     ),
     "new-skill": _Command("missions_command", "new_skill", "Write an installable package with a skill and tests."),
 }
-"""The commands of Errand by name, in the order of the help; those of plug-ins follow them."""
+"""Commands of Errand by name, in the order of the help; commands of plug-ins follow them."""
 
 
 def shipped_command(name: str) -> Any:
-    """The command of a name; imports its module. Raises KeyError."""
+    """Imports and returns the command of a name. Raises KeyError."""
     entry = COMMANDS[name]
     return as_command(name, getattr(import_module(f"executive.cli.{entry.module}"), entry.attribute))
 
 
 def as_command(name: str, found: Any) -> Any:
-    """The command that a `typer.Typer` or a function with typer's options makes. Raises TypeError for anything else."""
+    """Converts a `typer.Typer`, or a function with typer's options, to a command. Raises TypeError."""
     if isinstance(found, typer.Typer):
         return get_command(found)
     if not isinstance(found, FunctionType):
         raise TypeError("it is neither a typer.Typer nor a function")
-    from executive.cli.options import StartCommand  # which loads what a request is
+    from executive.cli.options import StartCommand  # loads the model of requests
 
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     alone.command(name=name, cls=StartCommand)(found)
@@ -102,9 +102,9 @@ def as_command(name: str, found: Any) -> Any:
 
 
 def help_lines(shipped: Collection[str]) -> dict[str, str]:
-    """The commands of plug-ins by name, each with the summary of its distribution. Imports none of their code.
+    """Returns the commands of plug-ins by name, with the summary of each distribution, without importing them.
 
-    It reads the metadata files itself, because importing `importlib.metadata` takes longer than the whole help.
+    Reads the metadata files itself, because importing `importlib.metadata` takes longer than the whole help.
     """
     lines = dict[str, str]()
     for folder in map(Path, sys.path):
@@ -128,7 +128,7 @@ def _text(file: Path) -> str:
 
 
 def plugin_command(name: str) -> Any | None:
-    """The command of a plug-in, or None if no distribution registers the name.
+    """Loads the command of a plug-in; returns None if no distribution registers the name.
 
     Raises InputError if the command cannot be loaded, several distributions register it, or it belongs to errand-train,
     which is not installed.
@@ -153,7 +153,7 @@ def plugin_command(name: str) -> Any | None:
 
 
 class _LazyGroup(TyperGroup):
-    """Lists all commands by their line of help, imports the one that is resolved, and shows errors of usage short."""
+    """Group of all commands, which imports a command when it is resolved, and shortens error messages."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -161,14 +161,14 @@ class _LazyGroup(TyperGroup):
             self.add_command(TyperCommand(name, help=entry.help))
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """All names, those of plug-ins last."""
+        """Lists all names, those of plug-ins last."""
         for name, line in help_lines(COMMANDS).items():
             if name not in self.commands:
                 self.add_command(TyperCommand(name, help=line))
         return super().list_commands(ctx)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that the first argument names, imported."""
+        """Imports and returns the command that the first argument names."""
         if args and args[0] in COMMANDS:
             self.add_command(shipped_command(args[0]), args[0])
         elif args and (found := plugin_command(args[0])) is not None:
@@ -176,7 +176,7 @@ class _LazyGroup(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
-        """As typer's. What is refused ends it with one line; a message that repeats an endless word is shown short."""
+        """Invokes a command as typer does; bad input ends it with one line, and long messages are cut."""
         try:
             return super().invoke(ctx)
         except (InputError, OSError) as error:
@@ -207,9 +207,9 @@ def _errand() -> None:
 
 
 def main() -> NoReturn:
-    """The entry point of the console script. It ends the process, once all is flushed and no thread works any more.
+    """Runs the command line, and ends the process when output is flushed and all threads have ended.
 
-    Python would take apart all modules first, which takes longer than some commands.
+    Python's own end would destroy all modules first, which takes longer than some commands.
     """
     gc.set_threshold(*_COLLECTED_AFTER)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else it reads the files of all distributions
@@ -220,7 +220,7 @@ def main() -> NoReturn:
         code = end.code
     if not isinstance(code, int | None):
         sys.exit(code)  # type: ignore[arg-type]
-    with suppress(OSError, ValueError):  # whoever read the output is gone: Python itself tells
+    with suppress(OSError, ValueError):  # the reader of the output is gone; Python reports it
         threading._shutdown()  # type: ignore[attr-defined]
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
@@ -231,9 +231,9 @@ def main() -> NoReturn:
 
 
 def command_line() -> None:
-    """Does what the command line asks for. Raises SystemExit in the end.
+    """Runs the command of the arguments. Always raises SystemExit.
 
-    Bytes that are no text are refused: no log, store or JSON could hold them.
+    Refuses arguments that are no UTF-8 text, because no log, store or JSON can hold them.
     """
     for argument in sys.argv[1:]:
         try:

@@ -1,4 +1,4 @@
-"""`errand fleet`: several robots do what is queued, each mission by the one that is done with it first."""
+"""`errand fleet` runs queued missions with several robots; each mission goes to the robot that finishes it first."""
 
 from __future__ import annotations
 
@@ -21,14 +21,12 @@ from skills.files.outside import is_folder
 
 fleet = typer.Typer(
     name="fleet",
-    help="What is queued, given out among several robots.",
+    help="Run the queued missions with several robots.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 
-Queue = Annotated[
-    Path, typer.Argument(metavar="QUEUE", help="The store of `errand queue add`, or the folder that has it.")
-]
+Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `errand queue add`, or its folder.")]
 
 
 @fleet.command()
@@ -37,7 +35,7 @@ def run(
     request: Request,
     queue: Queue,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for log, report and recording; `fleet` beside the store.")
+        Path | None, typer.Option(help="Folder for log, report and recording; by default `fleet` beside the store.")
     ] = None,
     quiet: QUIET = False,
     view: VIEW = False,
@@ -45,9 +43,9 @@ def run(
     view_port: VIEW_PORT = 0,
     as_json: AS_JSON = False,
 ) -> None:
-    """Runs all that is queued, in one world, with several robots.
+    """Runs all queued missions in one world with several robots.
 
-    A fault is for the robot named before it ("bob: robot dies at 20 s"), else for all.
+    A fault is for the robot that it names ("bob: robot dies at 20 s"), else for all robots.
     """
     console = console_for(as_json)
     store, tell = _store(queue), plain_lines(console)
@@ -91,7 +89,7 @@ def run(
 
 @fleet.command()
 def status(queue: Queue, as_json: AS_JSON = False) -> None:
-    """Shows which robot has which mission, also while they run."""
+    """Shows the robot and the state of each mission, also during a run."""
     with MissionStore(_store(queue), create=False) as missions:
         from executive.app.fleet import missions_json
 
@@ -107,9 +105,9 @@ def _store(queue: Path) -> Path:
 
 
 def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
-    """The missions of the queue; those that a fleet's run left when it was broken off go on, or are told as failed.
+    """Returns the queued missions; queues or fails the missions of an interrupted run of a fleet first.
 
-    Raises InputError: another command's mission was broken off, or nothing is queued.
+    Raises InputError if another command's mission was interrupted, or no mission is queued.
     """
     given = GivenMissions(missions)
     known = given.all()
@@ -122,7 +120,7 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
 
             raise interrupted_error(missions, each)
         if known[each.id].blocked is not None:
-            message = f"the run was broken off, and {known[each.id].robot} had begun it"
+            message = f"the run was interrupted, and {known[each.id].robot} had begun it"
             missions.finish(each.id, MissionState.FAILURE, message)
         else:
             missions.finish(each.id, MissionState.QUEUED, "")
@@ -131,13 +129,12 @@ def _to_do(missions: MissionStore) -> Sequence[StoredMission]:
     queued = [each for each in missions.missions(MissionState.QUEUED) if each.queued]
     if not queued:
         hint = " ".join(resumable_lines(missions)) or "queue a mission by `errand queue add`"
-        raise InputError("nothing is queued", hint=hint, file=missions.path)
+        raise InputError("no mission is queued", hint=hint, file=missions.path)
     return queued
 
 
 def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequence[str]:
-    """How to go on with what a run has left: by `errand fleet run` with what waits in the `queue`, and by `errand
-    resume` with what was cancelled."""
+    """Returns lines on how to continue: `errand fleet run` for queued missions, `errand resume` for cancelled ones."""
     given = GivenMissions(missions).all()
     waiting = [each for each in missions.missions(MissionState.QUEUED) if each.queued]
     lines = list[str]()
@@ -152,7 +149,7 @@ def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequen
 
 
 def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:
-    """The faults of each robot. Raises InputError: there is no such fault."""
+    """Returns the faults of each robot. Raises InputError if there is no such fault."""
     from skills.faults.fault_words import parse_fault
 
     faults: dict[str, list[str]] = {name: [] for name in robots}
@@ -169,14 +166,15 @@ def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequenc
     return faults
 
 
-def _achieved(told: Mapping[str, Any]) -> bool:
-    referee = told["referee"]
-    return told["outcome"] == MissionState.SUCCESS.value and (referee is None or referee["success"] is not False)
+def _achieved(mission: Mapping[str, Any]) -> bool:
+    referee = mission["referee"]
+    return mission["outcome"] == MissionState.SUCCESS.value and (referee is None or referee["success"] is not False)
 
 
-def _row(told: Mapping[str, Any], names: Mapping[int, str]) -> tuple[str, ...]:
-    referee = told["referee"]
+def _row(mission: Mapping[str, Any], names: Mapping[int, str]) -> tuple[str, ...]:
+    """Returns a mission's row of `errand fleet status`."""
+    number, referee = mission["id"], mission["referee"]
     seen = "" if referee is None else VERDICTS[referee["success"]]
-    after = "" if told["after"] is None else told["after"]
-    values = (told["id"], names[told["id"]], told["robot"] or "", told["outcome"], after, seen, told["reassigned"])
-    return (*map(str, values), told["message"])
+    after = "" if mission["after"] is None else mission["after"]
+    values = (number, names[number], mission["robot"] or "", mission["outcome"], after, seen, mission["reassigned"])
+    return (*map(str, values), mission["message"])

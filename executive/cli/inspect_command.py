@@ -1,4 +1,4 @@
-"""`errand log`, `errand replay` and `errand tree`: what a run did and when, and the tree of a mission."""
+"""`errand log` and `errand replay` show a run; `errand tree` shows the tree of a mission."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ LOG_SUFFIX: Final = ".mcap"
 def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
-    ros2: Annotated[Path | None, typer.Option(help="Write it anew as a ROS 2 bag (MCAP), and end.")] = None,
+    ros2: Annotated[Path | None, typer.Option(help="Convert it to a ROS 2 bag (MCAP), and end.")] = None,
     map_file: Annotated[
-        Path | None, typer.Option("--map", help="Draw map, way, path and particles as PNG, and end.")
+        Path | None, typer.Option("--map", help="Draw map, trajectory, path and particles as PNG, and end.")
     ] = None,
-    at: Annotated[float, quantity_option(Delay, help="When the map is drawn (s); else at the end.")] = math.inf,
+    at: Annotated[float, quantity_option(Delay, help="Time of the map (s); by default the end.")] = math.inf,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
 ) -> None:
-    """Prints what happened in a run: what each node did and why, detections, the outcome, tracebacks of defects."""
+    """Prints the timeline of a run: nodes with causes, detections, outcome, tracebacks of defects."""
     history = read_history(file)
     history = history if robot is None else history.of_robot(robot)
     if ros2 is not None:
@@ -69,7 +69,7 @@ def log(
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:
-    """The timeline as a table, and the traceback of each defect below it."""
+    """Prints the timeline as a table, and the traceback of each defect below it."""
     entries = list(timeline(history.events, leaves_only=not every_node))
     prefix = _common([entry.about for entry in entries if entry.state is not None])
     several = len(history.robots) > 1
@@ -83,7 +83,7 @@ def _show(history: History, console: Console, *, every_node: bool) -> None:
 
 
 def _common(path_ids: Sequence[str]) -> str:
-    """The parts, robot and mission, with which all path ids begin; empty where they differ."""
+    """Returns the prefix of robot and mission that all path ids share; empty if they differ."""
     starts = {"/".join(path_id.split("/")[:2]) + "/" for path_id in path_ids}
     return starts.pop() if len(starts) == 1 else ""
 
@@ -100,11 +100,11 @@ def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
 def replay(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     html: Annotated[Path | None, typer.Option(help="Write one HTML file that needs no server, and end.")] = None,
-    scene: Annotated[bool, typer.Option(help="With the 3D recording that lies beside the log.")] = True,
-    port: Annotated[int, quantity_option(Port, help="Serve here; 0 takes a free port.")] = 0,
-    view_for: Annotated[float | None, quantity_option(Wait, help="End after so many seconds.")] = None,
+    scene: Annotated[bool, typer.Option(help="Show the 3D recording beside the log.")] = True,
+    port: Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")] = 0,
+    view_for: Annotated[float | None, quantity_option(Wait, help="End after this time, s.")] = None,
 ) -> None:
-    """Shows what happened in a run, at any time of it: tree, map, pictures, events, 3D recording."""
+    """Shows a run at any time of it: tree, map, pictures, events, 3D recording."""
     history = read_history(file)
     history.trees()
     beside = file.parent / RECORDING
@@ -119,6 +119,7 @@ def replay(
 
 
 def _serve(history: History, recording: Path | None, port: int, view_for_s: float | None) -> None:
+    """Serves the replay page."""
     from executive.view.html import feed_of
     from executive.view.server import PageContent, serve, wait
 
@@ -129,7 +130,7 @@ def _serve(history: History, recording: Path | None, port: int, view_for_s: floa
 
 
 class TreeFormat(StrEnum):
-    """How `errand tree` shows a tree."""
+    """Formats of `errand tree`."""
 
     TEXT = "text"
     SVG = "svg"
@@ -145,24 +146,28 @@ _FORMS: Final[Mapping[TreeFormat, Callable[[NodeView], str]]] = {
     TreeFormat.JSON: lambda view: json.dumps(to_json(view), ensure_ascii=False) + "\n",
 }
 _MOST: Final = {TreeFormat.TEXT: MANY_NODES, TreeFormat.SVG: DRAWN_NODES, TreeFormat.MERMAID: DRAWN_NODES}
-"""Most nodes of the forms that people read; programs read the other forms, at any size."""
+"""Largest number of nodes in the formats for people."""
 
 
 @takes_request("sentence", "world")
 def tree(
     request: Request,
     file: Annotated[str | None, typer.Argument(metavar="FILE|SENTENCE|LOG", show_default=False)] = None,
-    form: Annotated[TreeFormat, typer.Option("--format", help="How to show it.")] = TreeFormat.TEXT,
-    depth: Annotated[int | None, quantity_option(Tries, help="Show only so many levels below the root.")] = None,
+    form: Annotated[TreeFormat, typer.Option("--format", help="Output format.")] = TreeFormat.TEXT,
+    depth: Annotated[int | None, quantity_option(Tries, help="Number of levels below the root to show.")] = None,
     most: Annotated[
-        int | None, quantity_option(Count, help="Fold what is done or not begun beyond so many nodes.")
+        int | None, quantity_option(Count, help="Number of nodes to show; folds nodes that have ended or not begun.")
     ] = None,
-    at: Annotated[float | None, quantity_option(Delay, help="Of a log: at this time (s), not at its end.")] = None,
-    robot: Annotated[str | None, typer.Option(metavar="NAME", help="Of a log: of this one of several robots.")] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write it to this file.")] = None,
+    at: Annotated[
+        float | None, quantity_option(Delay, help="For a log: show the tree at this time (s), not at the end.")
+    ] = None,
+    robot: Annotated[
+        str | None, typer.Option(metavar="NAME", help="For a log: the robot to show among several.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write the tree to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
-    """Shows the tree of a sentence or a mission file before it runs, or of a log as it last was."""
+    """Shows the tree of a sentence or a mission file before it runs, or the last state of the tree in a log."""
     whole = _view(file, request, at, robot)
     shown = whole if depth is None else fold_below(whole, depth)
     few = most or _MOST.get(form)
@@ -176,7 +181,7 @@ def tree(
 
 
 def _view(text: str | None, request: Request, at_s: float | None, robot: str | None) -> NodeView:
-    """The tree of a log (.mcap), of a mission file (.yaml, a file, or a shipped one), or of a sentence."""
+    """Returns the tree of a log (.mcap), of a mission file (.yaml, a file, or a shipped one), or of a sentence."""
     if text is not None and text.endswith(LOG_SUFFIX):
         history = read_history(Path(text))
         if robot is None and len(history.robots) > 1:
@@ -197,7 +202,7 @@ def _view(text: str | None, request: Request, at_s: float | None, robot: str | N
 
 
 def _request(text: str | None, request: Request) -> Request:
-    """The request whose tree is shown. Raises InputError: there is none, or two are given."""
+    """Returns the request whose tree is shown. Raises InputError if none or two are given."""
     from executive.app.mission_files import shipped_missions
 
     if text is None and request.sentence is None:
@@ -205,6 +210,6 @@ def _request(text: str | None, request: Request) -> Request:
     if text is None:
         return request
     if request.sentence is not None:
-        raise InputError("a sentence and --say were given", hint="leave one of them out")
+        raise InputError("both a sentence and --say are given", hint="leave one of them out")
     is_mission = text.endswith((".yaml", ".yml")) or text in shipped_missions() or is_file(Path(text))
     return replace(request, file=Path(text)) if is_mission else replace(request, sentence=text)

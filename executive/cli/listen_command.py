@@ -1,4 +1,4 @@
-"""`errand listen`: the words and commands in recordings, or at the microphone."""
+"""`errand listen` recognises words and commands in recordings or at the microphone."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ def listen(
     request: Request,
     files: Annotated[list[Path] | None, typer.Argument(metavar="FILE.wav...", show_default=False)] = None,
     mic: Annotated[bool, typer.Option("--mic", help="Listen to the microphone until Ctrl-C.")] = False,
-    open_words: Annotated[bool, typer.Option("--open", help="Ground nothing in a world; names as spoken.")] = False,
-    no_wake: Annotated[bool, typer.Option("--no-wake", help="The robot's name need not be said.")] = False,
+    open_words: Annotated[bool, typer.Option("--open", help="Ground no names in a world.")] = False,
+    no_wake: Annotated[bool, typer.Option("--no-wake", help="Take sentences without the robot's name.")] = False,
     vocabulary: Annotated[
-        Path | None, typer.Option(help="A text file with one name on each line, in place of the world's names.")
+        Path | None, typer.Option(help="A text file with one name on each line, which replaces the names of the world.")
     ] = None,
-    robot: Annotated[str | None, typer.Option(help="The robot's name; the world's robot unless said.")] = None,
+    robot: Annotated[str | None, typer.Option(help="Name of the robot; by default the world's robot.")] = None,
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each file.")] = False,
 ) -> None:
-    """Recognises what is said in wav files or at the microphone, and shows the commands that it means."""
+    """Recognises sentences in wav files or at the microphone, and shows the commands that they mean."""
     if mic == bool(files):
         raise InputError("errand listen takes wav files or --mic", hint="try: errand listen request.wav")
     knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
@@ -80,18 +80,18 @@ def listener_for(
     robot_name: str | None = None,
     robots: Sequence[str] = (),
 ) -> Listener:
-    """A listener for the robot of a world, or for several, with the recogniser loaded.
+    """Builds a listener for the robot of a world, or for several robots, and loads the recogniser.
 
     Args:
-        knowledge: what is known of the world: its names, and the robot's own.
-        open_words: whether names stay as they were spoken, grounded in no world.
-        require_wake: whether the robot must be called by its name.
-        vocabulary: a file of names, in place of those of the world.
-        robot_name: the robot's name, in place of the one in `knowledge`.
-        robots: the names of several robots, in its place.
+        knowledge: knowledge of the world, with its names.
+        open_words: whether names are grounded in no world.
+        require_wake: whether a sentence must call the robot by name.
+        vocabulary: a file of names, in place of the names of the world.
+        robot_name: name of the robot, in place of the name in `knowledge`.
+        robots: names of several robots, in place of the only robot.
 
     Raises:
-        InputError: the extra `speech` is not installed, the vocabulary cannot be read, or robots cannot be told apart.
+        InputError: the extra `speech` is not installed, the vocabulary cannot be read, or names of robots sound alike.
     """
     names = tuple(robots) or (robot_name or knowledge.robot.name,)
     refuse_similar_names(robots)
@@ -104,21 +104,19 @@ def listener_for(
 
 
 def called_robots(robots: Sequence[RobotConfig], knowledge: Knowledge) -> tuple[str, ...]:
-    """The names of several robots as people say them: those that are given, else those that the world names."""
+    """Returns the spoken names of several robots: the given ones, else those of the world."""
     return tuple(each.name for each in robots) or tuple(map(display_name, knowledge.robots or ()))
 
 
 def hear_request(wav: Path, request: Request, *, console: Console) -> str:
-    """The sentence in a recording in words that can be typed instead, shown on the console.
-
-    It is for the robots and the world of a request.
+    """Recognises the sentence in a recording, for the robots and the world of a request, and prints it.
 
     Raises:
-        InputError: the request says something itself, the extra `speech` is not installed, the recording cannot be
-            read, or nobody is heard to speak.
+        InputError: the request has a sentence or a file itself, the extra `speech` is not installed, the recording
+            cannot be read, or it has no speech.
     """
     if request.file is not None or request.sentence is not None:
-        raise InputError("--listen stands alone", hint="leave out --say and the mission file")
+        raise InputError("--listen gives the sentence", hint="leave out --say and the mission file")
     knowledge = knowledge_of(open_world(request.world or DEFAULT_WORLD))
     robots = called_robots(request.robots, knowledge)
     listener = listener_for(knowledge, require_wake=request.require_wake is not False, robots=robots)
@@ -131,14 +129,14 @@ def hear_request(wav: Path, request: Request, *, console: Console) -> str:
 
 
 def answer_line(meaning: Understanding) -> str:
-    """The robot's answer to a request, in one line."""
+    """Returns the robot's answer to a sentence, in one line."""
     if meaning.status is Status.OK:
         return "All right: " + "; ".join(map(str, meaning.commands))
     return (meaning.reason or "I did not understand.").split(";")[0]
 
 
 def show_hearing(hearings: Iterable[Hearing], console: Console, voice: Voice) -> None:
-    """Shows the level and what is being said, block by block, and answers each sentence that ends."""
+    """Shows sound level and recognised words for each block, and answers each sentence at its end."""
     with Live(console=console, refresh_per_second=8, transient=True) as live:
         for hearing in hearings:
             live.update(_meter(hearing))
@@ -151,12 +149,12 @@ def _show_heard(heard: HeardUtterance, console: Console, voice: Voice) -> None:
     console.print(Text(f"{heard.start_s:7.1f} s  {heard.text}"))
     console.print(Text(f"           {answer_line(meaning)}", style="green" if meaning.commands else "yellow"))
     if meaning.status is not Status.NOT_ADDRESSED:
-        # nobody wants the form of the commands read out
+        # the text form of commands is not for reading aloud
         voice.say("All right." if meaning.status is Status.OK else answer_line(meaning))
 
 
 def _meter(hearing: Hearing) -> Text:
-    """A bar for the level, and the sentence under way."""
+    """Returns a bar of the sound level, and the words so far."""
     share = max(0.0, 1.0 - hearing.level_db / _QUIETEST_DB)
     filled = min(round(share * _METER_WIDTH), _METER_WIDTH)
     bar = Text("█" * filled + "░" * (_METER_WIDTH - filled), style="green" if hearing.speaking else "dim")
@@ -173,7 +171,7 @@ def _follow_microphone(listener: Listener) -> None:
 
 
 def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
-    """Shows what was heard in a file; None when it could not be listened to."""
+    """Shows the sentences in a file; returns None if it cannot be read."""
     try:
         recording = listener.hear_file(file)
     except InputError as error:
@@ -190,7 +188,7 @@ def _answer(listener: Listener, file: Path, *, jsonl: bool) -> Recording | None:
 
 
 def _show_recording(recording: Recording) -> None:
-    """The transcript and the commands on standard output, or the reason on standard error."""
+    """Prints transcript and commands on standard output, or the reason on standard error."""
     typer.echo(f"{recording.file}: {recording.transcript}")
     for note in recording.notes:
         typer.echo(f"  {note}")

@@ -1,4 +1,4 @@
-"""`errand map`: the robot explores, or follows a route, and makes its own map."""
+"""`errand map`: the robot explores or follows a route, and builds its own map."""
 
 from __future__ import annotations
 
@@ -39,37 +39,36 @@ if TYPE_CHECKING:
 TICK_S: Final = 0.05
 TOLD_EVERY_S: Final = 10.0
 DRAWN_EVERY_S: Final = 1.5
-KEPT_EVERY_S: Final = 20.0
-"""Seconds of the robot's clock between two lines, and of the wall's between two pictures and two savings."""
+SAVED_EVERY_S: Final = 20.0
+"""Periods of lines (s, robot's clock), of pictures and of saving (s, wall time)."""
 MOST_POINTS: Final = 10_000
 PICTURE: Final = "map.png"
 _OTHER: Final = "name another --out"
 
-map_group = typer.Typer(name="map", help="Maps that the robot makes itself.", rich_markup_mode=None)
+map_group = typer.Typer(name="map", help="Maps that the robot builds itself.", rich_markup_mode=None)
 
 
 @map_group.callback()
 def _group() -> None:
-    """Maps that the robot makes itself."""
+    """Keeps `build` a command of the group, although it is the only one."""
 
 
 @map_group.command()
 def build(
     world: Annotated[str, typer.Option(help="World by name or folder.")],
-    out: Annotated[Path, typer.Option("--out", help="The map's folder; a map that is in it already goes on.")],
-    seed: Annotated[int, quantity_option(Seed, help="Sets the things in the world and all noise.")] = 1,
+    out: Annotated[Path, typer.Option("--out", help="The map's folder; an unfinished map in it is continued.")],
+    seed: Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")] = 1,
     route: Annotated[
-        Path | None, typer.Option(help="Points x y (m) to drive to, from the start: one in a line, or a YAML list.")
+        Path | None,
+        typer.Option(help="File of points x y (m) to drive to, from the start: one in each line, or a YAML list."),
     ] = None,
-    most_s: Annotated[
-        float, quantity_option(LongDuration, "--max-time", help="End after so many seconds of driving.")
-    ] = 7200.0,
+    most_s: Annotated[float, quantity_option(LongDuration, "--max-time", help="Time limit of the drive, s.")] = 7200.0,
     people: Annotated[
-        bool, typer.Option(help="Whether the world's people are there; who stands about becomes part of the map.")
+        bool, typer.Option(help="Whether the world's people are present; people who stand become part of the map.")
     ] = True,
     as_json: AS_JSON = False,
 ) -> None:
-    """Explore a world, or follow a route, and save both grids and the pose graph."""
+    """Explores a world, or follows a route, and saves both grids and the pose graph."""
     console = console_for(as_json)
     opened = open_world(world) if people else open_world(world).without_people()
     points = None if route is None else _route_points(route)
@@ -77,18 +76,18 @@ def build(
     from executive.app.simulated import compile_first
 
     compile_first()
-    building = _Building(opened, seed, mapper, points, out, console)
+    drive = _Drive(opened, seed, mapper, points, out, console)
     with ended_by_signals((control := Control(pace=None)).cancel):
-        ended = building.drive(most_s, lambda: control.poll().cancel is not None)
-    result = building.result()
+        ended = drive.run(most_s, lambda: control.poll().cancel is not None)
+    result = drive.result()
     if ended is not None:
         console.print(f"errand: the map is not complete: {ended}", markup=False)
     console.print(f"{result['map']}: {result['distance_m']} m driven, {result['loop_closures']} loops", markup=False)
     finish(result, as_json, good=ended is None)
 
 
-class _Building:
-    """One drive: plant, survey, progress lines and pictures, and the true poses that judge the map afterwards."""
+class _Drive:
+    """Drive that builds a map: plant, survey, progress lines, pictures, and true poses for the map's error."""
 
     def __init__(
         self,
@@ -124,10 +123,10 @@ class _Building:
         self._true: dict[float, Pose2D] = {}
         self._begun_s = time.monotonic()
 
-    def drive(self, most_s: float, cancelled: Callable[[], bool]) -> str | None:
-        """Drives until the survey is done; returns why it ended before, or None."""
+    def run(self, most_s: float, cancelled: Callable[[], bool]) -> str | None:
+        """Drives until the survey is done; returns why it ended early, or None."""
         clock, survey = self._simulation.clock, self._survey
-        told_s, drawn_s, kept_s = 0.0, -math.inf, time.monotonic()
+        told_s, drawn_s, saved_s = 0.0, -math.inf, time.monotonic()
         try:
             while not survey.done and clock.now() < most_s and not cancelled():
                 clock.advance(TICK_S)
@@ -141,18 +140,18 @@ class _Building:
                 if wall_s - drawn_s > DRAWN_EVERY_S:
                     self._draw()
                     drawn_s = time.monotonic()
-                if wall_s - kept_s > KEPT_EVERY_S:
-                    self._keep()
-                    kept_s = time.monotonic()
+                if wall_s - saved_s > SAVED_EVERY_S:
+                    self._save()
+                    saved_s = time.monotonic()
         finally:
             survey.stop()
             if self._mapper.keyframes:
-                self._keep()
+                self._save()
         for note in survey.notes:
             self._console.print(note, markup=False)
         if survey.trouble is not None or survey.done:
             return survey.trouble
-        return "it was broken off; the same command goes on" if cancelled() else f"{most_s:g} s are over"
+        return "it was cancelled; the same command continues" if cancelled() else f"--max-time {most_s:g} s is over"
 
     def result(self) -> dict[str, Any]:
         """Saves the grids; returns the result as JSON values. Raises InputError."""
@@ -161,7 +160,7 @@ class _Building:
 
         mapper = self._mapper
         if not mapper.keyframes:
-            raise InputError("no map was made", hint="look at the robot's LiDAR")
+            raise InputError("no map was made, because no scan came", hint="check the robot's LiDAR")
         with writing(self._out, _OTHER):
             path = save_grids(self._out, map_grids(mapper))
         self._draw()
@@ -199,13 +198,13 @@ class _Building:
         picture = map_picture(
             self._survey.known_grid()[0], self._mapper.graph, self._mapper.pose, None if goal is None else goal[1]
         )
-        draft = self._out / f".{PICTURE}"
-        write_picture(draft, picture)
+        partial = self._out / f".{PICTURE}"
+        write_picture(partial, picture)
         with writing(self._out, _OTHER):
-            draft.replace(self._out / PICTURE)
+            partial.replace(self._out / PICTURE)
 
-    def _keep(self) -> None:
-        """Saves the graph, from which the next run goes on."""
+    def _save(self) -> None:
+        """Saves the pose graph, so that the next run can continue it."""
         from skills.mapping.map_folder import save_graph
 
         with writing(self._out, _OTHER):
@@ -213,7 +212,7 @@ class _Building:
 
 
 def _mapper(world: World, out: Path) -> Mapper:
-    """A new map, or the one that is in a folder. Raises InputError."""
+    """Returns a new mapper, or the one saved in a folder. Raises InputError."""
     from skills.mapping.map_folder import GRAPH_FILE, load_mapper
     from skills.mapping.mapper import Mapper
     from skills.mapping.pose_graph import MappingExtraMissingError, gtsam_module
@@ -229,20 +228,20 @@ def _mapper(world: World, out: Path) -> Mapper:
 
 
 def _route_points(path: Path) -> list[tuple[float, float]]:
-    """The points of a route: a YAML list of pairs, or a pair in each line. Raises InputError."""
+    """Reads the points of a route: a YAML list of pairs, or a pair in each line. Raises InputError."""
     text = read_text(path)
     try:
-        told = read_yaml(path).data
+        data = read_yaml(path).data
     except InputError:
-        told = None
+        data = None
     try:
         lines = (line.split("#")[0].replace(",", " ").split() for line in text.splitlines())
-        points = [(float(x), float(y)) for x, y in (row for row in (told if isinstance(told, list) else lines) if row)]
+        points = [(float(x), float(y)) for x, y in (row for row in (data if isinstance(data, list) else lines) if row)]
         if not 0 < len(points) <= MOST_POINTS or not all(math.isfinite(x + y) for x, y in points):
             raise ValueError
     except (ValueError, TypeError, OverflowError) as error:
         hint = f"write x and y in metres from the start, one point in a line, at most {MOST_POINTS}"
-        raise InputError("it is no route", hint=hint, file=path) from error
+        raise InputError("it is not a route", hint=hint, file=path) from error
     return points
 
 
@@ -252,7 +251,7 @@ _TRAJECTORY, _LOOP, _ROBOT, _GOAL = (70, 120, 220), (230, 150, 30), (30, 140, 60
 
 
 def map_picture(ground: GridMap, graph: PoseGraph, pose: Pose2D, goal: Pose2D | None) -> Picture:
-    """Draws the ground as known so far (north up, RGB), at most _WIDEST pixels wide or high."""
+    """Draws the map so far with graph, robot and goal (north up, RGB), at most _WIDEST pixels wide or high."""
     grey = ground.grey(**_GREY)
     seen = np.argwhere(grey != _GREY["unknown"])
     low, high = seen.min(axis=0), seen.max(axis=0) + 1

@@ -1,4 +1,4 @@
-"""`errand missions` and `errand init`: the missions that come with Errand; `errand new-skill`: a skill of one's own."""
+"""`errand missions` and `errand init`: the shipped missions. `errand new-skill`: a package for a new skill."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ def missions() -> None:
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to put them.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the missions.", show_default=False)],
 ) -> None:
-    """Copies the missions that come with Errand into a folder, to be changed; files that are there stay."""
+    """Copies the missions that come with Errand into a folder; existing files stay."""
     with writing(folder, "name another folder"):
         folder.mkdir(parents=True, exist_ok=True)
         new = [file for file in sorted(FOLDER.glob("*.[yj]*")) if not (folder / file.name).exists()]
@@ -41,14 +41,14 @@ def init(
 
 
 def _first_words(file: Path) -> str:
-    """The first line of comment that is meant for people."""
+    """Returns the first comment line of a mission file."""
     lines = file.read_text(encoding="utf-8").splitlines()
     return next((line[1:].strip() for line in lines if line[:1] == "#" and not line.startswith(_FOR_EDITORS)), "")
 
 
 def new_skill(
-    name: Annotated[str, typer.Argument(help="The skill's name: lower-case words joined by _.")],
-    folder: Annotated[Path, typer.Argument(help="The new folder for the package.")],
+    name: Annotated[str, typer.Argument(help="Name of the skill: lower-case words joined by _.")],
+    folder: Annotated[Path, typer.Argument(help="New folder for the package.")],
 ) -> None:
     """Writes an installable package with one skill, its tests and its registration."""
     from executive.tree.registry import installed_skills
@@ -60,17 +60,17 @@ def new_skill(
 
 
 def render_skill(name: str, folder: Path, *, taken: frozenset[str] = frozenset()) -> tuple[Path, ...]:
-    """Writes a package with the skill `name` into the new folder `folder`; the files written.
+    """Writes a package with the skill `name` into a new folder; returns the files.
 
     Raises:
-        InputError: the name is no lower-case word, or is taken; the folder exists and is not empty, or cannot be made.
+        InputError: the name is not allowed or is taken, or the folder is not empty or cannot be written.
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         raise InputError(
             f"'{name}' cannot be the name of a skill", hint="use lower-case words joined by _, as in wave_arm"
         )
     if name in taken:
-        raise InputError(f"there is a skill '{name}' already", hint="choose another name")
+        raise InputError(f"a skill '{name}' exists already", hint="choose another name")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise InputError(f"{folder} exists and is not empty", hint="name a new folder")
     package = f"errand_skill_{name}"

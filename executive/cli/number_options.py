@@ -1,4 +1,4 @@
-"""Options and arguments that are numbers: each has a quantity, whose range its messages name."""
+"""Options and arguments that are numbers; each has a quantity with a range for its messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from skills.quantities import QuantityError, number_in, range_text
 
 
 class OutOfRangeError(typer.BadParameter):
-    """The words of an option give no number of its quantity; told in one line, as other bad input is."""
+    """Error of an option whose text is no number of its quantity; shown in one line."""
 
     def show(self, file: IO[Any] | None = None) -> None:
         """Writes the line to standard error."""
@@ -22,12 +22,12 @@ class OutOfRangeError(typer.BadParameter):
 
 @dataclass(frozen=True)
 class NumberReader:
-    """Reads the words of an option as a number of a quantity; a duration may have units."""
+    """Parser of an option's text to a number of a quantity; a duration may have units."""
 
     hint: Any
 
     def __call__(self, words: Any) -> Any:
-        """The number. Raises OutOfRangeError, which ends the command, when the words give none or one out of range."""
+        """Returns the number. Raises OutOfRangeError if the text is no number or out of range."""
         if not isinstance(words, str):
             return words
         try:
@@ -37,7 +37,7 @@ class NumberReader:
 
 
 def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True) -> Any:
-    """An option that takes a number of a quantity."""
+    """Returns a typer option that takes a number of a quantity."""
     reader = NumberReader(hint)
     return typer.Option(
         *names,
@@ -49,5 +49,5 @@ def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True
 
 
 def quantity_argument(hint: Any, *, metavar: str, help: str) -> Any:
-    """An argument that is a number of a quantity."""
+    """Returns a typer argument that is a number of a quantity."""
     return typer.Argument(parser=NumberReader(hint), metavar=metavar, help=help)

@@ -1,4 +1,4 @@
-"""`errand object`: any mesh as a model for worlds and missions, and what such a model holds."""
+"""`errand object` imports a mesh as a model for worlds and missions, and shows imported models."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from skills.quantities import Factor, Mass
 
 PICTURE_PX = (640, 480)
 
-object_group = typer.Typer(name="object", help="Objects of your own, made of any mesh.", rich_markup_mode=None)
+object_group = typer.Typer(name="object", help="Objects of your own, from any mesh.", rich_markup_mode=None)
 
 
 @object_group.callback()
 def _group() -> None:
-    """Objects of your own, made of any mesh."""
+    """Objects of your own, from any mesh."""
 
 
 @object_group.command(name="import")
@@ -32,20 +32,23 @@ def import_command(
     mesh: Annotated[
         Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB or COLLADA.")
     ],
-    name: Annotated[str, typer.Option(help="What worlds call the model: letters, digits and _.")],
-    mass: Annotated[float, quantity_option(Mass, help="Its mass, kg.")],
-    out: Annotated[Path, typer.Option("--out", help="The model's folder; it is made.")],
+    name: Annotated[str, typer.Option(help="Name of the model in worlds: letters, digits and _.")],
+    mass: Annotated[float, quantity_option(Mass, help="Mass, kg.")],
+    out: Annotated[Path, typer.Option("--out", help="New folder for the model.")],
     class_name: Annotated[
-        str | None, typer.Option("--class", help="The class that the detector takes it for; else none of them.")
+        str | None, typer.Option("--class", help="The class that the detector reports for it; by default none.")
     ] = None,
     scale: Annotated[float, quantity_option(Factor, help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
     up: Annotated[
-        str | None, typer.Option(help="The file's axis that is up: x, y or z; z, but y of glTF and what COLLADA says.")
+        str | None,
+        typer.Option(
+            help="Upward axis of the file: x, y or z. By default z; for glTF y, for COLLADA as the file says."
+        ),
     ] = None,
-    close_holes: Annotated[bool, typer.Option("--close-holes", help="Close an open mesh where it is open.")] = False,
+    close_holes: Annotated[bool, typer.Option("--close-holes", help="Close the holes of an open mesh.")] = False,
     as_json: AS_JSON = False,
 ) -> None:
-    """Makes a model of a mesh: visual geometry, convex collision parts, and inertia from its volume and mass."""
+    """Imports a mesh as a model: visual geometry, convex collision parts, and inertia from volume and mass."""
     from plant.models.builder.importing import Wanted, import_object
 
     wanted = Wanted(name, mass, class_name, scale, up, close_holes)
@@ -63,11 +66,11 @@ def import_command(
 
 @object_group.command()
 def show(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder of `errand object import`.")],
-    picture: Annotated[Path | None, typer.Option("--picture", help="Draw it into this file, PNG.")] = None,
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of `errand object import`.")],
+    picture: Annotated[Path | None, typer.Option("--picture", help="Draw the model into this PNG file.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Tells what an imported model holds: extents, mass, inertia, collision parts."""
+    """Shows an imported model: extents, mass, inertia, collision parts."""
     found = read_imported(folder)
     if picture is not None:
         _draw(folder, found, picture)
@@ -85,7 +88,7 @@ def show(
 
 @contextmanager
 def _refused(mesh: Path | None = None) -> Iterator[None]:
-    """Raises InputError for what cannot be imported."""
+    """Raises InputError for a mesh that cannot be imported."""
     from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError
 
     try:
@@ -97,7 +100,7 @@ def _refused(mesh: Path | None = None) -> Iterator[None]:
 
 
 def _unlike_its_class(made: ImportedObject) -> str | None:
-    """Why the robot may not take it for one of its class: by its size; None where that fits."""
+    """Returns why the robot may not recognise the object as one of its class, by size; None if the size fits."""
     form = class_forms().get(made.class_name)
     if form is None:
         return None
@@ -110,7 +113,7 @@ def _unlike_its_class(made: ImportedObject) -> str | None:
 
 
 def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
-    """Raises InputError."""
+    """Draws a model into a PNG file. Raises InputError."""
     import numpy as np
 
     from plant.scene_pictures import Ball, portrait, save_png
@@ -127,8 +130,7 @@ def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
 
 def _in_words(made: ImportedObject) -> str:
     size, parts = " x ".join(f"{value:.3f}" for value in made.size_m), made.collision_parts
-    told = f"{made.name}, class {_class_of(made)}, {size} m, {made.mass_kg:g} kg"
-    return f"{told}, {count_text(parts, 'collision part')}"
+    return f"{made.name}, class {_class_of(made)}, {size} m, {made.mass_kg:g} kg, {count_text(parts, 'collision part')}"
 
 
 def _class_of(found: ImportedObject) -> str:

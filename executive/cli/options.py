@@ -1,4 +1,4 @@
-"""Options that several commands have; those of a request are declared in `executive.mission.request`."""
+"""Options that several commands share; `executive.mission.request` declares the options of a request."""
 
 from __future__ import annotations
 
@@ -28,27 +28,29 @@ _NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 
 
 START = Annotated[
-    str | None, typer.Option(_START, metavar="X Y YAW", help="Where the robot stands: metres and radians.")
+    str | None, typer.Option(_START, metavar="X Y YAW", help="Start of the robot, in metres and radians.")
 ]
-STORE = Annotated[Path | None, typer.Option(help="Where missions are kept; missions.sqlite in the folder for logs.")]
-ANYWAY = Annotated[bool, typer.Option("--anyway", help="Begin although `errand check` would refuse it.")]
+STORE = Annotated[
+    Path | None, typer.Option(help="File of the missions; by default missions.sqlite in the folder for logs.")
+]
+ANYWAY = Annotated[bool, typer.Option("--anyway", help="Begin in spite of errors of `errand check`.")]
 AS_JSON = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
-QUIET = Annotated[bool, typer.Option("--quiet", help="No lines and no tree while it runs.")]
-VIEW = Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, also after the end.")]
-VIEW_FOR = Annotated[float | None, quantity_option(Wait, help="The page stays so long (s) after the end.")]
-VIEW_PORT = Annotated[int, quantity_option(Port, help="The page's port; 0 takes a free one.")]
+QUIET = Annotated[bool, typer.Option("--quiet", help="Show no lines and no tree during the run.")]
+VIEW = Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, which stays after the end.")]
+VIEW_FOR = Annotated[float | None, quantity_option(Wait, help="Time that the page stays after the end, s.")]
+VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")]
 
 
 class StartCommand(TyperCommand):
-    """A command whose `--start` takes three numbers, or one word."""
+    """Command whose `--start` takes three numbers or one word."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As click's, after the numbers are joined."""
+        """Joins the numbers after `--start`, and parses as click does."""
         return super().parse_args(ctx, join_start(args))
 
 
 def join_start(arguments: Sequence[str]) -> list[str]:
-    """Joins three numbers after `--start` into one argument, so that a word may stand there as well."""
+    """Joins three numbers after `--start` into one argument, so that one word is allowed as well."""
     words, rest = list[str](), list(arguments)
     while rest:
         word = rest.pop(0)
@@ -61,7 +63,7 @@ def join_start(arguments: Sequence[str]) -> list[str]:
 
 @dataclasses.dataclass(frozen=True)
 class _Typed:
-    """A field that is typed; `part` is the field of the request in which it stands (empty: the request itself)."""
+    """Field of a request with an option; `part` is the field of the request that holds it (empty: the request)."""
 
     part: str
     name: str
@@ -71,16 +73,16 @@ class _Typed:
 
     @property
     def several(self) -> bool:
-        """Returns whether it may be given again and again."""
+        """Whether the option can be repeated."""
         return get_origin(self.kind) is tuple
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The names of its option."""
+        """Names of the option."""
         return (self.option.name or f"--{self.name.replace('_', '-')}",)
 
     def parameter(self, default: Any) -> inspect.Parameter:
-        """The parameter from which Typer makes the option."""
+        """Returns the parameter from which Typer builds the option."""
         option, kind = self.option, self.kind
         plain = next(each for each in get_args(kind) if each is not NoneType) if NoneType in get_args(kind) else kind
         if quantity_of(plain) is not None:
@@ -98,13 +100,13 @@ class _Typed:
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
 
     def value(self, typed: Any) -> Any:
-        """The field's value of what was typed; the default where nothing was. Raises InputError."""
+        """Returns the field's value of a typed value; the default without one. Raises InputError."""
         if self.option.read is not None:
             return self.default if typed in (None, False) or typed == [] else self.option.read(typed)
         return tuple(typed or ()) if self.several else typed
 
     def arguments(self, value: Any) -> list[str]:
-        """The arguments by which a value is typed."""
+        """Returns the command-line arguments that give a value."""
         if self.option.argument:
             return [str(value)]
         if isinstance(value, bool):
@@ -126,7 +128,7 @@ def _text(value: Any) -> str:
 
 
 def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
-    """The fields that are typed, those of the request's parts included."""
+    """Yields the fields with an option, also those of the request's parts."""
     hints = get_type_hints(model, include_extras=True)
     for each in dataclasses.fields(model):
         hint = hints[each.name]
@@ -140,13 +142,13 @@ def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
 
 
 def start_pose(text: str | None) -> Pose2D | None:
-    """The pose in `X Y YAW`; None where none is said. Raises InputError."""
+    """Parses a pose in `X Y YAW`; None without one. Raises InputError."""
     start = None if text is None else parse_start(text)
     return start if isinstance(start, Pose2D) else None
 
 
 def request_arguments(request: Request) -> list[str]:
-    """The arguments of `errand run` that make this request."""
+    """Returns the arguments of `errand run` that give this request."""
     arguments = list[str]()
     for each in _typed_fields():
         value = getattr(getattr(request, each.part) if each.part else request, each.name)
@@ -158,14 +160,14 @@ def request_arguments(request: Request) -> list[str]:
 def takes_request(
     *names: str, without: Sequence[str] = (), **defaults: Any
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Gives a command the options of these fields (by default of all), and their Request as its first argument.
+    """Gives a command the options of these fields, by default of all, and the Request as its first argument.
 
-    `defaults` stand in for those of the fields.
+    `defaults` replace the defaults of the fields.
     """
     fields = [each for each in _typed_fields() if (not names or each.name in names) and each.name not in without]
 
     def decorated(function: Callable[..., None]) -> Callable[..., None]:
-        """The command with the options of the fields before its own."""
+        """Returns the command with the options of the fields before its own."""
         signature = inspect.signature(function, eval_str=True)
         _, *own = (each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values())
         parameters = [*(each.parameter(defaults.get(each.name, each.default)) for each in fields), *own]
@@ -183,7 +185,7 @@ def takes_request(
 
 
 def _request(typed: Iterable[tuple[_Typed, Any]]) -> Request:
-    """The request of what was typed. Raises InputError."""
+    """Builds the request of typed values. Raises InputError."""
     values: dict[str, Any] = {}
     for each, words in typed:
         part = values if not each.part else values.setdefault(each.part, {})

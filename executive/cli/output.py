@@ -1,4 +1,4 @@
-"""Output of the command line: people read the console, scripts the last line of standard output; and questions."""
+"""Output of the command line for people (console) and scripts (last line of standard output), and questions."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _SHOWN: Final = 100
 
 
 def console_for(as_json: bool) -> Console:
-    """The console for people: standard error when standard output belongs to a script."""
+    """Returns the console for people: standard error if standard output belongs to a script."""
     from rich.console import Console
 
     return Console(stderr=as_json, highlight=False, soft_wrap=True)
 
 
 def plain_lines(console: Console) -> Callable[[str], None]:
-    """Writes lines on a console, their brackets as they are."""
+    """Returns a function that prints a line on a console without markup."""
     return lambda line: console.print(line, markup=False)
 
 
 def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
-    """One JSON object or array on one line of standard output."""
+    """Prints one JSON object or array on one line of standard output."""
     sys.stdout.write(json.dumps(value, ensure_ascii=False, allow_nan=False) + "\n")
     sys.stdout.flush()
 
@@ -52,7 +52,7 @@ def print_json(value: Mapping[str, Any] | Sequence[Any]) -> None:
 def finish(
     values: Mapping[str, Any] | Sequence[Any], as_json: bool, *, good: bool = True, otherwise: int = NOT_ACHIEVED
 ) -> None:
-    """Ends a command: prints its result where a script asks for it; unless it is good, exits with another status."""
+    """Ends a command: prints its result if `as_json`, and exits with the status `otherwise` unless it is `good`."""
     if as_json:
         print_json(values)
     if not good:
@@ -60,7 +60,7 @@ def finish(
 
 
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
-    """A table: in a box at a terminal, else one line for each row, the columns two spaces apart."""
+    """Prints a table: in a box at a terminal, else one line for each row, with columns two spaces apart."""
     if console.is_terminal:
         from rich.table import Column, Table
         from rich.text import Text
@@ -78,9 +78,9 @@ def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[
 
 
 def refuse(error: InputError | OSError) -> NoReturn:
-    """Ends a command for bad input, or a file that cannot be used, such as one whose name is too long.
+    """Ends a command with exit status 2 for bad input, or for a file that cannot be used.
 
-    Writes one line on standard error for each error; the exit status is 2. Raises the error where it is neither.
+    Prints a line on standard error for each error. Raises any other OSError again.
     """
     if isinstance(error, InputError):
         refused = error
@@ -96,7 +96,7 @@ def refuse(error: InputError | OSError) -> NoReturn:
 
 @contextmanager
 def writing(file: Path, hint: str = "name another file") -> Iterator[None]:
-    """Writes a file or a folder that the user names. Raises InputError: it cannot be written."""
+    """Raises InputError if the block cannot write a file or folder that the user names."""
     try:
         yield
     except OSError as error:
@@ -105,13 +105,13 @@ def writing(file: Path, hint: str = "name another file") -> Iterator[None]:
 
 @contextmanager
 def new_folder(out: Path) -> Iterator[Path]:
-    """A draft beside a new folder, put there when it is whole. Raises InputError: there is something, or it cannot be.
+    """Yields a temporary folder, and copies it to a new folder when the block ends without an error.
 
-    A draft that raises leaves nothing.
+    Raises InputError if the new folder exists and is not empty, or cannot be written.
     """
     with writing(out, "name another --out"):
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
-            raise InputError("there is something already", hint="name a new folder by --out", file=out)
+            raise InputError("it exists already", hint="name a new folder by --out", file=out)
         out.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as draft:
             yield Path(draft)
@@ -119,13 +119,13 @@ def new_folder(out: Path) -> Iterator[Path]:
 
 
 def terminal_answerer() -> Answerer | None:
-    """The function that asks at the terminal; None where nobody sits there, as in scripts."""
-    somebody = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
-    return ask_at_terminal if somebody else None
+    """Returns the function that asks at the terminal; None without a terminal, as in scripts."""
+    attended = sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
+    return ask_at_terminal if attended else None
 
 
 def ask_at_terminal(question: ClarifyingQuestion) -> str | None:
-    """Puts a question to who sits at the terminal; None for an empty line or the end of the input."""
+    """Asks a question at the terminal; returns None for an empty line or the end of the input."""
     numbers = "  ".join(f"[{number}] {name}" for number, name in enumerate(question.candidates, start=1))
     typer.echo(f"? {question.text}  {numbers}".rstrip(), err=True)
     try:

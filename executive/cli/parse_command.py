@@ -1,4 +1,4 @@
-"""`errand parse`: the commands that sentences mean, and how they came about."""
+"""`errand parse` shows the commands that sentences mean, and the steps of understanding."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from skills.files.outside import read_text
 def parse(
     sentence: Annotated[str | None, typer.Argument(help="The sentence.", show_default=False)] = None,
     file: Annotated[Path | None, typer.Option(help="A file with one sentence on each line.")] = None,
-    world: Annotated[str | None, typer.Option(help="World by name or folder; flat unless said.")] = None,
-    open_words: Annotated[bool, typer.Option("--open", help="Ground nothing in a world; names as spoken.")] = False,
+    world: Annotated[str | None, typer.Option(help="World by name or folder; by default flat.")] = None,
+    open_words: Annotated[bool, typer.Option("--open", help="Ground no names in a world.")] = False,
     jsonl: Annotated[bool, typer.Option("--jsonl", help="One JSON object for each sentence.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")
@@ -45,12 +45,12 @@ def parse(
     else:
         lines = read_text(file, most_bytes=20_000_000, hint="name a text file in UTF-8").splitlines()
     wake = knowledge is not None and knowledge.robot.require_wake
-    told = (executive.parse(line, knowledge=knowledge, require_wake=wake, open_words=open_words) for line in lines)
+    parsed = (executive.parse(line, knowledge=knowledge, require_wake=wake, open_words=open_words) for line in lines)
     if jsonl:
-        for meaning in told:
+        for meaning in parsed:
             print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)
         return
-    meanings = list(told)
+    meanings = list(parsed)
     if svg is not None:
         trace = meanings[0].trace
         if trace is None or not trace.tokens:
@@ -67,13 +67,13 @@ def parse(
 
 
 def _values(meaning: Understanding, explained: bool) -> dict[str, object]:
-    """The answer as JSON values, with its steps where those are asked for."""
+    """Returns a meaning as JSON values, with its steps if `explained`."""
     steps = None if meaning.trace is None else explain(meaning.trace)
     return {**meaning.to_json(), "steps": steps} if explained else meaning.to_json()
 
 
 def _show(meaning: Understanding, as_json: bool, explained: bool) -> None:
-    """The commands on standard output, with the steps before them, or the reason on standard error."""
+    """Prints the commands on standard output, perhaps with the steps, or the reason on standard error."""
     if explained and meaning.trace is not None:
         _echo(explanation_lines(meaning.trace), as_json)
     elif meaning.steps:

@@ -29,12 +29,12 @@ from skills.stack import SLOTS, plain
 
 _WORKERS: Final = 4
 _MORE_S: Final = 30.0
-"""A process that loads a plug-in needs some time for itself."""
+"""Time of a process that loads a plug-in, beside the plug-in's own limit."""
 
 
 @dataclass(frozen=True)
 class Plugin:
-    """An entry point of another distribution, and why it cannot be used (None: it can)."""
+    """Entry point of another distribution; `broken` says why it cannot be used (None: it can)."""
 
     group: str
     name: str
@@ -45,10 +45,10 @@ class Plugin:
 
 def plugins(
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
-    limit: Annotated[float, quantity_option(Duration, "--limit", help="How long each may take to load.")] = LIMIT_S,
+    limit: Annotated[float, quantity_option(Duration, "--limit", help="Time limit to load a plug-in.")] = LIMIT_S,
     load: Annotated[str | None, typer.Option(hidden=True)] = None,
 ) -> None:
-    """Lists what other distributions add, each loaded in a process of its own, and why some cannot be used."""
+    """Lists the plug-ins of other distributions and errors of loading them, each in a process of its own."""
     if load is not None:
         _load(load, limit)
         return
@@ -65,7 +65,7 @@ def plugins(
 
 
 def groups() -> Sequence[str]:
-    """The entry-point groups that errand reads."""
+    """Returns the entry-point groups that Errand reads."""
     return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, COMMANDS_GROUP)
 
 
@@ -79,7 +79,7 @@ def _key(entry: EntryPoint) -> str:
 
 
 def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
-    """The result of loading a plug-in in a process of its own."""
+    """Loads a plug-in in a process of its own; returns the result."""
     plugin = Plugin(entry.group, entry.name, distribution_of(entry), entry.value)
     namesakes = entry_points(group=entry.group, name=entry.name)
     clash = next((each for each in namesakes if _key(each) != _key(entry)), None)
@@ -99,7 +99,7 @@ def _checked(entry: EntryPoint, limit_s: float) -> Plugin:
 
 
 def _load(key: str, limit_s: float) -> None:
-    """Loads one plug-in in this process. Raises InputError: it cannot be used."""
+    """Loads one plug-in in this process. Raises InputError if it cannot be used."""
     entry = {_key(each): each for each in _of_others()}.get(key)
     if entry is None:
         raise InputError(f"there is no plug-in {key}")

@@ -1,4 +1,4 @@
-"""`errand queue` and `errand resume`: missions kept in a store, run one after another or whenever a trigger fires."""
+"""`errand queue` and `errand resume`: missions in a store, run one after another or when a trigger fires."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from skills.quantities import Count, Port, Wait
 
 queue = typer.Typer(
     name="queue",
-    help="Missions kept in a store, to be run one after another.",
+    help="Store missions, and run them one after another.",
     no_args_is_help=True,
     rich_markup_mode=None,
 )
 
-Out = Annotated[Path, typer.Option(help="Folder for logs; each mission gets one of its own in it.")]
+Out = Annotated[Path, typer.Option(help="Folder for logs, with a folder for each mission.")]
 Number = Annotated[
-    int, quantity_argument(Count, metavar="NUMBER", help="The mission's number, as `errand queue list` shows it.")
+    int, quantity_argument(Count, metavar="NUMBER", help="Number of the mission in `errand queue list`.")
 ]
 At = Annotated[
     str | None,
     typer.Option(metavar="TIME", help='Queue it at these times, as in "every weekday 09:00" or "2026-12-01 09:00".'),
 ]
 EveryPeriod = Annotated[
-    str | None, typer.Option("--every", metavar="PERIOD", help="Queue it again and again, as in 30m, 2h or 90s.")
+    str | None, typer.Option("--every", metavar="PERIOD", help="Queue it in this period, as in 30m, 2h or 90s.")
 ]
 On = Annotated[
     str | None,
@@ -50,13 +50,11 @@ On = Annotated[
 ]
 WhenMissed = Annotated[
     Missed | None,
-    typer.Option(
-        help="How to treat times that pass while nothing serves, or a mission runs: skip them (default), or queue once."
-    ),
+    typer.Option(help="For times that pass while no server waits: skip them (default), or queue the mission once."),
 ]
 
 _LONGEST_S: Final = 3.2e9  # a hundred years
-_MAY_GO_ON: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.ERROR)
+_RESUMABLE: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.ERROR)
 
 
 @queue.command()
@@ -71,7 +69,7 @@ def add(
     missed: WhenMissed = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Queue a sentence or a mission file, checked; with a trigger, `errand queue serve` queues it each time."""
+    """Checks and queues a sentence or a mission file; with a trigger, `errand queue serve` queues it each time."""
     from executive.app.checker import prepare_checked
 
     trigger = _trigger(at, every, on, missed)
@@ -86,25 +84,25 @@ def add(
             added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
             mission, standing = missions.mission(added.id), {added.id: added}
     wake_server(store or out / STORE_NAME)
-    said = "is queued" if trigger is None else f"stands, to be queued by `errand queue serve` ({trigger})"
+    said = "is queued" if trigger is None else f"waits for `errand queue serve` to queue it ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
-    finish(_told(mission, standing), as_json)
+    finish(_mission_json(mission, standing), as_json)
 
 
 @queue.command(name="list")
 def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) -> None:
-    """Shows all missions of the store and how far each is."""
+    """Lists all missions of the store with their states."""
     with MissionStore(store or out / STORE_NAME, create=False) as missions:
         known = missions.missions()
         standing = {each.id: each for each in StandingMissions(missions).missions()}
     header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
     show_table(console_for(as_json), header, [_row(each, standing) for each in known])
-    finish({"missions": [_told(each, standing) for each in known]}, as_json)
+    finish({"missions": [_mission_json(each, standing) for each in known]}, as_json)
 
 
 @queue.command()
 def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
-    """Forgets a mission; one that stands can be removed while a server runs."""
+    """Removes a mission; a mission with a trigger can be removed while a server runs."""
     with MissionStore(store or out / STORE_NAME, create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claim():
@@ -120,7 +118,7 @@ def run(
     quiet: QUIET = False,
     as_json: AS_JSON = False,
 ) -> None:
-    """Runs all that is queued, each mission in the world as the one before has left it."""
+    """Runs all queued missions, each in the world that the mission before it left."""
     from executive.app.runs import MissionRuns, queued_missions, resumable_line, run_in_turn
     from executive.cli.screen import ConsoleScreen
 
@@ -132,15 +130,16 @@ def run(
     if ended:
         console.print(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
     else:
-        console.print("Nothing is queued; `errand queue add` queues a mission, `errand queue list` shows all.")
+        console.print("No mission is queued; `errand queue add` queues one, `errand queue list` shows all.")
     if resumable is not None:
         console.print(resumable, markup=False)
     finish({"missions": [each.to_json() for each in ended]}, as_json, good=all(each.achieved for each in ended))
 
 
 def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tuple[str, ...]:
+    """Returns a mission's row of `errand queue list`."""
     asked, commands = mission.request, "\n".join(mission.request.commands)
-    state = "running or broken off" if mission.state is MissionState.RUNNING else mission.state.value
+    state = "running or interrupted" if mission.state is MissionState.RUNNING else mission.state.value
     trigger = f"{mission.standing}: {mission.why}" if mission.why else ""
     if (stands := standing.get(mission.id)) is not None:
         due = _due(stands)
@@ -149,37 +148,38 @@ def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tup
     return str(mission.id), state, asked.name, asked.world_name, str(asked.seed), commands, mission.message, trigger
 
 
-def _told(mission: StoredMission, standing: Mapping[int, StandingMission]) -> dict[str, Any]:
+def _mission_json(mission: StoredMission, standing: Mapping[int, StandingMission]) -> dict[str, Any]:
+    """Returns a mission as JSON values."""
     asked = mission.request
-    told: dict[str, Any] = {"mission": mission.id, "state": mission.state.value, "name": asked.name}
-    told |= {"world": asked.world_name, "seed": asked.seed, "commands": list(asked.commands)}
-    told["message"] = mission.message
+    values: dict[str, Any] = {"mission": mission.id, "state": mission.state.value, "name": asked.name}
+    values |= {"world": asked.world_name, "seed": asked.seed, "commands": list(asked.commands)}
+    values["message"] = mission.message
     if (stands := standing.get(mission.id)) is not None:
         due = _due(stands)
-        told |= {"trigger": str(stands.trigger), "next": None if due is None else due.isoformat()}
-        told |= {} if isinstance(stands.trigger, OnCall | OnTopic) else {"missed": stands.missed.value}
-    return {**told, "standing": mission.standing, "why": mission.why} if mission.why else told
+        values |= {"trigger": str(stands.trigger), "next": None if due is None else due.isoformat()}
+        values |= {} if isinstance(stands.trigger, OnCall | OnTopic) else {"missed": stands.missed.value}
+    return {**values, "standing": mission.standing, "why": mission.why} if mission.why else values
 
 
 def _due(standing: StandingMission) -> datetime | None:
-    """When it is due next, in local time."""
+    """Next time of a standing mission, in local time."""
     due = standing.due_next(utc_now(), None)
     return None if due is None else local(due, None)
 
 
 def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed | None) -> Trigger | None:
-    """The trigger of the options; None where there is none. Raises InputError."""
+    """Returns the trigger of the options; None without one. Raises InputError."""
     given: list[Trigger] = [schedule_of(at)] if at is not None else []
     given += [Every.from_text(every)] if every is not None else []
     given += [event_of(on)] if on is not None else []
     if len(given) > 1:
-        raise InputError("--at, --every and --on are one trigger each", hint="queue the mission once for each of them")
+        raise InputError("give one of --at, --every and --on", hint="queue the mission once for each trigger")
     trigger = given[0] if given else None
     if missed is not None and (trigger is None or isinstance(trigger, OnCall | OnTopic)):
         what = "without a trigger" if trigger is None else f"for '{trigger}'"
-        hint = "leave it out: calls and messages are queued as they come, and only while `errand queue serve` runs"
+        hint = "leave it out: calls and messages only count while `errand queue serve` runs"
         hint = hint if trigger else "give --at, --every or --on as well"
-        raise InputError(f"--missed says nothing {what}", hint=hint)
+        raise InputError(f"--missed has no meaning {what}", hint=hint)
     if isinstance(trigger, OnTopic):
         refuse_missing_source(trigger.kind)
     return trigger
@@ -189,21 +189,21 @@ def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed |
 def serve(
     out: Out = Path("out"),
     store: STORE = None,
-    host: Annotated[str, typer.Option(help="Where HTTP calls are served.")] = "127.0.0.1",
-    port: Annotated[int, quantity_option(Port, help="The port for HTTP calls; 0 takes a free one.")] = 8950,
+    host: Annotated[str, typer.Option(help="Host name or address for HTTP calls.")] = "127.0.0.1",
+    port: Annotated[int, quantity_option(Port, help="Port for HTTP calls; 0 takes a free one.")] = 8950,
     token: Annotated[
         str | None,
-        typer.Option(envvar="ERRAND_TOKEN", help="What calls must bear; by default one kept beside the store."),
+        typer.Option(envvar="ERRAND_TOKEN", help="Bearer token of calls; by default one stored beside the store."),
     ] = None,
-    until_idle: Annotated[bool, typer.Option("--until-idle", help="End when nothing is queued.")] = False,
+    until_idle: Annotated[bool, typer.Option("--until-idle", help="End when no mission is queued.")] = False,
     for_s: Annotated[
         float | None,
-        quantity_option(Wait, "--for", help="End after so long; no mission begins then."),
+        quantity_option(Wait, "--for", help="Begin no mission after this time, and end."),
     ] = None,
     quiet: QUIET = False,
     as_json: AS_JSON = False,
 ) -> None:
-    """Waits for triggers and runs what is queued, until Ctrl-C: at times, on a full battery, calls and messages."""
+    """Queues missions at times, on a full battery, calls and messages, and runs them, until Ctrl-C."""
     from executive.app.queue_server import CallAddress, Listeners, QueueServer
     from executive.app.runs import MissionRuns, resumable_line
     from executive.cli.screen import ConsoleScreen
@@ -228,44 +228,45 @@ def serve(
 
 
 def resume(
-    store: Annotated[Path, typer.Option(help="Where the missions are kept.")] = Path("out") / STORE_NAME,
+    store: Annotated[Path, typer.Option(help="File of the missions.")] = Path("out") / STORE_NAME,
     mission: Annotated[
-        int | None, quantity_option(Count, help="Its number; by default the one that was broken off or cancelled last.")
+        int | None,
+        quantity_option(Count, help="Number of the mission; by default the last interrupted or cancelled one."),
     ] = None,
     as_json: AS_JSON = False,
     quiet: QUIET = False,
 ) -> None:
-    """Goes on with the mission that was broken off or cancelled, from its last finished step; then with its queue."""
+    """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
     with MissionStore(store, create=False) as missions, missions.claim():
         from executive.app.runs import MissionRuns, queued_missions, run_in_turn
         from executive.cli.screen import ConsoleScreen
 
-        chosen = _broken_off(missions, mission)
+        chosen = _interrupted(missions, mission)
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
         ended = [runs.run(chosen), *(run_in_turn(queued_missions(missions), runs) if chosen.queued else ())]
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))
 
 
-def _broken_off(missions: MissionStore, number: int | None) -> StoredMission:
-    """The mission to go on with: the one named, the one that no process ended, or the newest where it was cancelled.
+def _interrupted(missions: MissionStore, number: int | None) -> StoredMission:
+    """Returns the mission to resume: the named one, an interrupted one, or the newest if it was cancelled.
 
-    Raises InputError when there is none.
+    Raises InputError if there is none.
     """
     if number is None:
         begun = [each for each in missions.missions() if each.starts]
-        broken = [each for each in begun if each.state is MissionState.RUNNING]
-        broken += [each for each in begun[-1:] if each.state in _MAY_GO_ON]
-        if broken:
-            return broken[0]
+        found = [each for each in begun if each.state is MissionState.RUNNING]
+        found += [each for each in begun[-1:] if each.state in _RESUMABLE]
+        if found:
+            return found[0]
         queued = missions.missions(MissionState.QUEUED)
-        hint = "`errand queue run` does what is queued" if queued else "`errand queue list` shows how missions ended"
-        raise InputError("no mission was broken off", hint=hint, file=missions.path)
+        hint = "`errand queue run` runs the queued missions" if queued else "`errand queue list` shows all missions"
+        raise InputError("no mission was interrupted", hint=hint, file=missions.path)
     chosen = missions.mission(number)
-    if chosen.state not in _MAY_GO_ON:
-        known = listing((state.value for state in _MAY_GO_ON), last="or")
+    if chosen.state not in _RESUMABLE:
+        known = listing((state.value for state in _RESUMABLE), last="or")
         raise InputError(
-            f"mission {number} is {chosen.state.value}", hint=f"name one that is {known}", file=missions.path
+            f"mission {number} is {chosen.state.value}", hint=f"name a mission that is {known}", file=missions.path
         )
     return chosen

@@ -1,4 +1,4 @@
-"""`errand teleop` drives a body and arm by hand, from terminal or live page; `errand warm-up` readies this machine."""
+"""`errand teleop` drives body and arm by hand; `errand warm-up` compiles the numeric code for this machine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
 from executive.cli.output import console_for
-from executive.cli.run_keys import keys_pressed
+from executive.cli.run_keys import read_keys
 from executive.mission.request import parse_start
 from executive.run.worker import LockStepWorker
 from executive.view.feed import Feed
@@ -48,19 +48,19 @@ v c  open, close    + - < >  height, tilt    p  save the pose    space  stop    
 
 def teleop(
     world: Annotated[str, typer.Option("--world", help="A world by name or folder.")] = "flat",
-    robot: Annotated[str, typer.Option("--robot", help="The robot's name.")] = "Alice",
+    robot: Annotated[str, typer.Option("--robot", help="Name of the robot.")] = "Alice",
     start: START = None,
-    seed: Annotated[int, quantity_option(Seed, help="Sets the objects and the sensors' noise.")] = 1,
-    poses: Annotated[Path, typer.Option("--poses", help="Folder of the poses that are saved.")] = Path("poses"),
-    port: Annotated[int, quantity_option(Port, help="Serve the page here; 0 takes a free port.")] = 0,
+    seed: Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")] = 1,
+    poses: Annotated[Path, typer.Option("--poses", help="Folder for saved poses.")] = Path("poses"),
+    port: Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")] = 0,
     limit: Annotated[
-        float | None, quantity_option(Delay, "--for", help="End after so many seconds on the robot's clock.")
+        float | None, quantity_option(Delay, "--for", help="End after this time (s) on the robot's clock.")
     ] = None,
 ) -> None:
-    """Drives a robot's body and arm by hand. It stops when keys stop coming, and keeps the skills' limits."""
+    """Drives a robot's body and arm by hand. The robot stops without keys, and keeps the limits of the skills."""
     with ExitStack() as stack:
         if not _NAME.fullmatch(robot):
-            raise InputError(f"'{robot[:60]}' is no name for a robot", hint="use letters and digits, as in Alice")
+            raise InputError(f"'{robot[:60]}' is not a name for a robot", hint="use letters and digits, as in Alice")
         opened = open_world(world)
         placed = only_robot(robot, opened, seed=seed, start=None if start is None else parse_start(start))
         if start is not None:
@@ -74,24 +74,24 @@ def teleop(
         stack.callback(driven.return_lease, context.lease)
         hands = Teleop(context)
 
-        def saving(name: str | None) -> str:
-            """Saves the pose under a name, or a free one; says so."""
+        def save(name: str | None) -> str:
+            """Saves the pose under a name, or under a free one; returns a sentence."""
             return f"saved as {save_pose(poses, name, hands.pose(), world=opened.name)}"
 
         feed, scene = Feed(), simulation.show_live()
-        server = stack.enter_context(serve(PageContent(feed, page_actions(hands, saving, scene), scene.url), port))
+        server = stack.enter_context(serve(PageContent(feed, page_actions(hands, save, scene), scene.url), port))
         console = console_for(False)
-        stack.enter_context(keys_pressed(TerminalKeys(hands, saving, console.print).press))
+        stack.enter_context(read_keys(TerminalKeys(hands, save, console.print).press))
         console.print(f"The page: {server.url}\n{_HELP}", markup=False)
         feed.tell("teleop_keys", {key: axis for key, (axis, _) in KEYS.items()})
         try:
-            drive(hands, context, limit, lambda: feed.tell("teleop", _told(hands)))
+            drive(hands, context, limit, lambda: feed.tell("teleop", _state(hands)))
         except KeyboardInterrupt:
             return
 
 
 def context_for(world: World, robot: Robot, clock: Clock, start: Pose2D) -> SkillContext:
-    """The robot with a localiser, a costmap and the lease. Raises InputError: another has the lease, or no map."""
+    """Returns a robot with localiser, costmap and lease. Raises InputError without a free lease or a map."""
     components = default_stack()
     try:
         scan_map, keepout_map = load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path)
@@ -112,19 +112,19 @@ def context_for(world: World, robot: Robot, clock: Clock, start: Pose2D) -> Skil
     )
 
 
-def drive(hands: Teleop, context: SkillContext, limit_s: float | None, told: Callable[[], None]) -> None:
-    """Does what is asked until the limit (s, on the robot's clock), never faster than the wall's clock."""
+def drive(hands: Teleop, context: SkillContext, limit_s: float | None, report: Callable[[], None]) -> None:
+    """Drives until the limit (s, robot's clock), never faster than real time; calls `report` in each period."""
     begun_s = context.clock.now()
     due_s = time.monotonic()
     while limit_s is None or context.clock.now() - begun_s < limit_s:
-        period(hands, context)
-        told()
+        advance(hands, context)
+        report()
         due_s = max(due_s + TeleopOptions().period_s, time.monotonic())
         threading.Event().wait(due_s - time.monotonic())
 
 
-def period(hands: Teleop, context: SkillContext) -> None:
-    """Estimates where the robot is, sends the commands of one period, and lets it pass."""
+def advance(hands: Teleop, context: SkillContext) -> None:
+    """Updates the estimates, sends the commands of one period, and advances the clock by it."""
     context.localiser.update(context.robot)
     context.costmap.update(context.robot, context.localiser.estimate())
     hands.tick()
@@ -132,13 +132,13 @@ def period(hands: Teleop, context: SkillContext) -> None:
 
 
 class TerminalKeys:
-    """Keys of a terminal, which reports presses and repeats of a held key, but no releases."""
+    """Keys of a terminal, which sends presses and repeats of a held key, but no releases."""
 
     def __init__(self, hands: Teleop, save: Callable[[str | None], str], say: Callable[[str], None]) -> None:
         self._hands, self._save, self._say = hands, save, say
 
     def press(self, key: str) -> None:
-        """Asks for what the key means; save with its key; any other stops the robot."""
+        """Commands the motion of a key, or saves the pose; any other key stops the robot."""
         self._hands.ask(axis_values([key]))
         if key == SAVE_KEY:
             try:
@@ -148,7 +148,7 @@ class TerminalKeys:
 
 
 def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene | None) -> Mapping[str, Action]:
-    """Actions of the page: `teleop` with held keys and sticks, `save_pose` with a name."""
+    """Returns the page's actions: `teleop` with held keys and sticks, `save_pose` with a name."""
 
     def ask(values: Mapping[str, Any]) -> str:
         try:
@@ -167,8 +167,8 @@ def page_actions(hands: Teleop, save: Callable[[str | None], str], scene: Scene 
     return {"teleop": ask, "save_pose": save_as, **({} if scene is None else scene_actions(scene))}
 
 
-def _told(hands: Teleop) -> dict[str, Any]:
-    """The state that the page shows."""
+def _state(hands: Teleop) -> dict[str, Any]:
+    """Returns the state for the page."""
     pose = hands.pose()
     return {
         "note": hands.note,

@@ -1,4 +1,4 @@
-"""`errand run`: a sentence or a mission file in the simulated world."""
+"""`errand run` runs a sentence or a mission file in the simulated world."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 @takes_request()
 def run(
     request: Request,
-    listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file that says it.")] = None,
+    listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file with the sentence.")] = None,
     as_json: AS_JSON = False,
     quiet: QUIET = False,
-    whole_tree: Annotated[bool, typer.Option("--tree", help="Show the whole tree in the end.")] = False,
+    whole_tree: Annotated[bool, typer.Option("--tree", help="Show the whole tree at the end.")] = False,
     profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
     store: STORE = None,
     anyway: ANYWAY = False,
@@ -81,10 +81,10 @@ def run(
 
 
 def refuse_unaddressed(request: Request) -> None:
-    """Raises InputError where a sentence lacks the robot's name, although the request or the world asks for it.
+    """Raises InputError if a sentence lacks the robot's name although the request or the world requires it.
 
-    Nothing heavy is imported for it. Whether a name that is there calls the robot is decided later, and so is all that
-    cannot be read here, and who of several robots is called.
+    A quick check without heavy imports. Understanding the sentence decides later whether the name calls the robot, and
+    which of several robots is called.
     """
     if request.sentence is None or request.robots:
         return
@@ -101,7 +101,7 @@ def refuse_unaddressed(request: Request) -> None:
 
 
 def _robot_of(world: str) -> dict[str, Any]:
-    """The robot in the knowledge file of a world; {} where it has none, or several."""
+    """Returns the robot in the knowledge file of a world; {} if it names none or several."""
     worlds = find_spec("plant.worlds")
     folders = [Path(world), *(Path(each) / world for each in (worlds and worlds.submodule_search_locations) or ())]
     file = next(file for folder in folders if is_file(file := folder / "knowledge.yaml") or folder is folders[-1])

@@ -1,4 +1,4 @@
-"""Keys that control a run from the terminal: space, s, x, c, answers, buttons of missions, sentences to the robot."""
+"""Keys at the terminal: pause, step, stop, cancel, answers, buttons of missions, and sentences to the robot."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ _ERASE: Final = frozenset("\x7f\b")
 
 @dataclass(frozen=True)
 class Typing:
-    """What is being typed: `text` is an answer or, with `saying`, a sentence to the robot; `reply` is its last word.
+    """State of typing: `text` is an answer or, with `saying`, a sentence to the robot; `reply` is the last reply.
 
-    `can_say` tells that there is somebody who understands sentences.
+    `can_say` says whether the robot takes sentences.
     """
 
     text: str = ""
@@ -41,9 +41,9 @@ class Typing:
 
 
 class Keys:
-    """What each key does to a run. While a question waits that any text answers, keys write that text.
+    """Controller of a run by keys. While a question with a free answer waits, keys write the answer.
 
-    A colon, or Enter, begins a sentence that `say` answers; Enter sends it, Escape leaves it.
+    A colon or Enter begins a sentence, Enter sends it to `say`, and Escape drops it.
     """
 
     def __init__(self, control: Control, say: Callable[[str], str] | None = None) -> None:
@@ -60,7 +60,7 @@ class Keys:
         )
 
     def press(self, key: str) -> None:
-        """Does what the key stands for; others do nothing."""
+        """Handles a key; unknown keys do nothing."""
         if self.typing.saying:
             self._write_sentence(key)
             return
@@ -87,7 +87,7 @@ class Keys:
             self._edit(key)
 
     def _edit(self, key: str) -> None:
-        """Writes or erases a letter."""
+        """Adds or erases a letter."""
         text = self.typing.text
         if key in _ERASE:
             self.typing = replace(self.typing, text=text[:-1])
@@ -102,7 +102,7 @@ class Keys:
             self._edit(key)
 
     def _answer(self, question: OpenQuestion, text: str) -> None:
-        """Answer, unless the time of the question was over just now."""
+        """Answers the question, unless its time is just over."""
         try:
             self._control.answer(question.id, text)
         except ValueError:
@@ -116,7 +116,7 @@ class Keys:
 
 
 def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -> list[str]:
-    """What to say below the tree: why the run is held, what is asked, what is typed and answered, which keys."""
+    """Returns the lines below the tree: why the run is paused, questions, typed text, replies, and the keys."""
     lines = [f"{state.mode.value.upper()}: {state.reason}"] if state.mode not in _NOTHING_TO_SAY else []
     for waiting in state.questions:
         question, left_s = waiting.question, max(0.0, waiting.until_s - now_s)
@@ -128,16 +128,15 @@ def prompt_lines(state: ControlState, now_s: float, typing: Typing = Typing()) -
         lines.append(f"buttons: {names}")
     lines += [typing.reply] if typing.reply else []
     if typing.saying:
-        return [*lines, f": {typing.text}_", "Enter says it · Esc leaves it"]
+        return [*lines, f": {typing.text}_", "Enter says it · Esc drops it"]
     return [*lines, SAY_HELP if typing.can_say else HELP]
 
 
 @contextmanager
-def keys_pressed(press: Callable[[str], object], descriptor: int | None = None) -> Iterator[bool]:
-    """Reads keys while the block runs, in a thread that sleeps until one comes; False where there is no terminal.
+def read_keys(press: Callable[[str], object], descriptor: int | None = None) -> Iterator[bool]:
+    """Calls `press` with each key, in a thread, while the block runs; yields False without a terminal.
 
-    `press` is called with each key in that thread. The terminal is put back as it was. `descriptor` is standard input
-    unless given.
+    `descriptor` is by default standard input. The terminal's mode is restored at the end.
     """
     source = _stdin() if descriptor is None else descriptor
     if source is None or not os.isatty(source):
@@ -176,7 +175,7 @@ def _read(source: int, wake: int, press: Callable[[str], object]) -> None:
 
 
 def _stdin() -> int | None:
-    """The descriptor of standard input; None where it is closed or replaced."""
+    """Returns the descriptor of standard input; None if it is closed or replaced."""
     try:
         return sys.stdin.fileno()
     except (AttributeError, ValueError, OSError):

@@ -1,4 +1,4 @@
-"""A run as people see it: the commands before, the live tree and a line for each ended skill, the verdicts after."""
+"""Display of a run at the terminal: commands, live tree, a line for each ended skill, and verdicts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from executive.app.mission_run import FinishedRun
 from executive.app.page_view import PageView
 from executive.app.prepared import Prepared
 from executive.app.runs import RunOptions
-from executive.cli.run_keys import HELP, Keys, keys_pressed, prompt_lines
+from executive.cli.run_keys import HELP, Keys, prompt_lines, read_keys
 from executive.language.parser import load_parser
 from executive.record.schemas import SPEECH
 from executive.record.work import Profile
@@ -38,7 +38,7 @@ SILENCE: Final = Silence()
 
 @contextmanager
 def voice_for(aloud: bool) -> Iterator[Voice]:
-    """The voice of a run, which has said all in the end; silence unless `aloud`. Raises InputError: there is none."""
+    """Yields a voice, silent unless `aloud`; waits for its last sentence. Raises InputError if there is no voice."""
     if not aloud:
         yield SILENCE
         return
@@ -50,15 +50,15 @@ def voice_for(aloud: bool) -> Iterator[Voice]:
 
 
 @dataclass(frozen=True)
-class HeardSpeech(RunVisitor):
-    """Writes what a robot says on the console, unless `quiet`, and says it with a voice, which must not block."""
+class SpeechOutput(RunVisitor):
+    """Output of a robot's speech: on the console unless `quiet`, and by a voice that does not block."""
 
     console: Console
     voice: Voice
     quiet: bool
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Lets speech be heard."""
+        """Prints and says a speech message."""
         if topic == SPEECH:
             robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
             if not self.quiet:
@@ -69,10 +69,10 @@ class HeardSpeech(RunVisitor):
 
 @dataclass
 class ConsoleScreen:
-    """Shows runs on the console, and has them controlled from there (`executive.app.runs.Screen`).
+    """Display and control of runs on the console.
 
-    `page` makes the live page of a run, where one is wanted; `shown_page` is the last one. With `whole_tree` all nodes
-    of a tree are shown in the end, and `profile` times the subsystems.
+    `page` builds the live page of a run, and `shown_page` is the last one. With `whole_tree` it shows all nodes of the
+    tree at the end. `profile` measures the time of subsystems.
     """
 
     console: Console
@@ -101,8 +101,8 @@ class ConsoleScreen:
         page = self.shown_page = None if self.page is None else self.page(prepared)
         attended = self.console.is_terminal and sys.stdin.isatty() and not self.quiet
         control = Control(attended=attended, pace=1.0 if attended else None) if page is None else page.control
-        speech = HeardSpeech(self.console, self.voice, self.quiet)
-        if self.quiet and page is None:  # nobody speaks to the run
+        speech = SpeechOutput(self.console, self.voice, self.quiet)
+        if self.quiet and page is None:  # no user can speak to the run
             load_parser().release()
             yield RunOptions(control, (speech,), page, self.profile)
             return
@@ -117,14 +117,14 @@ class ConsoleScreen:
             yield RunOptions(control, visitors, page, self.profile)
 
     def conclude(self, finished: FinishedRun) -> None:
-        """Shows the verdicts and the figures, after the whole tree where that is wanted."""
+        """Shows verdicts and figures, after the whole tree if `whole_tree`."""
         if self.whole_tree:
             self.console.print(to_rich(finished.tree, collapsed=False))
         for line in finished.report.lines():
             self.console.print(line)
 
     def name_files(self, out: Path) -> None:
-        """Names what was left in a folder, but for what the store keeps there."""
+        """Names the files in a folder, without those of the store."""
         names = sorted(path.name for path in out.iterdir() if not path.name.startswith(Path(STORE).stem))
         self.tell(f"Written to {out}: {', '.join(names)}")
 
@@ -132,7 +132,7 @@ class ConsoleScreen:
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5
-_TOLD = frozenset({"skill", "fallen"})
+_SHOWN_KINDS = frozenset({"skill", "fallen"})
 _UNDER_WAY = (Styles.IDLE.value, Styles.RUNNING.value)
 PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 
@@ -141,13 +141,13 @@ PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
 def live_view(
     console: Console, control: Control | None = None, *, say: Callable[[str], str] | None = None
 ) -> Iterator[RunVisitor]:
-    """Shows the tree while the mission runs, and writes a line for each skill that ends.
+    """Shows the tree while the mission runs, and prints a line for each ended skill.
 
-    Where somebody sits at a terminal, keys control the run, and `say` answers the sentences that are typed.
+    With a control and a terminal, keys control the run, and `say` answers typed sentences.
     """
     hands = control or Control(pace=None)
     keys = Keys(hands, say)
-    with keys_pressed(keys.press) if control is not None else nullcontext(False) as heard:
+    with read_keys(keys.press) if control is not None else nullcontext(False) as heard:
         lines = _Lines(console)
         if not console.is_terminal:
             yield lines
@@ -157,7 +157,7 @@ def live_view(
 
 
 class _Lines(RunVisitor):
-    """Writes a line whenever a skill has ended."""
+    """Printer of a line for each ended skill."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -166,7 +166,7 @@ class _Lines(RunVisitor):
         self._begun_s: dict[str, float] = {}
 
     def tick(self, progress: Progress) -> None:
-        """Writes what ended since the last tick."""
+        """Prints the skills that have ended since the last tick."""
         for robot, tree in progress.trees.items():
             if tree.root.path_id not in self._leaves:
                 self._leaves[tree.root.path_id] = _skill_titles(node_view(tree.root))
@@ -185,13 +185,13 @@ class _Lines(RunVisitor):
 
 
 class _Picture(RunVisitor):
-    """Writes those `lines`, and redraws the tree under way a few times a second, with `prompt(now_s)` below."""
+    """Live tree, redrawn a few times a second, with the `lines` above and `prompt(now_s)` below."""
 
     def __init__(self, lines: _Lines, live: Live, prompt: Callable[[float], Sequence[str]]) -> None:
         self._lines, self._live, self._prompt, self._drawn_s = lines, live, prompt, 0.0
 
     def tick(self, progress: Progress) -> None:
-        """Write; draw when it is time again."""
+        """Prints lines, and redraws the tree if it is time."""
         self._lines.tick(progress)
         now = time.perf_counter()
         if now - self._drawn_s < REFRESH_S:
@@ -212,7 +212,7 @@ class _Picture(RunVisitor):
 
 
 def visible_rows(picture: Text, rows: int) -> Text:
-    """At most so many lines of a tree, with what runs among them."""
+    """Returns at most `rows` lines of a tree, with a running node among them."""
     lines = picture.split("\n")
     if len(lines) <= rows:
         return picture
@@ -223,14 +223,14 @@ def visible_rows(picture: Text, rows: int) -> Text:
 
 
 def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
-    """What the skills below do, by path id."""
-    if node.kind in _TOLD:
+    """Returns the titles of the skills below a node by path id."""
+    if node.kind in _SHOWN_KINDS:
         return {node.path_id: node.title(above)}
     return {path_id: title for child in node.children for path_id, title in _skill_titles(child, node).items()}
 
 
 def skill_line(title: str, state: NodeState, took_s: float) -> Text:
-    """A skill that has ended: its mark, how long it took, what it did, and what came of it."""
+    """Returns the line of an ended skill: mark, duration, title, cause and message."""
     style = style_of(state)
     cause = state.cause.value if state.cause else ""
     what = printable(": ".join(filter(None, (title, cause, state.message))))
@@ -238,7 +238,7 @@ def skill_line(title: str, state: NodeState, took_s: float) -> Text:
 
 
 def progress_line(states: Iterable[NodeState], now_s: float) -> Text:
-    """Time, how far the present skill has come where it says so, and what it does."""
+    """Returns the line of the running skill: time, progress if the skill reports it, and message."""
     running = [state for state in states if state.status is Status.RUNNING]
     state = running[-1] if running else NodeState()
     done = round((state.progress or 0.0) * BAR_CELLS)

@@ -1,4 +1,4 @@
-"""`errand world`: worlds made of any map, and how a world looks."""
+"""`errand world` builds worlds from maps, and draws worlds."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from skills.robot import Pose2D
 
 MAX_BYTES: Final = 20_000_000
 WallHeight = Annotated[float, Quantity(ge=1.3, le=10.0, unit="m")]
-Out = Annotated[Path, typer.Option("--out", help="The world's folder; it is made.")]
+Out = Annotated[Path, typer.Option("--out", help="New folder for the world.")]
 
-world = typer.Typer(name="world", help="Worlds made of any map, and how a world looks.", rich_markup_mode=None)
+world = typer.Typer(name="world", help="Worlds from any map, and drawings of worlds.", rich_markup_mode=None)
 
 
 class _Cylinders(BaseModel):
-    """What is used of a file of cylinders: x, y, radius, height of each; start (x, y, yaw) and goal (x, y)."""
+    """File of cylinders: x, y, radius and height of each; start (x, y, yaw) and goal (x, y). In metres and radians."""
 
     model_config = ConfigDict(allow_inf_nan=False)
 
@@ -41,17 +41,17 @@ class _Cylinders(BaseModel):
 
 @world.callback()
 def _group() -> None:
-    """Worlds made of any map."""
+    """Worlds from any map."""
 
 
 @world.command(cls=StartCommand)
 def from_map(
-    map_file: Annotated[Path, typer.Argument(metavar="MAP.yaml", help="A map in the form of ROS map_server.")],
+    map_file: Annotated[Path, typer.Argument(metavar="MAP.yaml", help="A map in the format of ROS map_server.")],
     out: Out,
     start: START = None,
     wall_height: Annotated[float, quantity_option(WallHeight, help="Height of the walls, m.")] = 2.5,
 ) -> None:
-    """Makes a world of a map: walls, both grids, rooms and doors to be named."""
+    """Builds a world from a map: walls, both grids, and rooms and doors without names."""
     from plant.worlds.builder.own import world_from_grid
     from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -65,11 +65,11 @@ def from_map(
 
 @world.command(cls=StartCommand)
 def from_cylinders(
-    file: Annotated[Path, typer.Argument(metavar="FILE.json", help="Cylinders, as BARN's worlds have them.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE.json", help="Cylinders in the format of BARN worlds.")],
     out: Out,
     start: START = None,
 ) -> None:
-    """Makes a world of upright cylinders: a JSON object with `cylinders` [[x, y, radius, height], ...] and `start`."""
+    """Builds a world of upright cylinders from a JSON object: `cylinders` [[x, y, radius, height], ...] and `start`."""
     from plant.worlds.builder.own import world_from_cylinders
 
     read = _cylinders(file)
@@ -82,9 +82,9 @@ def from_cylinders(
 @world.command()
 def show(
     folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")],
-    out: Annotated[Path, typer.Option("--out", help="The picture, PNG.")] = Path("world.png"),
+    out: Annotated[Path, typer.Option("--out", help="PNG file of the picture.")] = Path("world.png"),
 ) -> None:
-    """Draws a world's plan: rooms, doors, walls, surfaces and the start."""
+    """Draws the plan of a world: rooms, doors, walls, surfaces and the start."""
     from plant.scene_pictures import draw_world, save_png
 
     drawn = open_world(folder)
@@ -105,7 +105,7 @@ def show(
 
 
 def _cylinders(path: Path) -> _Cylinders:
-    """Raises InputError: it is no such file."""
+    """Reads a file of cylinders. Raises InputError."""
     text = read_text(path, most_bytes=MAX_BYTES, hint="check the path")
     try:
         return TypeAdapter(_Cylinders).validate_python(json.loads(text))
@@ -113,15 +113,15 @@ def _cylinders(path: Path) -> _Cylinders:
         raise InputError(f"damaged JSON, {error.msg}", hint="correct it there", file=path, line=error.lineno) from error
     except ValidationError as error:
         where, what, hint = first_error(error.errors())
-        told = "it must have 'cylinders': [[x, y, radius, height], ...]"
-        raise InputError(f"{'.'.join(map(str, where)) or 'it'}: {what}; {hint}", hint=told, file=path) from error
+        form = "it must have 'cylinders': [[x, y, radius, height], ...]"
+        raise InputError(f"{'.'.join(map(str, where)) or 'it'}: {what}; {hint}", hint=form, file=path) from error
     except (ValueError, RecursionError) as error:
         what = "it is nested too deep" if isinstance(error, RecursionError) else "a number in it is too long"
         raise InputError(what, hint="correct it", file=path) from error
 
 
 def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
-    """Makes a world, and says what was made; it is read once more, so that what is said is so. Raises InputError."""
+    """Builds a world, loads it again, and prints its facts. Raises InputError."""
     try:
         with new_folder(out) as draft:
             make(draft)

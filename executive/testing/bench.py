@@ -1,4 +1,4 @@
-"""Test bench for one skill: its real leaf, a robot, estimators and a clock, ticked as the runner ticks."""
+"""Test bench for one skill: its leaf, a robot, estimators and a clock, ticked as the runner does."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SkillRun:
 
 
 class SkillBench:
-    """A robot with its lease, estimators and log. It runs one skill after the other."""
+    """Robot with its lease, estimators and log, which runs one skill after another."""
 
     def __init__(
         self,
@@ -60,7 +60,7 @@ class SkillBench:
         detector: Detector | None = None,
         seed: int = 0,
     ) -> None:
-        """Takes the robot's lease. `clock` advances the time; ideal estimators replace those that are not given."""
+        """Takes the robot's lease. Ideal estimators replace those that are not given."""
         self.robot, self.clock = robot, clock
         self._capabilities = robot.capabilities()
         self.sensing = False
@@ -80,11 +80,11 @@ class SkillBench:
         self._sense(robot)
 
     def context(self) -> SkillContext:
-        """The context with which a skill is created."""
+        """Returns the context with which a skill is created."""
         return self._context.for_skill(f"{_PREFIX}/skill")
 
     def inject(self, *words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS) -> None:
-        """Injects faults, given in words. Raises ValueError for words that are no fault of this robot."""
+        """Injects faults in words. Raises ValueError for words that are no fault of this robot."""
         cameras = [camera.source for camera in self._capabilities.cameras]
         self.add_faults(*(parse_fault(each, kinds, cameras=cameras) for each in words))
 
@@ -94,7 +94,7 @@ class SkillBench:
         self._context = replace(self._context, robot=self.robot)
 
     def leaf(self, skill: type[Skill[Any]], inputs: Any, *, limit_s: float | None = None) -> SkillLeaf:
-        """The skill's leaf with these inputs, as in a tree; `limit_s` is its time limit."""
+        """Returns the skill's leaf with these inputs, as in a tree; `limit_s` is its time limit."""
         fields = {name: Constant(value) for name, value in vars(inputs).items()}
         return SkillLeaf(
             path_id=f"{_PREFIX}/skill",
@@ -157,7 +157,7 @@ def scripted_bench(
     *,
     localised: bool = True,
 ) -> tuple[SkillBench, ScriptedRobot]:
-    """A bench with a scripted robot, and that robot; by default in the room with a table and a can."""
+    """Builds a bench with a scripted robot, by default in the room with a table and a can; returns both."""
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
     place = KnownPlace(start.pose)

@@ -37,7 +37,7 @@ _OWN_VERBS = ("acquire_lease", "take_lease", "return_lease", "lease_holder")
 
 @dataclass(frozen=True)
 class SuiteCase:
-    """A skill, inputs with which it succeeds, and a factory of benches with the scripted robot."""
+    """Case of the suite: a skill, inputs with which it succeeds, and a factory of benches with a scripted robot."""
 
     skill: type[Skill[Any]]
     inputs: Any
@@ -51,7 +51,7 @@ class SuiteCase:
 
     @cached_property
     def nominal(self) -> tuple[SkillRun, Counter[str]]:
-        """The run without faults, and how often the skill calls each verb in it."""
+        """Run without faults, and the number of the skill's calls of each verb in it."""
         bench, _ = self.bench()
         calls: Counter[str] = Counter()
 
@@ -63,7 +63,7 @@ class SuiteCase:
         return bench.run(self.skill, self.inputs), calls
 
     def sampled(self, ticks: int) -> list[int]:
-        """Tick numbers spread over a run, with the first and the last; all of a short run."""
+        """Returns tick numbers spread over a run, with the first and the last; all ticks of a short run."""
         if ticks <= self.samples:
             return list(range(1, ticks))
         step = (ticks - 2) / (self.samples - 1)
@@ -71,8 +71,10 @@ class SuiteCase:
 
 
 def cancelled_at_every_tick(case: SuiteCase) -> Iterator[str]:
-    """Cancels the skill at sampled ticks: the cause is CANCELLED, the robot stops within 0.2 s, a second `end` does
-    nothing."""
+    """Cancels the skill at sampled ticks; yields a sentence for each violation.
+
+    The cause must be CANCELLED, the robot must stop within 0.2 s, and a second `end` must do nothing.
+    """
     run, _ = case.nominal
     if run.outcome != "success":
         yield f"the skill fails without any fault: {run.cause} {run.message}"
@@ -105,7 +107,7 @@ def _cancelled(case: SuiteCase, tick: int) -> Iterator[str]:
 
 
 def exception_in_every_verb(case: SuiteCase) -> Iterator[str]:
-    """Lets each verb raise at its first call and halfway: the skill fails with cause ERROR, and the robot stops."""
+    """Lets each verb raise at its first call and halfway; the skill must fail with ERROR, and the robot must stop."""
     _, called = case.nominal
     for verb in (verb for verb in VERBS if called[verb] and verb not in _OWN_VERBS):
         for calls in sorted({0, called[verb] // 2}):
@@ -137,7 +139,7 @@ def _raising(case: SuiteCase, verb: str, calls: int) -> Iterator[str]:
 
 
 def stale_sensors(case: SuiteCase) -> Iterator[str]:
-    """Freezes all sensors at sampled ticks: the skill must not succeed on data older than it declares."""
+    """Freezes all sensors at sampled ticks; the skill must not succeed on data older than it declares."""
     run, called = case.nominal
     sensed = [verb for verb in SENSE_VERBS if called[verb]]
     declared = case.skill.max_data_age_s
@@ -155,7 +157,7 @@ def stale_sensors(case: SuiteCase) -> Iterator[str]:
 
 
 def _recorded(skill: type[Skill[Any]], made: list[Skill[Any]]) -> type[Skill[Any]]:
-    """A subclass of the skill that appends its instances to `made`."""
+    """Returns a subclass of the skill that appends its instances to `made`."""
     skill = skill.loaded()
 
     def init(self: Any, *arguments: Any, **options: Any) -> None:
@@ -173,14 +175,14 @@ PARTS: dict[str, Callable[[SuiteCase], Iterator[str]]] = {
 
 
 class SkillSuite:
-    """Base of a test class: set `skill` and `inputs`, and perhaps override `bench`."""
+    """Base class of tests: set `skill` and `inputs`, and perhaps override `bench`."""
 
     skill: ClassVar[type[Skill[Any]]]
     inputs: ClassVar[Any]
     samples: ClassVar[int] = 8
 
     def bench(self, capabilities: Capabilities) -> tuple[SkillBench, ScriptedRobot]:
-        """A new bench; by default the scripted Spot stands at the origin of the room, before the table."""
+        """Returns a new bench; by default the scripted Spot stands at the origin of the room, before the table."""
         return scripted_bench(capabilities)
 
     def test_it_can_be_cancelled_at_every_tick(self, robot_capabilities: Capabilities) -> None:
@@ -188,7 +190,7 @@ class SkillSuite:
         _raise_findings(cancelled_at_every_tick(self._case(robot_capabilities)))
 
     def test_an_exception_in_any_verb_is_a_failure_with_cause_error(self, robot_capabilities: Capabilities) -> None:
-        """And the robot is still afterwards."""
+        """The skill fails with ERROR, and the robot is still afterwards."""
         _raise_findings(exception_in_every_verb(self._case(robot_capabilities)))
 
     def test_no_success_is_claimed_on_stale_data(self, robot_capabilities: Capabilities) -> None:
@@ -207,7 +209,7 @@ def _raise_findings(found: Iterable[str]) -> None:
 
 
 class SkillTestSettings:
-    """Settings of all skill tests of a session; a conftest may add to `fault_kinds` or replace benches in `makers`."""
+    """Settings of all skill tests of a session; a conftest may extend `fault_kinds` or replace benches in `makers`."""
 
     def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
         self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
@@ -215,12 +217,12 @@ class SkillTestSettings:
 
 
 class SkillTestModule(pytest.File):
-    """One file of skill tests."""
+    """File of skill tests as a pytest collector."""
 
     settings: SkillTestSettings
 
     def collect(self) -> Iterable[pytest.Item]:
-        """The tests, and the parts of the suite if the file asks for them. A broken file is one error with its line."""
+        """Collects the tests, and the suite if the file wants it. Raises CollectError with the line of an error."""
         try:
             tests = load_skill_tests(self.path, self.settings.skills, self.settings.fault_kinds)
         except InputError as error:
@@ -237,21 +239,21 @@ class SkillTestModule(pytest.File):
         return item
 
     def _carried_out(self, tests: SkillTestFile, index: int) -> Iterator[str]:
-        """The report of a test that did not meet its expectation."""
+        """Runs a test; yields a report if it did not meet its expectation."""
         settings = self.settings
         trial = carry_out(tests, index, settings.skills[tests.skill], settings.makers, settings.fault_kinds)
         if trial.differences:
             yield trial.report()
 
     def _case(self, tests: SkillTestFile, index: int) -> SuiteCase:
-        """A test for all parts of the suite, which share the run without faults; the robot is a scripted one."""
+        """Returns the case of a test for all parts of the suite, with a scripted robot."""
         test, skill = tests.tests[index], self.settings.skills[tests.skill]
         make = partial(bench_of_setup, self.settings.capabilities, test.robot or tests.robot, test.world or tests.world)
         return SuiteCase(skill, tests.inputs(index, skill), make)
 
 
 class SkillTestItem(pytest.Item):
-    """A test, or a part of the suite, at one line of a file of skill tests; it fails where `findings` has any."""
+    """Test, or part of the suite, at a line of a file; it fails if `findings` yields a sentence."""
 
     def __init__(
         self, *, tests: SkillTestFile, index: int, findings: Callable[[], Iterable[str]], **options: Any
@@ -260,17 +262,17 @@ class SkillTestItem(pytest.Item):
         self.tests, self.index, self.findings = tests, index, findings
 
     def runtest(self) -> None:
-        """Runs it. Raises pytest's exception of a failure."""
+        """Runs the test. Raises pytest's failure exception."""
         found = "\n".join(self.findings())
         if found:
             pytest.fail(found, pytrace=False)
 
     def reportinfo(self) -> tuple[Path, int, str]:
-        """Where it stands: file, line (from 0), name."""
+        """Returns file, line (from 0) and name."""
         return self.path, self.tests.line(self.index) - 1, self.name
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
-        """A plain report for a failed test, and a traceback for a defect."""
+        """Returns a plain report for a failed test, and a traceback for a defect."""
         if isinstance(excinfo.value, pytest.fail.Exception | InputError):
             return f"{self.path}:{self.tests.line(self.index)}: skill '{self.tests.skill}'\n{excinfo.value}"
         return super().repr_failure(excinfo, style)

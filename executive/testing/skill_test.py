@@ -1,7 +1,7 @@
-"""Skill tests as YAML: which skill, its ports, the robot and its world, what goes wrong, and how it must end.
+"""Skill tests in YAML: skill, ports, robot, world, faults, and the expected end.
 
-A file `*.skilltest.yaml` holds the tests of one skill. What stands above `tests` holds for each of them unless it says
-otherwise.
+A file `*.skilltest.yaml` holds the tests of one skill. Keys above `tests` apply to each test that does not override
+them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class _Strict(BaseModel):
 
 
 class PoseSetup(_Strict):
-    """A planar pose in the world frame."""
+    """Planar pose in the world frame."""
 
     x: Coordinate = Field(default=0.0, description="metres")
     y: Coordinate = Field(default=0.0, description="metres")
@@ -49,52 +49,52 @@ class PoseSetup(_Strict):
 
 
 class RobotSetup(_Strict):
-    """The robot and how it begins."""
+    """Robot and its initial state."""
 
     kind: Literal["scripted", "plant"] = Field(
         default="scripted",
         description="scripted: exact and fast; plant: the simulated Spot in the small room, with physics",
     )
-    pose: PoseSetup = Field(default=PoseSetup(), description="where it stands (scripted only)")
+    pose: PoseSetup = Field(default=PoseSetup(), description="start pose (scripted only)")
     arm: tuple[Angle, ...] | None = Field(
-        default=None, description="arm angles, rad; stowed unless said (scripted only)"
+        default=None, description="arm angles, rad; by default stowed (scripted only)"
     )
-    holding: bool = Field(default=False, description="it begins with a can in its gripper (scripted only)")
+    holding: bool = Field(default=False, description="whether it begins with a can in its gripper (scripted only)")
     in_gripper: Turn | None = Field(
-        default=None, description="opening (rad) at which a closing gripper holds something (scripted only)"
+        default=None, description="opening (rad) at which a closing gripper holds an object (scripted only)"
     )
     pulled_at_s: Delay | None = Field(
-        default=None, description="from then on somebody pulls at what it holds (scripted only)"
+        default=None, description="time from which a person pulls at the held object (scripted only)"
     )
-    docked: bool = Field(default=False, description="it stands on a dock and charges (scripted only)")
+    docked: bool = Field(default=False, description="whether it stands on a dock and charges (scripted only)")
     charge: Share = Field(default=0.9, description="battery, 0 to 1 (scripted only)")
-    lost: bool = Field(default=False, description="it does not know where it is (scripted only)")
+    lost: bool = Field(default=False, description="whether it is not localised (scripted only)")
 
 
 class BlockSetup(_Strict):
-    """An upright block in the scripted robot's world."""
+    """Upright block in the scripted robot's world."""
 
     at: _Place = Field(description="middle of its base: x, y, z in metres")
     size: _Size = Field(description="extent along x, y and z in metres, each above 0")
     colour: tuple[_Shade, _Shade, _Shade] = Field(default=(200, 195, 185), description="red, green, blue from 0 to 255")
-    loose: bool = Field(default=False, description="it can be taken")
+    loose: bool = Field(default=False, description="whether the robot can take it")
 
 
 class WorldSetup(_Strict):
-    """The robot's surroundings."""
+    """World of a test."""
 
     room: bool = Field(default=True, description="a room of 6 m by 5 m, with a table before the origin")
     can: bool = Field(default=True, description="a red can near the edge of the table")
-    blocks: tuple[BlockSetup, ...] = Field(default=(), description="what else there is (scripted only)")
+    blocks: tuple[BlockSetup, ...] = Field(default=(), description="further blocks (scripted only)")
 
 
 class Expectation(_Strict):
-    """How the skill must end."""
+    """Expected end of the skill."""
 
-    outcome: Literal["success", "failure", "cancelled"] = Field(description="the end")
+    outcome: Literal["success", "failure", "cancelled"] = Field(description="outcome")
     cause: Cause | None = Field(default=None, description="the cause of a failure")
-    message: str | None = Field(default=None, description="a regular expression that is found in the last message")
-    within_s: Duration | None = Field(default=None, description="seconds on the robot's clock at most")
+    message: str | None = Field(default=None, description="a regular expression that the last message contains")
+    within_s: Duration | None = Field(default=None, description="time limit on the robot's clock, seconds")
 
     @field_validator("message")
     @classmethod
@@ -113,29 +113,29 @@ class Expectation(_Strict):
 
 
 class SkillTest(_Strict):
-    """One test."""
+    """Test of a skill."""
 
-    name: Annotated[str, Field(min_length=1, description="what it shows")]
+    name: Annotated[str, Field(min_length=1, description="name of the test")]
     with_: dict[str, Any] = Field(
-        default_factory=dict, alias="with", description="input ports; they stand in for those of the file"
+        default_factory=dict, alias="with", description="input ports, in place of those of the file"
     )
-    robot: RobotSetup | None = Field(default=None, description="instead of the file's")
-    world: WorldSetup | None = Field(default=None, description="instead of the file's")
-    faults: tuple[str, ...] = Field(default=(), description='what goes wrong, as in "camera freezes at 3 s"')
-    cancel_at_s: Delay | None = Field(default=None, description="cancel it at this time (s)")
-    expect: Expectation = Field(description="how it must end")
+    robot: RobotSetup | None = Field(default=None, description="in place of the file's")
+    world: WorldSetup | None = Field(default=None, description="in place of the file's")
+    faults: tuple[str, ...] = Field(default=(), description='faults in words, as in "camera freezes at 3 s"')
+    cancel_at_s: Delay | None = Field(default=None, description="time at which the skill is cancelled, s")
+    expect: Expectation = Field(description="expected end")
 
 
 class SkillTestFile(_Strict):
-    """The tests of one skill."""
+    """File with the tests of one skill."""
 
-    skill: Annotated[str, Field(min_length=1, description="the registered name")]
+    skill: Annotated[str, Field(min_length=1, description="registered name of the skill")]
     with_: dict[str, Any] = Field(default_factory=dict, alias="with", description="input ports of all tests")
     robot: RobotSetup = Field(default=RobotSetup(), description="the robot of all tests")
     world: WorldSetup = Field(default=WorldSetup(), description="the world of all tests")
     suite: bool = Field(
         default=False,
-        description="with each test that expects success and has no faults, also run the suite for every skill",
+        description="whether to run the skill suite on each test that expects success and has no faults",
     )
     tests: Annotated[tuple[SkillTest, ...], Field(min_length=1, description="the tests")]
     _source: YamlSource = PrivateAttr()
@@ -149,16 +149,13 @@ class SkillTestFile(_Strict):
         return self
 
     def line(self, index: int) -> int:
-        """The line at which a test stands, from 1."""
+        """Line of a test in the file, from 1."""
         return self._source.line(("tests", index))
 
     def inputs(self, index: int, skill: type[Skill[Any]]) -> Any:
-        """The skill's Inputs for one test; names are those of the room. Raises InputError with file and line."""
-        hints, knowledge, values = (
-            field_types(skill.Inputs),
-            room_knowledge(),
-            {**self.with_, **self.tests[index].with_},
-        )
+        """Returns the skill's Inputs for one test, grounded in the room. Raises InputError with file and line."""
+        hints, knowledge = field_types(skill.Inputs), room_knowledge()
+        values = {**self.with_, **self.tests[index].with_}
         try:
             found = assign_ports(values, skill.Inputs)
             missing = [name for name in required_fields(skill.Inputs) if name not in found]
@@ -180,7 +177,7 @@ def load_skill_tests(
 ) -> SkillTestFile:
     """Reads a file of skill tests and checks it against the registered skills.
 
-    Raises InputError: with file, line and hint: broken YAML, unknown keys, no such skill, port or fault, wrong values.
+    Raises InputError with file, line and hint for broken YAML, unknown keys, skills, ports or faults, or wrong values.
     """
     source = read_yaml(path)
     file = validate(SkillTestFile, source)
@@ -207,14 +204,14 @@ _LAST_MESSAGES = 12
 
 @dataclass(frozen=True)
 class Trial:
-    """Result of one test; `differences` is empty when it met its expectation."""
+    """Result of one test; `differences` is empty if it met its expectation."""
 
     test: SkillTest
     run: SkillRun
     differences: tuple[str, ...]
 
     def report(self) -> str:
-        """Differences, end, faults, and the last messages, as text."""
+        """Formats differences, end, faults and the last messages as text."""
         run = self.run
         lines = [*self.differences, ""]
         lines.append(f"it ended with {_end(run.outcome, run.cause)} after {run.time_s:g} s: {run.message}")
@@ -225,7 +222,7 @@ class Trial:
 
 
 def scripted_maker(capabilities: Capabilities) -> BenchMaker:
-    """A factory of benches with a scripted robot of these capabilities."""
+    """Returns a factory of benches with a scripted robot of these capabilities."""
 
     return lambda setup, world: bench_of_setup(capabilities, setup, world)[0]
 
@@ -233,20 +230,20 @@ def scripted_maker(capabilities: Capabilities) -> BenchMaker:
 def bench_of_setup(
     capabilities: Capabilities, setup: RobotSetup, world: WorldSetup
 ) -> tuple[SkillBench, ScriptedRobot]:
-    """A bench with the scripted robot and the world that a file describes, and that robot."""
+    """Builds a bench with the scripted robot and the world that a file describes; returns both."""
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
     start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked, setup.pulled_at_s)
     return scripted_bench(capabilities, start, blocks_of(world), localised=not setup.lost)
 
 
 def blocks_of(world: WorldSetup) -> tuple[Block, ...]:
-    """The blocks of a world."""
-    return (*(ROOM if world.room else ()), *((TABLE_CAN,) if world.can else ()), *map(_block, world.blocks))
-
-
-def _block(setup: BlockSetup) -> Block:
-    (x, y, z), (dx, dy, dz) = setup.at, setup.size
-    return Block(x - dx / 2, y - dy / 2, x + dx / 2, y + dy / 2, z, z + dz, setup.colour, setup.loose)
+    """Returns the blocks of a world."""
+    blocks = [*(ROOM if world.room else ()), *((TABLE_CAN,) if world.can else ())]
+    for each in world.blocks:
+        (x, y, z), (dx, dy, dz) = each.at, each.size
+        box = (x - dx / 2, y - dy / 2, x + dx / 2, y + dy / 2)
+        blocks.append(Block(*box, z, z + dz, each.colour, each.loose))
+    return tuple(blocks)
 
 
 def carry_out(

@@ -1,4 +1,4 @@
-"""The small room as a world: its knowledge (`small_room.yaml`), and the folder from which the plant builds it."""
+"""The small room of skill tests: its knowledge (`small_room.yaml`), and the world folder for the plant."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _RESOLUTION_M = 0.025
 
 
 def write_small_room(folder: Path, *, can: bool = True) -> Path:
-    """Writes the world into `folder` and returns that. Its only object is a can on the table, placed by the seed."""
+    """Writes the world into `folder` and returns it. Its only object is a can on the table, placed by the seed."""
     (folder / "map").mkdir(parents=True, exist_ok=True)
     (folder / "room.sdf").write_text(_sdf([_FLOOR, *ROOM]), encoding="utf-8")
     model = {"add_model": {"name": "room", "file": (folder / "room.sdf").resolve().as_uri()}}
@@ -36,7 +36,7 @@ def write_small_room(folder: Path, *, can: bool = True) -> Path:
 
 
 def room_knowledge() -> Knowledge:
-    """The knowledge of the small room."""
+    """Returns the knowledge of the small room."""
     return Knowledge.model_validate(_facts()["knowledge"])
 
 
@@ -46,7 +46,7 @@ def _write_yaml(path: Path, data: Mapping[str, Any]) -> None:
 
 @cache
 def _facts() -> dict[str, Any]:
-    """The knowledge and the objects of the room."""
+    """Reads the knowledge and the objects of the room."""
     facts: dict[str, Any] = read_yaml(Path(__file__).with_suffix(".yaml")).data
     return facts
 
@@ -69,7 +69,7 @@ def _write_map(folder: Path, name: str, band_m: tuple[float, float]) -> None:
 
 
 def _sdf(blocks: list[Block]) -> str:
-    """One fixed model of all blocks."""
+    """Returns an SDF file with one fixed model of all blocks."""
     shapes = "\n".join(_shapes(number, block) for number, block in enumerate(blocks))
     model = f'<model name="room"><link name="room">\n{shapes}\n</link></model>'
     return f'<?xml version="1.0"?>\n<sdf version="1.9">{model}</sdf>\n'

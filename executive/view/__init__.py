@@ -1,1 +1,1 @@
-"""Views of a tree: text, SVG and JSON, before, while and after it runs."""
+"""Views of a run: trees as text, SVG and JSON, the live page, the map, and report pages."""

@@ -1,4 +1,4 @@
-"""Feed of the page: every logged message in order, and the latest state of what is not logged."""
+"""Feed of the page: logged messages in order, and the latest progress and control state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_PICTURES: Final = 500
 
 @dataclass(frozen=True)
 class _Message:
-    """A message with its number from 1, its topic, robot and node, and the number of its picture."""
+    """Message with its number from 1, its topic, robot and node, and the number of its picture."""
 
     number: int
     about: Hashable
@@ -31,10 +31,10 @@ class _Message:
 
 
 class Feed:
-    """An ordered list of messages as JSON text. The run's thread writes it, the server's thread reads it.
+    """Ordered list of messages as JSON text. The run's thread writes it, and the server's thread reads it.
 
-    Pictures are stored apart: a page that opens late gets the list at once and fetches only the pictures that it shows.
-    When the list is full, the feed drops its older half, except the newest message of each topic, robot and node.
+    Pictures are stored separately, so that a page fetches only the pictures that it shows. A full feed drops its older
+    half, except the newest message of each topic, robot and node.
     """
 
     def __init__(self, *, most: int | None = MOST_MESSAGES, most_pictures: int = MOST_PICTURES) -> None:
@@ -46,7 +46,7 @@ class Feed:
         self._added = self._shown = 0
         self._pictures: dict[int, tuple[str, bytes]] = {}
         self._news: dict[str, tuple[int, str]] = {}
-        self._told = 0
+        self._states = 0
         self._listeners: tuple[Callable[[], None], ...] = ()
         self._read = self._readers = 0
 
@@ -65,10 +65,10 @@ class Feed:
         self._call_listeners()
 
     def tell(self, about: str, word: Mapping[str, Any]) -> None:
-        """Sets the latest state of something that is not logged, such as progress."""
+        """Sets the latest state of a subject that is not logged, such as progress."""
         with self._lock:
-            self._told += 1
-            self._news[about] = (self._told, _encoded({"live": about, "data": word}))
+            self._states += 1
+            self._news[about] = (self._states, _encoded({"live": about, "data": word}))
         self._call_listeners()
 
     def listen(self, listener: Callable[[], None]) -> None:
@@ -77,12 +77,12 @@ class Feed:
             self._listeners = (*self._listeners, listener)
 
     def since(self, cursor: tuple[int, int]) -> tuple[tuple[int, int], Sequence[str]]:
-        """The next cursor, and the messages since a cursor, which is (0, 0) at first."""
+        """Returns the next cursor, and the messages since a cursor; the first cursor is (0, 0)."""
         with self._lock:
-            added, told = cursor
-            words = [text for number, text in sorted(self._news.values()) if number > told]
+            added, states = cursor
+            words = [text for number, text in sorted(self._news.values()) if number > states]
             new = self._messages[bisect_right(self._messages, added, key=attrgetter("number")) :]
-            return (self._added, self._told), [*(each.text for each in new), *words]
+            return (self._added, self._states), [*(each.text for each in new), *words]
 
     @property
     def pictures(self) -> int:
@@ -91,7 +91,7 @@ class Feed:
             return self._shown
 
     def picture(self, number: int) -> tuple[str, bytes]:
-        """Format ("jpeg" or "png") and bytes of a picture. Raises LookupError for an unknown number."""
+        """Returns format ("jpeg" or "png") and bytes of a picture. Raises LookupError for an unknown number."""
         with self._lock:
             found = self._pictures.get(number)
         if found is None:
@@ -99,27 +99,27 @@ class Feed:
         return found
 
     def add_reader(self) -> None:
-        """Counts a page that begins to read."""
+        """Adds a page that reads the feed."""
         with self._lock:
             self._readers += 1
 
     def remove_reader(self) -> None:
-        """Counts a page that reads no more."""
+        """Removes a page that has read the feed."""
         with self._lock:
             self._readers -= 1
             self._lock.notify_all()
 
     def mark_sent(self, cursor: tuple[int, int]) -> None:
-        """Notes that a page has got all messages up to a cursor."""
+        """Marks all messages up to a cursor as sent to a page."""
         with self._lock:
             self._read = max(self._read, cursor[0])
             self._lock.notify_all()
 
     def wait_sent(self, timeout_s: float) -> bool:
-        """Waits until a page has got all messages, at most `timeout_s` of wall time; True if it has.
+        """Waits until a page has all messages, at most `timeout_s` of wall time; returns whether it has.
 
-        The run calls it after each tick, so that a busy run lets the server's thread work. It returns at once if no
-        page reads.
+        The run calls it after each tick, so that a busy run lets the server's thread work. Returns at once without a
+        page.
         """
         with self._lock:
             return self._lock.wait_for(lambda: self._readers == 0 or self._read >= self._added, timeout_s)

@@ -1,11 +1,11 @@
-"""The tree in forms that other programs read: SVG, Mermaid, and the XML of BehaviorTree.CPP."""
+"""The tree in formats of other programs: SVG, Mermaid, and the XML of BehaviorTree.CPP."""
 
 from __future__ import annotations
 
 import re
 import textwrap
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, SubElement
@@ -39,7 +39,7 @@ _SIZES: Final = {
 
 @dataclass(frozen=True)
 class _Box:
-    """A node with its place: the left upper corner, height, and the boxes of its children."""
+    """Box of a node: its upper left corner, height, note, and the boxes of its children."""
 
     node: NodeView
     x: float
@@ -71,7 +71,7 @@ class _Box:
 
 
 def to_svg(root: NodeView, *, title: str = "") -> str:
-    """The tree as a whole SVG document, with a legend; notes are cut to three lines and stand whole in the tooltip."""
+    """Draws the tree as an SVG document with a legend; notes have three lines, and tooltips have the whole note."""
     box, bottom = _laid_out(root, MARGIN, MARGIN + TITLE_H)
     boxes = list(box.walk())
     return render(
@@ -86,8 +86,10 @@ def to_svg(root: NodeView, *, title: str = "") -> str:
 
 
 def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
-    """The box of a node and of all nodes below it from height y on, and the height at which the next one may begin."""
-    note = _wrapped(note_of(node))
+    """Lays out a node and the nodes below it from height y on; returns its box, and the height for the next box."""
+    note = tuple(
+        textwrap.wrap(printable(note_of(node)), NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"),
+    )
     height = BOX_H + NOTE_LINE_H * len(note) + (4 if note else 0)
     children: list[_Box] = []
     below = y
@@ -101,25 +103,18 @@ def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
     return _Box(node, x, top, height, note, tuple(children)), max(below, top + height + ROW_GAP)
 
 
-def _wrapped(note: str) -> tuple[str, ...]:
-    return tuple(textwrap.wrap(printable(note), NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"))
-
-
 _SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 .,:()-_/+'")
 
 
 def to_mermaid(root: NodeView) -> str:
-    """The tree from left to right: a box for each node, with its state as symbol, colour and line, and its cause."""
-    return "\n".join(["flowchart LR", *_nodes(root), *_classes(), ""])
-
-
-def _nodes(root: NodeView) -> Iterator[str]:
+    """Writes the tree as a Mermaid flowchart from left to right, with the state, cause and message of each node."""
     numbers = {id(node): number for number, (_, node) in enumerate(root.walk())}
+    lines = ["flowchart LR"]
     for _, node in root.walk():
         number = numbers[id(node)]
-        yield f'  n{number}["{_label(node)}"]:::{_class(style_of(node.state))}'
-        for child in node.children:
-            yield f"  n{number} --> n{numbers[id(child)]}"
+        lines.append(f'  n{number}["{_label(node)}"]:::{_class(style_of(node.state))}')
+        lines += [f"  n{number} --> n{numbers[id(child)]}" for child in node.children]
+    return "\n".join([*lines, *_classes(), ""])
 
 
 def _label(node: NodeView) -> str:
@@ -130,7 +125,7 @@ def _label(node: NodeView) -> str:
 
 
 def mermaid_text(text: str) -> str:
-    """The text, with a character reference for every character that Mermaid might read as syntax."""
+    """Escapes every character that Mermaid might read as syntax by a character reference."""
     return "".join(char if char in _SAFE else f"#{ord(char)};" for char in printable(text))
 
 
@@ -163,11 +158,11 @@ _TAKEN: Final = frozenset(re.findall(r"\w+", _BUILT_IN_NAMES))
 
 
 def to_btcpp(root: NodeView) -> str:
-    """The tree as an XML document, which Groot2 opens.
+    """Writes the tree as an XML document for Groot2.
 
-    Sequences and selectors become `Sequence` and `Fallback`, which mean the same. Every other node has its own name in
-    explicit form, and the `TreeNodesModel` lists its ports. Each step of the mission is a tree of its own, so that the
-    editor can fold it. The node's description has state, cause, path id and source line.
+    Sequences and selectors become `Sequence` and `Fallback`. Every other node has its own name in explicit form, and
+    the `TreeNodesModel` lists its ports. Each step of the mission is a tree of its own, so that the editor can fold it.
+    The description of a node has its state, cause, path id and source line.
     """
     parts = _parts(root)
     steps = {id(node): tree_id for node, tree_id in parts}
@@ -182,7 +177,7 @@ def to_btcpp(root: NodeView) -> str:
 
 
 def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
-    """The steps of the mission and its guards, each with a name that no other tree has.
+    """Returns the steps of the mission and its guards, each with a unique name.
 
     The path id of a mission has two parts. The mission is the root, or below its guards.
     """
@@ -192,15 +187,11 @@ def _parts(root: NodeView) -> list[tuple[NodeView, str]]:
     taken = {_identifier(root.name)}
     for child in (child for parent in parents.values() for child in parent.children):
         if child.children and id(child) not in parents:
-            parts.append((child, _free(_identifier(child.path_id.rsplit("/", 1)[-1], "Step"), taken)))
+            name = _identifier(child.path_id.rsplit("/", 1)[-1], "Step")
+            names = (name, *(f"{name}{number}" for number in range(2, len(taken) + 2)))
+            parts.append((child, next(each for each in names if each not in taken)))
             taken.add(parts[-1][1])
     return parts
-
-
-def _free(name: str, taken: Collection[str]) -> str:
-    """The name, with a number where it is taken."""
-    names = (name if number == 1 else f"{name}{number}" for number in range(1, len(taken) + 2))
-    return next(free for free in names if free not in taken)
 
 
 def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, str]) -> None:
@@ -223,7 +214,7 @@ def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
 
 
 def _category(node: NodeView) -> str:
-    """Name of the element: a built-in control node, or the category that fits the number of children."""
+    """Name of a node's element: a built-in control node, or the category for its number of children."""
     if node.kind in _BUILT_IN and node.children:
         return _BUILT_IN[node.kind]
     if not node.children:
@@ -236,14 +227,14 @@ def _model_id(node: NodeView) -> str:
 
 
 def _identifier(text: str, prefix: str = "Errand") -> str:
-    """A name that the format allows: letters and digits, a letter first, and no built-in name."""
+    """Returns a name that the format allows: letters and digits, a letter first, and no built-in name."""
     words = re.findall(r"[A-Za-z0-9]+", text)
     name = "".join(word[0].upper() + word[1:] for word in words) or "Unnamed"
     return name if name[0].isalpha() and name not in _TAKEN else f"{prefix}{name}"
 
 
 def _named(ports: Iterable[Port]) -> Iterator[tuple[str, Port]]:
-    """The ports with their names in the file; an output with the name of an input gets another name."""
+    """Yields the ports with their names in the file; an output with the name of an input gets another name."""
     inputs = {port.name for port in ports if not port.output}
     for port in ports:
         yield f"{_port_name(port)}_out" if port.output and port.name in inputs else _port_name(port), port
@@ -255,7 +246,7 @@ def _port_name(port: Port) -> str:
 
 
 def _value(port: Port) -> str:
-    """A blackboard key in braces, or a text, quoted if it looks like a key."""
+    """Returns a blackboard key in braces, or a text, quoted if it looks like a key."""
     text = printable(port.value)
     if port.on_board:
         return f"{{{text}}}"
@@ -270,7 +261,7 @@ def _description(node: NodeView) -> str:
 
 
 def _models(root: NodeView, trees: Sequence[str]) -> Element:
-    """One model for each kind of node that is not built in, with all ports of its nodes."""
+    """Returns a model for each kind of node that is not built in, with all ports of its nodes."""
     models: dict[tuple[str, str], dict[str, Port]] = {}
     for _, node in root.walk():
         if node.kind not in _BUILT_IN or not node.children:

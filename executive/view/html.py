@@ -1,4 +1,4 @@
-"""HTML and SVG files that need no other file, from the templates in `templates`, and the page with a log in it."""
+"""HTML and SVG files that need no other file: reports from `templates`, and the replay page of a log."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from executive.view.text import printable
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markupsafe import Markup
 
 PAGE_FOLDER: Final = Path(__file__).parent / "page"
 _TEMPLATES: Final = Path(__file__).parent / "templates"
@@ -25,7 +24,7 @@ _SCRIPT: Final = re.compile(r'<script src="page/([\w.]+)" defer></script>\n?')
 
 
 def render(template: str, **values: Any) -> str:
-    """The text that a template makes of values. Every text is escaped; a missing value raises jinja2.UndefinedError."""
+    """Renders a template with values. Escapes every text; raises jinja2.UndefinedError for a missing value."""
     return _environment().get_template(template).render(values)
 
 
@@ -34,35 +33,36 @@ def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    def picture(jpeg: bytes) -> Markup:
-        return Markup(_data_address("jpeg", jpeg))
+    def finalized(value: Any) -> Any:
+        """Removes control characters from a text; leaves HTML as it is."""
+        return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=True,
         undefined=StrictUndefined,
-        finalize=_finalized,
+        finalize=finalized,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(clock=clock_text, data_address=picture, percent="{:.1%}".format, short="{:g}".format)
+    environment.filters.update(
+        clock=clock_text,
+        data_address=lambda jpeg: Markup(_data_address("jpeg", jpeg)),
+        percent="{:.1%}".format,
+        short="{:g}".format,
+    )
     return environment
 
 
-def _finalized(value: Any) -> Any:
-    """A text without control characters; what is HTML already stays as it is."""
-    return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
-
-
 def clock_text(t_s: float) -> str:
-    """A time of a run as minutes and seconds."""
+    """Formats a time of a run (s) as minutes and seconds."""
     minutes, seconds = divmod(max(0.0, t_s), 60.0)
     return f"{int(minutes)}:{seconds:04.1f}"
 
 
 def feed_of(events: Sequence[Event]) -> Feed:
-    """A feed that holds a whole log."""
+    """Returns a feed of a whole log."""
     feed = Feed(most=None)
     for event in events:
         feed(event.topic, event.stamp_s, event.data)
@@ -70,7 +70,7 @@ def feed_of(events: Sequence[Event]) -> Feed:
 
 
 def log_page(events: Sequence[Event], recording: Path | None = None) -> str:
-    """The page with a log in it, and with the 3D recording when there is one."""
+    """Returns the replay page of a log, with the 3D recording if there is one, as one HTML text."""
     feed = feed_of(events)
     _, texts = feed.since((0, 0))
     pictures = [_data_address(*feed.picture(number)) for number in range(feed.pictures)]
@@ -80,7 +80,9 @@ def log_page(events: Sequence[Event], recording: Path | None = None) -> str:
     page = _STYLE.sub(lambda match: f"<style>\n{_file(match[1])}</style>", page)
     page = _SCRIPT.sub("", page)
     messages = [json.loads(text) for text in texts]
-    data = _inert({"messages": messages, "pictures": pictures, "scene": scene})
+    recorded = {"messages": messages, "pictures": pictures, "scene": scene}
+    # "<" is escaped, so that the JSON can neither end its script element nor begin a comment
+    data = json.dumps(recorded, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")
     scripts = "\n".join(_file(name) for name in names)
     body = f'<script id="recorded" type="application/json">{data}</script>\n<script>\n{scripts}</script>\n</body>'
     return f"{page.rsplit('</body>', 1)[0]}{body}\n</html>\n"
@@ -92,8 +94,3 @@ def _file(name: str) -> str:
 
 def _data_address(form: str, data: bytes) -> str:
     return f"data:image/{form};base64,{base64.b64encode(data).decode()}"
-
-
-def _inert(value: Any) -> str:
-    """JSON that cannot end the script element that it stands in, nor begin a comment."""
-    return json.dumps(value, ensure_ascii=True, separators=(",", ":")).replace("<", "\\u003c")

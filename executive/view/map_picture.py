@@ -1,4 +1,4 @@
-"""Draws what a log knows of the robots' paths at one time on their map."""
+"""Draws the robots of a log on their map at one time."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from skills.files.errors import InputError
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)
 _CELL_M: Final = 0.05
-_TRAIL, _PLAN, _PARTICLE, _SEEN, _ROBOT, _INK = (  # blue, green, red
+_TRAIL, _PLAN, _PARTICLE, _OBSTACLE, _ROBOT, _INK = (  # blue, green, red
     (120, 158, 0),
     (178, 114, 0),
     (167, 121, 204),
@@ -33,14 +33,14 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class _Frame:
-    """Pixels of world metres: `height_px` rows, the picture's lower left corner at origin_m."""
+    """Frame of the picture: `height_px` rows, and its lower left corner at `origin_m` in the world."""
 
     origin_m: tuple[float, float]
     height_px: int
     pixels_per_m: float
 
     def pixels(self, points_W: Sequence[Sequence[float]]) -> NDArray[np.int32]:
-        """Pixels (N, 2), column and row, of (x, y) in metres."""
+        """Returns pixels (N, 2), column and row, of points (x, y) in metres."""
         xy = np.asarray(points_W, dtype=np.float64).reshape(-1, 2) - self.origin_m
         return np.column_stack(
             [np.round(xy[:, 0] * self.pixels_per_m), np.round(self.height_px - xy[:, 1] * self.pixels_per_m)]
@@ -48,11 +48,10 @@ class _Frame:
 
 
 def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.uint8]:
-    """The map (height, width, 3; blue, green, red) at a time on the robot's clock.
+    """Draws the map (height, width, 3; blue, green, red) at a time on the robot's clock.
 
-    It shows the trajectory, the planned and the reserved path, the localiser's particles, the costmap's cells that an
-    unmapped obstacle blocks, and the footprint. Each of several robots has its colour. Raises InputError if the log has
-    no map.
+    It shows the trajectory, the planned and the reserved path, the particles of the localiser, the cells of the
+    obstacle layer, and the footprint. Several robots have a colour each. Raises InputError if the log has no map.
     """
     known = [event for event in events if event.stamp_s <= at_s]
     maps = [event.data for event in events if event.topic == MAP]
@@ -67,7 +66,7 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
 
 
 def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
-    """The grid, enlarged, with the names of the places."""
+    """Draws the enlarged grid with the names of places; returns it with its frame."""
     grey = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
     if grey is None:
         raise InputError("the log's map is no picture")
@@ -85,14 +84,14 @@ def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
 def _draw_robot(
     picture: NDArray[np.uint8], frame: _Frame, name: str, events: Sequence[Event], colour: Colour | None
 ) -> None:
-    """Draws one robot from its events, in its colour (blue, green, red) if there are several robots."""
+    """Draws one robot from its events; `colour` (blue, green, red) is given for several robots."""
     poses = [event.data for event in events if event.topic == POSE]
     paths = [event.data["poses"] for event in events if event.topic == PATH]
     views = [event.data for event in events if event.topic == NAVIGATION]
     if views:
         side = max(1, round(0.5 * _CELL_M * frame.pixels_per_m))
         for column, row in frame.pixels(_pairs(views[-1], "seen")).tolist():
-            cv2.rectangle(picture, (column - side, row - side), (column + side, row + side), _SEEN, -1)
+            cv2.rectangle(picture, (column - side, row - side), (column + side, row + side), _OBSTACLE, -1)
     reserved = [event.data for event in events if event.topic == RESERVED_PATH]
     if reserved and reserved[-1]["turn"] is not None:
         _draw_reserved(picture, frame.pixels(_pairs(reserved[-1], "")), colour or _PLAN)
@@ -115,7 +114,7 @@ def _draw_robot(
 
 
 def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
-    """Draws the reserved path: a broad pale band, and a ring at its end."""
+    """Draws the reserved path as a broad pale band with a ring at its end."""
     pale = tuple(round(0.35 * part + 0.65 * 255) for part in colour)
     cv2.polylines(picture, [pixels], False, pale, 15, cv2.LINE_AA)
     cv2.circle(picture, pixels[-1].tolist(), 9, colour, 3, cv2.LINE_AA)

@@ -1,4 +1,4 @@
-"""What the page shows of a run's progress and control, and what its buttons do to it."""
+"""Progress and control state of a run for the page, and the actions of its buttons."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from executive.conversation.replies import Waiting
 from executive.run.control import Control
 from executive.run.control_state import ControlState, Mode
 from executive.run.visitor import Progress, RunVisitor
-from executive.tree.node import NodeState, Snapshot
+from executive.tree.node import NodeState
 from executive.view.feed import Feed
 from skills.files.errors import InputError
 from skills.files.outside import plain_text
@@ -23,14 +23,14 @@ Action = Callable[[Mapping[str, Any]], str]
 
 
 class RefusedError(Exception):
-    """An action cannot be done; the text says why and what to do."""
+    """Error of an action that cannot be done; its text says why and what to do."""
 
 
 def control_actions(control: Control) -> Mapping[str, Action]:
-    """The actions of a run by name. Each takes the page's values and returns a sentence, or raises RefusedError."""
+    """Returns the actions of a run by name. Each takes the page's values and returns a sentence, or RefusedError."""
 
     def bound(call: Callable[[Control, Mapping[str, Any]], None], said: str) -> Action:
-        """An action that calls the control and returns the sentence `said`."""
+        """Returns an action that calls the control and returns the sentence `said`."""
 
         def action(values: Mapping[str, Any]) -> str:
             try:
@@ -46,7 +46,7 @@ def control_actions(control: Control) -> Mapping[str, Action]:
 
 
 def text_of(values: Mapping[str, Any], key: str) -> str:
-    """A text among an action's values. Raises RefusedError if it is missing, empty, too long or no plain text."""
+    """Returns a text of an action's values. Raises RefusedError if it is missing, empty, too long or no plain text."""
     text = values.get(key)
     if not isinstance(text, str) or not text.strip():
         raise RefusedError(f"the action needs a text under '{key}'")
@@ -57,13 +57,13 @@ def text_of(values: Mapping[str, Any], key: str) -> str:
 
 
 def robot_of(values: Mapping[str, Any]) -> str | None:
-    """Name of the robot that an action is for; None for all robots."""
+    """Returns the robot that an action is for; None for all robots."""
     robot = values.get("robot")
     return robot if isinstance(robot, str) and robot else None
 
 
 def control_json(state: ControlState) -> dict[str, Any]:
-    """State of a run's control as JSON values for the page."""
+    """Returns the state of a run's control as JSON values for the page."""
     return {
         "mode": state.mode.value,
         "reason": state.reason,
@@ -87,7 +87,7 @@ def control_json(state: ControlState) -> dict[str, Any]:
 
 
 def asked_json(waiting: Waiting | None, robot: str = "") -> dict[str, Any]:
-    """The question that a robot asks back as JSON values for the page; null if none waits."""
+    """Returns the question that a robot asks back as JSON values for the page; null without one."""
     if waiting is None:
         return {"question": None}
     question = waiting.question
@@ -121,14 +121,14 @@ _LOOK_AGAIN_S: Final = 0.5
 
 
 class ProgressWatch(RunVisitor):
-    """Sends the progress a few times a second, and lets the page keep up."""
+    """Sender of the progress to the page, a few times a second."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
         self._sent_s = 0.0
 
     def tick(self, progress: Progress) -> None:
-        """Sends the progress if it is time again; waits a moment until the page has all messages."""
+        """Sends the progress if it is time; waits at most SEND_LIMIT_S until the page has all messages."""
         now = time.perf_counter()
         if now - self._sent_s >= PROGRESS_PERIOD_S:
             self._sent_s = now
@@ -137,20 +137,18 @@ class ProgressWatch(RunVisitor):
 
 
 def progress_json(progress: Progress) -> Mapping[str, Any]:
-    """For each robot its deepest running node, with message and progress (0 to 1)."""
-    robots = {name: _doing(states) for name, states in progress.states.items()}
+    """Returns for each robot its deepest running node, with message and progress (0 to 1), as JSON values."""
+    robots = dict[str, Mapping[str, Any]]()
+    for name, states in progress.states.items():
+        running = [(path_id, state) for path_id, state in states.items() if state.status is Status.RUNNING]
+        path_id, state = running[-1] if running else (None, NodeState())
+        robots[name] = {"node": path_id, "message": state.message, "progress": state.progress}
     word = {"now_s": round(progress.now_s, 3), "ticks": progress.ticks, "overruns": progress.overruns}
     return {**word, "robots": robots}
 
 
-def _doing(states: Snapshot) -> Mapping[str, Any]:
-    running = [(path_id, state) for path_id, state in states.items() if state.status is Status.RUNNING]
-    path_id, state = running[-1] if running else (None, NodeState())
-    return {"node": path_id, "message": state.message, "progress": state.progress}
-
-
 class ControlWatch:
-    """Sends each new state of a control, in a thread of its own, until the run ends or `close`."""
+    """Sender of each new state of a control, in a thread of its own, until the run ends or `close`."""
 
     def __init__(self, control: Control, feed: Feed) -> None:
         self._control, self._feed = control, feed

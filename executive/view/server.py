@@ -1,7 +1,7 @@
 """HTTP server of the page on 127.0.0.1, in a thread of its own.
 
-Every request for data, every action and the websocket need the token, which each server draws again. The server refuses
-requests from another origin or for another host, so that no other web page can reach the robot.
+Each server draws a new token, which all requests for data, actions and the websocket need. The server refuses requests
+from another origin or for another host, so that no other web page can control the robot.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ _NOT_ALLOWED: Final = 4403
 
 @dataclass(frozen=True)
 class PageContent:
-    """Content of the page: feed, actions of the buttons, and the 3D scene's address or recording."""
+    """Content of the page: feed, actions of the buttons, and the address or recording of the 3D scene."""
 
     feed: Feed
     actions: Mapping[str, Action] = field(default_factory=dict)
@@ -48,7 +48,7 @@ class PageContent:
 
 
 class PageServer(Server):
-    """A running server of the page."""
+    """Running server of the page."""
 
     def __init__(self, content: PageContent, *, port: int = 0) -> None:
         """Starts serving; `port` 0 takes a free one. Raises OSError if the port is taken."""
@@ -62,13 +62,13 @@ class PageServer(Server):
         content.feed.listen(self._wake)
 
     def offer_recording(self, recording: Path) -> None:
-        """Shows the recording of the scene from now on; it follows the page's slider."""
+        """Shows the recording of the scene, which follows the page's slider."""
         self._content = replace(self._content, recording=recording)
         self._content.feed.tell("recording", {"address": RECORDING_ADDRESS})
 
     @property
     def url(self) -> str:
-        """The page's address with its token."""
+        """Address of the page with its token."""
         return f"http://{HOST}:{self.port}/?token={self._token}"
 
     def close(self) -> None:
@@ -78,12 +78,13 @@ class PageServer(Server):
         super().close()
 
     def _wake(self) -> None:
-        """Wakes all websockets; from any thread."""
-        self.call_soon(self._wake_all)
+        """Wakes all websockets. Any thread may call it."""
 
-    def _wake_all(self) -> None:
-        for waker in self._wakers:
-            waker.set()
+        def wake_all() -> None:
+            for waker in self._wakers:
+                waker.set()
+
+        self.call_soon(wake_all)
 
     def _routes(self) -> Sequence[BaseRoute]:
         guarded = self._guarded
@@ -97,7 +98,7 @@ class PageServer(Server):
         ]
 
     def _allowed(self, connection: HTTPConnection) -> bool:
-        """Returns whether host, origin and token are right. Browsers always send the origin of actions."""
+        """Returns whether host, origin and token are right; browsers always send the origin of actions."""
         here = {f"{HOST}:{self.port}", f"localhost:{self.port}"}
         headers = connection.headers
         origin = headers.get("origin")
@@ -152,7 +153,7 @@ class PageServer(Server):
         return JSONResponse({"said": said})
 
     async def _send(self, websocket: WebSocket) -> None:
-        """Sends all messages, and then each new one."""
+        """Sends all messages, and then each new message."""
         if not self._allowed(websocket):
             await websocket.close(_NOT_ALLOWED)
             return
@@ -164,7 +165,7 @@ class PageServer(Server):
             await websocket.send_text(json.dumps([{"live": "hello", "data": self._hello()}]))
             await self._stream(websocket, waker)
         except (WebSocketDisconnect, RuntimeError, OSError):
-            pass  # the page went away
+            pass  # the page has disconnected
         finally:
             self._wakers.discard(waker)
             self._content.feed.remove_reader()
@@ -192,7 +193,7 @@ class PageServer(Server):
 
 
 def _values(body: bytes | None) -> Mapping[str, Any]:
-    """The values of an action. Raises RefusedError for anything but a JSON object."""
+    """Reads the values of an action. Raises RefusedError unless the body is a JSON object."""
     if body is None:
         raise RefusedError(f"the action's values are larger than {MAX_BODY} bytes")
     try:

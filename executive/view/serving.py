@@ -1,4 +1,4 @@
-"""Serves a web application from a thread of its own; the server of calls that start missions."""
+"""HTTP servers in a thread of their own, and the server of calls that start missions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_BODY: Final = 20_000
 
 
 class Server:
-    """A running server of some routes, in a thread of its own. Use it as a context manager, or call `close`."""
+    """Running server of routes in a thread of its own. Use it as a context manager, or call `close`."""
 
     def __init__(self, routes: Sequence[BaseRoute], opened: socket.socket, **settings: Any) -> None:
         """Starts serving on an open socket; `settings` are uvicorn's."""
@@ -58,7 +58,7 @@ class Server:
 
 
 async def body_of(request: Request) -> bytes | None:
-    """Body of a request; None if it is larger than MAX_BODY (the rest is not read), or the client disconnects."""
+    """Reads the body of a request; returns None if it is larger than MAX_BODY, or the client disconnects."""
     body = b""
     try:
         async for part in request.stream():
@@ -71,29 +71,29 @@ async def body_of(request: Request) -> bytes | None:
 
 
 class CallError(Exception):
-    """A call is refused, with a reason and an HTTP status."""
+    """Error of a refused call, with a reason and an HTTP status."""
 
     def __init__(self, status: HTTPStatus, reason: str) -> None:
         super().__init__(reason)
         self.status = status
 
 
-class Called(Protocol):
-    """Carries out a call."""
+class CallHandler(Protocol):
+    """Handler of calls."""
 
     def __call__(self, name: str, body: bytes) -> Mapping[str, Any]:
-        """Returns the answer's JSON object, in a thread of its own. Raises CallError."""
+        """Handles a call in a thread of its own; returns the answer's JSON object. Raises CallError."""
 
 
 class CallServer(Server):
-    """A running server for calls: `POST /missions/NAME` with `Authorization: Bearer TOKEN` starts a mission.
+    """Running server of calls: `POST /missions/NAME` with `Authorization: Bearer TOKEN` starts a mission.
 
-    It checks the token before anything else, and stores nothing of a request but the values in its JSON body.
+    It checks the token first, and stores only the values in the JSON body of a request.
     """
 
-    def __init__(self, called: Called, *, token: str, host: str, port: int) -> None:
+    def __init__(self, handler: CallHandler, *, token: str, host: str, port: int) -> None:
         """Starts serving; `port` 0 takes a free one. Raises OSError if the address is taken, or not of this machine."""
-        self._called, self._token = called, token
+        self._handler, self._token = handler, token
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         opened = socket.create_server((host, port), family=family)
         self.host, self.port = host, int(opened.getsockname()[1])
@@ -101,7 +101,7 @@ class CallServer(Server):
 
     @property
     def url(self) -> str:
-        """The address of calls, up to the name."""
+        """Address of calls, up to the name of the mission."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"http://{host}:{self.port}/missions/"
 
@@ -116,7 +116,7 @@ class CallServer(Server):
             said = {"error": f"the body is larger than {MAX_BODY} bytes"}
             return JSONResponse(said, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, {"Connection": "close"})
         try:
-            answer = await asyncio.to_thread(self._called, request.path_params["name"], body)
+            answer = await asyncio.to_thread(self._handler, request.path_params["name"], body)
         except CallError as refusal:
             return JSONResponse({"error": str(refusal)}, refusal.status)
         return JSONResponse(dict(answer), HTTPStatus.ACCEPTED)

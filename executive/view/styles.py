@@ -1,8 +1,7 @@
-"""The style of a node's state: one word, one symbol, one colour; told apart without colour vision.
+"""Styles of node states, which people without colour vision can distinguish.
 
-Lines are drawn in the colours of Okabe and Ito, which stay apart for all common kinds of colour vision; each state also
-has its own symbol and its own kind of line. Text stands in a darker ink of the same hue, readable on white and on the
-fill.
+Lines have the colours of Okabe and Ito, which differ for all common kinds of colour vision. Each state also has its own
+symbol and line pattern. Text has a darker ink of the same hue, readable on white and on the fill.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from skills.api import Cause
 
 @dataclass(frozen=True)
 class NodeStyle:
-    """A state's word, symbols (Unicode and ASCII), hex colours (line, text, fill), rich style, and SVG line dashes."""
+    """Style of a state: word, symbols (Unicode and ASCII), hex colours (line, text, fill), rich style, SVG dashes."""
 
     word: str
     symbol: str
@@ -32,7 +31,7 @@ class NodeStyle:
 
 
 class Styles(enum.Enum):
-    """The styles of all states."""
+    """Styles of all states."""
 
     IDLE = NodeStyle("not run", "○", "[ ]", "#c4cad1", "#57606a", "#ffffff", "dim", "2 3")
     RUNNING = NodeStyle("running", "▶", "[>]", "#0072b2", "#00537f", "#e5f3fb", "bold blue", "7 3")
@@ -42,17 +41,17 @@ class Styles(enum.Enum):
 
 
 ROBOT_COLOURS: Final = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")
-"""One for each of several robots, in the order of their names; a name always stands beside it."""
+"""Colours of several robots, in the order of their names; the name always stands beside the colour."""
 
 
 def rgb_of(colour: str) -> tuple[int, int, int]:
-    """Red, green and blue, 0 to 255, of a hex colour."""
+    """Converts a hex colour to red, green and blue, 0 to 255."""
     red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return red, green, blue
 
 
 def style_of(state: NodeState) -> NodeStyle:
-    """The style of a state."""
+    """Returns the style of a state."""
     if state.status is Status.INVALID:
         styles = Styles.CANCELLED if state.cause is Cause.CANCELLED else Styles.IDLE
     else:

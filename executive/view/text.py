@@ -1,4 +1,4 @@
-"""The tree as lines of text, plain or coloured, and folded where it is large."""
+"""The tree as lines of text, plain or coloured, and folded if it is large."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PLUMBING = frozenset({"monitor", "remember"})
 
 
 def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
-    """The tree as plain lines."""
+    """Formats the tree as plain lines."""
     lines = _lines(root, "", "", _ASCII_BRANCHES if ascii_only else _BRANCHES, False)
     text = "\n".join(
         f"{branches}{style.ascii if ascii_only else style.symbol} {label}{note}"
@@ -28,7 +28,7 @@ def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
 
 
 def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
-    """The tree with colours, for a terminal; `collapsed` hides nodes below those that succeeded or have not begun."""
+    """Formats the tree with colours; `collapsed` hides the nodes below a node that succeeded or has not begun."""
     text = Text(no_wrap=True, overflow="ellipsis")
     for n, (branches, style, label, note) in enumerate(_lines(root, "", "", _BRANCHES, collapsed)):
         text.append("\n" if n else "")
@@ -42,7 +42,7 @@ def to_rich(root: NodeView, *, collapsed: bool = True) -> Text:
 def _lines(
     node: NodeView, own: str, below: str, pieces: Sequence[str], collapsed: bool
 ) -> Iterator[tuple[str, NodeStyle, str, str]]:
-    """One line for each node, parents first: the branches before it, its style, its label, and a note on its state."""
+    """Yields a line for each node, parents first: branches, style, label, and a note on the state."""
     branch, last_branch, bar, blank = pieces
     hidden = collapsed and is_closed(node)
     unseen = node.below if hidden else node.hidden
@@ -57,10 +57,11 @@ def _lines(
 
 
 def note_of(node: NodeView) -> str:
-    """Cause and message of a node; the message only if no child has the same."""
+    """Returns cause and message of a node; the message only if no child has the same."""
     state = node.state
-    told = state.message and all(state.message != child.state.message for child in node.children)
-    sentence = state.message if told and (state.cause is not None or not node.children or node.kind == "retry") else ""
+    is_own = state.message and all(state.message != child.state.message for child in node.children)
+    counts = state.cause is not None or not node.children or node.kind == "retry"
+    sentence = state.message if is_own and counts else ""
     return ": ".join(filter(None, (state.cause.value if state.cause else "", sentence)))
 
 
@@ -70,14 +71,14 @@ def is_closed(node: NodeView) -> bool:
 
 
 def printable(text: str) -> str:
-    """The text on one line without control characters, which XML does not allow and terminals obey."""
+    """Returns the text on one line without control characters, which XML forbids and terminals obey."""
     return "".join(" " if char in "\n\r\t" else char if char.isprintable() else "\ufffd" for char in text)
 
 
 def fold_below(root: NodeView, depth: int) -> NodeView:
-    """The tree down to `depth` levels below the root; `hidden` counts the deeper nodes.
+    """Cuts the tree at `depth` levels below the root; `hidden` counts the deeper nodes.
 
-    Raises ValueError: a negative depth.
+    Raises ValueError for a negative depth.
     """
     if depth < 0:
         raise ValueError(f"a depth is at least 0, not {depth}")
@@ -87,7 +88,7 @@ def fold_below(root: NodeView, depth: int) -> NodeView:
 
 
 def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
-    """The tree with about `most` visible nodes at most.
+    """Folds the tree to at most about `most` visible nodes.
 
     Subtrees that have not begun are folded first, then those that succeeded, the deepest first. The root, its
     children, and the path to each running, failed or cancelled node stay visible.
@@ -103,18 +104,17 @@ def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
 
 
 def executed_tree(node: NodeView, above: NodeView | None = None) -> NodeView:
-    """The nodes that ran, with their actions in their names, without those that only pass on their one child's result.
+    """Returns the executed nodes, named by their actions, without nodes that only pass on one child's result.
 
-    Conditions that held and stored poses are left out, too. Nodes that failed or were cancelled never are. `above` is
-    the parent of the node.
+    It also leaves out conditions that held and stored poses, but no failed or cancelled node. `above` is the parent.
     """
-    below = tuple(executed_tree(child, node) for child in node.children if not _unseen(child))
+    below = tuple(executed_tree(child, node) for child in node.children if not _is_plumbing(child))
     if len(below) == 1 and (node.state.cause is None or node.state.message == below[0].state.message):
         return below[0]
     return replace(node, name=node.title(above), children=below)
 
 
-def _unseen(node: NodeView) -> bool:
+def _is_plumbing(node: NodeView) -> bool:
     return node.state.cause is None and (node.state.status is Status.INVALID or node.kind in _PLUMBING)
 
 

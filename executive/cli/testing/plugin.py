@@ -1,7 +1,6 @@
-"""The pytest plug-in of the package (entry point `errand` in the group `pytest11`).
+"""Pytest plug-in with fixtures for tests of skills; it collects files named `*.skilltest.yaml`.
 
-It gives fixtures for tests of skills and collects files named `*.skilltest.yaml`. Heavy modules are imported when a
-test asks for them, so that the tests of other projects start no slower.
+Heavy modules are imported only when a test needs them, so that the tests of other projects start as fast as before.
 """
 
 from __future__ import annotations
@@ -35,15 +34,15 @@ class Hooks:
 
     @staticmethod
     def pytest_errand_skill_tests(settings: Any) -> None:
-        """Changes what all skill tests of the session share, before the first is collected.
+        """Changes the settings of all skill tests of the session, before the first test is collected.
 
-        `settings` is an `executive.testing.skill_suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`,
-        put other benches into `makers`.
+        `settings` is an `executive.testing.skill_suite.SkillTestSettings`: append to `fault_kinds`, add to `skills`, or
+        replace benches in `makers`.
         """
 
 
 def pytest_addhooks(pluginmanager: pytest.PytestPluginManager) -> None:
-    """Lets a conftest change what skill tests share."""
+    """Registers the hooks, so that a conftest can change the settings of skill tests."""
     pluginmanager.add_hookspecs(Hooks)
 
 
@@ -59,7 +58,7 @@ def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Col
 
 
 def _settings(config: pytest.Config) -> SkillTestSettings:
-    """What the session's skill tests share, made when the first is collected."""
+    """Returns the settings of the session's skill tests, built when the first test is collected."""
     if _SETTINGS not in config.stash:
         from executive.testing.skill_suite import SkillTestSettings
         from executive.testing.skill_test import scripted_maker
@@ -79,7 +78,7 @@ def _settings(config: pytest.Config) -> SkillTestSettings:
 
 @dataclass(frozen=True)
 class SmallPlant:
-    """The simulated room: `bench` runs skills with the robot in it; its clock steps the plant."""
+    """Simulated room with a robot: `bench` runs skills, and its clock steps the plant."""
 
     world: World
     simulation: Simulation
@@ -87,7 +86,7 @@ class SmallPlant:
 
 
 def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
-    """Writes the world into `folder` and puts the robot into it, at (-0.5, 0) and 1.7 m before the table."""
+    """Writes the world into `folder` and places the robot at (-0.5, 0), 1.7 m before the table."""
     from executive.app.placed_robots import shared_detector
     from executive.testing.bench import SkillBench
     from executive.testing.small_room import write_small_room
@@ -112,7 +111,7 @@ def _small_plant(folder: Path, *, can: bool = True) -> SmallPlant:
 
 
 def _plant_bench(_robot: Any, world: Any) -> SkillBench:
-    """A bench in the small plant, whose files are deleted once it is built."""
+    """Builds a bench in the small plant; deletes the world's files afterwards."""
     with tempfile.TemporaryDirectory() as folder:
         return _small_plant(Path(folder), can=world.can).bench
 
@@ -126,13 +125,13 @@ def _spot() -> Capabilities:
 
 @pytest.fixture(scope="session")
 def robot_capabilities() -> Capabilities:
-    """What the scripted robot is and can do: Spot with its arm. Override it for another robot."""
+    """Capabilities of the scripted robot: Spot with its arm. Override the fixture for another robot."""
     return _spot()
 
 
 @pytest.fixture
 def virtual_clock() -> VirtualClock:
-    """Time that only `advance` moves."""
+    """Clock that only `advance` moves."""
     from skills.testing.clock import VirtualClock
 
     return VirtualClock()
@@ -140,9 +139,9 @@ def virtual_clock() -> VirtualClock:
 
 @pytest.fixture
 def make_scripted_robot(virtual_clock: VirtualClock, robot_capabilities: Capabilities) -> Callable[..., ScriptedRobot]:
-    """Makes a scripted robot on the virtual clock, in the room with a table and a can.
+    """Returns a factory of scripted robots on the virtual clock, in the room with a table and a can.
 
-    Takes the options of `ScriptedRobot`: name, capabilities, blocks, start, seed.
+    The factory takes the options of `ScriptedRobot`: name, capabilities, blocks, start, seed.
     """
     from skills.testing.blocks import ROOM, TABLE_CAN
     from skills.testing.robot import ScriptedRobot
@@ -156,13 +155,13 @@ def make_scripted_robot(virtual_clock: VirtualClock, robot_capabilities: Capabil
 
 @pytest.fixture
 def scripted_robot(make_scripted_robot: Callable[..., ScriptedRobot]) -> ScriptedRobot:
-    """A scripted robot at the origin of the room."""
+    """Scripted robot at the origin of the room."""
     return make_scripted_robot()
 
 
 @pytest.fixture
 def skill_bench(scripted_robot: ScriptedRobot, virtual_clock: VirtualClock) -> SkillBench:
-    """Runs skills in their leaf with the scripted robot; `skill_bench.inject("camera freezes at 3 s")` adds faults."""
+    """Bench that runs skills with the scripted robot; `skill_bench.inject("camera freezes at 3 s")` adds a fault."""
     from executive.testing.bench import SkillBench
     from skills.testing.estimators import BlockCostmap
 
@@ -171,7 +170,7 @@ def skill_bench(scripted_robot: ScriptedRobot, virtual_clock: VirtualClock) -> S
 
 @pytest.fixture
 def skill_context(virtual_clock: VirtualClock) -> Callable[..., SkillContext]:
-    """Makes the context of a skill for a robot: `skill_context(robot)`; takes the options of `SkillBench` besides."""
+    """Returns a factory of skill contexts: `skill_context(robot)`, with the options of `SkillBench`."""
     from executive.testing.bench import SkillBench
 
     def make(robot: ScriptedRobot, **options: Any) -> SkillContext:
@@ -182,6 +181,6 @@ def skill_context(virtual_clock: VirtualClock) -> Callable[..., SkillContext]:
 
 @pytest.fixture
 def small_plant(tmp_path: Path) -> SmallPlant:
-    """Spot in one room with a table and a can, simulated: contact, noisy sensors, scan matching."""
+    """Simulated Spot in a room with a table and a can: contact, noisy sensors, scan matching."""
     _spot()
     return _small_plant(tmp_path / "small_room")

@@ -196,12 +196,12 @@ def test_a_mission_that_ends_the_process_each_time_is_set_aside_and_the_next_one
     for _ in range(MOST_STARTS):
         store.begin(1)
     assert [each.outcome for each in server.serve(until_idle=True)] == ["error", "success"]
-    assert store.mission(1).message == "it was started 3 times and broken off"
+    assert store.mission(1).message == "it was started 3 times and interrupted"
 
 
 def test_a_run_that_was_broken_off_is_left_to_the_user(server, store, world):
     store.begin(store.add(REQUEST, queued=False).id)
-    with pytest.raises(InputError, match=r"mission 1 \(go kitchen\) was broken off; `errand resume`"):
+    with pytest.raises(InputError, match=r"mission 1 \(go kitchen\) was interrupted; `errand resume`"):
         server.serve(until_idle=True)
     assert world.runs == []
 

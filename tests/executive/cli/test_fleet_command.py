@@ -34,12 +34,12 @@ def test_a_run_that_was_killed_goes_on_without_what_is_over_and_what_had_changed
     given.progress(stuck, 0, "it was begun")
     assert [each.id for each in _to_do(store)] == [begun, waiting]
     assert (given.all()[begun].done, given.all()[begun].reassigned) == (2, 0)
-    assert store.mission(stuck).message == "the run was broken off, and Alice had begun it"
+    assert store.mission(stuck).message == "the run was interrupted, and Alice had begun it"
 
 
 def test_a_mission_that_another_command_was_broken_off_in_is_not_touched(store):
     store.begin(store.add(REQUEST, queued=True).id)
-    with pytest.raises(InputError, match="was broken off"):
+    with pytest.raises(InputError, match="was interrupted"):
         _to_do(store)
 
 
@@ -70,7 +70,7 @@ def test_a_chain_whose_run_was_killed_goes_on_with_its_parts(store):
 def test_a_chain_whose_first_part_was_broken_off_for_good_fails_as_a_whole(store):
     whole, first, second = split_in_two(store)
     GivenMissions(store).progress(first, 0, "it was begun")
-    with pytest.raises(InputError, match="nothing is queued"):
+    with pytest.raises(InputError, match="no mission is queued"):
         _to_do(store)
     assert [store.mission(each).state for each in (whole, first, second)] == [MissionState.FAILURE] * 3
 

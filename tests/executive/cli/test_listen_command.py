@@ -175,7 +175,7 @@ def test_the_request_to_run_is_what_was_heard(says, wav):
 
 
 def test_there_is_no_second_request_beside_the_one_heard(wav):
-    with pytest.raises(InputError, match="stands alone"):
+    with pytest.raises(InputError, match="gives the sentence"):
         hear_request(wav, Request("go home"), console=Console(file=io.StringIO()))
 
 

@@ -28,7 +28,7 @@ def test_a_name_that_cannot_be_one_is_refused(tmp_path, name):
 
 
 def test_a_name_that_is_taken_is_refused(tmp_path):
-    with pytest.raises(InputError, match="there is a skill 'stow' already"):
+    with pytest.raises(InputError, match="a skill 'stow' exists already"):
         render_skill("stow", tmp_path / "new", taken=frozenset(("stow",)))
 
 

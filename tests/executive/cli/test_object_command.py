@@ -83,8 +83,8 @@ def test_scripts_are_told_the_same_twice(mesh, tmp_path):
         (("--class", "drill"), "there is no class 'drill'; known are beer, coke"),
         (("--class", "person"), "there is no class 'person'"),
         (("--up", "w"), "the axis 'w' is none; give x, y or z"),
-        (("--out", "{tmp}"), "there is something already; name a new folder by --out"),
-        (("--out", "{tmp}/drill.stl"), "there is something already"),
+        (("--out", "{tmp}"), "it exists already; name a new folder by --out"),
+        (("--out", "{tmp}/drill.stl"), "it exists already"),
     ],
 )
 def test_what_cannot_be_is_one_line_and_status_2(mesh, tmp_path, arguments, why):

@@ -321,7 +321,7 @@ def test_another_run_gives_up_what_was_broken_off(errand, mission, plant, states
     with pytest.raises(GoneError):
         errand("run", mission("alone"), "--quiet")
     result = errand("run", mission("other"), "--quiet")
-    assert "Mission 1 (alone) had been broken off; it is given up." in result.output
+    assert "Mission 1 (alone) had been interrupted; it is given up." in result.output
     assert states() == ["cancelled", "success"]
 
 
@@ -330,10 +330,10 @@ def test_nothing_to_resume_is_refused_with_a_hint(errand, mission, plant):
     assert (result.exit_code, "there is no store; run or queue a mission first" in result.output) == (2, True)
     errand("queue", "add", mission("first"))
     result = errand("resume")
-    assert (result.exit_code, "no mission was broken off; `errand queue run`" in result.output) == (2, True)
+    assert (result.exit_code, "no mission was interrupted; `errand queue run`" in result.output) == (2, True)
     errand("queue", "run", "--quiet")
     result = errand("resume", "--mission", "1")
-    assert (result.exit_code, "mission 1 is success; name one that is" in result.output) == (2, True)
+    assert (result.exit_code, "mission 1 is success; name a mission that is" in result.output) == (2, True)
     result = errand("resume", "--mission", "8")
     assert (result.exit_code, "there is no mission 8; known are 1" in result.output) == (2, True)
 
@@ -392,13 +392,13 @@ def test_a_mission_with_a_trigger_stands_until_it_is_removed(errand, mission, pl
     ("options", "words"),
     [
         (("--at", "every wekday 09:00"), "did you mean 'weekday'"),
-        (("--at", "every day 09:00", "--every", "30m"), "--at, --every and --on are one trigger each"),
+        (("--at", "every day 09:00", "--every", "30m"), "give one of --at, --every and --on"),
         (("--at", "2020-01-01 09:00"), "has passed"),
         (("--every", "soon"), "is no period"),
         (("--on", "noon"), "is no trigger"),
         (("--on", "topic mqtt:door"), "registers 'mqtt' in the entry-point group 'errand.triggers'"),
-        (("--missed", "once"), "--missed says nothing without a trigger"),
-        (("--on", "call x", "--missed", "once"), "--missed says nothing for 'call x'"),
+        (("--missed", "once"), "--missed has no meaning without a trigger"),
+        (("--on", "call x", "--missed", "once"), "--missed has no meaning for 'call x'"),
     ],
 )
 def test_a_trigger_that_cannot_be_is_refused_and_nothing_is_kept(errand, mission, plant, options, words):
@@ -650,4 +650,4 @@ def test_after_a_cancelled_run_the_queue_says_how_to_go_on_also_when_nothing_is_
     errand("queue", "add", mission("first"))
     for said in (errand("queue", "run", "--quiet").output, errand("queue", "run", "--quiet").output):
         assert "Mission 1 (first) was cancelled; `errand resume --store" in " ".join(said.split())
-    assert "Nothing is queued" in said
+    assert "No mission is queued" in said

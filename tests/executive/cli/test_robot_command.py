@@ -13,7 +13,7 @@ from executive.app.placed_robots import only_robot
 from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.entry import app
-from executive.cli.robot_command import TerminalKeys, context_for, page_actions, period
+from executive.cli.robot_command import TerminalKeys, advance, context_for, page_actions
 from executive.mission.load import load_mission
 from executive.view.page_control import RefusedError
 from skills.files.errors import InputError
@@ -95,7 +95,7 @@ def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path):
     ("arguments", "said"),
     [
         (["--world", "nowhere"], "unknown world 'nowhere'"),
-        (["--robot", ""], "is no name for a robot"),
+        (["--robot", ""], "is not a name for a robot"),
         (["--start", "500", "500", "0"], "stands in an obstacle or outside"),
     ],
 )
@@ -128,7 +128,7 @@ def test_the_plants_robot_is_driven_by_hand():
             one_period()
 
     def one_period():
-        period(hands, context)
+        advance(hands, context)
         speeds.append(np.abs(robot.odometry().velocity))
         rates.append(max(abs(robot.joints().velocity_rad_s[name]) for name in model.names))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, keys_pressed, prompt_lines
+from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, prompt_lines, read_keys
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.tree.node import NodeSpec
@@ -104,7 +104,7 @@ def test_keys_typed_at_a_terminal_reach_the_run_and_it_is_put_back(control, term
     person, program = terminal
     before = termios.tcgetattr(program)
     version = control.state.version
-    with keys_pressed(Keys(control).press, program) as heard:
+    with read_keys(Keys(control).press, program) as heard:
         assert heard
         assert termios.tcgetattr(program) != before
         os.write(person, b" ")
@@ -115,18 +115,18 @@ def test_keys_typed_at_a_terminal_reach_the_run_and_it_is_put_back(control, term
 def test_the_terminal_is_put_back_after_an_exception(control, terminal):
     _, program = terminal
     before = termios.tcgetattr(program)
-    with pytest.raises(ZeroDivisionError), keys_pressed(Keys(control).press, program):
+    with pytest.raises(ZeroDivisionError), read_keys(Keys(control).press, program):
         raise ZeroDivisionError
     assert termios.tcgetattr(program) == before
 
 
 def test_nothing_is_read_where_there_is_no_terminal(control, tmp_path):
-    with (tmp_path / "in").open("w+") as file, keys_pressed(Keys(control).press, file.fileno()) as heard:
+    with (tmp_path / "in").open("w+") as file, read_keys(Keys(control).press, file.fileno()) as heard:
         assert not heard
 
 
 def test_waiting_for_keys_takes_no_time_of_the_processor(control, terminal):
-    with keys_pressed(Keys(control).press, terminal[1]):
+    with read_keys(Keys(control).press, terminal[1]):
         before = time.process_time()
         control.wait(control.state.version, timeout_s=0.3)
         assert time.process_time() - before < 0.1

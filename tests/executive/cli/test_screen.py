@@ -8,7 +8,7 @@ from py_trees.common import Status
 from rich.console import Console
 from rich.text import Text
 
-from executive.cli.screen import SILENCE, HeardSpeech, live_view, visible_rows, voice_for
+from executive.cli.screen import SILENCE, SpeechOutput, live_view, visible_rows, voice_for
 from executive.run.control import Control
 from executive.run.visitor import Progress
 from executive.speech import voice as voices
@@ -30,7 +30,7 @@ class Heard:
 @pytest.mark.parametrize(("quiet", "shown"), [(False, "Alice: [bold]Hello\n"), (True, "")])
 def test_what_is_said_is_a_line_unless_quiet_and_is_said_by_the_voice(quiet, shown):
     told, voice = io.StringIO(), Heard()
-    speech = HeardSpeech(Console(file=told, width=80), voice, quiet)
+    speech = SpeechOutput(Console(file=told, width=80), voice, quiet)
     speech.message("speech", {"robot": "Alice", "text": "[bold]Hello", "t": 1.0})
     speech.message("pose", {"robot": "Alice"})
     assert (told.getvalue(), voice.texts) == (shown, ["[bold]Hello"])

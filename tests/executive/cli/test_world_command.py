@@ -56,7 +56,7 @@ def test_a_goal_is_reached_in_a_world_made_of_a_map(map_file, tmp_path):
     [
         (("--start", 2.0, -1.0, 0.0), "room.yaml: the start (2, -1, 0) touches a wall"),
         (("--start", "here"), "--start here: a pose has 3 numbers, not 1"),
-        (("--out", "{tmp}"), "there is something already"),
+        (("--out", "{tmp}"), "it exists already"),
     ],
 )
 def test_what_cannot_be_is_one_line_and_status_2(map_file, tmp_path, arguments, why):

@@ -23,10 +23,10 @@ LINES = {
     "executive/record": 964,
     "executive/store": 1671,
     "executive/conversation": 583,
-    "executive/view": 1383,
-    "executive/testing": 811,
+    "executive/view": 1368,
+    "executive/testing": 810,
     "executive/app": 7419,
-    "executive/cli": 3813,
+    "executive/cli": 3815,
     "skills": 25198,
     "plant": 11612,
 }

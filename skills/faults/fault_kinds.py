@@ -101,7 +101,7 @@ def _among(match: re.Match[str], verbs: tuple[str, ...]) -> frozenset[str]:
     closes = match["verb"] == "gripper" and "set_gripper" in verbs
     verb = "set_gripper" if closes else verb_of(match["verb"])
     if verb not in verbs:
-        raise ValueError(f"'{match['verb']}' cannot do that; those that can are {', '.join(verbs)}")
+        raise ValueError(f"'{match['verb']}' cannot have this fault; name one of {', '.join(verbs)}")
     return frozenset((verb,))
 
 
@@ -271,7 +271,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(
         r"(?P<verb>\w+) (?:freezes|is stale)",
         "camera freezes at 3 s",
-        'a sensor, or all ("sensors"), gives its last reading over and over',
+        'a sensor, or all ("sensors"), repeats its last reading',
         _freezes,
         "{sensor}: freezes {span}",
     ),
@@ -312,27 +312,27 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(
         r"gripper reports holding(?: (?P<what>nothing|something))?",
         "gripper reports holding nothing",
-        "the gripper says so, whatever there is",
+        "the gripper reports this, whatever it holds",
         _gripper,
     ),
     FaultKind(
         r"gripper loses it",
         "gripper loses it at 20 s",
-        "what the gripper holds then, or takes next, falls out of it, once",
+        "the held object, or the next one that the gripper takes, falls once",
         _loses,
         "gripper loses it {at}",
     ),
     FaultKind(
         r"(?:image|camera) returns (?P<what>NaN|nan|no) depth",
         "image returns NaN depth",
-        "pictures come with depth that is NaN, or none",
+        "the depth of pictures is NaN, or missing",
         _no_depth,
         "{camera}: returns no depth {span}",
     ),
     FaultKind(
         r"(?:image|camera) is black",
         "camera is black from 1 s",
-        "pictures show nothing, depth stays",
+        "pictures are black, depth stays",
         _black,
         "{camera}: is black {span}",
     ),
@@ -358,26 +358,26 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
     FaultKind(
         r"odometry jumps (?P<metres>-?\d+(?:\.\d+)?) m",
         "odometry jumps 0.5 m at 2 s",
-        "dead reckoning is off by so much ahead",
+        "dead reckoning shifts ahead by this distance",
         _jumps,
         "odometry jumps {metres} m {at}",
     ),
     FaultKind(
         r"battery falls to (?P<percent>\d+(?:\.\d+)?) ?%",
         "battery falls to 5 % at 3 s",
-        "the battery says that it has so much left",
+        "the battery reports this charge",
         lambda match: _reads("battery", lambda reading: replace(reading, charge=float(match["percent"]) / 100.0)),
     ),
     FaultKind(
         r"robot reports (?P<fault>\w[\w -]*?)",
         "robot reports motor too hot at 2 s",
-        "`faults` holds it",
+        "the robot reports this fault",
         lambda match: _reads("faults", lambda faults: (*faults, match["fault"])),
     ),
     FaultKind(
         r"robot dies",
         "robot dies at 20 s",
-        "no verb is answered any more: each raises an exception",
+        "every verb raises an exception",
         lambda _: Effect(frozenset(VERBS), _raise),
     ),
     FaultKind(r"lease taken", "lease taken at 4 s", "another holder takes the lease, once", _lease),

@@ -93,7 +93,7 @@ def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
     from_s, to_s = float(when["from"] or 0.0), float(when["to"] or math.inf)
     if when["lasts"] is not None:
         if when["to"] is not None or when["calls"] is not None:
-            raise ValueError(f"'{words}' says twice how long; write '5 s at 20 s' or 'from 20 s to 25 s'")
+            raise ValueError(f"'{words}' gives the duration twice; write '5 s at 20 s' or 'from 20 s to 25 s'")
         to_s = from_s + float(when["lasts"])
     if to_s <= from_s:
         raise ValueError(f"'{words}' ends before it begins; write the earlier time first")
@@ -103,7 +103,7 @@ def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
 def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
     """Raises ValueError unless the effect is on pictures and the source is a camera of the robot."""
     if effect.verbs != {"image"}:
-        raise ValueError(f"'.{source}' names a camera, and this fault is none of a camera; leave '.{source}' out")
+        raise ValueError(f"'.{source}' names a camera, but this fault does not concern cameras; remove '.{source}'")
     if cameras and source not in cameras:
         near = difflib.get_close_matches(source, cameras, n=1)
         hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(cameras)}"

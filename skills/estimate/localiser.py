@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
-from skills.estimate.matching import GridSurfaces, Match, MatchOptions, match, score_poses
+from skills.estimate.matching import Match, MatchOptions, grid_surfaces, match, score_poses
 from skills.estimate.scan_points import has_moved, outside_discs, placed_points, scan_points
 from skills.geometry import compose, inverse, relative
 from skills.quantities import Count, Height, Length, Share, Turn
@@ -67,7 +67,7 @@ class ScanMatchingLocaliser:
     """
 
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: LocaliserOptions | None = None) -> None:
-        self._grid, self._surfaces = grid, GridSurfaces(grid)
+        self._grid, self._surfaces = grid, grid_surfaces(grid)
         self._options = options or LocaliserOptions()
         self._heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
         self._initial = initial

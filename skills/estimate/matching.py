@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,30 +46,20 @@ class Match:
     inlier_share: float
 
 
-class Surfaces(Protocol):
-    """A map of surfaces that scans are matched to."""
+Linearise = Callable[[FloatArray, FloatArray, float, float, float], tuple[FloatArray, FloatArray, int]]
+"""Hessian (3, 3) and gradient (3,) of the points' weighted squares on a map of surfaces, and the count of inliers.
 
-    def linearise(
-        self, points_F: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
-    ) -> tuple[FloatArray, FloatArray, int]:
-        """Hessian (3, 3) and gradient (3,) of the points' weighted squares at a pose (3,), and the count of inliers."""
+Parameters are the points (N, 2 or more columns), the pose (3,), the weight of a point, outlier_m and inlier_m.
+"""
 
 
-@dataclass(frozen=True)
-class GridSurfaces:
-    """The surfaces of a surveyed grid, as its distance field."""
-
-    grid: GridMap
-
-    def linearise(
-        self, points_F: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
-    ) -> tuple[FloatArray, FloatArray, int]:
-        """See `Surfaces.linearise`."""
-        return _linearise(self.grid.distance, _frame(self.grid), points_F, pose, weight, outlier_m, inlier_m)
+def grid_surfaces(grid: GridMap) -> Linearise:
+    """The surfaces of a surveyed grid, by its distance field."""
+    return partial(_linearise, grid.distance, _frame(grid))
 
 
 def match(
-    surfaces: Surfaces, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: MatchOptions
+    surfaces: Linearise, points_F: FloatArray, prior: Pose2D, covariance: FloatArray, options: MatchOptions
 ) -> Match:
     """The pose X_WF at which the points (N, 2 or more columns) lie best on the surfaces, given a prior."""
     mean = np.array([prior.x_m, prior.y_m, prior.yaw_rad])
@@ -77,7 +68,7 @@ def match(
     pose, hessian, inliers, coarse = mean.copy(), information.copy(), 0, options.iterations // 3
     for iteration in range(options.iterations):
         outlier_m = options.coarse_outlier_m if iteration < coarse else options.outlier_m
-        hessian, gradient, inliers = surfaces.linearise(points_F, pose, weight, outlier_m, options.inlier_m)
+        hessian, gradient, inliers = surfaces(points_F, pose, weight, outlier_m, options.inlier_m)
         hessian += information
         gradient += information @ (pose - mean)
         step = np.linalg.solve(hessian, gradient)
@@ -131,7 +122,7 @@ def _linearise(
     outlier_m: float,
     inlier_m: float,
 ) -> tuple[FloatArray, FloatArray, int]:
-    """The loop of `GridSurfaces.linearise`."""
+    """The loop of `grid_surfaces`; see `Linearise`."""
     hessian, gradient = np.zeros((3, 3)), np.zeros(3)
     rows, columns = distance.shape
     c, s, inliers = math.cos(pose[2]), math.sin(pose[2]), 0

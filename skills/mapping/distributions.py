@@ -26,7 +26,7 @@ Moments = NDArray[np.float32]
 
 
 class Distributions:
-    """Submap about the origin of its own frame A, `half_m` to all sides; implements `Surfaces`."""
+    """Submap about the origin of its own frame A, `half_m` to all sides."""
 
     def __init__(self, half_m: float = 30.0) -> None:
         cells = math.ceil(2.0 * half_m / CELL_M)
@@ -40,7 +40,7 @@ class Distributions:
     def linearise(
         self, points_F: FloatArray, pose: FloatArray, weight: float, outlier_m: float, inlier_m: float
     ) -> tuple[FloatArray, FloatArray, int]:
-        """See `skills.estimate.matching.Surfaces`; points are as in `add`."""
+        """See `skills.estimate.matching.Linearise`; points are as in `add`."""
         return _linearise(self._moments, self._low_m, points_F, pose, weight, outlier_m, inlier_m)
 
 

@@ -211,7 +211,7 @@ class Mapper:
             return not self._returning or self._recognised(points_F)
         distributions = self._current.distributions
         assert distributions is not None
-        found = match(distributions, points_F, self._X_AF, self._covariance, self._options.matching)
+        found = match(distributions.linearise, points_F, self._X_AF, self._covariance, self._options.matching)
         if found.inlier_share < self._options.least_share:
             return False
         self._X_AF, self._covariance = found.pose, found.covariance
@@ -351,7 +351,7 @@ class Mapper:
         if coarse is None or coarse.rival_score > options.rival_share * coarse.score:
             return None
         wide = np.diag([0.2**2, 0.2**2, 0.05**2])
-        found = match(distributions, points_F, coarse.pose, wide, options.matching)
+        found = match(distributions.linearise, points_F, coarse.pose, wide, options.matching)
         return found if found.inlier_share >= options.closure_share else None
 
     def distributions_of(self, submap: Submap) -> Distributions:

@@ -49,7 +49,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self._carried = Carried(plant, self.context, loose)
         self._hands = {name: robot.hand for name, robot in world.robots.items()}
         self.receivers = Receivers(world, self.context)
-        self._happened: list[tuple[float, str]] = []
+        self._events: list[tuple[float, str]] = []
         self.doors = Doors(plant, self.context, world.config.doors, self._outlines_W, self.note)
         self.moves: Moves | None = None
         self._steps = 0
@@ -64,9 +64,9 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         return self._robots
 
     @property
-    def happened(self) -> Sequence[tuple[float, str]]:
+    def events(self) -> Sequence[tuple[float, str]]:
         """Events of doors and moved objects: the time (s) and a sentence for each."""
-        return self._happened
+        return self._events
 
     @property
     def asleep(self) -> frozenset[str]:
@@ -153,7 +153,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         robots = {name: robot.state() for name, robot in self._robots.items()}
         return {**super().state(), "robots": robots, "moves": None if self.moves is None else self.moves.state()}
 
-    def go_on(self, state: State, world: Mapping[str, FloatArray]) -> None:
+    def resume(self, state: State, world: Mapping[str, FloatArray]) -> None:
         """Restores a state, and powers the robots up in it. Raises ValueError when it is of another Diagram."""
         if set(world) != set(self.world_state()):
             raise ValueError("the parts of the world are others")
@@ -172,7 +172,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
 
     def note(self, sentence: str) -> None:
         """Records a sentence about an event that happens now."""
-        self._happened.append((round(self.now(), 6), sentence))
+        self._events.append((round(self.now(), 6), sentence))
 
     def _hands_W(self) -> Mapping[str, FloatArray]:
         poses = {name: self.world.plant.EvalBodyPoseInWorld(self.context, hand) for name, hand in self._hands.items()}

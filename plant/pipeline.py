@@ -41,9 +41,9 @@ class Pipeline:
         return self._robots
 
     @property
-    def happened(self) -> Sequence[tuple[float, str]]:
+    def events(self) -> Sequence[tuple[float, str]]:
         """Events of doors and moved objects until now: the time (s) and a sentence for each."""
-        return [(time_s, sentence) for time_s, sentence in self._engine.happened if time_s <= self.now() + _EXACT_S]
+        return [(time_s, sentence) for time_s, sentence in self._engine.events if time_s <= self.now() + _EXACT_S]
 
     def now(self) -> float:
         """Simulated seconds since the start, as of the last readings."""

@@ -64,7 +64,7 @@ class Recorder:
         """Frames recorded so far."""
         return self._frames
 
-    def at(self, time_s: float) -> Frame:
+    def frame_at(self, time_s: float) -> Frame:
         """Returns the last frame at or before a time, or the first. Raises LookupError when there are no frames."""
         if not self._frames:
             raise LookupError("nothing was recorded")
@@ -95,7 +95,7 @@ class View:
     p_WTarget: tuple[float, float, float]
 
     @staticmethod
-    def over(corners_W: Sequence[tuple[float, float]]) -> View:
+    def from_above(corners_W: Sequence[tuple[float, float]]) -> View:
         """Returns a view from the south and above that shows all corners (x, y)."""
         low, high = np.min(corners_W, axis=0), np.max(corners_W, axis=0)
         x, y = (float(value) for value in (low + high) / 2)
@@ -103,7 +103,7 @@ class View:
         return View((x, y - 0.30 * size, 0.62 * size), (x, y, 0.0))
 
     @staticmethod
-    def beside(p_W: FloatArray) -> View:
+    def close_up(p_W: FloatArray) -> View:
         """Returns a view of a point, in which a robot of about a metre fills the picture."""
         x, y, z = (float(value) for value in p_W)
         dx, dy, dz = BESIDE_M
@@ -176,7 +176,7 @@ class LiveScene:
             self._root_context.SetTime(now_s)
             self.publish()
 
-    def go_easy(self) -> None:
+    def refresh_seldom(self) -> None:
         """Refreshes less often, for a browser without a graphics processor; callable from any thread."""
         self._period_s = EASY_PERIOD_WALL_S
 
@@ -196,5 +196,5 @@ class LiveScene:
 
     def _camera(self) -> View | None:
         if self._follows and self._followed is not None:
-            return View.beside(self._followed.EvalPoseInWorld(self._context).translation())
+            return View.close_up(self._followed.EvalPoseInWorld(self._context).translation())
         return self._view

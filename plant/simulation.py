@@ -85,7 +85,7 @@ class Simulation:
             self.engine.observe(self.recorder)
 
     def _moved(self, name: str) -> None:
-        self.referee.moved_by_others(name, self.engine.context, self.engine.now())
+        self.referee.record_move(name, self.engine.context, self.engine.now())
 
     def _referee_observes(self, now_s: float) -> None:
         self.referee.observe(self.engine.context, now_s, asleep=self.engine.asleep)
@@ -109,14 +109,14 @@ class Simulation:
         """Counters of the work so far by name; the same run gives the same counts on any machine."""
         return {**self.engine.work, "contact_points": self.referee.contact_points}
 
-    def keep_in(self, path: Path, *, label: str = "") -> Callable[[], None]:
+    def save_snapshots(self, path: Path, *, label: str = "") -> Callable[[], None]:
         """Writes the whole state to a file now and once a second; the returned function writes it at once.
 
         `label` names the run that the state belongs to.
         """
         writer = SnapshotWriter(path, self.engine, self.referee, {**self._facts(), "label": label}, sorted(self.robots))
         writer()
-        self.engine.after_advance(writer.when_due)
+        self.engine.after_advance(writer.write_if_due)
         return writer
 
     def restore(self, path: Path, *, label: str | None = "") -> None:
@@ -158,7 +158,7 @@ class Simulation:
     def _positions_at(self, time_s: float) -> FloatArray:
         if self.recorder is None:
             raise LookupError("nothing was recorded: build the simulation with record=True")
-        return np.asarray(self.recorder.at(time_s).positions)
+        return np.asarray(self.recorder.frame_at(time_s).positions)
 
     def show_live(self) -> LiveScene:
         """Serves a live scene of the world for browsers. Raises RuntimeError when no port is free."""
@@ -173,7 +173,7 @@ class Simulation:
         save_html(self.engine.world, self.recorder.frames, path, self._overview())
 
     def _overview(self) -> View:
-        return View.over(self.world.corners)
+        return View.from_above(self.world.corners)
 
 
 def _loose(placement: Placement) -> LooseModel:

@@ -178,7 +178,7 @@ class SnapshotWriter:
         self._append_points()
         self._file.write(self.content())
 
-    def when_due(self) -> None:
+    def write_if_due(self) -> None:
         """Writes a snapshot when the last one is older than `PERIOD_S`."""
         if self._engine.now() >= self._due_s:
             self()
@@ -219,8 +219,8 @@ def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping
         values = snapshot.values["paths"]
         rows = snapshot.rows[values["from"] :]
         paths = {robot: rows[rows[:, 0] == number, 1:] for number, robot in enumerate(values["robots"])}
-        engine.go_on(snapshot.values["engine"], world)
-        referee.go_on(snapshot.values["referee"], paths)
+        engine.resume(snapshot.values["engine"], world)
+        referee.resume(snapshot.values["referee"], paths)
     except (KeyError, TypeError, ValueError) as error:
         what = f"the plant's state was written by another version ({error!r})"
         raise SnapshotError(f"{what}; run the mission again") from error

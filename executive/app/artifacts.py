@@ -136,7 +136,7 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequenc
     Leaves out what happened before a restart, because this process did not record it.
     """
     pictures = {"map": _map(simulation, robots)}
-    begun_s = simulation.recorder.at(0.0).time_s if simulation.recorder is not None else 0.0
+    begun_s = simulation.recorder.frame_at(0.0).time_s if simulation.recorder is not None else 0.0
     for robot in robots:
         own = artifacts.of_robot(robot)
         if own.detection is not None:

@@ -50,7 +50,7 @@ class Scene(Protocol):
     def url(self) -> str:
         """Address of the picture."""
 
-    def go_easy(self) -> None:
+    def refresh_seldom(self) -> None:
         """Refreshes it less often."""
 
     def follow(self, wanted: bool) -> None:

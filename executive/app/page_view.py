@@ -153,7 +153,7 @@ def scene_actions(scene: Scene) -> Mapping[str, Action]:
     """Returns the page's actions on the scene: a slower refresh for slow browsers, and the camera."""
 
     def ease(_: Mapping[str, Any]) -> str:
-        scene.go_easy()
+        scene.refresh_seldom()
         return "the scene is refreshed less often"
 
     def follow(values: Mapping[str, Any]) -> str:

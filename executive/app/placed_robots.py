@@ -93,14 +93,14 @@ def _free_start(world: World, kind: str, placed: Iterable[PlacedRobot]) -> Pose2
 
     Raises InputError if there is none.
     """
-    from plant.worlds.seeding import people_stand_W
+    from plant.worlds.seeding import standing_points_W
 
     reach_m, free = _reach_m(kind), _free_ground(world)
     places = free.centres(np.argwhere(free.distance > max(TURNING_M, reach_m)))
     for other in placed:
         away_m = np.hypot(*(places - [other.start.x_m, other.start.y_m]).T)
         places = places[away_m > reach_m + _reach_m(other.kind) + BETWEEN_M]
-    for person_W in people_stand_W(world):
+    for person_W in standing_points_W(world):
         places = places[np.hypot(*(places - person_W).T) > FROM_PEOPLE_M]
     if not len(places):
         what = f"there is no free place in {world.name} for one more robot"

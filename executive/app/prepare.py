@@ -167,10 +167,10 @@ class Setting:
             request = with_scenario(request, world, self.knowledge)
             world = with_events(world, request.scenario)
         if request.variation.people:
-            from plant.worlds.seeding import with_passers_by
+            from plant.worlds.seeding import add_passers_by
 
             try:
-                world = with_passers_by(world, request.variation.people, request.seed)
+                world = add_passers_by(world, request.variation.people, request.seed)
             except WorldError as error:
                 raise InputError(str(error), hint="take --people out") from error
         tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())

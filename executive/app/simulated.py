@@ -96,7 +96,7 @@ class SimulatedBackend:
                     self._simulation.restore(durable.plant, label=durable.take_up_label)
                 except SnapshotError as error:
                     raise InputError(str(error)) from error
-            keep = self._simulation.keep_in(durable.plant, label=durable.label)
+            keep = self._simulation.save_snapshots(durable.plant, label=durable.label)
 
             def keep_settled() -> None:
                 self._pipeline.settle()
@@ -107,7 +107,7 @@ class SimulatedBackend:
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Events of doors, people and moved objects, as times (s) and sentences."""
-        return self._pipeline.happened
+        return self._pipeline.events
 
     def work(self) -> Mapping[str, int]:
         """The plant's work counters by name."""

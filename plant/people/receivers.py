@@ -73,7 +73,7 @@ class Offers(Stateful, saved=("_still_since_s",)):
         offering = [name for name in holding if self._holds_still(name)]
         self._still_since_s = {name: self._still_since_s.get(name, now_s) for name in offering}
 
-    def near(self, p_WP: FloatArray, reach_m: float, since_s: float) -> Offer | None:
+    def find(self, p_WP: FloatArray, reach_m: float, since_s: float) -> Offer | None:
         """Returns an offer that has stood since a time, within reach of a person at p_WP; None when there is none."""
         for name, still_s in self._still_since_s.items():
             away_m = math.dist(self.grip_W(name)[:2], p_WP[:2])
@@ -214,7 +214,7 @@ class Receiver(Stateful, saved=("phase", "offer", "_since_s", "_opening", "_p_HO
     def update(self, now_s: float) -> None:
         """Decides the next phase."""
         if self.offer is None:
-            self.offer = self._offers.near(self._X_WP().translation(), REACH_M, now_s - self._receiving.reaction_s)
+            self.offer = self._offers.find(self._X_WP().translation(), REACH_M, now_s - self._receiving.reaction_s)
             if self.offer is not None:
                 self._grip(self.offer)
                 self._enter(Phase.BRINGING, now_s)

@@ -228,7 +228,7 @@ class Walk(Stateful, saved=("_leg", "_done_m", "_wait_s", "_detour", "place_W", 
         """Ends the pause."""
         self._wait_s = 0.0
 
-    def detour(self, corners_W: tuple[Point, ...]) -> None:
+    def take_detour(self, corners_W: tuple[Point, ...]) -> None:
         """Replaces the rest of the leg by another path to the next stop."""
         leg = Leg(corners_W, self._legs[self._leg].pause_s)
         self._detour, self._done_m = (leg, leg.lengths_m()), 0.0
@@ -343,7 +343,7 @@ class Walkers(Stateful, saved=("_walks",)):
         walk.held_s = 0.0
         with contextlib.suppress(WorldError):
             ground = self._ground.with_obstacles(self._outlines_W(walk))
-            walk.detour(ground.plan_path(walk.place_W, walk.next_stop_W, who=name))
+            walk.take_detour(ground.plan_path(walk.place_W, walk.next_stop_W, who=name))
 
     def _held(self, name: str, walk: Walk) -> bool:
         """Returns whether a person must wait for a robot."""

@@ -101,10 +101,10 @@ def _is_held(history: ObjectHistory, condition: GoalCondition, until_s: float) -
     if condition.when is When.SOME_TIME:
         return True
     if condition.when is When.ALWAYS:
-        return own(history.held_always(condition.from_s, until_s))
-    if condition.ended_s is not None and not own(history.held_at(until_s)):
+        return own(history.holder_during(condition.from_s, until_s))
+    if condition.ended_s is not None and not own(history.holder_at(until_s)):
         return False
-    return condition.when is not When.END_OF_MISSION or own(history.held_by)
+    return condition.when is not When.END_OF_MISSION or own(history.holder)
 
 
 def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
@@ -118,14 +118,14 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
     if _is_past(condition):
         done = given
     else:
-        there = [one for one in objects if one.on_tray_of in people and not one.lies_where_others_put_it]
+        there = [one for one in objects if one.on_tray_of in people and not one.placed_by_person]
         done = [one for one in given if one in there or _taken_again(one, condition, truth)]
         done = there if condition.ended_s is None else done
     if len(done) >= condition.needed:
         past = any(one.on_tray_of not in people for one in done)
         verb = _were(done) + " put" if past else "rests" if len(done) == 1 else "rest"
         return Finding(True, f"{_names(done)} {verb} on {_either(people)}'s tray.")
-    now_W = {name: path.at(truth.now_s) for name, path in people.items()}
+    now_W = {name: path.position_at(truth.now_s) for name, path in people.items()}
     return Finding(False, _why_not_handed(condition, objects, now_W))
 
 
@@ -147,10 +147,10 @@ def _why_not_handed(
     """Sentence on a failed hand-over: where the object is, or which object was wanted."""
     if not objects:
         return f"No {_wanted(condition)} was brought{_out_of(condition.source)}."
-    history = next((one for one in objects if one.held_by is not None), objects[0])
+    history = next((one for one in objects if one.holder is not None), objects[0])
     apart = min(_apart_m(history.last.p_WO, p) for p in people.values())
     where = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
-    if history.held_by is not None:
+    if history.holder is not None:
         return f"The {history.name} is still in the gripper, {where}."
     if history.on_tray_of in people:
         return f"The {history.name} was not yet on the tray of {history.on_tray_of} at the end of its step."
@@ -178,10 +178,10 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
 def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> str:
     """Clause that says where an object is that does not, or did not, rest in the goal in time."""
     now = _rest_in(history, condition.goal)
-    if now is not None and not history.lies_where_others_put_it:
+    if now is not None and not history.placed_by_person:
         return f"the {history.name} was not on {_where(condition.goal)} at the end of its step"
     x, y, z = history.last.p_WO
-    state = "is in a gripper" if history.held_by else "is" if history.resting else "moves"
+    state = "is in a gripper" if history.holder else "is" if history.resting else "moves"
     return f"the {history.name} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
 
 
@@ -191,10 +191,10 @@ def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> F
     if condition.when is When.SOME_TIME:
         rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
         return next((p_W for p_W in rests if _region_at(condition.goal, p_W) is not None), None)
-    now_W = None if history.lies_where_others_put_it else _rest_in(history, condition.goal)
+    now_W = None if history.placed_by_person else _rest_in(history, condition.goal)
     if condition.ended_s is None:
         return now_W
-    put = history.put_by(until_s)
+    put = history.rest_at(until_s)
     if put is None or put[0] < condition.from_s or _region_at(condition.goal, put[1]) is None:
         return None
     if condition.when is not When.END_OF_MISSION or now_W is not None or _taken_again(history, condition, truth):
@@ -228,10 +228,10 @@ def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence
     """Positions of a path that count for a condition, in the order of time."""
     until_s = _until_s(condition, truth)
     if condition.when in (When.SOME_TIME, When.ALWAYS):
-        return list(path.between(condition.from_s, until_s))
+        return list(path.positions_between(condition.from_s, until_s))
     if condition.when is When.END_OF_MISSION:
-        return [path.at(until_s), path.at(truth.now_s)]
-    return [path.at(until_s)]
+        return [path.position_at(until_s), path.position_at(truth.now_s)]
+    return [path.position_at(until_s)]
 
 
 def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
@@ -242,9 +242,11 @@ def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Fi
         return Finding(False, f"there is no person {person} to go to.")
     until_s = _until_s(condition, truth)
     if condition.when is When.SOME_TIME:
-        apart_m = min(_apart_m(p, other.at(until_s)) for p in path.between(condition.from_s, until_s))
+        apart_m = min(
+            _apart_m(p, other.position_at(until_s)) for p in path.positions_between(condition.from_s, until_s)
+        )
     else:
-        apart_m = _apart_m(path.at(until_s), other.at(until_s))
+        apart_m = _apart_m(path.position_at(until_s), other.position_at(until_s))
     verb = "was" if _is_past(condition) else "is"
     return Finding(apart_m <= NEAR_PERSON_M, f"{robot} {verb} {apart_m:.1f} m from {person}.")
 
@@ -254,7 +256,9 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
     then_s, aside = condition.answered_s, []
     if condition.classes == (PERSON,):
         when_s = truth.now_s if then_s is None else then_s
-        people = ((name, path.at(when_s)) for name, path in truth.persons.items() if condition.person in (None, name))
+        people = (
+            (name, path.position_at(when_s)) for name, path in truth.persons.items() if condition.person in (None, name)
+        )
         verb = "is" if then_s is None else "was"
         there = [f"{name} {verb} in {on}" for name, p_W in people if (on := _region_at(condition.source, p_W))]
         who = condition.person or "nobody"
@@ -263,7 +267,8 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
         rest = [
             (each.name, p_W)
             for each in _of_class(condition, truth)
-            if (p_W := each.at(then_s) if then_s is not None else each.last.p_WO if each.resting else None) is not None
+            if (p_W := each.place_at(then_s) if then_s is not None else each.last.p_WO if each.resting else None)
+            is not None
         ]
         verb = "is" if then_s is None else "was"
         there = [f"the {name} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.source, p_W))]
@@ -311,7 +316,7 @@ def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> b
     """Returns whether an object rested in the source when the step began, or came to rest there during it."""
     from_s, until_s = condition.from_s, _until_s(condition, truth)
     came = zip(history.rested_s, history.rests_W, strict=True)
-    began_W = history.at(from_s)
+    began_W = history.place_at(from_s)
     places = [*(p_W for when_s, p_W in came if from_s < when_s <= until_s), *(() if began_W is None else (began_W,))]
     return any(_region_at(condition.source, p_W) is not None for p_W in places)
 
@@ -319,14 +324,14 @@ def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> b
 def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object was in the source at the end of the step, or is there now without being put back."""
     until_s = _until_s(condition, truth)
-    put = history.put_by(until_s)
-    then_W = put[1] if put is not None else history.at(until_s)
+    put = history.rest_at(until_s)
+    then_W = put[1] if put is not None else history.place_at(until_s)
     now = _region_at(condition.source, history.last.p_WO) is not None
     if condition.ended_s is None:
         return now
     if then_W is not None and _region_at(condition.source, then_W) is not None:
         return True
-    back = history.lies_where_others_put_it or _taken_again(history, condition, truth)
+    back = history.placed_by_person or _taken_again(history, condition, truth)
     return condition.when is When.END_OF_MISSION and now and not back
 
 

@@ -97,7 +97,7 @@ class ObjectHistory(Stateful):
         return len(self.dropped_s)
 
     @property
-    def lies_where_others_put_it(self) -> bool:
+    def placed_by_person(self) -> bool:
         """Returns whether a person moved it last."""
         return len(self.rests_W) - 1 in self._by_others and not self._carried
 
@@ -111,17 +111,17 @@ class ObjectHistory(Stateful):
     @property
     def resting(self) -> bool:
         """Returns whether it is still, supported, and in no gripper."""
-        return self.held_by is None and self._supported and self.speed_m_s < STILL_M_S
+        return self.holder is None and self._supported and self.speed_m_s < STILL_M_S
 
     @property
-    def held_by(self) -> str | None:
+    def holder(self) -> str | None:
         """Robot whose gripper holds it, or held it a moment ago."""
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
     def in_the_air(self) -> bool:
         """Returns whether a gripper carries it and it touches only the robot."""
-        return self._carried and self.held_by is not None and not self._supported
+        return self._carried and self.holder is not None and not self._supported
 
     @property
     def on_tray_of(self) -> str | None:
@@ -133,14 +133,14 @@ class ObjectHistory(Stateful):
         """Returns whether a body other than a robot supports it, or did a moment ago."""
         return self.last.time_s - self._supported_s <= FLICKER_S
 
-    def at(self, time_s: float) -> FloatArray | None:
+    def place_at(self, time_s: float) -> FloatArray | None:
         """Resting place at a time; None when it was carried or moved."""
         places = [(since_s, p_W) for since_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if since_s <= time_s]
         since_s, p_W = places[-1] if places else (self.rested_s[0], self.rests_W[0])
         lifted = any(since_s < lift.time_s <= time_s for lift in self.lifts)
         return None if lifted else p_W
 
-    def put_by(self, time_s: float) -> tuple[float, FloatArray] | None:
+    def rest_at(self, time_s: float) -> tuple[float, FloatArray] | None:
         """Time and place of its rest at a time, or of a rest that began within SETTLE_S after it; None without a rest.
 
         Its first place and places where a person put it do not count.
@@ -160,14 +160,14 @@ class ObjectHistory(Stateful):
             return None
         return when_s, self.rests_W[number]
 
-    def held_at(self, time_s: float) -> str | None:
+    def holder_at(self, time_s: float) -> str | None:
         """Robot that held it at a time, or lifted it within SETTLE_S after it; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= time_s]
         after = [lift for lift in self.lifts if time_s < lift.time_s <= time_s + SETTLE_S]
         held = [lift for lift in before[-1:] if not self._ended_between(lift.time_s, time_s)]
         return next((lift.robot for lift in (*held, *after)), None)
 
-    def held_always(self, from_s: float, until_s: float) -> str | None:
+    def holder_during(self, from_s: float, until_s: float) -> str | None:
         """Robot that held it during the whole interval; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= from_s + SETTLE_S]
         held = (lift.robot for lift in before[-1:] if not self._ended_between(lift.time_s, until_s))
@@ -210,7 +210,7 @@ class ObjectHistory(Stateful):
         self._last = ObjectSample(time_s, last.p_WO, None, last.X_WH, supported=True, on_floor=last.on_floor)
         self._supported_s = time_s
 
-    def moved_by_others(self, p_WO: FloatArray, time_s: float) -> None:
+    def record_move(self, p_WO: FloatArray, time_s: float) -> None:
         """Records that a person has moved it to p_WO, which is no drop and no placement by a robot."""
         self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)
         self._grip_s = self._tray_s = float("-inf")
@@ -222,7 +222,7 @@ class ObjectHistory(Stateful):
 
     def forget_past(self) -> None:
         """Forgets the history for another mission; only a held object keeps its lifts and rests."""
-        if self._last is not None and self.held_by is None:
+        if self._last is not None and self.holder is None:
             self.lifts, self.rests_W, self.rested_s, self._by_others = [], [], [], []
             self._rests(self._last)
         self.events, self.dropped_s, self.touches = [], [], 0

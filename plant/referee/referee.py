@@ -137,7 +137,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         )
         return judge(conditions, truth, collisions=self._counter.collisions)
 
-    def go_on(self, state: State, paths: Mapping[str, FloatArray]) -> None:
+    def resume(self, state: State, paths: Mapping[str, FloatArray]) -> None:
         """Restores a record with the paths of the robots, (N, 4) like `points`. Raises ValueError for other shapes."""
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
             raise ValueError("paths without times")
@@ -153,9 +153,9 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         for history in self._histories.values():
             history.forget_past()
 
-    def moved_by_others(self, name: str, plant_context: Context, time_s: float) -> None:
+    def record_move(self, name: str, plant_context: Context, time_s: float) -> None:
         """Records that a person has moved an object to its present pose. Raises KeyError for an unknown object."""
-        self._histories[name].moved_by_others(self._position(plant_context, self._entities.objects[name]), time_s)
+        self._histories[name].record_move(self._position(plant_context, self._entities.objects[name]), time_s)
 
     def points(self, robot: str) -> Sequence[FloatArray]:
         """Points of `path`, each with its time (s); the list only grows, and must not be changed."""

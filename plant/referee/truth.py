@@ -22,11 +22,11 @@ class TimedPath:
 
     points: FloatArray
 
-    def at(self, time_s: float) -> FloatArray:
+    def position_at(self, time_s: float) -> FloatArray:
         """Position (3,) at a time."""
         return self.points[self._index(time_s), :3]
 
-    def between(self, from_s: float, until_s: float) -> FloatArray:
+    def positions_between(self, from_s: float, until_s: float) -> FloatArray:
         """Positions (N, 3) from just before one time until another."""
         first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
         return self.points[first : self._index(until_s) + 1, :3]

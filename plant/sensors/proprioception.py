@@ -123,12 +123,12 @@ class BatteryModel(NoisySensor, saved=("_charge", "_stamp_s")):
         if docked:
             self._charge = min(1.0, self._charge + elapsed / self._spec.charge_s)
         else:
-            self._charge = discharged(self._charge, elapsed, load, self._spec)
+            self._charge = charge_after(self._charge, elapsed, load, self._spec)
         read = self._charge + float(self._rng.normal(0.0, self._spec.sigma))
         return Battery(stamp_s, min(max(round(read, 3), 0.0), 1.0))
 
 
-def discharged(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:
+def charge_after(charge: float, elapsed_s: float, load: float, spec: BatterySpec) -> float:
     """Charge that is left after elapsed_s at a load (cut to 0..1)."""
     share = spec.idle_share + (1.0 - spec.idle_share) * min(max(load, 0.0), 1.0)
     return max(0.0, charge - elapsed_s * share / spec.runtime_s)

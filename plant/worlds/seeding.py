@@ -200,7 +200,7 @@ def _before_start(
     return float(x), float(y), float(yaw)
 
 
-def people_stand_W(world: World) -> FloatArray:
+def standing_points_W(world: World) -> FloatArray:
     """Points (N, 2) where people may stand at first for some seed: a grid over the range of each person."""
     places = list[tuple[float, float]]()
     for rule in world.seed_rules.people:
@@ -271,7 +271,7 @@ def place_clutter(
     return tuple(placed)
 
 
-def with_passers_by(world: World, count: int, seed: int) -> World:
+def add_passers_by(world: World, count: int, seed: int) -> World:
     """Adds `count` walking people to a world; the seed chooses the places of their looped routes.
 
     Raises WorldError when the world has fewer than two places.

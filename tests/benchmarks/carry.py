@@ -61,7 +61,7 @@ class Way:
         if now_s < self._due_s:
             return
         self._due_s = now_s + LOOK_S
-        if self.simulation.referee.objects[TARGET].held_by is None:
+        if self.simulation.referee.objects[TARGET].holder is None:
             if self._held_s is not None and now_s - self._held_s > FLICKER_S and self.rooms and self.lost_at_s is None:
                 self.lost_at_s = round(self._held_s, 1)
             self._xy_W = None
@@ -111,7 +111,7 @@ def attempt(chosen: tuple[str, int]) -> dict[str, Any]:
         *(f"Take [Nothing] to [{goal}] and do [Nothing] to [Nothing]" for goal in legs),
     )
     result = run_texts(simulation, world, texts, seed).result
-    held = simulation.referee.objects[TARGET].held_by is not None
+    held = simulation.referee.objects[TARGET].holder is not None
     taken = bool(way.rooms)
     lost = taken and (way.lost_at_s is not None or not held)
     return {

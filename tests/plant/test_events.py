@@ -50,7 +50,7 @@ def test_a_door_closes_and_opens_at_its_times_and_the_lidar_sees_it():
     assert rays_in_doorway(simulation) > 500
     simulation.clock.advance(3.0)
     assert rays_in_doorway(simulation) == 0
-    assert [sentence for _, sentence in simulation.clock.happened] == ["the door closes", "the door opens"]
+    assert [sentence for _, sentence in simulation.clock.events] == ["the door closes", "the door opens"]
     changes = simulation.engine.doors.history()[AT]
     assert [share for _, share in changes] == [0.0, 0.5, 1.0, 0.5, 0.0]
     assert [begun_s for begun_s, _ in changes] == pytest.approx([0.0, 1.0, 2.5, 5.0, 6.5], abs=0.05)
@@ -114,19 +114,19 @@ def test_where_a_surface_has_no_room_nobody_moves_it():
     before_W = thing_W(simulation, "beer")
     simulation.clock.advance(1.0)
     assert thing_W(simulation, "beer") == pytest.approx(before_W, abs=0.01)
-    assert simulation.clock.happened == [(0.5, "nobody moves the beer, since nothing is free on the stool")]
+    assert simulation.clock.events == [(0.5, "nobody moves the beer, since nothing is free on the stool")]
 
 
 def test_doors_and_moves_go_on_after_a_restart(tmp_path):
     moves = (MoveRule(name="beer", at=1.0, to="kitchen table"),)
     before = simulated(moves=moves)
-    keep = before.keep_in(tmp_path / "flat.plant")
+    keep = before.save_snapshots(tmp_path / "flat.plant")
     before.clock.advance(2.0)
     keep()
     after = simulated(moves=moves)
     after.restore(tmp_path / "flat.plant")
     assert panel_W(after) == pytest.approx(AT)
-    assert after.clock.happened == []
+    assert after.clock.events == []
     assert after.engine.doors.history()[AT][:2] == before.engine.doors.history()[AT] == ((0.0, 0.0), (1.0, 0.5))
     assert thing_W(after, "beer") == pytest.approx(thing_W(before, "beer"), abs=0.01)
 

@@ -28,7 +28,7 @@ def test_it_is_refreshed_a_few_times_a_second_of_the_wall(simulation, monkeypatc
     monkeypatch.setattr(recording.time, "perf_counter", lambda: wall["s"])
     scene = simulation.show_live()
     if easy:
-        scene.go_easy()
+        scene.refresh_seldom()
     shown = []
     publish = scene.publish
     monkeypatch.setattr(scene, "publish", lambda: (shown.append(wall["s"]), publish()))

@@ -135,9 +135,9 @@ def test_what_happens_in_the_step_under_way_is_told_at_the_next_tick(engine):
     pipeline = Pipeline(engine)
     pipeline.advance(TICK_S)
     engine.note("the lamp falls over")  # the engine is a tick ahead by now
-    assert list(pipeline.happened) == []
+    assert list(pipeline.events) == []
     pipeline.advance(TICK_S)
-    assert list(pipeline.happened) == [(2 * TICK_S, "the lamp falls over")]
+    assert list(pipeline.events) == [(2 * TICK_S, "the lamp falls over")]
 
 
 def test_what_goes_wrong_in_a_step_is_raised_where_time_is_advanced(engine):

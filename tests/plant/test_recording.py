@@ -24,12 +24,12 @@ def test_frames_come_at_the_recorders_rate_and_are_found_by_time(engine):
     engine.advance(1.0)
     times = [frame.time_s for frame in recorder.frames]
     assert len(times) == 10
-    assert recorder.at(0.55).time_s == pytest.approx(max(t for t in times if t <= 0.55))
+    assert recorder.frame_at(0.55).time_s == pytest.approx(max(t for t in times if t <= 0.55))
 
 
 def test_an_empty_recording_says_so(engine):
     with pytest.raises(LookupError, match="nothing was recorded"):
-        Recorder(engine.world, engine.context).at(0.0)
+        Recorder(engine.world, engine.context).frame_at(0.0)
 
 
 def test_the_animation_is_one_html_file_with_the_robot_in_it(engine, tmp_path):

@@ -371,7 +371,7 @@ def test_what_is_always_held_was_let_go_at_no_time():
 
 def moved(stage, name, p_WO):
     """Somebody puts an object elsewhere."""
-    stage.put(name, p_WO).referee.moved_by_others(name, stage.context, stage.time)
+    stage.put(name, p_WO).referee.record_move(name, stage.context, stage.time)
     return stage.watch()
 
 
@@ -470,7 +470,7 @@ def test_a_robot_that_moved_before_it_touched_a_person_caused_it(speed, hit):
 
 def test_contacts_with_people_outlive_a_restart():
     stage, other = Stage().put("body", (0, 3 - 0.2 - 0.049, 0.9)).watch(), Stage()
-    other.referee.go_on(stage.referee.state(), {"alice": np.array(stage.referee.points("alice"))})
+    other.referee.resume(stage.referee.state(), {"alice": np.array(stage.referee.points("alice"))})
     assert other.referee.collisions == stage.referee.collisions
 
 

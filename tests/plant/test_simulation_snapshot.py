@@ -21,7 +21,7 @@ def make(seed=3):
 def kept(tmp_path_factory):
     """A plant that was given up while its robot walked, and where it kept its state."""
     simulation, path = make(), tmp_path_factory.mktemp("kept") / "flat.plant"
-    keep = simulation.keep_in(path, label="7")
+    keep = simulation.save_snapshots(path, label="7")
     robot = simulation.robots["Alice"]
     lease = robot.acquire_lease("test")
     for _ in range(30):

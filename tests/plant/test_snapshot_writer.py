@@ -34,7 +34,7 @@ class Plant:
                 path += [np.array([self.now_s, n, 0.0, self.now_s]) for n in range(20)]
             yield
 
-    def go_on(self, state, arrays):
+    def resume(self, state, arrays):
         self.restored = arrays
 
 
@@ -56,7 +56,7 @@ def writer(path, plant):
 def written_in(writer, plant, seconds):
     before = writer.bytes_written
     for _ in plant.walk(seconds):
-        writer.when_due()
+        writer.write_if_due()
     return writer.bytes_written - before
 
 

@@ -109,7 +109,7 @@ def shell_mass(mesh: Mesh, density_kg_m2: float) -> MassProperties:
     return _gathered(a, b, c, area * density_kg_m2, apex=False)
 
 
-def scaled_to(body: MassProperties, mass_kg: float) -> MassProperties:
+def scale_mass(body: MassProperties, mass_kg: float) -> MassProperties:
     """Mass properties of the same form with another mass."""
     return MassProperties(mass_kg, body.com, body.inertia * (mass_kg / body.mass_kg))
 

@@ -205,7 +205,7 @@ def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
     hall = Hall(tmp_path).until(Phase.PULLING)
     state, world = hall.engine.state(), {name: each.copy() for name, each in hall.engine.world_state().items()}
     hall.engine.advance(1.0)
-    hall.engine.go_on(state, world)
+    hall.engine.resume(state, world)
     assert hall.kim.phase is Phase.PULLING
     assert hall.kim.state() == state["receivers"]["people"]["Kim"]
     hall.lease = hall.robot.acquire_lease("again")

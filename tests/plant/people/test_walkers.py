@@ -202,7 +202,7 @@ def test_a_restored_walk_goes_on_where_it_was(hall):
     state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
     stage.engine.advance(1.0)
     there = stage.person_W
-    stage.engine.go_on(state, world)
+    stage.engine.resume(state, world)
     stage.engine.advance(1.0)
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
 
@@ -220,7 +220,7 @@ def test_who_is_on_a_way_around_goes_on_with_it_after_a_restart(hall):
     state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
     stage.engine.advance(1.0)
     there = stage.person_W
-    stage.engine.go_on(state, world)
+    stage.engine.resume(state, world)
     stage.engine.advance(1.0)
     assert stage.engine.walkers["Kim"].on_detour
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)

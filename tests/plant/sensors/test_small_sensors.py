@@ -11,7 +11,7 @@ from plant.sensors.proprioception import (
     ImuModel,
     ImuNoise,
     JointModel,
-    discharged,
+    charge_after,
 )
 
 ZERO = np.zeros(3)
@@ -46,9 +46,9 @@ def test_imu_has_bias_and_noise():
 
 def test_battery_lasts_its_runtime_at_load_and_longer_at_rest():
     spec = BatterySpec()
-    assert discharged(1.0, 5400.0, 1.0, spec) == pytest.approx(0.0)
-    assert discharged(1.0, 5400.0, 0.0, spec) == pytest.approx(0.6)
-    assert discharged(0.1, 1e6, 1.0, spec) == 0.0
+    assert charge_after(1.0, 5400.0, 1.0, spec) == pytest.approx(0.0)
+    assert charge_after(1.0, 5400.0, 0.0, spec) == pytest.approx(0.6)
+    assert charge_after(0.1, 1e6, 1.0, spec) == 0.0
 
 
 def test_battery_reading_falls_with_time_and_stays_in_range():

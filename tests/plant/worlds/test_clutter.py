@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from plant.worlds.seeding import (
+    add_passers_by,
     outline_of,
     place_clutter,
     place_objects,
     place_people,
     polygon_distance,
-    with_passers_by,
 )
 from plant.worlds.world import World, load_world
 
@@ -52,7 +52,7 @@ def test_clutter_moves_nothing_that_was_there_and_is_the_same_for_a_seed(world: 
 
 
 def test_passers_by_walk_between_places_of_the_world(world: World) -> None:
-    varied = with_passers_by(world, 2, 5)
+    varied = add_passers_by(world, 2, 5)
     routes = {each.name: each.route for each in place_people(varied, 5)}
     for name in ("passer-by 1", "passer-by 2"):
         assert routes[name] is not None
@@ -62,4 +62,4 @@ def test_passers_by_walk_between_places_of_the_world(world: World) -> None:
 
 
 def test_without_passers_by_the_world_stays_as_it_is(world: World) -> None:
-    assert with_passers_by(world, 0, 5) is world
+    assert add_passers_by(world, 0, 5) is world

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from plant.models.builder.importing.mesh_files import Patch, read_patches
 from plant.models.builder.importing.resting_pose import feet, resting_rotation
-from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, same_points, solid_of
+from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, solid_of, unique_points
 from plant.models.builder.mesh import (
     SMOOTH_COSINE,
     Colour,
@@ -26,7 +26,7 @@ from plant.models.builder.mesh import (
     plain_colours,
     write_text,
 )
-from plant.models.builder.shapes import ConvexMesh, MassProperties, Model, model_sdf, scaled_to, solid_mass
+from plant.models.builder.shapes import ConvexMesh, MassProperties, Model, model_sdf, scale_mass, solid_mass
 from plant.models.catalogue import NAME, ImportedObject, ObjectImportError, load_catalogue, write_imported
 from plant.scene_pictures import save_png
 from skills.robot import FloatArray, Picture
@@ -109,7 +109,7 @@ def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
     """
     wanted.refuse_wrong()
     body = _at_rest(_placed(mesh, wanted))
-    mass = scaled_to(_mass(body.solid), wanted.mass_kg)
+    mass = scale_mass(_mass(body.solid), wanted.mass_kg)
     _refuse_impossible(mass)
     parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
     bearing = feet(body.solid.points, mass.com)
@@ -241,7 +241,7 @@ def _corner_normals(triangles: FloatArray) -> FloatArray:
     """
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     facing = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-20)
-    _, index = same_points(triangles)
+    _, index = unique_points(triangles)
     order = np.argsort(index.reshape(-1), kind="stable")
     place, own = index.reshape(-1)[order], facing[order // 3]
     weighted = own * _corner_angles(triangles).reshape(-1, 1)[order]

@@ -19,7 +19,7 @@ MOST_PIECES: Final = 1_000
 Faces = NDArray[np.int64]
 
 
-def pieces(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
+def connected_pieces(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
     """Connected piece of each triangle (T,), and the mask of triangles to flip so that neighbours agree.
 
     None when three triangles meet at an edge, the surface has only one side, or there are too many pieces.
@@ -55,7 +55,7 @@ def pieces(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
     return None if number > MOST_PIECES else (piece, turned)
 
 
-def outward(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArray[np.bool_]:
+def outward_flips(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Mask of triangles (T,) to flip so that each piece faces outward, and a piece inside another inward."""
     numbers = np.unique(piece)
     corners = {number: points[faces[piece == number]] for number in numbers.tolist()}
@@ -123,7 +123,7 @@ def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid
         ObjectImportError: the surface is open, its triangles cannot be wound alike, or it is flat.
     """
     points, faces, kept = _welded(triangles)
-    alike = pieces(faces)
+    alike = connected_pieces(faces)
     turned = np.zeros(len(faces), dtype=np.bool_) if alike is None else alike[1]
     faces = _turned(faces, turned)
     rims = _unpaired(faces)
@@ -134,9 +134,9 @@ def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid
         hint = "close it in the program that made it, or add --close-holes"
         raise ObjectImportError(f"it is open (not watertight), at {len(rims)} edges", hint)
     points, faces = _closed(points, faces, rims)
-    closed = pieces(faces)
+    closed = connected_pieces(faces)
     if closed is not None:
-        inward = outward(points, faces, closed[0])
+        inward = outward_flips(points, faces, closed[0])
     else:
         inward = np.full(len(faces), _volume(np.asarray(points[faces])) < 0.0)
     solid = Solid(points, _turned(faces, inward))
@@ -157,7 +157,7 @@ def _volume(triangles: FloatArray) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
-def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
+def unique_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
     """Unique points (N, 3) and the indices of the triangles (T, 3); nearly equal points count as equal."""
     corners = triangles.reshape(-1, 3)
     step = max(float(np.ptp(corners, axis=0).max()) * _SAME_POINT, 1e-12)
@@ -169,7 +169,7 @@ def same_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
 
 def _welded(triangles: FloatArray) -> tuple[FloatArray, Faces, NDArray[np.bool_]]:
     """Points, indices of the triangles that are not degenerate, and the mask (T,) of these."""
-    points, faces = same_points(triangles)
+    points, faces = unique_points(triangles)
     apart = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
     return points, faces[apart], apart
 

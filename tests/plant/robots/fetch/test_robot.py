@@ -265,7 +265,7 @@ def test_state_and_restore_go_on_as_if_nothing_had_been(floor):
     first.robots["Bob"].drive(0.4, 0.0, 0.3, until_s=1.0, lease=lease)
     first.robots["Bob"].stand(0.5, 0.0, until_s=5.0, lease=lease)
     first.advance(3.0)
-    second.go_on(first.state(), first.world_state())
+    second.resume(first.state(), first.world_state())
     first.advance(1.0)
     second.advance(1.0)
     np.testing.assert_allclose(pose(second), pose(first), atol=1e-3)

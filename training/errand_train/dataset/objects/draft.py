@@ -17,7 +17,7 @@ from plant.models.builder.shapes import (
     MassProperties,
     Shape,
     Sphere,
-    scaled_to,
+    scale_mass,
     shell_mass,
     solid_mass,
 )
@@ -114,7 +114,7 @@ class Draft:
         moved = Mesh(self.materials)
         moved.add_mesh(self.mesh, p=-origin)
         mass = join_masses(self._bodies)
-        mass = mass if mass_kg is None else scaled_to(mass, mass_kg)
+        mass = mass if mass_kg is None else scale_mass(mass, mass_kg)
         mass = MassProperties(mass.mass_kg, mass.com - origin, mass.inertia)
         used = {self.materials[name].texture for name, *_ in moved.groups()}
         pictures = {name: picture for name, picture in self._pictures.items() if name in used}

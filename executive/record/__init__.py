@@ -1,1 +1,1 @@
-"""The event log: written as MCAP while a mission runs, read back afterwards."""
+"""Event log of a run: written as MCAP while missions run, read back afterwards."""

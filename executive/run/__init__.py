@@ -1,1 +1,1 @@
-"""Running trees: the only place that advances time, ticks, and holds the robots."""
+"""Runs of trees: the only place that advances time, ticks trees, and holds the leases of robots."""

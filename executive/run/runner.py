@@ -1,4 +1,4 @@
-"""The runner: the only place that advances time and ticks trees."""
+"""Runner of missions: the only place that advances time and ticks trees."""
 
 from __future__ import annotations
 

@@ -180,7 +180,7 @@ class Session(RunRobot):
         return changed
 
     def _go_on_after_the_top(self) -> None:
-        """Where the mission under way has ended, continues the mission below it, or begins the next."""
+        """Continues the mission below the one under way after its end, or begins the next."""
         if self._top.finished and len(self._stack) > 1:
             done = self._top
             done.halt(self.attempt)

@@ -1,1 +1,1 @@
-"""The durable store: missions queued and under way, and how far each has come."""
+"""Durable store of missions, queued and under way, with the progress of each."""

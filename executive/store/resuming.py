@@ -208,7 +208,7 @@ class _NotHeldBack:
 
 
 def _applies_as_before(node: Any, applied: bool) -> None:
-    """Makes the first `applies` of a branch repeat the answer from before the restart, since the blackboard is full."""
+    """Makes the first `applies` of a branch repeat its answer from before the restart, when the board held less."""
     answers = [applied]
     asked: Callable[[], bool] = node.applies
     vars(node)["applies"] = lambda: answers.pop() if answers else asked()

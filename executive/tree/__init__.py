@@ -1,1 +1,1 @@
-"""From missions to behaviour trees: the compiler, the behaviours, and what can be said of a tree before it runs."""
+"""Behaviour trees of missions: the compiler, the nodes, and the checks and estimates before a run."""

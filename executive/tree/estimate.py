@@ -150,14 +150,14 @@ class _Walk:
 def estimate_tree(
     root: NodeSpec, *, start: Pose2D, planner: RoutePlanner, estimates: Estimates
 ) -> tuple[Estimate, tuple[InputError, ...], tuple[InputError, ...]]:
-    """What a tree will take from `start` on, with their lines the places that cannot be reached, and warnings."""
+    """Estimates a tree from `start` on; returns also errors for unreachable places, and warnings, with their lines."""
     walk = _Walk(planner, estimates, start)
     return _followed(root, walk, first=False), tuple(walk.errors), tuple(walk.warnings)
 
 
 @functools.cache
 def load_estimates() -> Estimates:
-    """The typical durations that come with the project."""
+    """Loads the shipped typical durations."""
     return validate(Estimates, read_yaml(Path(__file__).with_name("estimates.yaml")))
 
 

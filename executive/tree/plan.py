@@ -77,7 +77,7 @@ class Assembled:
 
     @property
     def node(self) -> NodeSpec:
-        """The only node; there must be one."""
+        """Node of an assembly that has exactly one."""
         (node,) = self.nodes
         return node
 

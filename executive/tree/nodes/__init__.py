@@ -1,1 +1,1 @@
-"""The nodes of trees by concept: how each is planned, and what it does."""
+"""Nodes of trees by concept: each page has the plans and the py_trees behaviours."""

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import skills
-from executive.tree.registry import GROUP, built_in_skills, faults_of, installed_skills, missing, skills_of
+from executive.tree.registry import GROUP, built_in_skills, faults_of, installed_skills, missing_skill, skills_of
 from skills.api import Skill
 from skills.files.errors import InputError
 
@@ -169,8 +169,8 @@ def test_a_broken_skill_affects_no_other_and_a_file_that_uses_it_is_refused_with
     found = installed_skills()
     assert {"wink", *built_in_skills()} <= set(found)
     assert "wave" not in found
-    assert "distribution wavers" in missing("wave", found)[0]
-    assert "there is no skill" in missing("wavy", found)[0]
+    assert "distribution wavers" in missing_skill("wave", found)[0]
+    assert "there is no skill" in missing_skill("wavy", found)[0]
 
 
 @pytest.fixture

@@ -20,7 +20,7 @@ LINES = {
     "executive/mission": 1517,
     "executive/tree": 7404,
     "executive/run": 3067,
-    "executive/record": 964,
+    "executive/record": 952,
     "executive/store": 1671,
     "executive/conversation": 583,
     "executive/view": 1368,

@@ -114,6 +114,7 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
     grey = grid.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
+    middles = {name: np.mean(place.polygon, axis=0) for name, place in knowledge.places.items()}
     return {
         "world": world,
         "frame_id": "world",
@@ -122,10 +123,7 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
         "size_m": {"x": width_m, "y": height_m},
         "format": "png",
         "data": base64.b64encode(png).decode(),
-        "places": [_label(name, place.polygon) for name, place in knowledge.places.items()],
+        "places": [
+            {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)} for name, (x, y) in middles.items()
+        ],
     }
-
-
-def _label(name: str, polygon: Sequence[tuple[float, float]]) -> dict[str, Any]:
-    x, y = np.mean(polygon, axis=0)
-    return {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)}

@@ -187,26 +187,16 @@ def compress_picture(message: Message, now_s: float) -> Message:
 
 def box_annotations(detections: Sequence[Message], now_s: float) -> Message:
     """Converts detections to annotations of the picture: boxes (u0, v0, u1, v1) with class and score."""
-    when = stamp(now_s)
-    return {
-        "circles": [],
-        "points": [_box(each["box"], when) for each in detections],
-        "texts": [_caption(each, when) for each in detections],
-    }
-
-
-def _box(box: Sequence[float], when: Message) -> Message:
-    u0, v0, u1, v1 = map(float, box)
-    corners = [{"x": u, "y": v} for u, v in ((u0, v0), (u1, v0), (u1, v1), (u0, v1))]
-    colours = {"outline_color": _BOX_COLOUR, "outline_colors": [], "fill_color": _CLEAR}
-    return {"timestamp": when, "type": _LINE_LOOP, "points": corners, "thickness": 2.0, **colours}
-
-
-def _caption(detection: Message, when: Message) -> Message:
-    u0, v0 = map(float, detection["box"][:2])
-    text = f"{detection['class_name']} {detection['score']:.2f}"
+    when, points, texts = stamp(now_s), [], []
+    outline = {"outline_color": _BOX_COLOUR, "outline_colors": [], "fill_color": _CLEAR}
     colours = {"text_color": _BOX_COLOUR, "background_color": _BACK}
-    return {"timestamp": when, "position": {"x": u0, "y": v0}, "text": text, "font_size": 14.0, **colours}
+    for each in detections:
+        u0, v0, u1, v1 = map(float, each["box"])
+        corners = [{"x": u, "y": v} for u, v in ((u0, v0), (u1, v0), (u1, v1), (u0, v1))]
+        points.append({"timestamp": when, "type": _LINE_LOOP, "points": corners, "thickness": 2.0, **outline})
+        text, position = f"{each['class_name']} {each['score']:.2f}", {"x": u0, "y": v0}
+        texts.append({"timestamp": when, "position": position, "text": text, "font_size": 14.0, **colours})
+    return {"circles": [], "points": points, "texts": texts}
 
 
 def planar_pose(x_m: float, y_m: float, yaw_rad: float) -> Message:

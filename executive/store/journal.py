@@ -105,7 +105,7 @@ class StoreJournal(RunVisitor):
         news = bool(self._steps or self._values)
         if news:
             self.keep_world()
-        if news or (note.pose is not None and _apart(self._pose, note.pose)):
+        if news or (note.pose is not None and _has_moved(self._pose, note.pose)):
             self._write(note)
 
     def _take_steps(self, note: TickNote) -> None:
@@ -174,7 +174,7 @@ def _json(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _apart(before: Pose2D | None, now: Pose2D) -> bool:
+def _has_moved(before: Pose2D | None, now: Pose2D) -> bool:
     if before is None:
         return True
     turned = wrap(now.yaw_rad - before.yaw_rad)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Final, Union
 
-from executive.tree.types import describe_type, field_types, required_fields
+from executive.tree.types import field_types, required_fields
 from executive.words.command import parse_object
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Surface
@@ -154,7 +154,7 @@ def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
     for key, item in value.items():
         name = _named(str(key), hints)
         if name is None:
-            what = f"{record.__name__} has no '{key}'"
+            what = f"there is no field '{key}'"
             raise PortValueError((*path, str(key)), what, suggestion(str(key), plain))
         read[name] = port_value(item, hints[name], knowledge, (*path, str(key)))
     filled = {**_DEFAULTS.get(record, {}), **read}
@@ -184,7 +184,7 @@ def _plain(value: Any, hint: Any, path: Path) -> Any:
     kinds = _PLAIN.get(hint)
     if kinds is None:
         hint = f"let an earlier step give it, and write {{{FROM_KEY}: NAME}}"
-        raise PortValueError(path, f"a {describe_type(hint)} cannot be written in a file", hint)
+        raise PortValueError(path, "such a value cannot be written in a file", hint)
     fits = isinstance(value, kinds[0]) and (hint is bool or not isinstance(value, bool))
     if not fits or (isinstance(value, float) and not math.isfinite(value)):
         raise _refusal(value, kinds[1], path)

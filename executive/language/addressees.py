@@ -26,7 +26,7 @@ _REFUSED: Final[Mapping[str, str]] = {
 
 
 class RobotChoice(enum.Enum):
-    """Addressee that is no robot by name."""
+    """Addressee without a name: all robots, or any of them."""
 
     ALL = "all"  # each of the robots
     ANY = "any"  # whichever of them does it best: none was named
@@ -116,7 +116,7 @@ class Addressees:
         return re.search(rf"\b{self.forms.one.pattern}", self.forms.narrated.sub("", text), re.IGNORECASE) is None
 
     def parts(self, text: str) -> tuple[Addressee | None, tuple[AddressedText, ...]]:
-        """Returns the addressee of a sentence, and its parts, those in a row for the same addressee as one.
+        """Splits a sentence into its addressee and its parts; successive parts for the same robots become one.
 
         Raises RefusalError when it is not clear which robots it names, or when it forbids an action.
         """

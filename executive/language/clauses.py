@@ -53,27 +53,27 @@ class Clause:
 
     @property
     def begins(self) -> bool:
-        """Returns whether it begins a sentence."""
+        """Returns whether the clause begins a sentence."""
         return re.search(r"[.!?;]", self.joint) is not None
 
     @property
     def outer(self) -> bool:
-        """Returns whether it follows all clauses before it."""
+        """Returns whether the clause follows all earlier ones."""
         return CLAUSES.outer.search(self.joint) is not None
 
     @property
     def anyway(self) -> bool:
-        """Returns whether it runs at the end in any case."""
+        """Returns whether the clause runs at the end in any case."""
         return CLAUSES.whatever.search(self.joint) is not None
 
     @property
     def ends_anyway(self) -> bool:
-        """Returns whether its last words say that it runs in any case."""
+        """Returns whether the last words say that the clause runs in any case."""
         return self.kind is None and CLAUSES.ends_anyway.search(self.text) is not None
 
     @property
     def then(self) -> bool:
-        """Returns whether "then" stands before it."""
+        """Returns whether "then" stands before the clause."""
         return re.search(r"\bthen\b", self.joint, re.IGNORECASE) is not None
 
 

@@ -190,7 +190,7 @@ def check_routes_and_speaker(clauses: Sequence[Predicate], actions: Sequence[Act
 
 
 def check_relation(act: str, kinds: Sequence[str], location: Location) -> None:
-    """Refuses a relation to a place that a command ("go", "bring", "look") does not keep.
+    """Refuses a relation to a place that a command ("go", "bring", "look") does not support.
 
     `kinds` are the possible kinds of the place: "room", "surface" or "person". Raises RefusalError.
     """

@@ -38,7 +38,7 @@ class NounKind(enum.Enum):
 
     @property
     def within_reach(self) -> bool:
-        """Returns whether a robot in a house can handle or reach it."""
+        """Returns whether a robot in a house can handle or reach objects of the kind."""
         return self not in (NounKind.ELSEWHERE, NounKind.ABSTRACT)
 
 

@@ -91,33 +91,33 @@ class Phrase:
 
     @property
     def pronoun(self) -> bool:
-        """Returns whether it stands for an earlier phrase ("it", "one", "two of them")."""
+        """Returns whether the phrase stands for an earlier phrase ("it", "one", "two of them")."""
         word = self.head.word in lexicon().pronouns and not self.stands_for_one
         return word and all(map(_is_determiner, self.tokens[:-1]))
 
     @property
     def stands_for_one(self) -> bool:
-        """Returns whether its noun is "one" with words before it ("the red one")."""
+        """Returns whether the noun is "one" with words before it ("the red one")."""
         return self.head.word in _ONE and len(self.tokens) > 1
 
     @property
     def stands_for_somebody(self) -> bool:
-        """Returns whether it is a pronoun that can mean a person."""
+        """Returns whether the phrase is a pronoun that can mean a person."""
         return len(self.tokens) == 1 and self.head.word in lexicon().somebody
 
     @property
     def speaker(self) -> bool:
-        """Returns whether it means the speaker."""
+        """Returns whether the phrase means the speaker."""
         return len(self.tokens) == 1 and self.head.word in lexicon().speaker
 
     @property
     def person(self) -> bool:
-        """Returns whether it is a person: a noun for people, or a person's name."""
+        """Returns whether the phrase is a person: a noun for people, or a person's name."""
         return self.head.lemma in lexicon().people or self.head.word in lexicon().people or self.named_person
 
     @property
     def named_person(self) -> bool:
-        """Returns whether it is a person's name."""
+        """Returns whether the phrase is a person's name."""
         if self._determined() or (self.plural and self.head.kind is not NounKind.PERSON):
             return False
         if self.head.known:
@@ -129,18 +129,18 @@ class Phrase:
 
     @property
     def proper(self) -> bool:
-        """Returns whether it is written as a name, of any kind."""
+        """Returns whether the phrase is written as a name, of any kind."""
         return not self._determined() and all(token.pos == "PROPN" for token in self.tokens)
 
     @property
     def universal(self) -> bool:
-        """Returns whether it means all of a kind ("everyone", "all the men"); "all the forks" are only the forks."""
+        """Returns whether the phrase means all of a kind ("everyone", "all the men"); "all the forks" does not."""
         words = {t.word for t in self.tokens} & lexicon().everyone
         return bool(words - {_ALL}) or (bool(words) and (self.person or not self.plural))
 
     @property
     def addressed(self) -> bool:
-        """Returns whether it is the addressee, or an object of theirs ("your phone"): a robot has none."""
+        """Returns whether the phrase means the robot, or an object of the robot ("your phone"): a robot owns none."""
         if len(self.tokens) == 1 and self.head.word in ("you", "yourself"):
             return True
         held = self.kind is NounKind.THING or self.head.lemma in lexicon().fixtures
@@ -148,12 +148,12 @@ class Phrase:
 
     @property
     def indefinite(self) -> bool:
-        """Returns whether it means any one of its kind: no article but "a", no possessive."""
+        """Returns whether the phrase means any one of its kind: no article but "a", no possessive."""
         return not any(t.word in lexicon().definite or t.tag in ("PRP$", "POS") for t in self.tokens)
 
     @property
     def known(self) -> bool:
-        """Returns whether the world knows its name."""
+        """Returns whether the world knows the name."""
         return self.head.known
 
     @property
@@ -169,7 +169,7 @@ class Phrase:
 
     @property
     def counts(self) -> bool:
-        """Returns whether it is only a number ("two", "a couple")."""
+        """Returns whether the phrase is only a number ("two", "a couple")."""
         return _number(self.head) is not None
 
     def with_extra(self, *words: str) -> Phrase:

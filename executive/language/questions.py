@@ -20,7 +20,7 @@ _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 
 
 class Slot(Enum):
-    """Role of the name that a question asks for."""
+    """Role of the asked name in a command."""
 
     THING = "thing"  # which object
     PLACE = "place"  # which place

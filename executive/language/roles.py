@@ -26,12 +26,12 @@ class Location:
 
     @property
     def person(self) -> bool:
-        """Returns whether it is a person."""
+        """Returns whether the location is a person."""
         return self.phrase is not None and self.phrase.person
 
     @property
     def living(self) -> bool:
-        """Returns whether it is a person of any profession, or an animal: "him" and "her" can mean it."""
+        """Returns whether the location is a person of any profession, or an animal: "him" and "her" can mean them."""
         return self.phrase is not None and (self.phrase.person or self.phrase.kind is NounKind.PERSON)
 
     @property
@@ -41,12 +41,12 @@ class Location:
 
     @property
     def role(self) -> PrepositionRole | None:
-        """Role of its preposition."""
+        """Role of the preposition."""
         return lexicon().prepositions.get(tuple(self.preposition.split()))
 
     @property
     def every_room(self) -> bool:
-        """Returns whether it means all rooms."""
+        """Returns whether the location means all rooms."""
         return self.phrase is not None and self.phrase.universal and self.phrase.singular.split()[-1] == "room"
 
     @property
@@ -93,7 +93,7 @@ class Roles:
     favour: bool = False
 
     def add(self, one: _Placed) -> None:
-        """Adds a phrase with the place around it, by its preposition."""
+        """Adds a phrase with the larger place, by the preposition."""
         phrase, role, location = one.chunk.phrase, one.chunk.role, one.location
         joined = bool(one.joint and self.goals)
         if role is None:

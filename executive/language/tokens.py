@@ -49,7 +49,7 @@ class Token:
 
     @property
     def adjective(self) -> bool:
-        """Returns whether it can be an attribute of an object ("red", "heaviest")."""
+        """Returns whether the word can be an attribute of an object ("red", "heaviest")."""
         return is_attribute(self.text) or (self.pos in ("ADJ", "ADV") and may_be_attribute(self.text))
 
 

@@ -183,7 +183,7 @@ class Request:
         return _form().validate_json(text)
 
     def from_anywhere(self) -> Request:
-        """Copies it with absolute paths, for a process in another folder."""
+        """Copies the request with absolute paths, for a process in another folder."""
         world = self.world if self.world is None or not is_there(Path(self.world)) else str(Path(self.world).resolve())
         return replace(
             self,

@@ -37,7 +37,7 @@ class Scenario:
 
     @property
     def moving(self) -> set[str]:
-        """Names of the people and doors that it moves; in one run, only one scenario may move each."""
+        """Names of the moved people and doors; in one run, only one scenario may move each."""
         return {*self.people, *(door["name"] for door in self.doors)}
 
     def merge(self, other: Scenario) -> Scenario:
@@ -51,7 +51,7 @@ class Scenario:
         )
 
     def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
-        """Copies it, with drawn faults in place of the random ones."""
+        """Copies the scenario, with drawn faults in place of the random ones."""
         return replace(self, faults=(*self.faults, *faults), random=0)
 
     def lines(self) -> tuple[str, ...]:

@@ -74,7 +74,7 @@ class Adapter:
             before[...] = before + low_rank.change().reshape(before.shape)
 
     def save(self, file: Path, *, base: str) -> None:
-        """Writes it to a file; `base` is the sha256 of the weights to which it belongs."""
+        """Writes the adapter to a file; `base` is the sha256 of the weights to which the adapter belongs."""
         parts = {f"{name}{_UP}": low.up for name, low in self.changes.items()}
         parts |= {f"{name}{_DOWN}": low.down for name, low in self.changes.items()}
         np.savez(file, base=np.array(base), **parts)  # type: ignore[arg-type]

@@ -87,12 +87,12 @@ class GoalCondition:
 
     @property
     def from_s(self) -> float:
-        """Time when its step began."""
+        """Time when the step of the condition began."""
         return self.since_s if self.began_s is None else max(self.began_s, self.since_s)
 
     @property
     def needed(self) -> int:
-        """Number of objects that fulfil it."""
+        """Number of objects that fulfil the condition."""
         return max(1, self.count)
 
 

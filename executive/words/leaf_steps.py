@@ -52,7 +52,7 @@ class Say(Step):
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """Commands that the sentence means, once it is understood."""
+        """Commands of the sentence, once it is understood."""
         return self._meaning
 
     def with_commands(self, commands: tuple[Command, ...]) -> Say:
@@ -139,7 +139,7 @@ class UseMission(Step):
 
     @property
     def mission(self) -> Any:
-        """`Mission` of the file, once it is read."""
+        """`Mission` of the file, once the file is read."""
         return self._mission
 
     def with_mission(self, mission: Any) -> UseMission:
@@ -208,7 +208,7 @@ class Answering(Step):
 
     @property
     def answer_name(self) -> str | None:
-        """Name of its answer."""
+        """Name under which later steps read the answer."""
         return (self.gives or {}).get("answer")
 
     @property

@@ -16,7 +16,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Side:
-    """Side of an outline, and its distance (m) from a line."""
+    """Side of an outline, and its distance (m) from a given line."""
 
     ends: tuple[Point, Point]
     off_m: float

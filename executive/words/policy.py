@@ -109,7 +109,7 @@ class Policy(Strict):
         return stops and not guarded and not self.further_attempts and numbers == (None, None, None)
 
     def with_policy(self, below: Policy | None) -> Self:
-        """Copies it, with its open values taken from `below`."""
+        """Copies the policy, with its open values taken from `below`."""
         values: dict[str, Any] = {} if below is None else {key: getattr(below, key) for key in Policy.model_fields}
         return self.model_copy(
             update={key: value for key, value in values.items() if value is not None and getattr(self, key) is None}

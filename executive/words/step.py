@@ -56,11 +56,11 @@ class Placed(Policy):
         return self._place
 
     def error(self, below: KeyPath, message: str, hint: str) -> InputError:
-        """Error in the value at a path below it, for instance ("world",)."""
+        """Error in the value at a path below the step or mission, for instance ("world",)."""
         return InputError(message, hint=hint) if self._place is None else self._place.error(below, message, hint)
 
     def with_place(self, place: Place | None) -> Self:
-        """Copies it, with another place."""
+        """Copies the step or mission, with another place."""
         copy = self.model_copy()
         copy._place = place
         return copy
@@ -89,7 +89,7 @@ class Step(Placed):
 
     @property
     def inner_steps(self) -> tuple[Step, ...]:
-        """Steps inside it, in the order of its fields."""
+        """Steps inside the step, in the order of the fields."""
         return tuple(step for name in type(self).model_fields for step in _steps_in(getattr(self, name)))
 
     @property
@@ -99,7 +99,7 @@ class Step(Placed):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Faults of its values by themselves."""
+        """Faults in the step's own values."""
         yield from ()
 
     def walk(self) -> Iterator[Step]:

@@ -175,7 +175,7 @@ class Together(Step):
 
     @property
     def faults(self) -> Iterator[Fault]:
-        """Fault of a number greater than that of the steps."""
+        """Fault of a `done_when` greater than the number of steps."""
         if self.needed > len(self.steps):
             what = f"{self.needed} of {len(self.steps)} steps cannot be done"
             yield ("done_when",), what, f"give {len(self.steps)} at most"
@@ -214,7 +214,7 @@ class Group(Step):
 
     @property
     def inner_steps(self) -> Steps:
-        """Steps that interrupt the group, its own, and those at the end."""
+        """Steps that interrupt the group, the group's own steps, and those at the end."""
         return (*(step for each in self.when or () for step in each.steps), *self.steps, *self.always)
 
     @property

@@ -32,7 +32,7 @@ FULL: Final = 0.99
 
 
 def parse_condition(text: str, state: State, reader: PlainReader) -> SpokenCondition:
-    """Parses a condition. Raises RefusalError when the robot can neither see nor read it."""
+    """Parses a condition. Raises RefusalError when the robot can neither see nor measure it."""
     words = _P.tail.sub("", " ".join(text.replace(" o' clock", " o'clock").split()).strip(" ,."))
     if (found := usual_condition(words, state, reader)) is not None:
         return found

@@ -147,7 +147,7 @@ class DecisionBuilder:
         return True
 
     def split(self, text: str, state: State, follows: Sequence[Clause]) -> tuple[SpokenCondition, str]:
-        """Splits a condition from the action behind it, where no comma does."""
+        """Splits a condition from an action that follows without a comma."""
         refusal: RefusalError | None = None
         for cut_at in (*([len(text)] if follows else []), *verb_positions(text), len(text)):
             rest = re.sub(r"^(?:then|please)\s+", "", text[cut_at:], flags=re.IGNORECASE)
@@ -198,7 +198,7 @@ class DecisionBuilder:
         return end
 
     def branch(self, clauses: Sequence[Clause], supposed: SpokenCondition, state: State) -> tuple[Steps, State]:
-        """Builds the steps of a branch; "tell Robin" tells its condition."""
+        """Builds the steps of a branch, in which "tell Robin" refers to the condition."""
         if not clauses:
             raise missing_action("if", supposed.said)
         inner = type(self)(self.reader, statement_of(supposed), self.verb)

@@ -139,7 +139,7 @@ def _kind(text: str) -> tuple[Cue, str] | None:
 
 
 def trailing_cue(text: str) -> Clause | None:
-    """First cue behind an action in a clause, which decides or repeats that action."""
+    """First cue after an action in a clause, which decides or repeats that action."""
     forms = CLAUSES.mapping("behind")
     found = [(match.start(), Cue(kind), match) for kind, form in forms for match in form.finditer(text, 1)]
     found = [one for one in found if one[1] is not Cue.IF or not CLAUSES.asks_before.search(text[: one[0]])]
@@ -150,7 +150,7 @@ def trailing_cue(text: str) -> Clause | None:
 
 
 def verb_positions(text: str) -> Iterator[int]:
-    """Positions behind the first word where a clause may begin without a comma before it."""
+    """Positions after the first word where a clause may begin without a comma before it."""
     for match in re.finditer(r"[\w']+", text):
         if match.start() and match[0].lower() in _verbs():
             yield match.start()
@@ -182,6 +182,6 @@ _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
 _NEXT: Final = re.compile(r"\s*([^\s,;:]\w*)")
 _SMALL: Final = frozenset({"then", "please", "just"})
 _ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
-"""Verbs behind which "and" and "please" join no other clause: "go and charge"."""
+"""Verbs after which "and" and "please" join no other clause: "go and charge"."""
 _ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)
 _SOME: Final = re.compile(r"(?:some|any|every|no|body|thing|one|where|what|who)$", re.IGNORECASE)

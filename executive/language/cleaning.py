@@ -65,7 +65,7 @@ def foreign_reason(text: str) -> str | None:
 
 _FORMS: Final = Patterns("wake.yaml")
 SAME_NAME: Final = 0.13
-"""Largest distance in sound (see `sound_distance`) of a misheard name behind a greeting."""
+"""Largest distance in sound (see `sound_distance`) of a misheard name after a greeting."""
 SAME_NAME_ALONE: Final = 0.05
 """Largest distance in sound of a misheard name without a greeting."""
 

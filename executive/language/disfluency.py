@@ -49,7 +49,7 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
 
 
 def unwanted_phrases(items: Sequence[Item]) -> tuple[Phrase, ...]:
-    """Noun phrases right behind "not"."""
+    """Noun phrases right after "not"."""
     pairs = pairwise(item for item in items if not isinstance(item, Separator))
     return tuple(b.phrase for a, b in pairs if isinstance(a, Negation) and isinstance(b, Chunk))
 

@@ -14,7 +14,7 @@ from executive.words.yaml_steps import steps_to_yaml
 
 
 def explain(trace: Trace) -> dict[str, Any]:
-    """Explains each step of understanding a sentence, as JSON values; the steps behind a refusal are empty.
+    """Explains each step of understanding a sentence, as JSON values; the steps after a refusal are empty.
 
     `parts` are the clauses, `stands_for` the pronouns with their meanings, `frames` the commands with the names that
     were spoken, and `refused_at` is the step that refused.

@@ -26,7 +26,7 @@ def _asks(items: Sequence[Item]) -> bool:
 
 
 def where_is(row: Row, items: list[Item]) -> Item | None:
-    """ "Where is the hammer", "check where the hammer is" ask to find it: an object or a person in the house."""
+    """Reads "where is the hammer", "check where the hammer is" as a request to find an object or a person."""
     asks = _asks(items)
     if row.tokens[row.at].word != "where" or not (asks or may_begin_command(items)):
         return None
@@ -53,7 +53,7 @@ def _is_be(row: Row, at: int) -> bool:
 
 
 def how_many(row: Row, items: list[Item]) -> Item | None:
-    """ "How many chairs are in the hall" asks to look for chairs there."""
+    """Reads "how many chairs are in the hall" as a request to look for chairs there."""
     phrase = row.phrases.get(row.at)
     if row.tokens[row.at].word != "how" or phrase is None or len(phrase.tokens) < 3 or not may_begin_command(items):
         return None
@@ -73,7 +73,7 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
 
 
 def do_we_have(row: Row, items: list[Item]) -> Item | None:
-    """ "Do we have any coke left" asks whether there is any."""
+    """Reads "do we have any coke left" as a question whether there is any."""
     words = [token.word for token in row.tokens[row.at : row.at + 3]]
     has = len(words) == 3 and words[0] in ("do", "have") and words[2] in ("have", "got")
     phrase = row.phrase_at(row.at + 3) if has and words[1] in ("we", "you", "i", "they") else None
@@ -84,7 +84,7 @@ def do_we_have(row: Row, items: list[Item]) -> Item | None:
 
 
 def what_is(row: Row, items: list[Item]) -> Item | None:
-    """ "What is on the bench", "is there anything on it", "is the bench empty" ask to look for all objects there."""
+    """Reads "what is on the bench" or "is the bench empty" as a request to look for all objects there."""
     asks = _asks(items)
     found = _whatever(row) or _fullness(row) if asks or may_begin_command(items) else None
     if found is None:
@@ -96,7 +96,7 @@ def what_is(row: Row, items: list[Item]) -> Item | None:
 
 
 def _whatever(row: Row) -> Chunk | None:
-    """Place behind "what is" or "is there anything", with its preposition."""
+    """Place after "what is" or "is there anything", with its preposition."""
     at, asked = row.at, False
     for word in (token.word for token in row.tokens[row.at :]):
         whatever = word in ("what", "anything", "something")
@@ -126,7 +126,7 @@ def _fullness(row: Row) -> Chunk | None:
 
 
 def reported_speech(row: Row, items: list[Item]) -> Item | None:
-    """ "I left it in the hall" gives the place of an object; behind a noun it only identifies that object."""
+    """Reads "I left it in the hall" as a statement on the place; after a noun it only identifies the object."""
     subject = items[-1] if items else None
     if not isinstance(subject, Chunk) or row.tokens[row.at].word not in lexicon().placing or subject.role is not None:
         return None
@@ -143,7 +143,7 @@ def reported_speech(row: Row, items: list[Item]) -> Item | None:
 
 
 def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
-    """Bare phrase at the end, with the places behind it, and its index: "the patient in room four"."""
+    """Bare phrase at the end, with the places after it, and its index: "the patient in room four"."""
     at = len(items) - 1
     while at > 0 and isinstance(item := items[at], Chunk) and item.role is not None:
         at -= 1
@@ -152,7 +152,7 @@ def _subject(items: Sequence[Item]) -> tuple[int, Chunk | None]:
 
 
 def stated_need(row: Row, items: list[Item]) -> Item | None:
-    """ "The patient in room four needs a blanket" asks to bring somebody something."""
+    """Reads "the patient in room four needs a blanket" as a request to bring it."""
     found, (at, who) = row.match(lexicon().needs), _subject(items)
     behind = row.tokens[row.at + len(found or ()) :][:1]
     if found is None or who is None or who.phrase.head.word in ("her", "him", "them"):
@@ -167,7 +167,7 @@ def stated_need(row: Row, items: list[Item]) -> Item | None:
 
 
 def belonging(row: Row, items: list[Item]) -> Item | None:
-    """ "The plates go in the cupboard" asks to put them there."""
+    """Reads "the plates go in the cupboard" as a request to put them there."""
     (at, item), behind = _subject(items), row.ahead()
     if row.tokens[row.at].word not in _BELONGS or not behind or behind[0].word not in _WHERE or item is None:
         return None
@@ -182,7 +182,7 @@ def belonging(row: Row, items: list[Item]) -> Item | None:
 
 
 def ongoing_event(row: Row, items: list[Item]) -> Item | None:
-    """ "My back hurts" is no request by itself."""
+    """Reads "my back hurts" as an event, which asks for nothing."""
     token, subject = row.tokens[row.at], items[-1] if items else None
     if token.tag != "VBZ" or token.pos != "VERB" or token.lemma in _WANTS or token.lemma in lexicon().asks:
         return None
@@ -195,7 +195,7 @@ def ongoing_event(row: Row, items: list[Item]) -> Item | None:
 
 
 def narration(row: Row, items: list[Item]) -> Item | None:
-    """ "Somebody spilled milk", "I can't reach the jar", "Kim is waiting for the books" give a reason for a request."""
+    """Reads "somebody spilled milk", "I can't reach the jar" as a reason for a request."""
     last = items[-1] if len(items) > 1 else None
     at = len(items) - 1 - (isinstance(last, Separator) and last.word.isalpha() and last.word != "and")
     subject = items[at] if at >= 0 else None

@@ -91,7 +91,7 @@ class Unknown(_Word):
 
 
 class Outside(_Word):
-    """Verb that the robot does not know; the items behind it belong to it."""
+    """Verb that the robot does not know; the items after it belong to it."""
 
 
 class Negation(_Word):
@@ -162,18 +162,18 @@ class Row:
         return " ".join(phrase)
 
     def ahead(self, count: int = 1) -> Sequence[Token]:
-        """The `count` words behind the next one, fewer at the end."""
+        """The `count` words after the next one, fewer at the end."""
         return self.tokens[self.at + 1 : self.at + 1 + count]
 
 
 def may_begin_command(items: Sequence[Item]) -> bool:
-    """Returns whether a command may begin behind these items."""
+    """Returns whether a command may begin after these items."""
     return not items or isinstance(items[-1], Separator)
 
 
 @dataclass(frozen=True)
 class Predicate:
-    """Verb, or a form of "to be", with the items behind it; the robot may not know the verb.
+    """Verb, or a form of "to be", with the items after it; the robot may not know the verb.
 
     `verb` is None for items before the first verb; `subject` stands before a form of "to be"; `whether` says that "if"
     or "whether" stands before it.
@@ -221,7 +221,7 @@ def _ungapped(clause: Predicate) -> Iterator[Predicate]:
 
 
 def _gives_another(items: Sequence[Item], at: int) -> bool:
-    """Returns whether another recipient and object stand behind a separator: "me the book and Anna the pen"."""
+    """Returns whether another recipient and object stand after a separator: "me the book and Anna the pen"."""
     joint, who, what = items[at], items[at + 1], items[at + 2] if at + 2 < len(items) else None
     if not (isinstance(joint, Separator) and isinstance(who, Chunk) and isinstance(what, Chunk)):
         return False
@@ -263,7 +263,7 @@ def drop_name(clauses: Sequence[Predicate]) -> tuple[Predicate, ...]:
 
 
 def requested_predicates(predicates: Sequence[Predicate]) -> list[Predicate]:
-    """Normalises predicates: moves a fronted place behind its verb, removes reasons and "check if"."""
+    """Normalises predicates: moves a fronted place after its verb, removes reasons and "check if"."""
     return list(_without_checks(_without_reasons(_with_fronted(_with_verb(predicates)))))
 
 
@@ -278,7 +278,7 @@ def _with_verb(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
 
 
 def _with_fronted(clauses: Sequence[Predicate]) -> Sequence[Predicate]:
-    """Moves a place before the first verb behind it: "from the kitchen bring me a spoon"."""
+    """Moves a place before the first verb after it: "from the kitchen bring me a spoon"."""
     if len(clauses) < 2 or clauses[0].verb is not None or not isinstance(clauses[1].verb, Verb | Being):
         return clauses
     fronted = clauses[0].content
@@ -332,4 +332,4 @@ def _without_checks(clauses: Sequence[Predicate]) -> Iterator[Predicate]:
 
 
 PLACES: Final = frozenset({PrepositionRole.SOURCE, PrepositionRole.GOAL, PrepositionRole.AT, PrepositionRole.BESIDE})
-"""Roles of places behind a preposition."""
+"""Roles of places after a preposition."""

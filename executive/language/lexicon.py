@@ -29,7 +29,7 @@ class VerbKind(enum.Enum):
 
 
 class PrepositionRole(enum.Enum):
-    """Role of the place behind a preposition."""
+    """Role of the place after a preposition."""
 
     SOURCE = "source"  # from there
     GOAL = "goal"  # to there

@@ -27,7 +27,7 @@ _HEADLIKE: Final = frozenset({"obj", "iobj", "obl", "nsubj", "attr", "conj", "ro
 class Phrase:
     """Noun with the words around it.
 
-    `extra` are the words joined behind it ("of wine"), `of_kind` is the kind of the noun behind "of", and `numbered` a
+    `extra` are the words joined after it ("of wine"), `of_kind` is the kind of the noun after "of", and `numbered` a
     count that was said apart from it ("make that two").
     """
 
@@ -173,11 +173,11 @@ class Phrase:
         return _number(self.head) is not None
 
     def with_extra(self, *words: str) -> Phrase:
-        """Adds words behind the noun."""
+        """Adds words after the noun."""
         return replace(self, extra=(*self.extra, *words))
 
     def with_contents(self, inner: Phrase) -> Phrase:
-        """Adds "of" and the contents behind the noun; of a mere number nothing can be held."""
+        """Adds "of" and the contents after the noun; of a mere number nothing can be held."""
         head = replace(self.head, kind=NounKind.ABSTRACT) if inner.counts else self.head
         return replace(self.with_extra("of", inner.text), tokens=(*self.tokens[:-1], head), of_kind=inner.kind)
 

@@ -32,13 +32,13 @@ _MOST_CHARACTERS: Final = 800
 
 @dataclass(frozen=True)
 class Trace:
-    """Results of each step on a sentence, in the order of the fields; steps behind a refusal are empty.
+    """Results of each step on a sentence, in the order of the fields; steps after a refusal are empty.
 
     The first fields are given. `memory` is the memory of earlier sentences, and afterwards of this one. `lead` are
     items before the words, `asked` marks a statement to check, `elliptic` allows that "it" is left out, `recipient`
     receives objects where the sentence names nobody.
 
-    `affirmed` is a checked statement without its negation, `unwanted` are phrases behind "not", `meanings` are pronouns
+    `affirmed` is a checked statement without its negation, `unwanted` are phrases after "not", `meanings` are pronouns
     with their meanings, `notes` say which name was taken for which. `refused_at` names the step that refused. `steps`
     is the mission of a sentence that decides, repeats, waits or the like, and `parts` are its clauses.
     """
@@ -76,7 +76,7 @@ class Pipeline:
     knowledge: Knowledge | None
 
     def run(self, trace: Trace, *, behind: str | None = None, upto: str | None = None) -> Trace:
-        """Runs all steps, or those behind one and up to another by their names.
+        """Runs all steps, or those after one and up to another by their names.
 
         Never raises on text, which has no wake phrase.
         """

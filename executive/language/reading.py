@@ -35,14 +35,14 @@ _SEPARATORS: Final = frozenset({",", "and", "or", "then", ";"})
 _VERB_TAGS: Final = frozenset({"VB", "VBP", "VBD", "VBN"})
 _SHOWN: Final = frozenset({"that", "this", "those", "these"})
 _OF_ALL: Final = re.compile(r"all|none|(?:any|every|no)(?:where|one|body|thing)")
-"""Words behind which "but" means "except"."""
+"""Words after which "but" means "except"."""
 
 
 class Reader(Row):
     """Reader of the words of a sentence from left to right."""
 
     def read(self, lead: Sequence[Item] = ()) -> tuple[Item, ...]:
-        """Reads the words as items behind `lead`: each word becomes an item, except the silent ones."""
+        """Reads the words as items after `lead`: each word becomes an item, except the silent ones."""
         steps: tuple[Callable[[list[Item]], Item | None], ...] = (
             self._mark,
             *(partial(step, self) for step in INDIRECT),
@@ -97,7 +97,7 @@ class Reader(Row):
         return any(ahead[:n] in lexicon().prepositions for n in range(2, len(ahead) + 1))
 
     def _gerund(self, items: list[Item]) -> tuple[str, ...] | None:
-        """Verb in the form "bringing" or "brought" where a command begins, as behind "would you mind"."""
+        """Verb in the form "bringing" or "brought" where a command begins, as after "would you mind"."""
         first = self.tokens[self.at]
         past = first.tag in ("VBD", "VBN") and not items
         if not (past or (first.tag == "VBG" and may_begin_command(items))):
@@ -133,7 +133,7 @@ class Reader(Row):
         return Chunk(phrase, " ".join(preposition), lexicon().prepositions[preposition] if preposition else None)
 
     def _level(self, items: list[Item]) -> Item | None:
-        """ "Upstairs": a destination, or a place to search; before a place it adds nothing."""
+        """Reads "upstairs" as a destination, or a place to search; before a place it adds nothing."""
         token, ahead = self.tokens[self.at], self.ahead()
         if token.word not in lexicon().levels:
             return None
@@ -147,7 +147,7 @@ class Reader(Row):
         return _place(token, PrepositionRole.AT if looks else PrepositionRole.GOAL)
 
     def _shown_at(self, start: int) -> Phrase | None:
-        """Noun phrase behind a "that" which was not parsed as its article ("hand me that cup")."""
+        """Noun phrase after a "that" which was not parsed as its article ("hand me that cup")."""
         points = start < len(self.tokens) and self.tokens[start].word in _SHOWN
         phrase = self.phrase_at(start + 1) if points else None
         if phrase is None or phrase.named_person or phrase.head.word in lexicon().subjects:
@@ -176,7 +176,7 @@ class Reader(Row):
         return phrase.with_extra(self.take(1))
 
     def _description_end(self, phrase: Phrase) -> int:
-        """End of a description behind a noun: of a person's action or clothes, or of an object's contents."""
+        """End of a description after a noun: of a person's action or clothes, or of an object's contents."""
         if self.at >= len(self.tokens):
             return self.at
         here = [t.word for t in (self.tokens[self.at], *self.ahead())]

@@ -72,10 +72,10 @@ THERE: Final = Location(None, preposition="there")
 
 @dataclass
 class Roles:
-    """Items behind a verb, sorted into noun phrases, places by their prepositions, and unknown words.
+    """Items after a verb, sorted into noun phrases, places by their prepositions, and unknown words.
 
     `first_at` is the place of the first bare phrase when that is a person, `listed` says that "and" stands between the
-    phrases. `choices` are phrases joined by "or". `favour` says that the recipient stood behind "for".
+    phrases. `choices` are phrases joined by "or". `favour` says that the recipient stood after "for".
     """
 
     objects: list[Phrase] = field(default_factory=list)
@@ -149,10 +149,10 @@ class _Placed:
 
 
 def read_roles(items: Sequence[Item], *, describes: bool, puts: bool = False) -> Roles:
-    """Sorts the items behind a verb into roles.
+    """Sorts the items after a verb into roles.
 
-    `describes` says that a first "near" or "on top of" with more places behind it identifies the object, `puts` that
-    "on" behind "from" is the destination, as in "put the cup from the desk on the bed".
+    `describes` says that a first "near" or "on top of" with more places after it identifies the object, `puts` that
+    "on" after "from" is the destination, as in "put the cup from the desk on the bed".
     """
     roles = Roles()
     spoken = list(_spoken(items, roles))
@@ -234,7 +234,7 @@ def _somebody(phrase: Phrase) -> bool:
 
 
 def _listed_before(row: Sequence[_Placed]) -> list[Phrase]:
-    """Phrases that an "or" behind the row joins: the last one, and those joined to it by commas."""
+    """Phrases that an "or" after the row joins: the last one, and those joined to it by commas."""
     first = len(row) - 1
     while first > 0 and row[first].joint in _LISTING:
         before, chunk = row[first - 1].chunk, row[first].chunk

@@ -1,6 +1,6 @@
 """Words with their place in the sentence and in the dependency tree, known names among them.
 
-The tagger has seen few commands: it tags "sink" in "the bathroom sink" and a name in lower case behind "to" as verbs,
+The tagger has seen few commands: it tags "sink" in "the bathroom sink" and a name in lower case after "to" as verbs,
 and "look" in "go to the counter look for the bowl" as a noun. `repairs.yaml` has rules for a word and its neighbours,
 as in Brill, "A simple rule-based part of speech tagger" (1992).
 """

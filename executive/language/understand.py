@@ -149,9 +149,9 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
     """Understands a text for one robot, given as an empty trace, and perhaps its clauses."""
     trace = pipeline.run(said)
     if pipeline.knowledge is not None and _MENTIONED.search(said.text) is not None:
-        from executive.language.structure.sentence import structured
+        from executive.language.structure.sentence import read_structure
 
-        trace = structured(trace, clauses, pipeline, said.memory)
+        trace = read_structure(trace, clauses, pipeline, said.memory)
     refusal = trace.refusal
     if refusal is None:
         ok = Understanding(said.text, Status.OK, trace.commands, notes=trace.notes, memory=trace.memory, trace=trace)

@@ -191,7 +191,7 @@ def _look(words: str, state: State, reader: PlainReader) -> SpokenCondition:
     match = _P.fullness.fullmatch(re.sub(r"n't\b", " not", words))
     if match is None:
         return reader.check(words, state)
-    place = with_preposition(reader.items_of(match["on"] or match["what"]), "on")
+    place = with_preposition(reader.read_items(match["on"] or match["what"]), "on")
     found = reader.look_by_items((verb("find"), Chunk(OBJECTS), *place), words, state)
     empty = (match["how"] or "").lower() in ("empty", "free", "bare", "clear")
     return found.negate(words) if empty != bool(match["not"]) else found
@@ -202,7 +202,7 @@ def _seen(match: re.Match[str], words: str, state: State, reader: PlainReader) -
     what = re.sub(r"^(?:him|them)(?= )", "it", match["what"], flags=re.IGNORECASE)
     looks = re.match(r"you (?:can |do |could |\w+n't |not )*(?:see|spot|notice)\b", words, re.IGNORECASE)
     if re.fullmatch(r"it|one|him|her|them", what, re.IGNORECASE):
-        found = reader.look_by_items((verb("find"), *reader.items_of(what)), words, state)
+        found = reader.look_by_items((verb("find"), *reader.read_items(what)), words, state)
     elif looks and state.at is not None and reader.is_somebody(match["what"], state):
         found = reader.look(match["what"], state.at, words, state)
     elif re.fullmatch(r"it there", what, re.IGNORECASE):
@@ -247,7 +247,7 @@ def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[S
     first = parse_condition(before, state, reader)
     denied = isinstance(first.condition, Not)
     if _P.there.match(before) and _P.bare.match(after):
-        items = reader.items_of(after)
+        items = reader.read_items(after)
         place = next((item for item in items if isinstance(item, Chunk) and item.role is not None), None)
         if place is not None and not _P.placed.search(before):
             first = reader.look_by_items((*first.items, place), before, state)
@@ -255,7 +255,7 @@ def _both(before: str, after: str, state: State, reader: PlainReader) -> tuple[S
         return first, reader.exists(after, after, first.holds)
     if _P.at.fullmatch(before) and re.match(r"(?:in|on|at|the) ", after, re.IGNORECASE) and " is " not in after:
         old = next((item for item in first.items if isinstance(item, Chunk) and item.role is not None), None)
-        moved = with_preposition(reader.items_of(after), "in" if old is None else old.preposition)
+        moved = with_preposition(reader.read_items(after), "in" if old is None else old.preposition)
         second = reader.look_by_items((*(one for one in first.items if one is not old), *moved), after, first.holds)
         return first, second.negate(after) if denied else second
     return first, parse_condition(after, first.holds, reader)

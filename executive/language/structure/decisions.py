@@ -76,7 +76,7 @@ class DecisionBuilder:
 
     def read_together(self, clauses: Sequence[Clause], state: State) -> PlainReading:
         """Understands plain clauses together."""
-        return self.reader.commands_of(
+        return self.reader.read_commands(
             join_clauses([replace(clauses[0], joint=""), *clauses[1:]]), state, clauses[0].lead
         )
 
@@ -88,11 +88,11 @@ class DecisionBuilder:
         row.asked = find_last_check(reading, before, self.reader)
 
     def put(self, row: StepRow, block: Step, state: State) -> None:
-        """Adds a block; `state` is the state behind it."""
+        """Adds a block; `state` is the state after it."""
         self.put_done(row, ((block,), state, ()))
 
     def put_done(self, row: StepRow, done: Done) -> None:
-        """Adds steps with the state behind them, and notes."""
+        """Adds steps with the state after them, and notes."""
         steps, row.state, notes = done
         row.steps += steps
         row.asked = None
@@ -113,7 +113,7 @@ class DecisionBuilder:
         return len(clauses)
 
     def decide(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """ "If" and "unless"."""
+        """Builds a choice for "if" and "unless"."""
         clause, end = clauses[at], end_of_scope(clauses, at + 1)
         follows = clauses[at + 1 : end]
         bare_and = bool(follows) and re.match(r",?\s*and\b", follows[0].joint.strip(), re.IGNORECASE) is not None
@@ -170,7 +170,7 @@ class DecisionBuilder:
     def choose(
         self, row: StepRow, supposed: SpokenCondition, body: Sequence[Clause], clauses: Sequence[Clause], end: int
     ) -> int:
-        """Adds the steps of both branches; `end` is behind the first, and the result behind the second."""
+        """Adds a choice of two branches; `end` is after the first, and the returned index after the second."""
         then, after = self.branch(body, supposed, supposed.holds)
         otherwise: Steps = ()
         other_state = supposed.fails
@@ -208,7 +208,7 @@ class DecisionBuilder:
         return found
 
     def attach(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """ "If so", "otherwise", "if that fails": they refer to the last look or action."""
+        """Builds a branch for "if so", "otherwise" or "if that fails", which refer to the last look or action."""
         clause, end, both = clauses[at], end_of_scope(clauses, at + 1, branch=True), end_of_scope(clauses, at + 1)
         cue, words = clause.kind, [clause.cue]
         self.flush(row)
@@ -251,7 +251,7 @@ class DecisionBuilder:
         return end
 
     def wait_for(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """ "As soon as Robin comes, ..." waits for the condition."""
+        """Builds a wait for "as soon as Robin comes, ..."."""
         self.flush(row)
         end = end_of_scope(clauses, at + 1)
         supposed, rest = self.split(clauses[at].text, row.state, clauses[at + 1 : end])
@@ -263,7 +263,7 @@ class DecisionBuilder:
         return len(clauses)
 
     def repeat(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """ "Every ten minutes", "three times", "as long as ..." before an action."""
+        """Builds rounds for "every ten minutes", "three times" or "as long as ..." before an action."""
         clause, end = clauses[at], end_of_scope(clauses, at + 1, rounds=True)
         self.flush(row)
         if self._on_the_way(row, clause, clauses[at + 1 : end]):
@@ -281,7 +281,7 @@ class DecisionBuilder:
         return end
 
     def put_rounds(self, row: StepRow, rounds: Rounds, body: Sequence[Clause]) -> None:
-        """Adds rounds of the clauses."""
+        """Adds rounds of some clauses."""
         steps, state = self.nest(body, replace(rounds.state, goal=None, at=None))
         commands = [command for step in steps for each in step.walk() for command in each.commands]
         stays = len(commands) == 1 and commands[0].item is None and commands[0].task in (None, Task.CHARGE)
@@ -291,7 +291,7 @@ class DecisionBuilder:
         self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
 
     def _how_often(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
-        """Splits the rounds from the action behind them."""
+        """Splits the rounds from the action after them."""
         text, state = clause.text, row.state
         if clause.kind is Cue.TIMES:
             return Rounds(Loop(times=times_of_cue(clause.cue)), state), text
@@ -310,7 +310,7 @@ class DecisionBuilder:
         return _rounds_by(clause.kind, supposed), rest
 
     def limit_rounds(self, every_s: float, text: str, state: State) -> Rounds | None:
-        """Rounds within "for an hour", "until three o'clock", "five times"; None for other texts."""
+        """Parses the rounds within "for an hour", "until three o'clock" or "five times"; None for other texts."""
         if not text:
             return Rounds(Loop(every_s=every_s), state)
         if (match := ACTS.for_span.fullmatch(text)) is not None:
@@ -334,7 +334,7 @@ class DecisionBuilder:
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
-        """ "While driving to the kitchen, say ...": adds both in parallel, where that is simple."""
+        """Builds parallel steps for "while driving to the kitchen, say ...", where that is simple."""
         text = clause.text
         match = ACTS.under_way.match(text) if clause.kind is Cue.WHILE else None
         if match is None:
@@ -348,7 +348,7 @@ class DecisionBuilder:
 
     def put_together(self, row: StepRow, where: str, body: Sequence[Clause]) -> None:
         """Adds a speech in parallel to a drive."""
-        reading = self.reader.commands_of(where, row.state, (verb("go"),))
+        reading = self.reader.read_commands(where, row.state, (verb("go"),))
         said = parse_speech(body[0].text, self.reader) if len(body) == 1 else None
         if said is None or said.text is None or said.to is not None or len(reading.commands) != 1:
             raise RefusalError("while I go somewhere I can only say something", [join_clauses(body)])
@@ -376,7 +376,7 @@ class DecisionBuilder:
         self.put_rounds(row, rounds, scope)
 
     def _rounds_behind(self, row: StepRow, scope: Sequence[Clause], found: Clause) -> Rounds:
-        """ "... until there are none left", "... until three o'clock"."""
+        """Builds rounds for "... until there are none left" or "... until three o'clock"."""
         if not found.text:
             raise RefusalError(f"{found.cue.lower()} what?", [found.cue])
         if found.kind is Cue.UNTIL and (time := parse_time(found.text)) is not None:

@@ -70,7 +70,7 @@ class SpokenCondition:
 
 @dataclass(frozen=True)
 class PlainReading:
-    """Plain part: its commands, the state behind it, and the trace of its understanding."""
+    """Plain part: its commands, the state after it, and the trace of its understanding."""
 
     commands: tuple[Command, ...]
     state: State
@@ -124,22 +124,22 @@ class PlainReader:
             raise found.refusal
         return found
 
-    def commands_of(self, text: str, state: State, lead: Sequence[Item] = ()) -> PlainReading:
-        """Understands a plain part behind the items `lead`."""
+    def read_commands(self, text: str, state: State, lead: Sequence[Item] = ()) -> PlainReading:
+        """Understands a plain part after the items `lead`."""
         trace = Trace(text, state.memory, tuple(lead), elliptic=True, recipient=state.recipient)
         return self._reading(self._run(trace), state)
 
-    def commands_of_items(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> PlainReading:
+    def commands_from_items(self, items: Sequence[Item], state: State, tokens: Sequence[Token] = ()) -> PlainReading:
         """Understands items, and the words from which they were read."""
         trace = Trace("", state.memory, tokens=tuple(tokens), items=tuple(items))
         return self._reading(self._run(trace, behind="reading"), state)
 
-    def commands_of_actions(self, trace: Trace, actions: Sequence[Action], state: State) -> PlainReading:
+    def commands_from_actions(self, trace: Trace, actions: Sequence[Action], state: State) -> PlainReading:
         """Understands actions in place of those of a trace."""
         trace = replace(trace, actions=tuple(actions), memory=state.memory)
         return self._reading(self._run(trace, behind="understanding"), state)
 
-    def actions_of(self, text: str, state: State) -> Trace:
+    def read_actions(self, text: str, state: State) -> Trace:
         """Understands a plain part up to its actions."""
         return self._run(Trace(text, state.memory, elliptic=True), upto="understanding")
 
@@ -150,14 +150,14 @@ class PlainReader:
             commands = commands[1:]
         return PlainReading(commands, self._after(commands, trace.memory, state), trace)
 
-    def items_of(self, text: str) -> tuple[Item, ...]:
+    def read_items(self, text: str) -> tuple[Item, ...]:
         """Reads the items of some words."""
         return self._run(Trace(text), upto="reading").items
 
     def go_to(self, text: str, state: State) -> PlainReading:
         """Understands going to a place, given by a noun phrase or "there"."""
-        items = (Adverb(here=False),) if text.lower() == "there" else self.items_of(text)
-        return self.commands_of_items((verb("go"), *with_preposition(items, "to")), state)
+        items = (Adverb(here=False),) if text.lower() == "there" else self.read_items(text)
+        return self.commands_from_items((verb("go"), *with_preposition(items, "to")), state)
 
     def check(self, text: str, state: State, lead: Sequence[Item] = (), *, said: str | None = None) -> SpokenCondition:
         """Condition that the statement in the text holds; `said` is its full text."""
@@ -176,14 +176,14 @@ class PlainReader:
     def look(self, who: str, room: str, text: str, state: State) -> SpokenCondition:
         """Condition that somebody is in a room."""
         where = Chunk(phrase_of_name(room, NounKind.PLACE), "in", PrepositionRole.AT)
-        return self.look_by_items((verb("check"), Whether(), *self.items_of(who), IS, where), text, state)
+        return self.look_by_items((verb("check"), Whether(), *self.read_items(who), IS, where), text, state)
 
     def look_by_items(
         self, items: Sequence[Item], text: str, state: State, tokens: Sequence[Token] = ()
     ) -> SpokenCondition:
         """Condition of the looks of some items; `text` is its full text."""
         try:
-            reading = self.commands_of_items([self._by_name(item, state) for item in items], state, tokens)
+            reading = self.commands_from_items([self._by_name(item, state) for item in items], state, tokens)
         except RefusalError as refusal:
             if refusal.kind is not RefusalKind.NOT_UNDERSTOOD:
                 raise
@@ -211,7 +211,7 @@ class PlainReader:
         else:
             assert place.phrase is not None
             to = Chunk(place.phrase, "to", PrepositionRole.GOAL)
-            reading = self.commands_of_items((verb("go"), to), state)
+            reading = self.commands_from_items((verb("go"), to), state)
         first, *more = reading.commands
         goal = first.goal
         if more or first.item or first.task or goal is None or self.knowledge.place(goal) is None:
@@ -253,7 +253,7 @@ class PlainReader:
         return replace(state, memory=memory)
 
     def _after(self, commands: tuple[Command, ...], memory: Memory, state: State) -> State:
-        """State behind some commands."""
+        """State after some commands."""
         held, goal = state.held, state.goal
         for command in commands:
             if command.task is Task.GRASP:
@@ -314,9 +314,9 @@ class Rounds:
 
 
 def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, rounds: bool = False) -> int:
-    """Index behind the clauses that belong to a condition or to rounds before `at`.
+    """Index after the clauses that belong to a condition or to rounds before `at`.
 
-    `branch` marks a second branch, where "then" goes on behind both branches. Clauses that follow the whole end it; in
+    `branch` marks a second branch, where "then" goes on after both branches. Clauses that follow the whole end it; in
     "first ..., finally ..." they belong to it.
     """
     first = any(re.search(r"\bfirst\b", one.joint, re.IGNORECASE) for one in clauses[at : at + 1])
@@ -333,7 +333,7 @@ def end_of_scope(clauses: Sequence[Clause], at: int, *, branch: bool = False, ro
 
 
 def negate_supposed(supposed: SpokenCondition) -> SpokenCondition:
-    """Negation of a condition, with the state behind it."""
+    """Negation of a condition, with the state after it."""
     return replace(supposed.negate(f"not {supposed.said}"), quotable=False)
 
 
@@ -345,7 +345,7 @@ def statement_of(supposed: SpokenCondition) -> str | None:
 
 
 def state_behind_both(one: State, other: State) -> State:
-    """State behind two branches."""
+    """State after two branches."""
     return replace(
         one,
         held=one.held if one.held == other.held else None,

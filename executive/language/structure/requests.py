@@ -33,7 +33,7 @@ from skills.files.errors import listing
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
 Done = tuple[Steps, State, tuple[str, ...]]
-"""Steps, the state behind them, and notes."""
+"""Steps, the state after them, and notes."""
 
 
 def parse_wait(text: str, state: State, reader: PlainReader) -> Done | None:
@@ -114,7 +114,7 @@ class Listener:
 
 
 @dataclass(frozen=True)
-class Said:
+class SpeechRequest:
     """Speech and its listener; `text` is None where it was not said ("tell Robin")."""
 
     text: str | None
@@ -122,7 +122,7 @@ class Said:
 
 
 @dataclass(frozen=True)
-class Asked:
+class QuestionRequest:
     """Question to somebody, the objects to choose from (with their articles), and whether it is yes or no."""
 
     text: str
@@ -131,49 +131,49 @@ class Asked:
     yes_or_no: bool = False
 
 
-def parse_speech(text: str, reader: PlainReader) -> Said | None:
+def parse_speech(text: str, reader: PlainReader) -> SpeechRequest | None:
     """Parses a clause that asks the robot to speak; None for other clauses.
 
     Raises RefusalError when the robot cannot say it in the speaker's place, or does not know the listener.
     """
     forms, parser = _of_world(reader.knowledge), reader.pipeline.parser
     if (match := forms.say_to.fullmatch(text) or forms.say_whom.fullmatch(text)) is not None:
-        return Said(_words(match["text"], parser), _listener(match))
+        return SpeechRequest(_words(match["text"], parser), _listener(match))
     if forms.says_inside.match(text) is not None:
         raise RefusalError(f"I do not understand to whom to say '{text}'; name one person at the end", [text])
     if (match := ACTS.say.fullmatch(text)) is not None:
-        return Said(_words(match["text"], parser), None)
+        return SpeechRequest(_words(match["text"], parser), None)
     if (match := forms.greet.fullmatch(text)) is not None:
-        return Said("hello", _listener(match))
+        return SpeechRequest("hello", _listener(match))
     if (match := forms.announce_to.fullmatch(text)) is not None:
-        return Said(_told(match["text"]), _listener(match))
+        return SpeechRequest(_told(match["text"]), _listener(match))
     if (match := ACTS.announce.fullmatch(text)) is not None:
-        return Said(_told(match["text"]), None if match["place"] is None else Listener(where=match["place"]))
+        return SpeechRequest(_told(match["text"]), None if match["place"] is None else Listener(where=match["place"]))
     match = forms.tell_that.fullmatch(text) or forms.let_know_that.fullmatch(text)
     if match is not None and not ACTS.question.match(match["text"]):
-        return Said(_told(match["text"]), _listener(match))
+        return SpeechRequest(_told(match["text"]), _listener(match))
     if (match := forms.tell_to.fullmatch(text)) is not None:
-        return Said(_told(f"please {match['act']}"), _listener(match))
+        return SpeechRequest(_told(f"please {match['act']}"), _listener(match))
     match = forms.tell.fullmatch(text) or forms.let_know.fullmatch(text)
     return None if match is None else _relayed(match["text"], text, _listener(match), parser)
 
 
-def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser) -> Said:
-    """ "Tell Robin dinner is ready", "let Robin know it"."""
+def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser) -> SpeechRequest:
+    """Parses the speech in "tell Robin dinner is ready" or "let Robin know it"."""
     if said is not None and re.match(r"(?:and|or)\b", said, re.IGNORECASE):
         raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
     if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
-        return Said(None, to)
+        return SpeechRequest(None, to)
     if CLAUSES.greetings.fullmatch(said) or (not ACTS.question.match(said) and _clause(said, parser)):
-        return Said(_told(said), to)
+        return SpeechRequest(_told(said), to)
     raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
 
 
-def make_speech(who: str, text: str, knowledge: Knowledge) -> Said:
-    """Makes a speech to somebody. Raises RefusalError for an unknown person, or words that change their meaning."""
+def make_speech(who: str, text: str, knowledge: Knowledge) -> SpeechRequest:
+    """Makes a speech to somebody. Raises RefusalError for an unknown person, or when the meaning would change."""
     if (match := _of_world(knowledge).who.fullmatch(who)) is None:
         raise RefusalError(f"I do not know to whom to say it: '{who}'", [who])
-    return Said(_told(text), _listener(match))
+    return SpeechRequest(_told(text), _listener(match))
 
 
 def _clause(text: str, parser: DependencyParser) -> bool:
@@ -238,7 +238,7 @@ def _listener(match: re.Match[str]) -> Listener:
     return Listener(who, where, name=who)
 
 
-def parse_question(text: str, knowledge: Knowledge) -> Asked | None:
+def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
     """Parses a clause that asks the robot to put a question to somebody; None for other clauses.
 
     Raises RefusalError for a question that the robot cannot put.
@@ -259,17 +259,17 @@ def parse_question(text: str, knowledge: Knowledge) -> Asked | None:
     if (word := CLAUSES.deictic.search(match["what"])) is not None:
         raise RefusalError(f"I cannot ask that for you: '{word[0]}' would mean somebody else", [text])
     choices = tuple(re.split(r",? or |, ", match["what"], flags=re.IGNORECASE))
-    return Asked(f"Do you want {match['what']}?", _listener(match), choices, yes_or_no=len(choices) == 1)
+    return QuestionRequest(f"Do you want {match['what']}?", _listener(match), choices, yes_or_no=len(choices) == 1)
 
 
-def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> Asked:
-    """ "What he wants to drink": a choice among all known objects of that kind."""
+def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> QuestionRequest:
+    """Makes the question for "what he wants to drink": a choice among all known objects of that kind."""
     kind = (match["kind"] or ("drink" if "drink" in text.lower() else "")).lower()
     names = knowledge.classes(kind.removesuffix("s")) if kind else ()
     if not names:
         raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
     spoken = "What do you want to drink?" if match["kind"] is None else f"Which {kind} do you want?"
-    return Asked(spoken, _listener(match), tuple(f"a {name}" for name in names))
+    return QuestionRequest(spoken, _listener(match), tuple(f"a {name}" for name in names))
 
 
 def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:
@@ -277,7 +277,7 @@ def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[St
 
     Raises RefusalError when no room is said, nobody is known to be there, or there is only one such object.
     """
-    trace = reader.actions_of(text, state)
+    trace = reader.read_actions(text, state)
     goals = [one.goal for one in trace.actions if one.goal is not None and one.goal.phrase is not None]
     to = next((goal for goal in goals if goal.phrase and ACTS.everyone.fullmatch(goal.phrase.spoken)), None)
     if to is None or to.phrase is None:
@@ -294,7 +294,7 @@ def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[St
     for name in people:
         person = Location(phrase_of_name(name, NounKind.PERSON), "to", to.within)
         actions = [replace(one, goal=person) if one.goal == to else one for one in trace.actions]
-        reading = reader.commands_of_actions(trace, actions, begun)
+        reading = reader.commands_from_actions(trace, actions, begun)
         if any(action.target is not None and not action.target.indefinite for action in reading.trace.resolved):
             raise RefusalError(f"there is only one of it, and I cannot bring it to {who}; name one person", [who])
         steps += steps_of_commands(reading.commands)
@@ -304,7 +304,7 @@ def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[St
 
 def search_for(what: str, state: State, reader: PlainReader) -> PlainReading:
     """Understands a search for an object or a person in all rooms. Raises RefusalError when it is unclear."""
-    reading = reader.commands_of(what, state, (verb("find"),))
+    reading = reader.read_commands(what, state, (verb("find"),))
     finds = [command for command in reading.commands if command.task is Task.FIND]
     if len(finds) != len(reading.commands) or re.search(r"\b(?:in|on|at|near)\b", what):
         raise RefusalError(f"I cannot look for {listing([what])} in every room", [what])

@@ -34,8 +34,8 @@ from executive.language.structure.plain import (
     with_preposition,
 )
 from executive.language.structure.requests import (
-    Asked,
     Listener,
+    QuestionRequest,
     escape_braces,
     make_speech,
     parse_charging,
@@ -69,7 +69,7 @@ class SentenceBuilder(DecisionBuilder):
         return tuple(row.steps), row.state
 
     def _next(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
-        """Builds the clause at `at`, and those that belong to it; returns the index behind them."""
+        """Builds the clause at `at`, and those that belong to it; returns the index after them."""
         clause = clauses[at]
         if clause.anyway or clause.ends_anyway:
             return self.put_always(row, clauses, at)
@@ -84,12 +84,12 @@ class SentenceBuilder(DecisionBuilder):
             self.flush(row)
             row.begun = len(row.steps)
         if self.verb is not None and at == 0 and ACTS.no_verb.match(clause.text):
-            clause = replace(clause, lead=self.reader.items_of(self.verb))
+            clause = replace(clause, lead=self.reader.read_items(self.verb))
             clauses = [clause, *clauses[1:]]
         return self._act(row, clause, clauses, at)
 
     def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
-        """Builds the clause at `at`, which begins with an action; returns the index behind it."""
+        """Builds the clause at `at`, which begins with an action; returns the index after it."""
         text = clause.text
         self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
         if ACTS.answered.fullmatch(text) is not None and self._answered(row):
@@ -120,7 +120,7 @@ class SentenceBuilder(DecisionBuilder):
         return looked
 
     def _known(self, row: StepRow) -> State:
-        """State behind the pending clauses."""
+        """State after the pending clauses."""
         return self.read_together(row.plain, row.state).state if row.plain else row.state
 
     def _waits(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
@@ -163,7 +163,7 @@ class SentenceBuilder(DecisionBuilder):
         return at + 1
 
     def _tells_when(self, row: StepRow, match: re.Match[str]) -> None:
-        """ "Tell me when Robin comes" waits for the condition, and then tells it."""
+        """Builds a wait and a speech for "tell me when Robin comes"."""
         self.flush(row)
         supposed = parse_condition(match["what"], row.state, self.reader)
         statement = statement_of(supposed)
@@ -178,10 +178,10 @@ class SentenceBuilder(DecisionBuilder):
         """Goes to the listener."""
         if to is None or not (to.who or to.where):
             return
-        who = with_preposition(self.reader.items_of(to.who), "to") if to.who and not to.speaker else ()
-        where = with_preposition(self.reader.items_of(to.where), "in" if who else "to") if to.where else ()
+        who = with_preposition(self.reader.read_items(to.who), "to") if to.who and not to.speaker else ()
+        where = with_preposition(self.reader.read_items(to.where), "in" if who else "to") if to.where else ()
         going = (verb("come"), Adverb(here=True)) if to.speaker else (verb("go"), *who, *where)
-        reading = self.reader.commands_of_items(going, row.state)
+        reading = self.reader.commands_from_items(going, row.state)
         if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
             self.add(row, reading)
 
@@ -199,7 +199,9 @@ class SentenceBuilder(DecisionBuilder):
         self.put(row, Ask(ask=escape_braces(asked.text), choices=choices), replace(row.state, goal=None, at=None))
         return end
 
-    def _agreed(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
+    def _agreed(
+        self, asked: QuestionRequest, state: State, clauses: Sequence[Clause], at: int
+    ) -> tuple[dict[str, Steps], int]:
         """Steps for the answers yes and no."""
         found: dict[str, Steps] = {"yes": (), "no": ()}
         while at < len(clauses):
@@ -221,7 +223,9 @@ class SentenceBuilder(DecisionBuilder):
             raise RefusalError("say 'if yes' before the action for that answer", [clauses[at].text])
         return found, at
 
-    def _chosen(self, asked: Asked, state: State, clauses: Sequence[Clause], at: int) -> tuple[dict[str, Steps], int]:
+    def _chosen(
+        self, asked: QuestionRequest, state: State, clauses: Sequence[Clause], at: int
+    ) -> tuple[dict[str, Steps], int]:
         """Steps for each of the choices: the robot brings it, where that was said."""
         article = r"^(?:a|an|some|the|any|another) "
         names = [re.sub(article, "", choice, flags=re.IGNORECASE) for choice in asked.choices]
@@ -230,21 +234,23 @@ class SentenceBuilder(DecisionBuilder):
         chosen = (self._choosing(asked, n, state) for n in range(len(names)))
         return {name: self.nest([clauses[at]], each)[0] for name, each in zip(names, chosen, strict=True)}, at + 1
 
-    def _choosing(self, asked: Asked, number: int, state: State) -> State:
-        """State behind the answer: "it" is the chosen object, and the person who was asked receives it."""
-        objects = tuple(item.phrase for item in self.reader.items_of(asked.choices[number]) if isinstance(item, Chunk))
+    def _choosing(self, asked: QuestionRequest, number: int, state: State) -> State:
+        """State after the answer: "it" is the chosen object, and the person who was asked receives it."""
+        objects = tuple(
+            item.phrase for item in self.reader.read_items(asked.choices[number]) if isinstance(item, Chunk)
+        )
         person = Location(phrase_of_name(asked.of.name or "", NounKind.PERSON), "to")
         memory = replace(state.memory, objects=objects, gathered=objects, where=None, person=person)
         return replace(state, memory=memory, recipient=person)
 
     def _checks(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
-        """ "Look whether the door is open", "is the battery low": checks that only blocks can do."""
+        """Builds a check that only blocks can do: "look whether the door is open", "is the battery low"."""
         text = statement_of_check(clauses[at].text)
         if text is None:
             return None
         state = self._known(row)
         try:
-            self.reader.commands_of(clauses[at].text, state)
+            self.reader.read_commands(clauses[at].text, state)
         except RefusalError as refusal:
             plain = refusal
         else:
@@ -302,7 +308,7 @@ class SentenceBuilder(DecisionBuilder):
         self.flush(row)
         for room in self.reader.knowledge.places:
             there = Chunk(phrase_of_name(room, NounKind.PLACE), "to", PrepositionRole.GOAL)
-            reading = self.reader.commands_of_items((verb("go"), there), replace(row.state, goal=None))
+            reading = self.reader.commands_from_items((verb("go"), there), replace(row.state, goal=None))
             said, state = self.sequence([says], reading.state)
             self.put_done(row, ((*steps_of_commands(reading.commands), *said), state, ()))
 
@@ -312,7 +318,7 @@ MOST_NESTED: Final = 2
 MOST_CLAUSES: Final = 24
 
 
-def structured(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
+def read_structure(plain: Trace, clauses: Sequence[Clause] | None, pipeline: Pipeline, memory: Memory) -> Trace:
     """Reads a sentence that decides, repeats, waits, says or asks, given the trace of its plain reading.
 
     Returns the plain trace for a list of plain commands: where the sentence could be such a list, only certain

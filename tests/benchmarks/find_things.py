@@ -27,7 +27,7 @@ from errand_train.dataset.compose import Placed, Scene, compose
 from errand_train.dataset.lighting import random_lighting
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
 from errand_train.dataset.render import is_validation
-from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.room import Support
 from errand_train.dataset.views import View, camera_specs
 from executive.app.placed_robots import shared_detector
@@ -154,7 +154,7 @@ def scattered(
     corners = np.asarray(surface.polygon_W)
     taken: list[tuple[NDArray[np.float64], float]] = []
     for model in models:
-        rest = choose(rng, model, resting_poses(model))
+        rest = choose_pose(rng, model, resting_poses(model))
         points = model.surface.points @ rest.R.T
         reach = float(np.linalg.norm(points[:, :2], axis=1).max())
         for _ in range(200):

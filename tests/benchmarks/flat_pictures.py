@@ -29,7 +29,7 @@ from errand_train.dataset.coco import document
 from errand_train.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
 from errand_train.dataset.objects import DISTRACTORS, ObjectModel
 from errand_train.dataset.render import label_view
-from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.silhouette import project
 from errand_train.dataset.views import (
     BODY_SHARE,
@@ -146,7 +146,7 @@ def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> It
     taken: list[FloatArray] = []
     for category in ("person", "extinguisher", str(rng.choice(supply.lying_about))):
         model = supply.take(rng, category)
-        rest = choose(rng, model, resting_poses(model))
+        rest = choose_pose(rng, model, resting_poses(model))
         places = rng.permutation(_floor_points(free, ROOM_FOR_PEOPLE_M))
         xy = next((p for p in places if _clear_of(p, taken)), None)
         if xy is None or model.kind == "sitting":

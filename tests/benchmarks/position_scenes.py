@@ -24,7 +24,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_train.dataset.coco import box_of
 from errand_train.dataset.compose import Placed, Scene, compose
-from errand_train.dataset.degrade import exposed
+from errand_train.dataset.degrade import expose
 from errand_train.dataset.lighting import random_lighting
 from errand_train.dataset.render import Stage, is_validation
 from errand_train.dataset.silhouette import silhouette
@@ -112,7 +112,7 @@ def _hand_view(rng: np.random.Generator, scene: Scene, thing: Placed) -> View | 
 def _shot(rng: np.random.Generator, stage: DepthStage, view: View) -> Shot:
     range_m = camera_specs()[view.camera].depth_range_m
     rendered, labels, clean = stage.seen(view, range_m)
-    colour = np.asarray(np.round(exposed(rendered.astype(np.float32), MEAN_EXPOSURE)), dtype=np.uint8)
+    colour = np.asarray(np.round(expose(rendered.astype(np.float32), MEAN_EXPOSURE)), dtype=np.uint8)
     grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
     depth = DepthDegrader(rng, view.intrinsics, range_m, DepthNoise()).depth(clean, grey)
     frames = FrameTree({"hand_camera": ("odom", view.X_WC)})

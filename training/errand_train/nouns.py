@@ -25,7 +25,7 @@ _SHRINKAGE: Final = 0.2
 
 
 def learn_nouns(examples: Mapping[str, NounKind], vector_of: VectorOf) -> NounKinds:
-    """Learns from examples; `vector_of` gives the unit vector of a word, or None."""
+    """Learns the kinds of nouns from examples; `vector_of` returns the unit vector of a word, or None."""
     single = ((vector_of(noun), kind) for noun, kind in examples.items() if " " not in noun)
     known = [(vector, kind) for vector, kind in single if vector is not None]
     vectors = np.array([vector for vector, _ in known])
@@ -34,7 +34,7 @@ def learn_nouns(examples: Mapping[str, NounKind], vector_of: VectorOf) -> NounKi
 
 
 def _discriminant(vectors: FloatArray, labels: npt.NDArray[np.int_]) -> FloatArray:
-    """The weights of a linear discriminant with shrunk covariance, all kinds being equally likely beforehand."""
+    """Weights of a linear discriminant with shrunk covariance and equal priors."""
     means = np.array([vectors[labels == label].mean(axis=0) for label in range(len(NounKind))])
     spread = vectors - means[labels]
     covariance = spread.T @ spread / len(vectors)

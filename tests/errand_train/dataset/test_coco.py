@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from pycocotools import mask as coco_mask
 
-from errand_train.dataset.coco import annotation, box_of, categories, counts, document, lost_in_the_dark, run_lengths
+from errand_train.dataset.coco import annotation, box_of, categories, counts, document, is_black, run_lengths
 from errand_train.dataset.silhouette import Silhouette
 from skills.perception.class_forms import class_forms
 
@@ -118,4 +118,4 @@ def test_a_document_numbers_pictures_and_labels_and_joins_them() -> None:
 def test_a_thing_that_is_all_black_is_lost_in_the_dark(mean: float, spread: float, lost: bool) -> None:
     noise = np.random.default_rng(1).normal(mean, spread, (20, 20, 3))
     picture = np.clip(noise, 0, 255).astype(np.uint8)
-    assert lost_in_the_dark(picture, np.ones((20, 20), dtype=bool)) is lost
+    assert is_black(picture, np.ones((20, 20), dtype=bool)) is lost

@@ -17,10 +17,10 @@ from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial import ConvexHull
 
 from errand_train.dataset.compose import Placed, compose
-from errand_train.dataset.degrade import Degradation, degraded
+from errand_train.dataset.degrade import Degradation, degrade
 from errand_train.dataset.objects import instance
 from errand_train.dataset.render import is_validation
-from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.room import random_room
 from errand_train.dataset.textures import ROLES, numbers, texture
 from errand_train.dataset.views import any_view, camera_specs
@@ -50,16 +50,16 @@ def test_a_thing_rests_on_three_points_under_its_centre_of_mass(category: str) -
 
 def test_a_bottle_stands_or_lies_and_a_person_only_stands() -> None:
     bottle, rng = instance("beer", 0), np.random.default_rng(1)
-    upright = [choose(rng, bottle, resting_poses(bottle)).upright for _ in range(60)]
+    upright = [choose_pose(rng, bottle, resting_poses(bottle)).upright for _ in range(60)]
     assert 0.5 < np.mean(upright) < 0.9
 
 
 def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not() -> None:
     # Of 400 by chance: an extinguisher stands 0.9 of the time, toppled 0.675.
     thing, person, rng = instance("extinguisher", 0), instance("person", 48), np.random.default_rng(1)
-    standing = [choose(rng, thing, resting_poses(thing), toppled=True).upright for _ in range(400)]
+    standing = [choose_pose(rng, thing, resting_poses(thing), toppled=True).upright for _ in range(400)]
     assert np.mean(standing) == pytest.approx(0.675, abs=0.06)
-    assert all(choose(rng, person, resting_poses(person), toppled=True).upright for _ in range(60))
+    assert all(choose_pose(rng, person, resting_poses(person), toppled=True).upright for _ in range(60))
 
 
 @pytest.mark.parametrize("category", ["cube", "cylinder", "coke"])
@@ -124,15 +124,15 @@ def test_cameras_are_in_the_room_and_out_of_furniture() -> None:
 
 def test_a_degraded_picture_keeps_its_size_and_grey_has_one_channel(tmp_path: Path) -> None:
     clean = np.full((48, 64, 3), 90, dtype=np.uint8)
-    how = Degradation.drawn(np.random.default_rng(2))
-    assert degraded(clean, how, np.random.default_rng(0), grey=False).shape == (48, 64, 3)
-    assert degraded(clean, how, np.random.default_rng(0), grey=True).shape == (48, 64)
+    how = Degradation.draw(np.random.default_rng(2))
+    assert degrade(clean, how, np.random.default_rng(0), grey=False).shape == (48, 64, 3)
+    assert degrade(clean, how, np.random.default_rng(0), grey=True).shape == (48, 64)
 
 
 def test_degrading_is_the_same_for_the_same_seed() -> None:
     clean = np.random.default_rng(1).integers(0, 255, (48, 64, 3)).astype(np.uint8)
-    how = Degradation.drawn(np.random.default_rng(2))
-    first, second = (degraded(clean, how, np.random.default_rng(0), grey=False) for _ in range(2))
+    how = Degradation.draw(np.random.default_rng(2))
+    first, second = (degrade(clean, how, np.random.default_rng(0), grey=False) for _ in range(2))
     assert np.array_equal(first, second)
 
 

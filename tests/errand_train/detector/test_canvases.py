@@ -29,7 +29,7 @@ def maker() -> CanvasMaker:
 
 
 def plain(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("errand_train.detector.canvases.as_seen_otherwise", lambda picture, _random: picture)
+    monkeypatch.setattr("errand_train.detector.canvases.change_photometry", lambda picture, _random: picture)
 
 
 def bright_box(canvas: Canvas, around: np.ndarray) -> np.ndarray:

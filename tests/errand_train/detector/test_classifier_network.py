@@ -12,11 +12,11 @@ pytest.importorskip("onnx")
 
 from errand_train.detector.classifier_network import USED, ClassifierNetwork  # noqa: E402
 from errand_train.detector.crop_batches import CropBatch  # noqa: E402
-from errand_train.detector.export import export, fused  # noqa: E402
+from errand_train.detector.export import export, fuse  # noqa: E402
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import CropLearner  # noqa: E402
-from errand_train.detector.proposal_table import refined_in  # noqa: E402
-from errand_train.detector.quantisation import quantised  # noqa: E402
+from errand_train.detector.proposal_table import refined_proposals  # noqa: E402
+from errand_train.detector.quantisation import quantise  # noqa: E402
 from skills.perception.detector.letterbox import Scales, halve  # noqa: E402
 from skills.perception.detector.model_files import (  # noqa: E402
     CLASSIFIER,
@@ -111,7 +111,7 @@ def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_
         "logits": logits.numpy(),
     }
     found, scores = load_network(file, CLASSIFIER).session.run(["boxes", "scores"], told)
-    in_use = fused(network)
+    in_use = fuse(network)
     in_use.stop_learning()
     with torch.no_grad():
         expected, expected_boxes = in_use(as_bytes / 255, boxes, logits)
@@ -148,7 +148,7 @@ def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_pa
         "regions": boxes.numpy(),
         "logits": logits.numpy(),
     }
-    made = quantised(model, [told])
+    made = quantise(model, [told])
     kinds = {one.data_type for one in made.graph.initializer if one.name.endswith("weight_quantized")}
     assert kinds == {onnx.TensorProto.INT8}
     # 16 blocks of 3 convolutions, of which the first has 2; neither the first of all, nor this block, nor the last two
@@ -158,7 +158,7 @@ def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_pa
 def test_normalisation_becomes_part_of_the_layers() -> None:
     network, (crops, boxes, logits) = trained(), given(2)
     with torch.no_grad():
-        for mine, theirs in zip(fused(network)(crops, boxes, logits), network(crops, boxes, logits), strict=True):
+        for mine, theirs in zip(fuse(network)(crops, boxes, logits), network(crops, boxes, logits), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-2)
 
 
@@ -166,7 +166,7 @@ def test_normalisation_becomes_part_of_the_layers() -> None:
 def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_path: Path) -> None:
     picture = picture_of(("hammer", 0.2, (100, 100, 200, 200)))
     picture[50:250, 50:250, 0] = 255
-    look = partial(refined_in, load_model(write_pair(tmp_path / "m.onnx")))
+    look = partial(refined_proposals, load_model(write_pair(tmp_path / "m.onnx")))
     found = look(Scales(picture, halve(picture)))
     assert found.boxes.round().tolist() == [[105.0, 105.0, 195.0, 195.0]]
     assert found.logits.argmax(axis=1).tolist() == [CLASSES.index("beer")]
@@ -175,7 +175,7 @@ def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_
 def test_without_a_refinement_network_there_is_nothing_to_learn_from(tmp_path: Path) -> None:
     pair = load_model(write_pair(tmp_path / "m.onnx"), networks=1)
     with pytest.raises(ValueError, match="no refinement network"):
-        refined_in(pair, Scales(picture_of(), halve(picture_of())))
+        refined_proposals(pair, Scales(picture_of(), halve(picture_of())))
 
 
 def test_learning_goes_on_from_no_refinement_networks_file(tmp_path: Path) -> None:

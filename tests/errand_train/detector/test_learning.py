@@ -11,7 +11,7 @@ pytest.importorskip("onnx")
 from errand_train.detector.assign import assign  # noqa: E402
 from errand_train.detector.batches import batch_of, truth_of  # noqa: E402
 from errand_train.detector.canvases import Canvas  # noqa: E402
-from errand_train.detector.export import export, fused  # noqa: E402
+from errand_train.detector.export import export, fuse  # noqa: E402
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import Learner, ProposalLearner  # noqa: E402
 from errand_train.detector.losses import Losses, complete_overlap, losses  # noqa: E402
@@ -135,9 +135,9 @@ def test_the_average_follows_fast_at_first() -> None:
 def test_without_normalisation_the_network_says_the_same() -> None:
     network, pictures = unsettled(), torch.rand(2, 3, 64, 64)
     with torch.no_grad():
-        for mine, theirs in zip(network(pictures), fused(network)(pictures), strict=True):
+        for mine, theirs in zip(network(pictures), fuse(network)(pictures), strict=True):
             assert torch.allclose(mine, theirs, atol=1e-3)
-    assert not any(isinstance(module, torch.nn.BatchNorm2d) for module in fused(network).modules())
+    assert not any(isinstance(module, torch.nn.BatchNorm2d) for module in fuse(network).modules())
 
 
 def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from errand_train.detector.labels import Labels
-from errand_train.detector.placing import Cell, joined, placed, turning
+from errand_train.detector.placing import Cell, join_targets, place_labels, similarity_map
 
 CELL = Cell(0, 0, 100, 80)
 
@@ -17,35 +17,35 @@ def labels(*outlines: np.ndarray, seen: float = 1.0, ignored: bool = False) -> L
 
 
 def still() -> np.ndarray:
-    return turning(np.zeros(2, np.float32), np.zeros(2, np.float32), angle_rad=0.0, scale=1.0, flipped=False)
+    return similarity_map(np.zeros(2, np.float32), np.zeros(2, np.float32), angle_rad=0.0, scale=1.0, flipped=False)
 
 
 def test_what_is_inside_keeps_its_box() -> None:
-    found = placed(labels(square(10, 20, 30)), still(), CELL)
+    found = place_labels(labels(square(10, 20, 30)), still(), CELL)
     assert found.boxes.tolist() == [[10, 20, 40, 50]]
     assert not found.ignored.any()
 
 
 def test_a_right_angle_turns_the_box_about_the_focus() -> None:
     focus = np.array([20, 20], dtype=np.float32)
-    affine = turning(focus, focus, angle_rad=np.pi / 2, scale=1.0, flipped=False)
+    affine = similarity_map(focus, focus, angle_rad=np.pi / 2, scale=1.0, flipped=False)
     tall = np.array([[15, 10], [25, 10], [25, 30], [15, 30]], dtype=np.float32)
-    assert placed(labels(tall), affine, CELL).boxes[0].tolist() == pytest.approx([10, 15, 30, 25], abs=1e-3)
+    assert place_labels(labels(tall), affine, CELL).boxes[0].tolist() == pytest.approx([10, 15, 30, 25], abs=1e-3)
 
 
 def test_a_turned_disc_keeps_its_box_where_a_turned_box_would_grow() -> None:
     angles = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     disc = (np.stack([np.cos(angles), np.sin(angles)], axis=1) * 20 + (50, 40)).astype(np.float32)
     focus = np.array([50, 40], dtype=np.float32)
-    affine = turning(focus, focus, angle_rad=np.pi / 4, scale=1.0, flipped=False)
-    assert placed(labels(disc), affine, CELL).boxes[0].tolist() == pytest.approx([30, 20, 70, 60], abs=0.5)
+    affine = similarity_map(focus, focus, angle_rad=np.pi / 4, scale=1.0, flipped=False)
+    assert place_labels(labels(disc), affine, CELL).boxes[0].tolist() == pytest.approx([30, 20, 70, 60], abs=0.5)
 
 
 def test_mirroring_brings_the_focus_where_it_is_told_and_swaps_sides() -> None:
-    affine = turning(
+    affine = similarity_map(
         np.array([10, 10], np.float32), np.array([50, 40], np.float32), angle_rad=0.0, scale=2.0, flipped=True
     )
-    assert placed(labels(square(10, 10, 15)), affine, CELL).boxes.tolist() == [[20, 40, 50, 70]]
+    assert place_labels(labels(square(10, 10, 15)), affine, CELL).boxes.tolist() == [[20, 40, 50, 70]]
 
 
 # seen before, part within the cell -> ignored (under a quarter seen)
@@ -54,26 +54,26 @@ def test_mirroring_brings_the_focus_where_it_is_told_and_swaps_sides() -> None:
     [(1.0, 80, False), (1.0, 95, True), (0.4, 70, False), (0.4, 80, True), (0.2, 10, True)],
 )
 def test_what_is_hardly_seen_any_more_is_ignored(seen: float, x: float, expected: bool) -> None:
-    found = placed(labels(square(x, 10, 40), seen=seen), still(), CELL)
+    found = place_labels(labels(square(x, 10, 40), seen=seen), still(), CELL)
     assert found.ignored.tolist() == [expected]
     assert found.boxes[0, 2] <= 100
 
 
 def test_what_is_outside_is_left_out() -> None:
-    found = placed(labels(square(10, 10, 20), square(200, 10, 20)), still(), CELL)
+    found = place_labels(labels(square(10, 10, 20), square(200, 10, 20)), still(), CELL)
     assert found.classes.tolist() == [0]
 
 
 def test_what_has_become_small_is_ignored() -> None:
-    affine = turning(np.zeros(2, np.float32), np.zeros(2, np.float32), angle_rad=0.0, scale=0.2, flipped=False)
-    assert placed(labels(square(10, 10, 40)), affine, CELL).ignored.tolist() == [True]
+    affine = similarity_map(np.zeros(2, np.float32), np.zeros(2, np.float32), angle_rad=0.0, scale=0.2, flipped=False)
+    assert place_labels(labels(square(10, 10, 40)), affine, CELL).ignored.tolist() == [True]
 
 
 def test_what_was_ignored_stays_so() -> None:
-    assert placed(labels(square(10, 10, 40), ignored=True), still(), CELL).ignored.tolist() == [True]
+    assert place_labels(labels(square(10, 10, 40), ignored=True), still(), CELL).ignored.tolist() == [True]
 
 
 def test_a_picture_without_things_gives_no_targets() -> None:
-    found = placed(labels(), still(), CELL)
+    found = place_labels(labels(), still(), CELL)
     assert found.boxes.shape == (0, 4)
-    assert joined([found, found]).boxes.shape == (0, 4)
+    assert join_targets([found, found]).boxes.shape == (0, 4)

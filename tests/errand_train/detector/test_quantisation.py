@@ -16,7 +16,7 @@ from onnxruntime import InferenceSession  # noqa: E402
 
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.onnx_files import trained_weights  # noqa: E402
-from errand_train.detector.quantisation import main, quantised, quantised_detector  # noqa: E402
+from errand_train.detector.quantisation import main, quantise, quantise_detector  # noqa: E402
 from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
 
 
@@ -95,7 +95,7 @@ def plain() -> "onnx.ModelProto":
 
 @pytest.fixture(scope="module")
 def made(plain: "onnx.ModelProto") -> "onnx.ModelProto":
-    return quantised(plain, [{"images": noise(k)[None]} for k in range(10)])
+    return quantise(plain, [{"images": noise(k)[None]} for k in range(10)])
 
 
 @pytest.fixture
@@ -126,7 +126,7 @@ def test_the_convolutions_at_both_ends_stay_as_they_are(made: "onnx.ModelProto")
 
 
 def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too() -> None:
-    made = quantised(convolutions(separable=True), [{"images": noise(k)[None]} for k in range(4)])
+    made = quantise(convolutions(separable=True), [{"images": noise(k)[None]} for k in range(4)])
     kept = {one.name for one in made.graph.initializer if one.name.endswith("weight_quantized")}
     assert kept == {"network.second.weight_quantized"}
 
@@ -153,7 +153,7 @@ def test_the_others_come_too_and_belong_together(tmp_path: Path, data: Path, pla
     second = refinement_file(first)
     second.write_bytes(refinement_bytes(first.read_bytes()))
     classifier_file(first).write_bytes(classifier_bytes(second.read_bytes()))
-    file = quantised_detector(first, data, tmp_path / "out")
+    file = quantise_detector(first, data, tmp_path / "out")
     model = load_model(file)
     assert model.refinement is not None
     assert model.classifier is not None
@@ -167,9 +167,9 @@ def test_the_others_come_too_and_belong_together(tmp_path: Path, data: Path, pla
 def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
     first = tmp_path / "detector.onnx"
     first.write_bytes(plain.SerializeToString())
-    once = quantised_detector(first, data, tmp_path / "once")
+    once = quantise_detector(first, data, tmp_path / "once")
     refinement_file(once).write_bytes(refinement_bytes(once.read_bytes()))
-    twice = quantised_detector(once, data, tmp_path / "twice")
+    twice = quantise_detector(once, data, tmp_path / "twice")
     assert twice.read_bytes() == once.read_bytes()
 
 
@@ -177,7 +177,7 @@ def test_what_is_in_8_bits_already_is_refused(tmp_path: Path, data: Path) -> Non
     told = {"format": "errand-detector-1", "class_names": json.dumps(list(CLASSES)), "eight_bits": "yes"}
     file = write_model(tmp_path / "detector.onnx", metadata=told)
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*is quantised already"):
-        quantised_detector(file, data, tmp_path / "out")
+        quantise_detector(file, data, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -185,7 +185,7 @@ def test_nothing_is_written_over(tmp_path: Path, data: Path, plain: "onnx.ModelP
     file = tmp_path / "detector.onnx"
     file.write_bytes(plain.SerializeToString())
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*written over"):
-        quantised_detector(file, data, tmp_path)
+        quantise_detector(file, data, tmp_path)
     assert file.read_bytes() == plain.SerializeToString()
 
 

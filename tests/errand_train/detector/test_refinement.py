@@ -13,14 +13,14 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
 from errand_train.detector.crop_batches import CropFeed  # noqa: E402
-from errand_train.detector.crop_network import covered, moved  # noqa: E402
+from errand_train.detector.crop_network import coverage, shift_boxes  # noqa: E402
 from errand_train.detector.export import export  # noqa: E402
 from errand_train.detector.labels import Labels, TrainingDataError, TrainingPicture  # noqa: E402
 from errand_train.detector.learner import CropLearner, ProposalLearner  # noqa: E402
 from errand_train.detector.losses import crop_losses  # noqa: E402
 from errand_train.detector.network import Residual  # noqa: E402
-from errand_train.detector.proposal_table import ProposalTable, proposals_in, table_of  # noqa: E402
-from errand_train.detector.refinement_network import RefinementNetwork, surest_about  # noqa: E402
+from errand_train.detector.proposal_table import ProposalTable, build_table, first_proposals  # noqa: E402
+from errand_train.detector.refinement_network import RefinementNetwork, best_cell_about  # noqa: E402
 from errand_train.detector.store import PictureStore  # noqa: E402
 from skills.perception.detector.letterbox import Scales, halve  # noqa: E402
 from skills.perception.detector.model_files import load_model, refinement_file  # noqa: E402
@@ -42,9 +42,9 @@ def labelled(*boxes: tuple[int, int, int, int], ignored: bool = False) -> Traini
 
 
 def table(file: Path, picture: TrainingPicture, *things: tuple[str, float, tuple[float, ...]]) -> ProposalTable:
-    look = partial(proposals_in, load_model(write_model(file)))
+    look = partial(first_proposals, load_model(write_model(file)))
     seen = picture_of(*things)
-    return table_of(look, [(Scales(seen, halve(seen)), picture.labels)])
+    return build_table(look, [(Scales(seen, halve(seen)), picture.labels)])
 
 
 def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
@@ -122,7 +122,7 @@ def test_a_fresh_network_says_the_mean_of_what_the_proposal_network_said_and_see
     )
     with torch.no_grad():
         logits, found = network(crops, boxes, first)
-        seen, seen_boxes = surest_about(boxes, *network.detector(crops))
+        seen, seen_boxes = best_cell_about(boxes, *network.detector(crops))
     assert torch.allclose(logits, (first + seen) / 2, atol=1e-4)
     assert torch.allclose(found, (boxes + seen_boxes) / 2, atol=1e-3)
 
@@ -142,13 +142,13 @@ def test_the_cell_counts_that_is_surest_of_a_box_about_the_places() -> None:
     place = torch.tensor([[0.0, 0.0, 10.0, 10.0]])
     found = torch.tensor([[[50.0, 50.0, 60.0, 60.0], [5.0, 0.0, 15.0, 10.0], [0.0, 0.0, 10.0, 10.0]]])
     logits = torch.tensor([0.9, 0.7, 0.5]).logit()[None, :, None]
-    seen, box = surest_about(place, logits, found)
+    seen, box = best_cell_about(place, logits, found)
     assert seen.sigmoid().item() == pytest.approx(0.5)
     assert box.tolist() == [[0.0, 0.0, 10.0, 10.0]]
 
 
 def test_cells_tell_the_share_that_a_box_covers() -> None:
-    share = covered(torch.tensor([[4.0, 8.0, 24.0, 20.0]]))[0, 0]
+    share = coverage(torch.tensor([[4.0, 8.0, 24.0, 20.0]]))[0, 0]
     assert share[1, :4].tolist() == [0.5, 1.0, 1.0, 0.0]
     assert share[2, 1] == 0.5
     assert float(share.sum()) * 64 == pytest.approx(20 * 12)
@@ -156,7 +156,7 @@ def test_cells_tell_the_share_that_a_box_covers() -> None:
 
 def test_sides_move_and_stretch_a_box() -> None:
     half = float(np.log(0.5))
-    found = moved(torch.tensor([[10.0, 10.0, 30.0, 50.0]]), torch.tensor([[0.5, 0.0, half, 0.0]]))
+    found = shift_boxes(torch.tensor([[10.0, 10.0, 30.0, 50.0]]), torch.tensor([[0.5, 0.0, half, 0.0]]))
     assert found[0].tolist() == pytest.approx([25.0, 10.0, 35.0, 50.0])
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from errand_train.detector.schedule import Budget, Schedule, shuffled
+from errand_train.detector.schedule import Budget, Schedule, shuffled_numbers
 
 
 def test_the_rate_rises_first_and_falls_to_the_last_share() -> None:
@@ -43,8 +43,8 @@ def test_progress_is_of_whatever_is_limited(pictures: int | None, seconds: float
 
 
 def test_every_round_holds_each_picture_once_wherever_it_is_begun() -> None:
-    whole = shuffled(seed=3, first=0, count=21, of=7)
+    whole = shuffled_numbers(seed=3, first=0, count=21, of=7)
     assert [sorted(whole[k : k + 7].tolist()) for k in (0, 7, 14)] == [list(range(7))] * 3
     assert whole[:7].tolist() != whole[7:14].tolist()
-    assert np.array_equal(shuffled(seed=3, first=5, count=6, of=7), whole[5:11])
-    assert not np.array_equal(shuffled(seed=4, first=0, count=21, of=7), whole)
+    assert np.array_equal(shuffled_numbers(seed=3, first=5, count=6, of=7), whole[5:11])
+    assert not np.array_equal(shuffled_numbers(seed=4, first=0, count=21, of=7), whole)

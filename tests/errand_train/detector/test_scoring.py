@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from errand_train.detector.scoring import by_camera, judged, picture_errors, score
+from errand_train.detector.scoring import by_camera, judge_picture, picture_errors, score
 from errand_train.detector.scoring_labels import Label, LabelledPicture
 from skills.detection import Detection
 
@@ -162,7 +162,7 @@ def test_how_wrong_a_picture_is(found, expected):
 def test_what_is_right_wrong_and_missed_in_a_picture():
     labels = (thing(0), thing(100), thing(200, ignore=True), thing(300, "wrench"))
     found = (seen(500, 0.6), seen(0, 0.9), seen(200, 0.9), seen(300, 0.8, "wrench"), seen(100, 0.4))
-    told = judged(LabelledPicture("a.png", labels), found, ("hammer", "wrench"))
+    told = judge_picture(LabelledPicture("a.png", labels), found, ("hammer", "wrench"))
     assert told.right == (found[1], found[3])
     assert told.wrong == (found[0],)
     assert told.missed == (labels[1],)

@@ -15,11 +15,11 @@ def spoken(monkeypatch):
     """Sentences are spoken as tones; gives how many were."""
     texts = []
 
-    def speech(speaker, text, draw):
+    def speak(speaker, text, draw):
         texts.append(text)
         return tone(1.0, height=0.5)
 
-    monkeypatch.setattr(data, "speech", speech)
+    monkeypatch.setattr(data, "speak", speak)
     monkeypatch.setattr(data, "speakers", lambda: (Speaker("tone", "sh", 1.0, lambda draw: ()),))
     return texts
 

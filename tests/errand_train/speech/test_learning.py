@@ -11,7 +11,7 @@ faster_whisper = pytest.importorskip("faster_whisper")
 from made_speech import tone  # noqa: E402
 
 from errand_train.speech.batches import Batches  # noqa: E402
-from errand_train.speech.data import SpokenSentence, usual  # noqa: E402
+from errand_train.speech.data import SpokenSentence, without_long  # noqa: E402
 from errand_train.speech.learning import Lessons, learn, losses, text_loss  # noqa: E402
 from errand_train.speech.model import AdaptedWhisper  # noqa: E402
 from errand_train.speech.noises import Conditions  # noqa: E402
@@ -50,7 +50,7 @@ def net():
 
 
 def test_a_batch_holds_prompts_and_texts_as_the_recogniser_takes_them(batches):
-    batch = batches.heard(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
+    batch = batches.batch(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
     assert batch.heard.shape == batch.said.shape and batch.heard.shape[:2] == (3, 80)
     tokens = Letters()
     for row, sentence in enumerate(SENTENCES):
@@ -64,7 +64,7 @@ def test_a_batch_holds_prompts_and_texts_as_the_recogniser_takes_them(batches):
 
 
 def test_silence_is_behind_the_longest(batches):
-    batch = batches.heard(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
+    batch = batches.batch(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
     assert (batch.heard[:, :, -149:] == 0.0).all() and (batch.heard[1, :, :-160] != 0.0).any()
 
 
@@ -75,7 +75,7 @@ def test_each_sentence_is_drawn_once_in_a_round(batches):
 
 
 def test_learning_lowers_what_is_wrong(net, batches):
-    batch = batches.heard(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
+    batch = batches.batch(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
     before = text_loss(net, [batch])
     steps = list(learn(net, iter([batch] * 6), Lessons(steps=6, warm_up=2)))
     assert steps == [1, 2, 3, 4, 5, 6]
@@ -83,8 +83,8 @@ def test_learning_lowers_what_is_wrong(net, batches):
 
 
 def test_before_learning_the_clear_sound_is_heard_as_published(net, batches):
-    clear = batches.heard(SENTENCES, Conditions(clear=1.0, echoing=0.0), np.random.default_rng(1), silence_s=1.5)
-    noisy = batches.heard(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
+    clear = batches.batch(SENTENCES, Conditions(clear=1.0, echoing=0.0), np.random.default_rng(1), silence_s=1.5)
+    noisy = batches.batch(SENTENCES, NOISY, np.random.default_rng(1), silence_s=1.5)
     with torch.no_grad():
         assert float(losses(net, noisy)[1]) > float(losses(net, clear)[1])
 
@@ -92,7 +92,7 @@ def test_before_learning_the_clear_sound_is_heard_as_published(net, batches):
 def test_long_sentences_are_rare():
     short = SENTENCES[0]
     long = SpokenSentence(short.text, short.prompt, "tone", np.zeros(100_000, np.float32))
-    assert len(usual([long] * 8 + [short] * 8)) == 9
+    assert len(without_long([long] * 8 + [short] * 8)) == 9
 
 
 def test_the_rate_rises_and_falls():

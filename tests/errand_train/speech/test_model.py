@@ -33,7 +33,7 @@ def learned():
     model, small = base_weights()
     net = AdaptedWhisper(read_model_file(model.getvalue()), RANKS, torch.float32)
     with torch.no_grad():
-        for part in net.adapted():
+        for part in net.adapted_layers():
             part.up.normal_(0.0, 0.02)
             part.down.copy_(part.down.half())
             part.up.copy_(part.up.half())
@@ -45,7 +45,7 @@ def _by_torch(net, features):
     """What is heard, and the probability of each token of the text behind what was told before."""
     prompt, given = torch.tensor([[*START, 7, 7]]), torch.tensor([TEXT[:-1]])
     with torch.no_grad():
-        heard = net.encoded(torch.from_numpy(features)[None])
+        heard = net.encode(torch.from_numpy(features)[None])
         scores = net.logits(net.states(heard, prompt, torch.tensor([len(START)]), given))[0]
     words = scores[:, : START[0] - 1].softmax(-1)
     return heard.numpy(), [float(words[n, token]) for n, token in enumerate(TEXT[1:])]
@@ -82,5 +82,5 @@ def test_without_adapters_the_network_is_the_published_one(learned, features):
 def test_only_adapters_learn(learned):
     net, _, _ = learned
     assert sum(part.numel() for part in net.parameters() if part.requires_grad) < 500_000
-    assert {part.name.split("/")[0] for part in net.adapted()} == {"encoder", "decoder"}
+    assert {part.name.split("/")[0] for part in net.adapted_layers()} == {"encoder", "decoder"}
     assert {"encoder/conv1/weight", "encoder/conv2/weight"} <= set(net.adapter().changes)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_speech import tone
 
-from errand_train.speech.noises import Conditions, heard_in
+from errand_train.speech.noises import Conditions, hear
 from executive.speech.sound import RATE_HZ
 
 SPEECH = tone(1.5, height=0.5)
@@ -13,7 +13,7 @@ PLAIN = Conditions(clear=1.0, echoing=0.0, voice_change=1.0)
 
 
 def _drawn(conditions, seeds=range(30)):
-    return [heard_in(conditions, SPEECH, TALKERS, np.random.default_rng(seed)) for seed in seeds]
+    return [hear(conditions, SPEECH, TALKERS, np.random.default_rng(seed)) for seed in seeds]
 
 
 def test_both_sounds_last_equally_long_and_stay_within_full_scale():
@@ -41,10 +41,10 @@ def test_noise_is_as_strong_as_it_should_be(ratio_db, between_db):
 
 
 def test_voices_are_made_higher_and_deeper():
-    lengths = {len(heard_in(Conditions(), SPEECH, TALKERS, np.random.default_rng(n)).said) for n in range(20)}
+    lengths = {len(hear(Conditions(), SPEECH, TALKERS, np.random.default_rng(n)).said) for n in range(20)}
     assert len(lengths) > 10
 
 
 def test_the_same_draw_gives_the_same_sound():
-    first, second = (heard_in(Conditions(), SPEECH, TALKERS, np.random.default_rng(4)) for _ in range(2))
+    first, second = (hear(Conditions(), SPEECH, TALKERS, np.random.default_rng(4)) for _ in range(2))
     np.testing.assert_array_equal(first.heard, second.heard)

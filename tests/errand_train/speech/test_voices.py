@@ -5,7 +5,7 @@ import random
 import pytest
 
 from errand_train.speech import voices
-from errand_train.speech.voices import drawn_speaker, speakers, speech
+from errand_train.speech.voices import draw_speaker, speak, speakers
 from executive.speech.sound import RATE_HZ
 from skills.files.errors import InputError
 
@@ -32,7 +32,7 @@ def test_each_that_is_installed_speaks():
     except InputError:
         pytest.skip("no synthetic voice is installed")
     for speaker in found:
-        assert 0.3 * RATE_HZ < len(speech(speaker, "Bring the cup.", random.Random(1))) < 5 * RATE_HZ
+        assert 0.3 * RATE_HZ < len(speak(speaker, "Bring the cup.", random.Random(1))) < 5 * RATE_HZ
 
 
 def test_those_left_out_are_never_drawn():
@@ -41,4 +41,4 @@ def test_those_left_out_are_never_drawn():
     except InputError:
         pytest.skip("no synthetic voice is installed")
     draw = random.Random(1)
-    assert "espeak" not in {drawn_speaker(found, draw).name for _ in range(100)}
+    assert "espeak" not in {draw_speaker(found, draw).name for _ in range(100)}

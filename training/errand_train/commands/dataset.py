@@ -30,13 +30,16 @@ if TYPE_CHECKING:
 __all__ = ["dataset"]
 
 dataset = typer.Typer(
-    name="dataset", help="Pictures with labels, made in the plant.", no_args_is_help=True, rich_markup_mode=None
+    name="dataset",
+    help="Labelled pictures and the training of the detector.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
 )
 
 
 @dataset.callback()
 def _group() -> None:
-    """Pictures with labels, made in the plant."""
+    """Labelled pictures and the training of the detector."""
 
 
 dataset.command(name="score")(score_command)
@@ -99,7 +102,7 @@ def _render(out: Path, images: int, seed: int, others: Path | None, pool: Pool, 
 def _give_out(
     workers: Workers, function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
 ) -> Iterator[tuple[int, Mapping[str, bytes] | None]]:
-    """As `errand_train.dataset.shards.GiveOut` says."""
+    """Distributes calls as `errand_train.dataset.shards.GiveOut` says."""
     for finished in workers.map_items(function, numbers):
         yield finished.item, finished.result
 

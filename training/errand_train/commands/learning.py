@@ -43,13 +43,13 @@ def check_folders(data: Path, out: Path, resume: bool) -> None:
 
 
 def check_time(minutes: float | None, epochs: int | None) -> None:
-    """Raises InputError when both are given."""
+    """Raises InputError when both limits are given."""
     if minutes is not None and epochs is not None:
         raise InputError("--minutes and --epochs are both given", hint="give one of them")
 
 
 def budget_of(data: Path, minutes: float | None, epochs: int | None, *, default_minutes: float) -> Budget:
-    """How long to train. Raises InputError."""
+    """Length of the training. Raises InputError for a broken data set."""
     if epochs is None:
         return Budget(seconds=60.0 * (default_minutes if minutes is None else minutes))
     try:
@@ -61,7 +61,7 @@ def budget_of(data: Path, minutes: float | None, epochs: int | None, *, default_
 def with_progress(
     work: Callable[[Callable[[Report], None]], Path], out: Path, console: Console
 ) -> tuple[Path, dict[str, float]]:
-    """Runs a training with a progress bar; its ONNX file and last figures. Raises InputError."""
+    """Runs a training with a progress bar; returns its ONNX file and last figures. Raises InputError."""
     figures = dict[str, float]()
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
     with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
@@ -85,7 +85,7 @@ def with_progress(
 
 
 def print_trained(console: Console, model: Path, figures: dict[str, float], *, as_json: bool) -> None:
-    """Prints which file was written, and its figures."""
+    """Prints the name of the written file and its figures."""
     console.print(f"{model}: {_line(figures)}")
     if as_json:
         print_json({"model": str(model), "figures": figures})

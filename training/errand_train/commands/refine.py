@@ -56,7 +56,7 @@ def refine_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Trains the refinement network, which takes crops of the proposals, or the classifier network; export it."""
+    """Trains the refinement network, which takes crops of the proposals, or the classifier network, and exports it."""
     console = console_for(as_json)
     check_folders(data, out, resume)
     check_time(minutes, epochs)
@@ -77,7 +77,7 @@ def refine_command(
 
 
 def _proposal_network(model: Path | None) -> Path:
-    """Raises InputError."""
+    """File of the proposal network. Raises InputError when it is missing."""
     file = model or MODEL_FILE
     if not file.is_file():
         raise InputError("there is no such file", hint="name a detector's ONNX file with --model", file=file)
@@ -85,7 +85,7 @@ def _proposal_network(model: Path | None) -> Path:
 
 
 def _refine(options: RefineOptions, console: Console) -> tuple[Path, dict[str, float]]:
-    """Trains; the ONNX file and its figures. Raises InputError."""
+    """Trains; returns the ONNX file and its figures. Raises InputError."""
     from errand_train.detector.refine import refine
 
     return with_progress(partial(refine, options), options.out, console)

@@ -1,4 +1,4 @@
-"""`errand dataset score`: how good the detector is on labelled pictures."""
+"""`errand dataset score`: evaluates the detector on labelled pictures."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from errand_train.commands.score_report import scores_json, show_scores
 from errand_train.commands.worst_sheet import Shown, contact_sheet
-from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judged, picture_errors, score
+from errand_train.detector.scoring import BODY, BODY_CLASSES, by_camera, judge_picture, picture_errors, score
 from errand_train.detector.scoring_labels import LabelledPicture, pictures_of_coco
 from errand_train.libraries import check_libraries
 from executive.app.picture_files import open_detector, read_picture, write_picture
@@ -44,7 +44,7 @@ Found = tuple[Detection, ...]
 
 @dataclass(frozen=True)
 class _Work:
-    """Labelled pictures, where they are, and the detector that is judged."""
+    """Labelled pictures, their folder, and the detector under evaluation."""
 
     pictures: tuple[LabelledPicture, ...]
     files: tuple[Path, ...]
@@ -64,7 +64,7 @@ def score_command(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Judges the detector by labelled pictures: average precision as COCO has it, precision, recalls, speed."""
+    """Evaluates the detector on labelled pictures: COCO's average precision, precision, recalls, speed."""
     console = console_for(as_json)
     check_libraries(("pycocotools",), "scoring")
     drawing = _png(sheet)
@@ -89,7 +89,7 @@ def score_command(
 
 
 def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, views: bool) -> _Work:
-    """Reads the labels, and see that all pictures are there. Raises InputError."""
+    """Reads the labels and checks that all pictures exist. Raises InputError."""
     try:
         labelled = pictures_of_coco(_document(data), detector.class_names)[:limit]
     except ValueError as error:
@@ -105,7 +105,7 @@ def _work(data: Path, folder: Path, limit: int | None, detector: OnnxDetector, v
 
 
 def _document(data: Path) -> Any:
-    """The JSON value of a file. Raises InputError, or ValueError for what is no JSON."""
+    """Parses a JSON file. Raises InputError for an unreadable file, and ValueError for invalid JSON."""
     try:
         return json.loads(read_text(data, most_bytes=MOST_BYTES, hint="name a COCO file with --data"))
     except (json.JSONDecodeError, RecursionError) as error:
@@ -113,7 +113,7 @@ def _document(data: Path) -> Any:
 
 
 def _all_found(work: _Work, console: Console) -> list[Found]:
-    """What is found in each picture, also what is hardly sure."""
+    """Detects the objects in each picture, faint ones included."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     found = list[Found]()
     with Progress(*columns, console=console, transient=True) as bar:
@@ -134,19 +134,19 @@ def _found(work: _Work, group: range) -> list[Found]:
 
 
 def _looked(detector: OnnxDetector, pictures: Sequence[Picture], views: bool) -> list[Found]:
-    """What is in some pictures."""
+    """Detects the objects in some pictures."""
     if not views:
         return detector.detect(pictures)
     return [AugmentedDetector(detector).detect_in_views(picture) for picture in pictures]
 
 
 def _groups(count: int) -> list[range]:
-    """The numbers of pictures that are looked at together."""
+    """Numbers of the pictures of each batch."""
     return [range(k, min(k + TOGETHER, count)) for k in range(0, count, TOGETHER)]
 
 
 def _read(work: _Work, k: int) -> Picture:
-    """A picture of the size that its labels are for. Raises InputError."""
+    """Reads a picture and checks that its size fits its labels. Raises InputError."""
     picture, expected = read_picture(work.files[k]), work.pictures[k].size_px
     size = picture.shape[1], picture.shape[0]
     if expected is not None and expected != size:
@@ -156,7 +156,7 @@ def _read(work: _Work, k: int) -> Picture:
 
 
 def _pictures_per_second(work: _Work) -> float:
-    """From pictures in memory to their final boxes at the usual threshold: one over the median of the times."""
+    """Speed from pictures in memory to final boxes at the usual threshold: one over the median time."""
     detector = OnnxDetector(work.detector.model)
     times_s = list[float]()
     for group in _groups(min(len(work.files), TIMED_PICTURES)):
@@ -176,12 +176,12 @@ def _error(work: _Work, found: Sequence[Found], k: int) -> float:
 
 
 def _shown(work: _Work, found: Sequence[Found], k: int) -> Shown:
-    judgement = judged(work.pictures[k], found[k], work.detector.class_names)
+    judgement = judge_picture(work.pictures[k], found[k], work.detector.class_names)
     return Shown(work.pictures[k].file, _read(work, k), judgement)
 
 
 def _png(sheet: Path | None) -> Path | None:
-    """Raises InputError for a name that does not end in .png."""
+    """Checks the name of the sheet. Raises InputError unless it ends in .png."""
     if sheet is not None and sheet.suffix.lower() != ".png":
         raise InputError("the sheet is a PNG", hint=f"call it {sheet.with_suffix('.png').name}", file=sheet)
     return sheet

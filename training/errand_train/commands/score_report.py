@@ -1,4 +1,4 @@
-"""Figures of a detector, for scripts and for people."""
+"""Report of a detector's figures, as JSON and as tables."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ __all__ = ["scores_json", "show_scores"]
 
 
 def scores_json(scores: Mapping[str, Score], pictures_per_second: float) -> dict[str, Any]:
-    """All figures as JSON values: of all pictures, and by camera where the data set tells of cameras."""
+    """Figures as JSON values: of all pictures, and by camera where the data set names cameras."""
     cameras = {name: _json(one) for name, one in scores.items() if name != "all"}
     return {**_json(scores["all"]), "frames_per_second": round(pictures_per_second, 1), "by_camera": cameras}
 
 
 def _json(score: Score) -> dict[str, Any]:
-    """The figures of some pictures; null where there are none."""
+    """Figures of some pictures; null where there are none."""
     return {
         "pictures": score.pictures,
         "mAP50": _rounded(score.map50),
@@ -68,7 +68,7 @@ def show_scores(console: Console, scores: Mapping[str, Score], pictures_per_seco
 
 
 def _show(console: Console, camera: str, score: Score) -> None:
-    """Prints tables and a line on the rest."""
+    """Prints the tables of one camera, and a line with the other figures."""
     if camera != "all":
         console.print(f"{camera} camera" if camera == "hand" else f"{camera} cameras")
     figures = [(one.name, one.labels, one.ap50, one.ap50_95, one.precision, one.recall) for one in score.classes]

@@ -53,7 +53,7 @@ def train_command(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
-    """Trains the detector and exports it as ONNX; write checkpoints and figures during training."""
+    """Trains the proposal network and exports it as ONNX; writes checkpoints and figures on the way."""
     console = console_for(as_json)
     check_folders(data, out, resume)
     check_time(minutes, epochs)
@@ -72,7 +72,7 @@ def train_command(
 
 
 def _train(options: TrainOptions, console: Console) -> tuple[Path, dict[str, float]]:
-    """Trains; the ONNX file and its figures. Raises InputError."""
+    """Trains; returns the ONNX file and its figures. Raises InputError."""
     from errand_train.detector.train import train
 
     return with_progress(partial(train, options), options.out, console)

@@ -1,4 +1,4 @@
-"""A contact sheet of pictures with what the detector got right, wrong and not at all."""
+"""Contact sheet of pictures with right, wrong and missed detections."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MISSED_COLOUR: Final = (250, 200, 30)
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture (H, W, 3) RGB, its name, and how its detections are judged."""
+    """A picture (H, W, 3) RGB with its name and its judged detections."""
 
     name: str
     picture: Picture
@@ -34,7 +34,7 @@ class Shown:
 
 
 def contact_sheet(shown: Sequence[Shown]) -> Picture:
-    """The pictures in rows of five: green is right, red is wrong, yellow was to be found."""
+    """Draws the pictures in rows of five: green is right, red is wrong, yellow is missed."""
     tiles = [_tile(one) for one in shown]
     columns = min(COLUMNS, max(1, len(tiles)))
     rows = max(1, math.ceil(len(tiles) / columns))

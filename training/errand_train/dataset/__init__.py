@@ -1,1 +1,1 @@
-"""Pictures of objects in random rooms, with boxes and masks, to learn and to judge a detector by."""
+"""Labelled pictures of objects in random rooms, for training and evaluation of a detector."""

@@ -1,4 +1,4 @@
-"""The COCO form of labels: categories by the project's class ids, boxes, run lengths, and what is to be ignored."""
+"""Labels in COCO's format: categories with the project's class ids, boxes, run lengths, and labels to ignore."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ DARKEST_MEAN, DARKEST_SPREAD = 14.0, 7.0
 
 
 def run_lengths(mask: Mask) -> dict[str, Any]:
-    """A mask (H, W) as COCO's uncompressed run lengths: down the columns, zeros first."""
+    """Encodes a mask (H, W) as COCO's uncompressed run lengths: down the columns, zeros first."""
     flat = np.asarray(mask, dtype=bool).reshape(-1, order="F")
     changes = np.flatnonzero(np.diff(flat)) + 1
     edges = np.concatenate([[0], changes, [flat.size]])
@@ -33,7 +33,7 @@ def run_lengths(mask: Mask) -> dict[str, Any]:
 
 
 def box_of(mask: Mask) -> tuple[int, int, int, int]:
-    """The box (x, y, width, height) of a mask in pixels. Raises ValueError when it is empty."""
+    """Box (x, y, width, height) of a mask in pixels. Raises ValueError for an empty mask."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     if not rows.size:
         raise ValueError("an empty mask has no box")
@@ -44,7 +44,7 @@ def box_of(mask: Mask) -> tuple[int, int, int, int]:
 def annotation(
     *, mask: Mask, alone: Silhouette, class_id: int, instance: str, distance_m: float, unseeable: bool = False
 ) -> dict[str, Any] | None:
-    """One label without ids, or None when next to nothing is seen.
+    """Makes one label without ids; None when almost nothing is visible.
 
     `visibility` is the share seen of what the object alone would show in the picture, `truncation` the share of the
     object beyond the picture's edge. Too little seen, too small, all over the picture, without an outline, or
@@ -73,19 +73,19 @@ def annotation(
     }
 
 
-def lost_in_the_dark(picture: NDArray[np.uint8], mask: Mask) -> bool:
-    """Returns whether nobody could see the object of a mask in the picture, (H, W) or (H, W, 3): all black."""
+def is_black(picture: NDArray[np.uint8], mask: Mask) -> bool:
+    """Returns whether the object of a mask is all black in the picture (H, W) or (H, W, 3)."""
     seen = picture[mask].astype(np.float32)
     return bool(seen.mean() < DARKEST_MEAN and seen.std() < DARKEST_SPREAD)
 
 
 def categories() -> list[dict[str, Any]]:
-    """The nine classes with the project's ids."""
+    """Categories of the nine classes with the project's ids."""
     return [{"id": entry.id, "name": name, "supercategory": "thing"} for name, entry in load_catalogue().items()]
 
 
 def document(info: Mapping[str, Any], shots: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """A COCO file of pictures as scenes wrote them: {`image`, `annotations`}; ids count from 1 in that order."""
+    """Joins pictures {`image`, `annotations`} of scenes to a COCO file; ids count from 1 in that order."""
     images, labels = list[dict[str, Any]](), list[dict[str, Any]]()
     for shot in shots:
         number = len(images) + 1
@@ -96,7 +96,7 @@ def document(info: Mapping[str, Any], shots: Iterable[Mapping[str, Any]]) -> dic
 
 
 def counts(labels: Sequence[Mapping[str, Any]]) -> dict[str, int]:
-    """How many labels that count each class has, by name."""
+    """Counts the labels of each class that are not ignored, by name."""
     names = {entry["id"]: entry["name"] for entry in categories()}
     found = dict.fromkeys(names.values(), 0)
     for label in labels:

@@ -1,4 +1,4 @@
-"""Puts a scene together: a room, objects of the classes and others on its supports and floor, and people."""
+"""Composition of a scene: a room, objects of the classes and distractors on supports and floor, and people."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from scipy.spatial import ConvexHull
 
 from errand_train.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
-from errand_train.dataset.resting import choose, resting_poses
+from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.room import Room, Support, random_room
 from plant.worlds.seeding import polygon_distance
 from skills.robot import FloatArray
 
 SELDOM_BY_CHANCE = ("person", "extinguisher")
-"""What stands apart from the clutter, and so is seldom in the views of other objects."""
+"""Classes that stand apart from the clutter, and so are seldom in the views of other objects."""
 CLASSES_PER_SCENE = 7
 CROWDED_SHARE, MOST_ROUNDS = 0.65, 4
 ONLY_DISTRACTORS_EVERY = 10
@@ -39,7 +39,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Held:
-    """An object between the robot's jaws: its pose in the hand's frame, and the jaw's opening (rad)."""
+    """An object between the robot's jaws: its pose in the hand's frame, and the opening of the jaw (rad)."""
 
     model: ObjectModel
     X_HO: RigidTransform
@@ -47,7 +47,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that is to be seen, before light and cameras. `seats` are boxes under people who sit: (x, y, yaw, height).
+    """A scene before light and cameras. `seats` are boxes under people who sit: (x, y, yaw, height).
 
     `crowded` tells that there is more in it than in those for validation.
     """
@@ -60,7 +60,7 @@ class Scene:
 
 
 def compose(rng: np.random.Generator, index: int, *, for_training: bool, others: Sequence[ObjectModel] = ()) -> Scene:
-    """Compose the scene of a number. Every tenth holds distractors only; `others` replace some of them for training.
+    """Composes the scene of a number. Every tenth holds distractors only; `others` replace some of them for training.
 
     Many of those for training hold two to four times as much as those for validation, so that a picture teaches more.
     """
@@ -86,7 +86,7 @@ def compose(rng: np.random.Generator, index: int, *, for_training: bool, others:
 
 
 def _class_models(rng: np.random.Generator, rounds: int, *, for_training: bool) -> list[ObjectModel]:
-    """Instances of some of the classes, now and then two of one, and all that is small so many times; large first."""
+    """Instances of some classes, sometimes two of one, with the small ones in several rounds; large ones first."""
     chosen = [str(name) for name in rng.permutation(CLASSES)[:CLASSES_PER_SCENE]]
     doubled = [name for name in chosen if name not in SELDOM_BY_CHANCE and rng.random() < 0.35]
     again = [name for name in CLASSES if name not in SELDOM_BY_CHANCE] * (rounds - 1)
@@ -115,7 +115,7 @@ def _hold(rng: np.random.Generator, other: ObjectModel | None, *, for_training: 
 
 
 class _Table:
-    """What stands where already."""
+    """Placement of objects on supports and floor."""
 
     def __init__(self, room: Room, rng: np.random.Generator, *, toppled: bool) -> None:
         self._room, self._rng, self._toppled = room, rng, toppled
@@ -124,8 +124,8 @@ class _Table:
         self.seats: list[tuple[float, float, float, float]] = []
 
     def place(self, model: ObjectModel, supports: Sequence[Support]) -> None:
-        """Puts an object on a support or on the floor where it fits; leave it away when it fits nowhere."""
-        pose = choose(self._rng, model, resting_poses(model), toppled=self._toppled)
+        """Puts an object on a support or on the floor; leaves it out when it fits nowhere."""
+        pose = choose_pose(self._rng, model, resting_poses(model), toppled=self._toppled)
         points = model.surface.points @ pose.R.T
         outline = points[ConvexHull(points[:, :2]).vertices, :2]
         tall = float(np.ptp(points[:, 2]))
@@ -143,7 +143,7 @@ class _Table:
     def _spot(
         self, model: ObjectModel, supports: Sequence[Support], outline: FloatArray, tall: float
     ) -> tuple[float, float, float, float] | None:
-        """A place (x, y, z, yaw) on a support or the floor, or None when this try was in vain."""
+        """Tries a place (x, y, z, yaw) on a support or the floor; None when it is taken."""
         rng, yaw = self._rng, float(self._rng.uniform(0, 2 * np.pi))
         on_floor = 1.0 if model.category == "person" else 0.75 if max(model.size_m) > LARGE_M else 0.2
         if model.category == "extinguisher":
@@ -166,7 +166,7 @@ class _Table:
         return (float(x), float(y), support.height_m, yaw)
 
     def _neighbour(self, height_m: float) -> FloatArray | None:
-        """Now and then an object on the same level, to be put beside: clutter gathers."""
+        """Chooses sometimes an object on the same level to stand beside, since clutter gathers."""
         level = [outline for z, outline in self._taken if abs(z - height_m) < 0.01]
         if not level or self._rng.random() > TOGETHER_SHARE:
             return None
@@ -206,7 +206,7 @@ class _Table:
 
 
 def _seat_height(model: ObjectModel) -> float:
-    """Where a sitting person's thighs begin: the lowest point behind the hips."""
+    """Height of a sitting person's thighs: the lowest point behind the hips."""
     points = model.surface.points
     behind = points[
         (points[:, 0] < 0.05) & (points[:, 0] > -0.15) & (points[:, 2] > 0.25) & (np.abs(points[:, 1]) < 0.15)

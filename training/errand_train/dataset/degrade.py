@@ -1,4 +1,4 @@
-"""What the robot's cameras make of a clean picture: exposure, colour, motion blur, defocus, vignette, grain."""
+"""Camera effects on a clean picture: exposure, colour, motion blur, defocus, vignette, grain."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ FloatPicture = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Degradation:
-    """How one picture is degraded; lengths in pixels of a picture 640 wide, noise in counts of 255."""
+    """Degradation of one picture; lengths in pixels of a picture 640 wide, noise in counts of 255."""
 
     mean: float
     gamma: float
@@ -30,8 +30,8 @@ class Degradation:
     quality: int
 
     @classmethod
-    def drawn(cls, rng: np.random.Generator) -> Self:
-        """From nearly clean to poor."""
+    def draw(cls, rng: np.random.Generator) -> Self:
+        """Draws a degradation from nearly clean to poor."""
         blurred = rng.random() < 0.25
         return cls(
             mean=float(np.clip(rng.normal(114, 32), 50, 205)),
@@ -47,9 +47,9 @@ class Degradation:
         )
 
 
-def degraded(clean: Picture, how: Degradation, rng: np.random.Generator, *, grey: bool) -> Picture:
-    """The picture (H, W, 3), or (H, W) in grey."""
-    image = exposed(clean.astype(np.float32), how.mean, how.gamma)
+def degrade(clean: Picture, how: Degradation, rng: np.random.Generator, *, grey: bool) -> Picture:
+    """Degrades a picture (H, W, 3); returns (H, W) when grey."""
+    image = expose(clean.astype(np.float32), how.mean, how.gamma)
     scale = clean.shape[1] / 640.0
     image = _blurred(image, how, scale)
     height, width = clean.shape[:2]
@@ -64,8 +64,8 @@ def degraded(clean: Picture, how: Degradation, rng: np.random.Generator, *, grey
     return _counts(image + grain * (0.6 + 0.8 * (image / 255.0)))
 
 
-def exposed(image: FloatPicture, mean: float, gamma: float = 1.0) -> FloatPicture:
-    """Brightness (0 to 255) set to a mean, as automatic exposure does, not always well."""
+def expose(image: FloatPicture, mean: float, gamma: float = 1.0) -> FloatPicture:
+    """Scales brightness (0 to 255) to a mean, as automatic exposure does."""
     gain = float(np.clip(mean / max(float(image.mean()), 1.0), 0.35, 8.0))
     lit = 255.0 * np.clip(image * gain / 255.0, 0, 1) ** gamma
     return np.asarray(lit, dtype=np.float32)

@@ -1,10 +1,10 @@
-"""What can go wrong with a data set, told in a sentence."""
+"""The error of a data set that cannot be made."""
 
 from __future__ import annotations
 
 
 class DatasetError(Exception):
-    """The folder or the wishes cannot be used; the message says why, `hint` what to do."""
+    """A folder or option cannot be used; the message says why, `hint` what to do."""
 
     def __init__(self, message: str, hint: str) -> None:
         self.message, self.hint = message, hint

@@ -1,4 +1,4 @@
-"""Furniture for random rooms: the flat's own kinds in other sizes and materials, and some more, with their tops."""
+"""Furniture for random rooms: the flat's kinds in other sizes and materials, and more, with their tops."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _CLOTHS = ("cloth_grey", "cloth_sand", "cloth_slate", "cloth_white")
 
 @dataclass(frozen=True)
 class Top:
-    """Where objects may lie in a piece's frame: (x0, y0, x1, y1) in metres, its height and the free height above."""
+    """Area for objects in a piece's frame: (x0, y0, x1, y1) in metres, its height and the free height above."""
 
     rect: Rect
     height_m: float
@@ -39,7 +39,7 @@ class Furnished:
 
 
 def random_materials(rng: np.random.Generator, textures: Mapping[str, tuple[str, ...]]) -> dict[str, Material]:
-    """The materials that furniture names, each with a random look; `textures` gives files by role."""
+    """Materials of furniture with random appearance; `textures` gives files by role."""
     made = {}
     for name, usual in materials().items():
         role = "cloth" if name.startswith("cloth") or name in ("rug", "pillow") else "wood"
@@ -104,7 +104,7 @@ def cabinet(rng: np.random.Generator, m: Materials) -> Furnished:
 
 
 def shelf(rng: np.random.Generator, m: Materials) -> Furnished:
-    """Opens shelves on which objects stand."""
+    """An open shelf for objects."""
     w, d, h, boards = _of(rng, 0.6, 1.4), _of(rng, 0.26, 0.45), _of(rng, 0.8, 1.9), int(rng.integers(2, 5))
     body, back, side = _one(rng, _BODIES), int(rng.random() < 0.7), 0.025
     pitch, tops = (h - side) / boards, []

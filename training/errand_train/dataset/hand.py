@@ -1,4 +1,4 @@
-"""The robot's hand as its own camera sees it: simple jaws by the robot's own figures, with or without an object."""
+"""The robot's hand in front of its camera: simple jaws of the robot's dimensions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PALM, _FINGER = "arm_wr1", "arm_f1x"
 
 
 def hand_mesh(opening_rad: float) -> Mesh:
-    """Palm, fixed jaw and finger in the frame of the hand's link, the finger opened by an angle."""
+    """Palm, fixed jaw and finger in the frame of the hand's link; the finger is open by an angle."""
     facts = spot_facts()
     links = {link["link"]: link for link in facts["arm"]}
     yellow, black = (tuple(facts["colours"][name][:3]) for name in ("yellow", "black"))

@@ -1,4 +1,4 @@
-"""How a scene is lit and drawn: plainly as the flat is, with shadows, or physically."""
+"""Lighting of a scene: plain, with shadows, or physically based."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _PHYSICAL_GAIN = 2.5
 
 @dataclass(frozen=True)
 class Lighting:
-    """The renderer's parameters, and whether the appearance comes from the glTF files (physical) or from OBJ."""
+    """Parameters of the renderer; the appearance comes from glTF (physical) or from OBJ."""
 
     style: str
     parameters: RenderEngineVtkParams
 
     @property
     def physical(self) -> bool:
-        """Returns whether light is reckoned physically."""
+        """Returns whether rendering is physically based."""
         return self.style == PHYSICAL
 
 
 def random_lighting(rng: np.random.Generator, room: Room) -> Lighting:
-    """Day, evening or lamp light: one to three lamps or the sun, and softer light from all around."""
+    """Draws day, evening or lamp light: one to three lamps or the sun, and softer light from all sides."""
     style = str(rng.choice(STYLES, p=[0.45, 0.3, 0.25]))
     shadows = style == SHADOWS or (style == PHYSICAL and rng.random() < 0.5)
     gain = _PHYSICAL_GAIN if style == PHYSICAL else 1.0

@@ -1,4 +1,4 @@
-"""One picture that shows many of a data set, with their boxes."""
+"""Contact sheet of a data set, with boxes."""
 
 from __future__ import annotations
 

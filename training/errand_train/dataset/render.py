@@ -1,4 +1,4 @@
-"""Renders a scene from several views and labels what is seen."""
+"""Rendering of a scene from several views, with labels."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from pydrake.geometry import (
 from pydrake.geometry import Mesh as MeshShape
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from errand_train.dataset.coco import annotation, lost_in_the_dark
+from errand_train.dataset.coco import annotation, is_black
 from errand_train.dataset.compose import SELDOM_BY_CHANCE, Held, Placed, Scene, compose
-from errand_train.dataset.degrade import Degradation, degraded
+from errand_train.dataset.degrade import Degradation, degrade
 from errand_train.dataset.hand import hand_mesh
 from errand_train.dataset.lighting import Lighting, random_lighting
 from errand_train.dataset.objects import ObjectModel
@@ -55,7 +55,7 @@ _FAR_AWAY: Final = RigidTransform([0.0, 0.0, -200.0])
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture, (H, W, 3) RGB or (H, W) grey, the quality to store it at, its facts and its labels."""
+    """One picture, (H, W, 3) RGB or (H, W) grey, with its JPEG quality, metadata and labels."""
 
     picture: Picture
     quality: int
@@ -64,17 +64,17 @@ class Shot:
 
 
 def is_validation(index: int) -> bool:
-    """Returns whether the scene of a number holds held-out instances, layouts and textures."""
+    """Returns whether the scene of a number uses held-out instances, layouts and textures."""
     return index % VALIDATION_EVERY == VALIDATION_EVERY - 1
 
 
 def views_in(index: int) -> int:
-    """How many pictures are taken of the scene of a number."""
+    """Number of pictures of a scene."""
     return VALIDATION_VIEWS if is_validation(index) else TRAINING_VIEWS
 
 
 def render_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> list[Shot]:
-    """Renders the pictures of a scene, the same for the same arguments; `others` replace some of its distractors."""
+    """Renders the pictures of a scene, equal for equal arguments; `others` replace some of its distractors."""
     rng = np.random.default_rng([seed, index, 71])
     scene = compose(rng, index, for_training=not is_validation(index), others=others)
     lighting = random_lighting(rng, scene.room)
@@ -85,7 +85,7 @@ def render_scene(seed: int, index: int, others: Sequence[ObjectModel] = ()) -> l
 
 
 def _views(rng: np.random.Generator, scene: Scene, count: int, others: Sequence[ObjectModel]) -> list[View]:
-    """Choose so many views: the objects of the classes take turns; where there is none, distractors do.
+    """Chooses views: the objects of the classes take turns; without any, the distractors do.
 
     A quarter of the views show the `others` in the scene.
     """
@@ -110,7 +110,7 @@ def _views(rng: np.random.Generator, scene: Scene, count: int, others: Sequence[
 
 
 class Stage:
-    """The scene in Drake, to be seen from any view."""
+    """The scene in Drake, rendered from any view."""
 
     def __init__(self, scene: Scene, lighting: Lighting, folder: Path, opening_rad: float) -> None:
         self._graph, self._physical = SceneGraph(), lighting.physical
@@ -158,11 +158,11 @@ class Stage:
         self._graph.RegisterGeometry(self._source, frame, appearance)
 
     def hand_pose(self, view: View) -> RigidTransform:
-        """Where the hand is: about the camera when it is in view, else far away."""
+        """Pose of the hand: about the camera when in view, else far away."""
         return view.X_WC @ self._X_HC.inverse() if view.in_hand else _FAR_AWAY
 
     def take(self, view: View) -> tuple[Picture, NDArray[np.int16]]:
-        """Clean picture (H, W, 3) and labels (H, W)."""
+        """Renders the clean picture (H, W, 3) and the labels (H, W)."""
         poses = FramePoseVector()
         poses.set_value(self._hand, self.hand_pose(view))
         self._graph.get_source_pose_port(self._source).FixValue(self._context, Value(poses))
@@ -175,7 +175,7 @@ class Stage:
 
 
 def _jaw_for(held: Held) -> float:
-    """The angle at which the finger about touches the object."""
+    """Angle at which the finger nearly touches the object."""
     thick = float(np.sort(held.model.size_m)[0])
     return float(np.clip(thick / 0.10, 0.05, 1.2))
 
@@ -205,8 +205,8 @@ def _shot(
     rng: np.random.Generator, stage: Stage, view: View, scene: Scene, lighting: Lighting, index: int, number: int
 ) -> Shot:
     clean, labels = stage.take(view)
-    how = Degradation.drawn(rng)
-    picture = degraded(clean, how, rng, grey=view.grey)
+    how = Degradation.draw(rng)
+    picture = degrade(clean, how, rng, grey=view.grey)
     facts = {
         "width": view.intrinsics.width,
         "height": view.intrinsics.height,
@@ -236,7 +236,7 @@ def label_view(
     X_WH: RigidTransform,
     picture: Picture,
 ) -> list[dict[str, Any]]:
-    """Labels of all objects of the classes that show: masks from the label image, what they hide from silhouettes."""
+    """Labels the visible objects of the classes: masks from the label image, visibility from silhouettes."""
     found, X_CW = [], view.X_WC.inverse()
     for label in sorted(set(np.unique(labels).tolist()) & set(labelled)):
         model, X_FO, in_hand = labelled[label]
@@ -251,7 +251,7 @@ def label_view(
             class_id=model.class_id,
             instance=model.name,
             distance_m=distance,
-            unseeable=lost_in_the_dark(picture, mask) or _opened_by_camera(points_C),
+            unseeable=is_black(picture, mask) or _opened_by_camera(points_C),
         )
         if entry is not None:
             found.append(entry)
@@ -259,7 +259,7 @@ def label_view(
 
 
 def _opened_by_camera(points_C: NDArray[np.float64]) -> bool:
-    """Whether the camera, or what is nearer to it than it shows, is within the box of an object's points (N, 3).
+    """Returns whether the camera, or its near plane, is within the box of an object's points (N, 3).
 
     Then the picture shows what is behind the object, and the label image its inside.
     """

@@ -1,4 +1,4 @@
-"""How an object rests on a plane: the stable faces of its convex hull."""
+"""Stable poses of an object on a plane, by the faces of its convex hull."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from skills.robot import FloatArray
 LEAST_MARGIN = 0.05
 _UPRIGHT = {"person": 1.0, "extinguisher": 0.9, "beer": 0.7, "coke": 0.72, "cylinder": 0.6}
 TOPPLED_SHARE: Final = 0.75
-"""How much more seldom objects stand in pictures to train on than is usual."""
+"""Factor by which objects stand less often in training pictures than usual."""
 
 
 @dataclass(frozen=True)
 class Resting:
-    """A turn that lays the object on a plane, the height of its origin over it, and how easily it stays (0..1).
+    """Rotation that lays an object on a plane, height of its origin over the plane, and stability (0..1).
 
     `upright` tells whether the model's own z axis points up.
     """
@@ -35,13 +35,13 @@ class Resting:
 
 
 def resting_poses(model: ObjectModel) -> tuple[Resting, ...]:
-    """All stable poses; the one that stands as it was made comes first when there is one."""
+    """Finds all stable poses; the upright one comes first if it is stable."""
     return _poses_of(model.folder)
 
 
 @lru_cache(maxsize=2048)
 def _poses_of(folder: Path) -> tuple[Resting, ...]:
-    """Kept by the folder, so that no model's triangles stay in memory for it."""
+    """Caches poses by the folder, so that no triangles stay in memory."""
     model = read_model(folder)
     points, com = model.surface.points, np.array(model.com_m)
     if model.category == "person":
@@ -90,8 +90,10 @@ def _to_down(normal: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) + K + K @ K / (1 + cosine))
 
 
-def choose(rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting], *, toppled: bool = False) -> Resting:
-    """One of the poses: upright as often as is usual for such objects, else by how easily they stay.
+def choose_pose(
+    rng: np.random.Generator, model: ObjectModel, poses: Sequence[Resting], *, toppled: bool = False
+) -> Resting:
+    """Chooses a pose: upright as often as usual for such objects, else by stability.
 
     `toppled`: what usually stands lies more often than that, but people, so that it is trained that way, too.
     """

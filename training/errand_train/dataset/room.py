@@ -26,7 +26,7 @@ _HANGINGS = (
 
 @dataclass(frozen=True)
 class Support:
-    """A rectangle on which objects rest: its middle, half sizes, turn (rad), height and free height above (m)."""
+    """A rectangle for objects: its middle, half sizes, yaw (rad), height and free height above (m)."""
 
     centre: tuple[float, float]
     half: tuple[float, float]
@@ -45,7 +45,7 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class Room:
-    """The room's frame has its origin in a corner of the floor; `size_m` is (x, y, height)."""
+    """A room whose frame has its origin in a corner of the floor; `size_m` is (x, y, height)."""
 
     size_m: tuple[float, float, float]
     mesh: Mesh
@@ -56,12 +56,12 @@ class Room:
 
 
 def texture_file(role: str, number: int) -> str:
-    """The file name of a texture beside the mesh."""
+    """File name of a texture beside the mesh."""
     return f"{role}_{number:03d}.png"
 
 
 def random_room(rng: np.random.Generator, *, for_training: bool) -> Room:
-    """A room for training, or one with held-out textures."""
+    """Draws a room for training, or one with held-out textures."""
     known = numbers(for_training=for_training)
     chosen = {role: tuple(int(n) for n in rng.choice(known, FILES_PER_ROLE, replace=False)) for role in ROLES}
     files = {role: tuple(texture_file(role, n) for n in picked) for role, picked in chosen.items()}

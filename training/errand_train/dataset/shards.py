@@ -1,4 +1,4 @@
-"""A data set's folder: scenes written one by one, whole or not at all, so that a broken-off run goes on.
+"""Folder of a data set: scenes are written one by one, each whole, so that an interrupted run can continue.
 
 DIR/dataset.json            what the folder is: format, seed, digest of the sources
 DIR/scenes/000012/3.jpg     pictures
@@ -39,12 +39,12 @@ _SHOTS: Final = "shots.json"
 
 
 GiveOut = Callable[[Callable[[int], Mapping[str, bytes]], list[int]], Iterator[tuple[int, Mapping[str, bytes] | None]]]
-"""Has a function called with each number somewhere: numbers with results as they come, None for what is lost."""
+"""Distributes calls of a function with numbers; yields numbers with results, None for a lost one."""
 
 
 @dataclass(frozen=True)
 class Summary:
-    """What a data set holds: pictures and counted labels by class for each split, and pictures without any label."""
+    """Summary of a data set: pictures and counted labels by class for each split, and pictures without labels."""
 
     images: Mapping[str, int]
     labels: Mapping[str, Mapping[str, int]]
@@ -54,7 +54,7 @@ class Summary:
 
 @cache
 def digest() -> str:
-    """Changes whenever a source does that makes the pictures."""
+    """Digest of the sources that make the pictures."""
     made = hashlib.sha256(sources_digest().encode())
     for path in sorted(Path(__file__).parent.glob("*.py")):
         made.update(path.name.encode() + b"\0" + path.read_bytes())
@@ -64,7 +64,7 @@ def digest() -> str:
 def one_by_one(
     function: Callable[[int], Mapping[str, bytes]], numbers: list[int]
 ) -> Iterator[tuple[int, Mapping[str, bytes]]]:
-    """A `GiveOut` to this process itself."""
+    """`GiveOut` that calls the function in this process."""
     return ((number, function(number)) for number in numbers)
 
 
@@ -77,7 +77,7 @@ def render(
     give_out: GiveOut = one_by_one,
     others: Path | None = None,
 ) -> Summary:
-    """Renders what is still missing of a data set and writes its COCO files. Raises DatasetError.
+    """Renders the missing scenes of a data set and writes its COCO files. Raises DatasetError.
 
     `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made. `others`
     is a folder of models of no class, each in a folder of its own, which replace some distractors for training.
@@ -95,12 +95,12 @@ def render(
 
 
 class _LostSceneError(Exception):
-    """Nobody has rendered a scene."""
+    """A scene was not rendered."""
 
 
 @contextmanager
 def _told(out: Path) -> Iterator[None]:
-    """Errors of the disk, said in a sentence."""
+    """Turns errors of the disk into DatasetError."""
     try:
         yield
     except _LostSceneError as error:
@@ -115,7 +115,7 @@ def _told(out: Path) -> Iterator[None]:
 
 
 def _model_folders(others: Path) -> tuple[Path, ...]:
-    """Find the folders of models in a folder. Raises DatasetError when there is none, or one cannot be a distractor."""
+    """Finds the folders of models in a folder. Raises DatasetError without any, and for one of a class."""
     found = tuple(sorted(file.parent for file in others.glob(f"*/{MODEL_FACTS}")))
     if not found:
         raise DatasetError(f"{others}: holds no folder with {MODEL_FACTS}", "name a folder of object models")
@@ -130,7 +130,7 @@ def _model_folders(others: Path) -> tuple[Path, ...]:
 
 
 def _claim(out: Path, seed: int, others: Sequence[Path]) -> None:
-    """Makes the folder ours, or checks that it is: of the same seed, sources and others."""
+    """Claims a new folder, or checks that seed, sources and others are the same."""
     wanted = {"format": FORMAT, "seed": seed, "sources": digest(), **_others_entry(others)}
     path = out / MANIFEST
     if not out.exists() or not any(out.iterdir()):
@@ -173,7 +173,7 @@ def _compare(path: Path, wanted: Mapping[str, Any]) -> None:
 
 
 def _taken(images: int) -> list[int]:
-    """How many pictures are taken into the data set of each scene, in order; all of them but of the last one."""
+    """Number of pictures of each scene in the data set, in order; all of them except for the last scene."""
     counts: list[int] = []
     while (left := images - sum(counts)) > 0:
         counts.append(min(left, views_in(len(counts))))
@@ -187,7 +187,7 @@ def _scene_folder(out: Path, index: int) -> Path:
 def _rendered(
     out: Path, make: Callable[[int], Mapping[str, bytes]], missing: list[int], give_out: GiveOut
 ) -> Iterator[int]:
-    """Has scenes made and writes each whole into its folder; each number as soon as that is there."""
+    """Distributes scenes and writes each whole into its folder; yields each finished number."""
     for index, files in give_out(make, missing):
         if files is None:
             raise _LostSceneError(f"{out}: the processes that rendered scene {index} were killed")
@@ -203,7 +203,7 @@ def _write_files(files: Mapping[str, bytes], folder: Path) -> None:
 
 
 def scene_files(seed: int, others: Sequence[Path], index: int) -> Mapping[str, bytes]:
-    """Renders one scene; its files by name. `others` are folders of further distractors."""
+    """Renders one scene and returns its files by name. `others` are folders of further distractors."""
     cv2.setNumThreads(1)
     shown_as = _scene_folder(Path(), index)
     pictures: dict[str, bytes] = {}

@@ -1,4 +1,4 @@
-"""What an object alone would cover: its triangles drawn with nothing before them, also beyond the picture's edge."""
+"""Silhouette of an object: the pixels that it would cover alone, also beyond the picture's edge."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def _compiled(function: FunctionT) -> FunctionT:
 
 @dataclass(frozen=True)
 class Silhouette:
-    """Pixels inside of the picture, and in all (also beyond its edges)."""
+    """Covered pixels inside the picture, and in all."""
 
     inside_px: int
     whole_px: int
 
 
 def project(points_C: FloatArray, camera: Intrinsics) -> FloatArray:
-    """Pixels (N, 2) of points (N, 3) in the camera's frame; whole numbers are pixel centres."""
+    """Projects points (N, 3) of the camera's frame to pixels (N, 2); whole numbers are pixel centres."""
     z = np.maximum(points_C[:, 2], 1e-6)
     u = camera.fx * points_C[:, 0] / z + camera.cx
     v = camera.fy * points_C[:, 1] / z + camera.cy
@@ -37,7 +37,7 @@ def project(points_C: FloatArray, camera: Intrinsics) -> FloatArray:
 
 
 def silhouette(points_C: FloatArray, faces: NDArray[np.int64], camera: Intrinsics) -> Silhouette:
-    """How many pixels a mesh covers. Triangles that reach behind the camera are left out.
+    """Counts the pixels that a mesh covers. Leaves out triangles that reach behind the camera.
 
     The canvas reaches one picture beyond every edge; what lies still farther out does not count.
     """

@@ -16,7 +16,7 @@ from errand_train.models.pictures import cloth, noise, speckle, to_picture, wood
 from skills.robot import FloatArray, Picture
 
 TEXTURES = 1024
-"""How many textures each role has."""
+"""Number of textures of each role."""
 VALIDATION_BELOW = 64
 """Validation takes held-out textures below this number, so that its pictures stay the same when more are added."""
 SIZE_PX = 256
@@ -25,13 +25,13 @@ Maker = Callable[[np.random.Generator], FloatArray]
 
 
 def numbers(*, for_training: bool) -> list[int]:
-    """The textures that training may see, or those that validation does. Every fourth number is kept from training."""
+    """Numbers of the textures for training, or for validation. Every fourth number is held out from training."""
     count = TEXTURES if for_training else VALIDATION_BELOW
     return [number for number in range(count) if held_out(number) != for_training]
 
 
 def texture(role: str, number: int) -> Picture:
-    """The picture of a role ("floor", "wall", "ceiling", "wood", "cloth", "picture", "outside") by its number.
+    """Draws the picture of a role ("floor", "wall", "ceiling", "wood", "cloth", "picture", "outside") by its number.
 
     Raises KeyError for another role.
     """

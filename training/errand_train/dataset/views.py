@@ -1,4 +1,4 @@
-"""Where the robot's cameras are when they see an object: hand and body cameras, heights, tilts, distances."""
+"""Views of the robot's cameras on an object: hand and body cameras, heights, tilts, distances."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ TRIES = 80
 
 @dataclass(frozen=True)
 class View:
-    """A picture to take: camera by name, its pose and intrinsics, whether in grey; `in_hand`: the hand is before it."""
+    """A view: camera by name, its pose and intrinsics, grey or not; with `in_hand` the hand is in front of it."""
 
     camera: str
     X_WC: RigidTransform
@@ -38,12 +38,12 @@ class View:
 
 @cache
 def camera_specs() -> Mapping[str, CameraSpec]:
-    """The cameras of the robot, by name."""
+    """Cameras of the robot, by name."""
     return load_cameras(CAMERAS)
 
 
 def roll_deg(X_WC: RigidTransform) -> float:
-    """How far the picture is turned clockwise from upright; 0 when it looks straight up or down."""
+    """Clockwise roll of the picture from upright, in degrees; 0 when it looks straight up or down."""
     up_C = X_WC.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
     if np.hypot(up_C[0], up_C[1]) < 1e-6:
         return 0.0
@@ -51,7 +51,7 @@ def roll_deg(X_WC: RigidTransform) -> float:
 
 
 def view_of(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
-    """A view in which the object stands somewhere in the picture, or None when none was found."""
+    """Draws a view that has an object somewhere in the picture; None when none was found."""
     in_body = rng.random() < BODY_SHARE
     for _ in range(TRIES):
         view = _body_view(rng, room, thing, specs) if in_body else _hand_view(rng, room, thing, specs["hand"])
@@ -61,7 +61,7 @@ def view_of(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[
 
 
 def any_view(rng: np.random.Generator, room: Room, specs: Mapping[str, CameraSpec]) -> View:
-    """A view into the room from anywhere."""
+    """Draws a view into the room from anywhere."""
     width, depth, height = room.size_m
     eye = np.array(
         [rng.uniform(0.2, width - 0.2), rng.uniform(0.2, depth - 0.2), rng.uniform(0.3, min(1.7, height - 0.2))]
@@ -72,7 +72,7 @@ def any_view(rng: np.random.Generator, room: Room, specs: Mapping[str, CameraSpe
 
 
 def _aim(thing: Placed) -> FloatArray:
-    """The middle of an object; of a person a point of the upper body."""
+    """Target of the view: the middle of an object, or a point of a person's upper body."""
     points = thing.model.surface.points
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
     if thing.model.category == "person":
@@ -81,7 +81,7 @@ def _aim(thing: Placed) -> FloatArray:
 
 
 def distance_to(rng: np.random.Generator, thing: Placed, focal: float) -> float:
-    """Evenly in its logarithm, from where the object fills the picture to where it is but some pixels long."""
+    """Draws a distance, log-uniform from where the object fills the picture to where it is some pixels long."""
     size = float(max(thing.model.size_m))
     near = max(NEAREST_M, 0.55 * size)
     far = min(FARTHEST_M, focal * size / LEAST_PIXELS)
@@ -95,7 +95,7 @@ def _varied(rng: np.random.Generator, camera: Intrinsics) -> Intrinsics:
 
 
 def eye_about(rng: np.random.Generator, thing: Placed, aim: FloatArray, focal: float) -> FloatArray:
-    """A place (3,) of the hand camera to see an object at `aim` from: mostly from above, people from about level."""
+    """Draws a position (3,) of the hand camera to view `aim`: mostly from above, people from about level."""
     distance, around = distance_to(rng, thing, focal), float(rng.uniform(0, 2 * np.pi))
     above = float(np.radians(rng.uniform(-5, 75) if thing.model.category != "person" else rng.uniform(-25, 25)))
     direction = np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
@@ -112,7 +112,7 @@ def _hand_view(rng: np.random.Generator, room: Room, thing: Placed, spec: Camera
 
 
 def off_centre(rng: np.random.Generator, X_WC: RigidTransform, camera: Intrinsics, roll: float) -> RigidTransform:
-    """The camera turned so that its target stands anywhere in the picture."""
+    """Rotates a camera so that its target is anywhere in the picture."""
     yaw = float(rng.uniform(-0.8, 0.8)) * np.arctan(camera.width / 2 / camera.fx)
     pitch = float(rng.uniform(-0.8, 0.8)) * np.arctan(camera.height / 2 / camera.fy)
     turn = RotationMatrix(RollPitchYaw(pitch, yaw, 0.0)) @ RotationMatrix(RollPitchYaw(0.0, 0.0, roll))

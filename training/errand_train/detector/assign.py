@@ -1,4 +1,4 @@
-"""Which cells of the network answer for which object.
+"""Assignment of the network's cells to objects.
 
 Task-aligned assignment after Feng et al., "TOOD: Task-aligned One-stage Object Detection" (2021): of the cells whose
 middles lie in an object's box, those answer for it that score its class high and overlap its box well already.
@@ -17,12 +17,12 @@ _TINY = 1e-9
 _MOST_CELLS = 10
 _SCORE_POWER, _OVERLAP_POWER = 0.5, 6.0
 _LEAST_SIDE_PX = 16.0
-"""How small a box is at least taken to be when asking which cells lie in it."""
+"""Least size of a box in the test which cells lie in it."""
 
 
 @dataclass(frozen=True)
 class TruthBatch:
-    """The objects of N pictures, filled up to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
+    """Objects of N pictures, padded to G rows: boxes (N, G, 4), classes, ignored and present (N, G)."""
 
     boxes: Tensor
     classes: Tensor
@@ -32,8 +32,8 @@ class TruthBatch:
 
 @dataclass(frozen=True)
 class Assigned:
-    """For each cell of each picture (N, A): the row of its object or -1; how well it does, from 0 to 1; whether to be
-    left out of the loss."""
+    """Assignment of each cell of each picture (N, A): row of its object or -1, quality from 0 to 1, and whether the
+    loss leaves it out."""
 
     objects: Tensor
     quality: Tensor

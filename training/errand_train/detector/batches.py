@@ -1,4 +1,4 @@
-"""Canvases as tensors."""
+"""Batches of training canvases as tensors."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from torch import Tensor
 from errand_train.detector.assign import TruthBatch
 from errand_train.detector.canvases import Canvas, CanvasMaker
 from errand_train.detector.placing import Targets
-from errand_train.detector.schedule import Phase, shuffled
+from errand_train.detector.schedule import Phase, shuffled_numbers
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Pictures (N, 3, H, W) from 0 to 1 and what is to be found in them."""
+    """Pictures (N, 3, H, W) from 0 to 1 and their targets."""
 
     pictures: Tensor
     truth: TruthBatch
 
     @property
     def inputs(self) -> tuple[Tensor, ...]:
-        """What the network takes."""
+        """Inputs of the network."""
         return (self.pictures,)
 
 
 @dataclass(frozen=True)
 class Feed:
-    """An endless sequence of canvases, the same for the same seed."""
+    """Endless sequence of canvases, equal for equal seeds."""
 
     maker: CanvasMaker
     seed: int
 
     def batch(self, taken: int, phase: Phase) -> Batch:
-        """The next batch when so many canvases are `taken`."""
-        chosen = shuffled(self.seed, taken, phase.batch, len(self.maker.pictures))
+        """Next batch after `taken` canvases."""
+        chosen = shuffled_numbers(self.seed, taken, phase.batch, len(self.maker.pictures))
         canvases = [
             self.maker.make(int(index), phase.canvas, np.random.default_rng([self.seed, taken + k]))
             for k, index in enumerate(chosen)
@@ -46,14 +46,14 @@ class Feed:
 
 
 def batch_of(canvases: Sequence[Canvas]) -> Batch:
-    """Canvases of one size as a batch."""
+    """Joins canvases of one size to a batch."""
     pictures = torch.from_numpy(np.stack([canvas.picture for canvas in canvases]))
     scaled = pictures.permute(0, 3, 1, 2).float().mul_(1.0 / 255.0)
     return Batch(scaled.contiguous(memory_format=torch.channels_last), truth_of([c.targets for c in canvases]))
 
 
 def truth_of(targets: Sequence[Targets]) -> TruthBatch:
-    """Targets of several canvases, filled up to the same number of rows, at least one."""
+    """Joins the targets of several canvases, padded to the same number of rows, at least one."""
     rows = max(1, max((len(one.boxes) for one in targets), default=1))
     boxes = torch.zeros((len(targets), rows, 4))
     classes = torch.zeros((len(targets), rows), dtype=torch.int64)

@@ -1,4 +1,4 @@
-"""Scores that mean something: 0.5 becomes the score of each class at which precision and recall are best together."""
+"""Calibration of scores: an offset makes 0.5 the threshold with the best F1 score of each class."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from errand_train.detector.matching import Evaluation, evaluated
+from errand_train.detector.matching import Evaluation, evaluate
 from errand_train.detector.scoring_labels import LabelledPicture
 from skills.detection import Detection
 
@@ -20,11 +20,11 @@ _LIMITS: Final = (0.05, 0.95)
 def score_offsets(
     pictures: Sequence[LabelledPicture], found: Sequence[Sequence[Detection]], class_names: Sequence[str]
 ) -> tuple[float, ...]:
-    """What to add to each class's logit, so that 0.5 is its best threshold; 0 where labels are few.
+    """Offset of each class's logit that makes 0.5 its best threshold; 0 where labels are few.
 
     `found` are the detections of each picture, also those of low score.
     """
-    evaluation = evaluated(pictures, found, class_names)
+    evaluation = evaluate(pictures, found, class_names)
     return tuple(_offset(evaluation, name) for name in class_names)
 
 
@@ -40,7 +40,7 @@ def _offset(evaluation: Evaluation, name: str) -> float:
 
 
 def best_threshold(scores: Floats, right: NDArray[np.bool_], labels: int) -> float:
-    """The score from which on detections give the highest harmonic mean of precision and recall.
+    """Threshold with the highest harmonic mean of precision and recall.
 
     Halfway to the next lower score, so that small changes do not matter. 0.5 when nothing is right.
     """

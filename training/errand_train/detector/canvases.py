@@ -1,4 +1,4 @@
-"""Canvases to train on: windows on pictures at about the scale at which the detector will see them, or four in one.
+"""Training canvases: windows on pictures at about the scale of the detector, or mosaics of four.
 
 Windows about objects rather than whole pictures, after Singh et al., "SNIPER" (2018): most of a picture of a room holds
 nothing to be found, and training on windows costs a quarter of the time. Four in one after Bochkovskiy et al.,
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from errand_train.detector.labels import Labels, TrainingPicture
-from errand_train.detector.photometry import as_seen_otherwise
-from errand_train.detector.placing import Cell, Targets, joined, placed, turning
+from errand_train.detector.photometry import change_photometry
+from errand_train.detector.placing import Cell, Targets, join_targets, place_labels, similarity_map
 from errand_train.detector.store import PictureStore
 from skills.perception.detector.letterbox import HEIGHT_PX, PADDING, WIDTH_PX
 
@@ -28,7 +28,7 @@ _RIGHT_ANGLE: Final = np.pi / 2
 
 @dataclass(frozen=True)
 class CanvasOptions:
-    """Size of a canvas in pixels and how it is made.
+    """Size of a canvas in pixels, and options of its content.
 
     `mosaic` is the share of canvases of four pictures, `focused` the share of windows about an object where there is
     one. Scales are drawn evenly in their logarithm. `changed` is the share of canvases with other light and colours.
@@ -46,7 +46,7 @@ class CanvasOptions:
 
 @dataclass(frozen=True)
 class Canvas:
-    """A picture (H, W, 3) and what is to be found in it."""
+    """A picture (H, W, 3) and its targets."""
 
     picture: Picture
     targets: Targets
@@ -54,21 +54,21 @@ class Canvas:
 
 @dataclass(frozen=True)
 class CanvasMaker:
-    """Makes canvases of stored pictures. The same random source gives the same canvas."""
+    """Maker of canvases from stored pictures. Equal random sources give equal canvases."""
 
     pictures: Sequence[TrainingPicture]
     store: PictureStore
 
     def make(self, index: int, options: CanvasOptions, random: np.random.Generator) -> Canvas:
-        """A canvas that shows the picture `index`, perhaps beside three others."""
+        """Makes a canvas of the picture `index`, perhaps beside three others."""
         canvas = np.full((options.height_px, options.width_px, 3), PADDING, dtype=np.uint8)
         several = random.random() < options.mosaic
         cells = _four(options, random) if several else [Cell(0, 0, options.width_px, options.height_px)]
         others = random.integers(0, len(self.pictures), len(cells) - 1).tolist()
         parts = [self._fill(canvas, cell, k, options, random) for cell, k in zip(cells, [index, *others], strict=True)]
         if random.random() < options.changed:
-            canvas = as_seen_otherwise(canvas, random)
-        return Canvas(canvas, joined(parts))
+            canvas = change_photometry(canvas, random)
+        return Canvas(canvas, join_targets(parts))
 
     def _fill(
         self, canvas: Picture, cell: Cell, index: int, options: CanvasOptions, random: np.random.Generator
@@ -78,7 +78,7 @@ class CanvasMaker:
         choose = _whole if options.whole else _window
         affine = choose(labels, cell, options, random)
         _warp(self.store, index, affine, canvas, cell)
-        return placed(labels, affine, cell)
+        return place_labels(labels, affine, cell)
 
 
 def _four(options: CanvasOptions, random: np.random.Generator) -> list[Cell]:
@@ -103,7 +103,7 @@ def _window(labels: Labels, cell: Cell, options: CanvasOptions, random: np.rando
     reach = np.array(cell.size) * 0.3
     to = (cell.middle + random.uniform(-reach, reach)).astype(np.float32)
     flipped = bool(random.random() < 0.5)
-    return turning(focus, to, angle_rad=_turn(random), scale=scale, flipped=flipped)
+    return similarity_map(focus, to, angle_rad=_turn(random), scale=scale, flipped=flipped)
 
 
 def _somewhere(random: np.random.Generator) -> Floats:
@@ -139,7 +139,7 @@ def _whole(_labels: Labels, cell: Cell, options: CanvasOptions, random: np.rando
     angle = float(random.normal(0.0, 0.05)) + (0.0 if upright else float(random.integers(0, 4)) * _RIGHT_ANGLE)
     flipped = bool(random.random() < 0.5)
     to = (cell.middle + random.uniform(-reach, reach)).astype(np.float32)
-    return turning(focus, to, angle_rad=angle, scale=scale, flipped=flipped)
+    return similarity_map(focus, to, angle_rad=angle, scale=scale, flipped=flipped)
 
 
 def _warp(store: PictureStore, index: int, affine: Floats, canvas: Picture, cell: Cell) -> None:

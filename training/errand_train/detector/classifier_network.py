@@ -1,4 +1,4 @@
-"""The classifier network: judges what the refinement network saw in a crop, with a backbone pretrained on ImageNet.
+"""The classifier network: judges the refinement network's boxes in crops, with a backbone pretrained on ImageNet.
 
 It begins with the refinement network's opinion, to which it adds. In use it adds three quarters of what it would: it is
 surer of what it has trained on than of what is new. (As the mean of weights before and after learning, after Wortsman
@@ -10,7 +10,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from errand_train.detector.crop_network import MOST_LOGIT, CropNetwork, covered, moved
+from errand_train.detector.crop_network import MOST_LOGIT, CropNetwork, coverage, shift_boxes
 from errand_train.detector.lite_backbone import AT_8, AT_16, AT_32, LiteBackbone
 from errand_train.detector.network import ConvUnit
 from skills.perception.detector.model_files import CLASSIFIER, CROP_PX
@@ -19,11 +19,11 @@ _CELLS_16, _CELLS_32 = CROP_PX // 16, CROP_PX // 32
 _SQUEEZED_16, _SQUEEZED_32, _JOINED = 24, 96, 192
 _SIDES_SCALE = 0.1
 USED = 0.75
-"""The share of what it adds to the refinement network's opinion that it adds in use."""
+"""Share of its correction of the refinement network's logits that it adds in use."""
 
 
 class ClassifierNetwork(CropNetwork):
-    """A crop network that says at first what stands before it says."""
+    """Crop network whose untrained output is that of the network before it."""
 
     kind = CLASSIFIER
 
@@ -37,24 +37,24 @@ class ClassifierNetwork(CropNetwork):
 
     @property
     def early_layers(self) -> LiteBackbone:
-        """What makes the features at stride 8."""
+        """Layers up to the features at stride 8."""
         return self.backbone
 
     def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
-        at16, at32 = self.backbone.late(at8 + self.place(covered(boxes)))
+        """Logits (N, K) and boxes (N, 4) from the features of the early layers."""
+        at16, at32 = self.backbone.late(at8 + self.place(coverage(boxes)))
         before = logits.clamp(-MOST_LOGIT, MOST_LOGIT)
         seen = [self.squeeze16(at16).flatten(1), self.squeeze32(at32).flatten(1), before, boxes / CROP_PX]
         known = self.join(torch.cat(seen, dim=1))
-        return self.trust * before + self.scores(known), moved(boxes, _SIDES_SCALE * self.sides(known).float())
+        return self.trust * before + self.scores(known), shift_boxes(boxes, _SIDES_SCALE * self.sides(known).float())
 
     def stop_learning(self) -> None:
-        """Adds only a part of what it adds in training: `USED`."""
+        """Scales its corrections by `USED`."""
         self.add(USED)
 
     @torch.no_grad()
     def add(self, share: float) -> None:
-        """Adds a share, or a multiple, of what it adds to logits and boxes from now on."""
+        """Scales its corrections of logits and boxes by a factor."""
         self.trust.sub_(1.0).mul_(share).add_(1.0)
         for layer in (self.scores, self.sides):
             layer.weight.mul_(share)

@@ -1,4 +1,4 @@
-"""COCO files: pictures, their labels, and the categories, with what the project's own data sets tell beyond COCO."""
+"""COCO files: pictures, labels and categories, with the fields of the project's data sets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class CocoImage(_Entry):
 
     @property
     def size_px(self) -> tuple[int, int] | None:
-        """Width and height, where the file tells."""
+        """Width and height, if the file has them."""
         return None if self.width is None or self.height is None else (self.width, self.height)
 
 
@@ -47,7 +47,7 @@ class CocoLabel(_Entry):
 
     @property
     def seen(self) -> float | None:
-        """The share of the whole object that is seen, where the file tells."""
+        """Visible share of the whole object, if the file has it."""
         if self.visibility is None and self.truncation is None:
             return None
         return (1.0 if self.visibility is None else self.visibility) * (1.0 - (self.truncation or 0.0))
@@ -61,14 +61,14 @@ class CocoCategory(_Entry):
 
 
 class CocoFile(_Entry):
-    """All of a file. Every label is of one of its pictures."""
+    """A whole COCO file. Every label belongs to one of its pictures."""
 
     images: tuple[CocoImage, ...]
     annotations: tuple[CocoLabel, ...]
     categories: tuple[CocoCategory, ...]
 
     def by_picture(self) -> list[tuple[CocoImage, list[CocoLabel]]]:
-        """Each picture with its labels. Raises ValueError for a label of none of them."""
+        """Pairs each picture with its labels. Raises ValueError for a label of an unknown picture."""
         labels: dict[int | str, list[CocoLabel]] = {image.id: [] for image in self.images}
         for k, label in enumerate(self.annotations):
             if label.image_id not in labels:
@@ -78,7 +78,7 @@ class CocoFile(_Entry):
 
 
 def coco_file(document: object) -> CocoFile:
-    """The COCO file of a JSON value. Raises ValueError that names the first entry that is wrong."""
+    """Validates a COCO file of a JSON value. Raises ValueError with the first wrong entry."""
     try:
         return CocoFile.model_validate(document)
     except ValidationError as error:

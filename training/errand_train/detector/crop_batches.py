@@ -1,4 +1,4 @@
-"""Crops about regions, turned, mirrored, shifted and with other light, as batches to train on."""
+"""Batches of augmented RoI crops: rotated, mirrored, shifted and with other light."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from errand_train.detector.photometry import as_seen_otherwise
-from errand_train.detector.placing import turning
+from errand_train.detector.photometry import change_photometry
+from errand_train.detector.placing import similarity_map
 from errand_train.detector.proposal_table import ProposalTable
-from errand_train.detector.schedule import shuffled
+from errand_train.detector.schedule import shuffled_numbers
 from errand_train.detector.store import PictureStore
 from skills.perception.detector.model_files import CROP_PX
 from skills.perception.detector.onnx_detector import crop_map, transform_boxes
@@ -31,7 +31,7 @@ _BOX_SPREAD: Final = 0.04
 
 @dataclass(frozen=True)
 class CropBatch:
-    """Crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them, logits (N, K) of them, and what is right.
+    """Crops (N, 3, 128, 128) from 0 to 1, with boxes (N, 4) in them, logits (N, K), and targets.
 
     `wanted` (N, 4) are boxes, `classes` (N,) numbers or -1 for nothing.
     """
@@ -44,20 +44,20 @@ class CropBatch:
 
     @property
     def inputs(self) -> tuple[Tensor, ...]:
-        """What the network takes."""
+        """Inputs of the network."""
         return (self.crops, self.boxes, self.logits)
 
 
 @dataclass(frozen=True)
 class CropFeed:
-    """An endless sequence of crops, the same for the same seed. Half of them are about objects."""
+    """Endless sequence of crops, equal for equal seeds. Half of them show objects."""
 
     table: ProposalTable
     store: PictureStore
     seed: int
 
     def batch(self, taken: int, count: int) -> CropBatch:
-        """The next batch when so many crops are `taken`."""
+        """Next batch after `taken` crops."""
         rows = self._rows(taken, count)
         made = [self._crop(int(row), np.random.default_rng([self.seed, taken + k])) for k, row in enumerate(rows)]
         pictures = torch.from_numpy(np.stack([picture for picture, _ in made])).permute(0, 3, 1, 2)
@@ -77,23 +77,23 @@ class CropFeed:
         number = first // count
         return np.concatenate(
             [
-                objects[shuffled(self.seed, number * many, many, len(objects))],
-                others[shuffled(self.seed + 1, number * (count - many), count - many, len(others))],
+                objects[shuffled_numbers(self.seed, number * many, many, len(objects))],
+                others[shuffled_numbers(self.seed + 1, number * (count - many), count - many, len(others))],
             ]
         )
 
     def _crop(self, row: int, random: np.random.Generator) -> tuple[Picture, Floats]:
         """A crop, and (2, 4) the region's box and the object's in it."""
         table = self.table
-        affine, region = changed_map(table.boxes[row], random)
+        affine, region = random_crop_map(table.boxes[row], random)
         crop = self.store.scales(int(table.pictures[row])).warp(affine.astype(np.float64), (CROP_PX, CROP_PX))
         if random.random() < _CHANGED:
-            crop = as_seen_otherwise(crop, random)
+            crop = change_photometry(crop, random)
         return crop, transform_boxes(np.stack([region, table.wanted[row]]), affine)
 
 
-def changed_map(box: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """The map (2, 3) to the crop of a box (4,) that fits a little otherwise, changed; and that box."""
+def random_crop_map(box: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """Draws a box (4,) near another and a random map (2, 3) to its crop; returns map and box."""
     region = _spread(box, random)
     return _changed(crop_map(region), region, random), region
 
@@ -111,4 +111,4 @@ def _changed(affine: Floats, box: Floats, random: np.random.Generator) -> Floats
     to = CROP_PX / 2 + random.uniform(-_SHIFT_PX, _SHIFT_PX, 2)
     flipped = bool(random.random() < 0.5)
     focus = ((box[:2] + box[2:]) / 2).astype(np.float32)
-    return turning(focus, to.astype(np.float32), angle_rad=angle, scale=scale, flipped=flipped)
+    return similarity_map(focus, to.astype(np.float32), angle_rad=angle, scale=scale, flipped=flipped)

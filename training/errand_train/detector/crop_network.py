@@ -1,4 +1,4 @@
-"""What the refinement and the classifier network have in common: both judge boxes in crops."""
+"""Base of the refinement and the classifier network, which judge boxes in RoI crops."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CELLS_8: Final = CROP_PX // 8
 
 
 class CropNetwork(CascadeNetwork):
-    """Crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and logits before (N, K) to logits and better boxes."""
+    """Network from crops (N, 3, 128, 128) from 0 to 1, boxes (N, 4) in them and logits (N, K) to logits and boxes."""
 
     def __init__(self, classes: int, known: int, joined: int, at8: int) -> None:
         """So many numbers `known` are joined to `joined`; `at8` are the channels at stride 8."""
@@ -38,11 +38,11 @@ class CropNetwork(CascadeNetwork):
 
     @property
     def score_biases(self) -> list[Tensor]:
-        """What is added last to the logits (K,)."""
+        """Last biases of the logits (K,)."""
         return [self.scores.bias]
 
     def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
+        """Logits (N, K) and boxes (N, 4) from the features of the early layers."""
         raise NotImplementedError
 
     def forward(self, crops: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
@@ -50,8 +50,8 @@ class CropNetwork(CascadeNetwork):
         return self.from_early(self.early_layers.early(crops), boxes, logits)
 
 
-def covered(boxes: Tensor) -> Tensor:
-    """The share of each cell of stride 8 that boxes (N, 4) cover, (N, 1, 16, 16)."""
+def coverage(boxes: Tensor) -> Tensor:
+    """Share of each cell of stride 8 that boxes (N, 4) cover, (N, 1, 16, 16)."""
     edges = torch.arange(_CELLS_8, device=boxes.device, dtype=boxes.dtype)[None] * 8.0
     x0, y0, x1, y1 = (boxes[:, k : k + 1] for k in range(4))
     across = ((x1 - edges) / 8.0).clamp(0.0, 1.0) - ((x0 - edges) / 8.0).clamp(0.0, 1.0)
@@ -59,8 +59,8 @@ def covered(boxes: Tensor) -> Tensor:
     return (down[:, :, None] * across[:, None, :])[:, None]
 
 
-def moved(boxes: Tensor, sides: Tensor) -> Tensor:
-    """Boxes (N, 4) with middles moved by shares of their sizes, and sizes changed by factors of which `sides` tells."""
+def shift_boxes(boxes: Tensor, sides: Tensor) -> Tensor:
+    """Shifts boxes (N, 4) by shares of their sizes, and scales them by exponentials, as `sides` says."""
     middle, size = (boxes[:, :2] + boxes[:, 2:]) / 2, boxes[:, 2:] - boxes[:, :2]
     middle = middle + sides[:, :2] * size
     half = size * sides[:, 2:].clamp(-_MOST_GROWTH, _MOST_GROWTH).exp() / 2

@@ -1,4 +1,4 @@
-"""Networks as ONNX files that take pictures or crops as bytes and give boxes and scores in their pixels."""
+"""Export of networks as ONNX files from pictures or crops in bytes to boxes and scores."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ Network = TypeVar("Network", bound=nn.Module)
 
 
 class Exportable(nn.Module):
-    """A network that takes pictures or crops (N, H, W, 3) of bytes, and what else it takes, to boxes and scores.
+    """Network from pictures or crops (N, H, W, 3) in bytes, and its other inputs, to boxes and scores.
 
     `score_offsets` are added to the logits of each class.
     """
 
     def __init__(self, network: CascadeNetwork, score_offsets: Sequence[float] | None = None) -> None:
         super().__init__()
-        self.network = fused(network)
+        self.network = fuse(network)
         self.network.stop_learning()
         self.network.early_layers.take_bytes()
         with torch.no_grad():
@@ -38,13 +38,13 @@ class Exportable(nn.Module):
                 bias.add_(torch.tensor(score_offsets))
 
     def forward(self, images: Tensor, *known: Tensor) -> tuple[Tensor, Tensor]:
-        """Boxes and scores."""
+        """Computes boxes and scores."""
         logits, boxes = self.network(images.permute(0, 3, 1, 2).float(), *known)
         return boxes, logits.sigmoid()
 
 
-def fused(network: Network) -> Network:
-    """A copy for use only, with every normalisation taken into the layer before it."""
+def fuse(network: Network) -> Network:
+    """Copies a network for inference, with every normalisation folded into the layer before it."""
     made: Network = copy.deepcopy(network).cpu().float().eval()
     for _, unit in normalised_layers(made):
         layer, normalisation = unit[0], unit[1]

@@ -1,4 +1,4 @@
-"""Labelled pictures as the renderer writes them (COCO), with the outline of each object, so that they can be turned."""
+"""Labelled pictures of the renderer (COCO), with the outline of each object for rotations."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_CORNERS: Final = 24
 
 
 class TrainingDataError(ValueError):
-    """The folder of a data set cannot be trained on; the text says where and why, `hint` what to do."""
+    """A data set cannot be trained on; the message says where and why, `hint` what to do."""
 
     def __init__(self, message: str, *, hint: str) -> None:
         self.message, self.hint = message, hint
@@ -31,7 +31,7 @@ class TrainingDataError(ValueError):
 
 @dataclass(frozen=True)
 class Labels:
-    """Objects of one picture: convex outlines (K, 2) in pixels, class indices (N,), how much of each is seen, and more.
+    """Objects of one picture: convex outlines (K, 2) in pixels, class indices (N,), visibilities, and more.
 
     `seen` (N,) is the share of the whole object that the picture shows; `ignored` (N,) marks what is neither to be
     found nor to be left.
@@ -48,7 +48,7 @@ class Labels:
 
 @dataclass(frozen=True)
 class TrainingPicture:
-    """A picture's file and its labels, in pixels of the letterbox."""
+    """File of a picture and its labels, in pixels of the letterbox."""
 
     file: Path
     labels: Labels
@@ -60,12 +60,12 @@ def category_names(folder: Path) -> tuple[str, ...]:
 
 
 def read_split(folder: Path, split: str) -> tuple[TrainingPicture, ...]:
-    """All pictures of `train` or `val`. Raises TrainingDataError."""
+    """Reads all pictures of `train` or `val`. Raises TrainingDataError."""
     return tuple(_picture(folder, image, labels) for image, labels in _file(folder, split).by_picture())
 
 
 def digest_of(folder: Path) -> str:
-    """A short digest of what the data set says of itself and of its training labels."""
+    """Short digest of the manifest and the training labels of a data set."""
     made = hashlib.sha256()
     for name in ("dataset.json", "train.json"):
         path = folder / name
@@ -98,7 +98,7 @@ def _picture(folder: Path, image: CocoImage, labels: Sequence[CocoLabel]) -> Tra
 
 
 def outline_of(label: CocoLabel) -> Floats:
-    """The convex outline (K, 2) of a label's mask, or of its box where it has no mask of run lengths."""
+    """Convex outline (K, 2) of a label's mask, or of its box where it has no mask of run lengths."""
     x, y, width, height = label.bbox
     corners = np.array([[x, y], [x + width, y], [x + width, y + height], [x, y + height]], dtype=np.float32)
     lengths = label.segmentation

@@ -1,4 +1,4 @@
-"""The state of training: network, its weight average, optimiser and progress; and one step of it, for each kind."""
+"""State of a training: network, weight average, optimiser and progress; and one step, for each kind of network."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from errand_train.detector.batches import Batch
 from errand_train.detector.classifier_network import ClassifierNetwork
 from errand_train.detector.crop_batches import CropBatch
 from errand_train.detector.crop_network import CropNetwork
-from errand_train.detector.export import fused
+from errand_train.detector.export import fuse
 from errand_train.detector.labels import TrainingDataError
 from errand_train.detector.losses import Losses, crop_losses, losses
 from errand_train.detector.network import CascadeNetwork, DetectorNetwork, EarlyLayers, cells
@@ -34,7 +34,7 @@ Network = TypeVar("Network", bound=CascadeNetwork)
 
 @dataclass
 class Progress:
-    """How many steps, pictures and seconds of training there were."""
+    """Steps, pictures and seconds of training so far."""
 
     steps: int = 0
     taken: int = 0
@@ -43,7 +43,7 @@ class Progress:
 
 @dataclass
 class Learner(Generic[Network]):
-    """All that changes in training, whatever the network. The average of its weights is what is exported."""
+    """State of the training of any network. The average of its weights is exported."""
 
     network: Network
     device: torch.device
@@ -74,19 +74,19 @@ class Learner(Generic[Network]):
         return float(found.scores.detach()), float(found.boxes.detach())
 
     def quick(self) -> torch.autocast:
-        """Within it the network computes in bfloat16, where that saves time."""
+        """Context in which the network computes in bfloat16, where that saves time."""
         return torch.autocast(self.device.type, torch.bfloat16, enabled=quick_in_bfloat16(self.device))
 
-    def moved(self, *parts: Tensor) -> tuple[Tensor, ...]:
-        """The parts of a batch where the network is."""
+    def to_device(self, *parts: Tensor) -> tuple[Tensor, ...]:
+        """Moves the parts of a batch to the network's device."""
         return tuple(part.to(self.device) for part in parts)
 
     def begin_average(self) -> None:
-        """Lets the average be the network as it is now."""
+        """Starts the average at the present weights."""
         self.average.load_state_dict(self.network.state_dict())
 
     def save(self, file: Path) -> None:
-        """Writes everything; whole or not at all."""
+        """Writes a checkpoint, whole or not at all."""
         state = {
             "format": FORMAT,
             "network": self.network.state_dict(),
@@ -99,7 +99,7 @@ class Learner(Generic[Network]):
         fresh.replace(file)
 
     def restore(self, file: Path) -> None:
-        """Goes on where a file left off. Raises TrainingDataError."""
+        """Continues from a checkpoint. Raises TrainingDataError."""
         state = read_checkpoint(file)
         _take(self.network, state["network"], file)
         _take(self._average, state["average"], file)
@@ -107,19 +107,19 @@ class Learner(Generic[Network]):
         self.progress = Progress(**state["progress"])
 
     def start_from(self, file: Path, batches: Iterable[Batch | CropBatch]) -> None:
-        """Takes over the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
+        """Loads the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
 
         All else starts again. Raises TrainingDataError.
         """
         if file.suffix == ONNX:
             take_over(self.network, file)
-            settle(self.network, (self.moved(*batch.inputs) for batch in batches))
+            settle(self.network, (self.to_device(*batch.inputs) for batch in batches))
             self.begin_average()
         else:
             self.start_from_checkpoint(file)
 
     def start_from_checkpoint(self, file: Path) -> None:
-        """Takes over a checkpoint's averaged weights; all else starts again. Raises TrainingDataError."""
+        """Loads the averaged weights of a checkpoint; all else starts at zero. Raises TrainingDataError."""
         _take(self._average, read_checkpoint(file)["average"], file)
         self._average.n_averaged.zero_()
         self.network.load_state_dict(self.average.state_dict())
@@ -140,29 +140,29 @@ def _take(network: nn.Module, weights: Mapping[str, Any], file: Path) -> None:
 
 @dataclass
 class ProposalLearner(Learner[DetectorNetwork]):
-    """All that changes while the proposal network is trained."""
+    """State of the training of the proposal network."""
 
     @staticmethod
     def new(classes: int, seed: int, device: torch.device) -> ProposalLearner:
-        """An untrained network."""
+        """Makes an untrained network."""
         torch.manual_seed(seed)
         return ProposalLearner(DetectorNetwork(classes), device)
 
     def step(self, batch: Batch, rate: float) -> tuple[float, float]:
-        """Trains on one batch; returns score loss and box loss."""
+        """Takes a step on one batch; returns score loss and box loss."""
         return self.take_step(lambda: self._losses(batch), rate)
 
     def _losses(self, batch: Batch) -> Losses:
         with self.quick():
             logits, boxes = self.network(batch.pictures.to(self.device))
         middles = cells(batch.pictures.shape[2], batch.pictures.shape[3])[0].to(self.device)
-        truth = TruthBatch(*self.moved(*vars(batch.truth).values()))
+        truth = TruthBatch(*self.to_device(*vars(batch.truth).values()))
         return losses(logits, boxes, middles, truth)
 
 
 @dataclass
 class CropLearner(Learner[CropNetwork]):
-    """All that changes while a network is trained on crops.
+    """State of the training of a network on crops.
 
     `early` makes the features at stride 8 when they are no longer trained. It needs no normalisation.
     """
@@ -171,12 +171,12 @@ class CropLearner(Learner[CropNetwork]):
 
     @staticmethod
     def new(classes: int, seed: int, device: torch.device, *, classifier: bool) -> CropLearner:
-        """An untrained refinement or classifier network."""
+        """Makes an untrained refinement or classifier network."""
         torch.manual_seed(seed)
         return CropLearner(ClassifierNetwork(classes) if classifier else RefinementNetwork(classes), device)
 
     def begin(self, first: Path, batches: Iterable[CropBatch]) -> None:
-        """Takes over the weights to begin with; what has none there stays as it is. Raises TrainingDataError.
+        """Loads the initial weights; layers without any stay unchanged. Raises TrainingDataError.
 
         The refinement network begins with the proposal network's ONNX file and statistics of batches, the classifier
         with ImageNet's weights.
@@ -191,19 +191,19 @@ class CropLearner(Learner[CropNetwork]):
         self.begin_average()
 
     def keep_early(self) -> None:
-        """Train no longer what makes the features at stride 8: two fifths of the time of each step."""
+        """Freezes the layers up to stride 8, which take two fifths of the time of each step."""
         early = self.network.early_layers
         for part in (early.stem, early.stage8):
             part.requires_grad_(False)
-        made = fused(self.average.early_layers).requires_grad_(False)
+        made = fuse(self.average.early_layers).requires_grad_(False)
         self.early = made.to(self.device, memory_format=torch.channels_last)
 
     def step(self, batch: CropBatch, rate: float) -> tuple[float, float]:
-        """Trains on one batch; returns score loss and box loss."""
+        """Takes a step on one batch; returns score loss and box loss."""
         return self.take_step(lambda: self._losses(batch), rate)
 
     def _losses(self, batch: CropBatch) -> Losses:
-        crops, regions, before, wanted, classes = self.moved(*vars(batch).values())
+        crops, regions, before, wanted, classes = self.to_device(*vars(batch).values())
         with self.quick():
             if self.early is None:
                 logits, boxes = self.network(crops, regions, before)
@@ -221,7 +221,7 @@ def quick_in_bfloat16(device: torch.device) -> bool:
 
 
 def read_checkpoint(file: Path) -> dict[str, Any]:
-    """The state in a file. Raises TrainingDataError."""
+    """Reads the state in a file. Raises TrainingDataError."""
     try:
         state = torch.load(file, map_location="cpu", weights_only=True)
     except (OSError, RuntimeError, ValueError, EOFError, pickle.UnpicklingError) as error:

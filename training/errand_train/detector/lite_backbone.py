@@ -1,4 +1,4 @@
-"""EfficientNet-Lite0, a backbone with weights that were trained on ImageNet.
+"""EfficientNet-Lite0, a backbone with weights trained on ImageNet.
 
 After Tan and Le, "EfficientNet" (2019), in the form without squeeze-and-excitation and with ReLU6 that suits 8 bits;
 its blocks after Sandler et al., "MobileNetV2" (2018). The weights are those of the package
@@ -75,7 +75,7 @@ class _Halving(torch.autograd.Function):
 
 
 class PaddedConv(nn.Conv2d):
-    """A convolution of which the output is as large as its input, or half as large with stride 2.
+    """Convolution whose output has the size of its input, or half of it with stride 2.
 
     With stride 2 there is one row more of padding below than above, and so at the sides, as ImageNet's weights want it.
     """
@@ -85,7 +85,7 @@ class PaddedConv(nn.Conv2d):
         super().__init__(inputs, outputs, kernel, stride, around, groups=groups, bias=False)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(N, inputs, H, W) to (N, outputs, H or H / 2, W or W / 2)."""
+        """Computes (N, outputs, H or H / 2, W or W / 2) from (N, inputs, H, W)."""
         if self.stride[0] == 1:
             return super().forward(x)
         kernel = self.kernel_size[0]
@@ -106,7 +106,7 @@ def _unit(layer: nn.Conv2d, *then: nn.Module) -> nn.Sequential:
 
 
 class InvertedResidual(nn.Module):
-    """Wider by a factor, each channel filtered by itself, narrow again; added to the input where the shapes agree."""
+    """Inverted residual block: expansion, depthwise convolution, projection, and a shortcut where shapes agree."""
 
     def __init__(self, inputs: int, outputs: int, kernel: int, stride: int, wider: int) -> None:
         super().__init__()
@@ -117,13 +117,13 @@ class InvertedResidual(nn.Module):
         self.adds = stride == 1 and inputs == outputs
 
     def forward(self, x: Tensor) -> Tensor:
-        """(N, inputs, H, W) to (N, outputs, H or H / 2, W or W / 2)."""
+        """Computes (N, outputs, H or H / 2, W or W / 2) from (N, inputs, H, W)."""
         y: Tensor = self.narrow(self.filter(x if self.widen is None else self.widen(x)))
         return x + y if self.adds else y
 
 
 class LiteBackbone(EarlyLayers):
-    """Pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to features at strides 8, 16 and 32."""
+    """Backbone from pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to features at strides 8, 16 and 32."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -136,21 +136,21 @@ class LiteBackbone(EarlyLayers):
         self.stage32 = nn.Sequential(*(block for stage in _TO_32 for block in stage.layers()))
 
     def early(self, pictures: Tensor) -> Tensor:
-        """(N, 3, H, W) to features (N, 40, H / 8, W / 8)."""
+        """Computes features (N, 40, H / 8, W / 8) of pictures (N, 3, H, W)."""
         at8: Tensor = self.stage8(self.stem((pictures * self.one - _MEAN) / _SPREAD))
         return at8
 
     def late(self, at8: Tensor) -> tuple[Tensor, Tensor]:
-        """Features at stride 8 to those at 16 (N, 112, ...) and at 32 (N, 320, ...)."""
+        """Computes features at strides 16 (N, 112, ...) and 32 (N, 320, ...) from those at 8."""
         at16 = self.stage16(at8)
         return at16, self.stage32(at16)
 
     def take_bytes(self) -> None:
-        """Takes values from 0 to 255 from now on."""
+        """Changes the first layer to inputs from 0 to 255."""
         self.one = 1.0
 
     def begin_with_imagenet(self) -> None:
-        """Take over the weights that were trained on ImageNet. Raises TrainingDataError when they are not installed."""
+        """Loads the weights trained on ImageNet. Raises TrainingDataError when they are not installed."""
         self._take(torch.load(io.BytesIO(_weights_of_imagenet()), map_location="cpu", weights_only=True))
 
     def _take(self, kept: Mapping[str, Tensor]) -> None:
@@ -164,7 +164,7 @@ class LiteBackbone(EarlyLayers):
                 _take_unit(block.narrow, kept, f"{of}_project_conv", f"{of}_bn2")
 
     def blocks(self) -> list[InvertedResidual]:
-        """All blocks in their order."""
+        """Blocks in their order."""
         return [one for one in self.modules() if isinstance(one, InvertedResidual)]
 
 

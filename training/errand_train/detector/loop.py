@@ -1,4 +1,4 @@
-"""The training loop: steps until the time is over, and an examination every tenth of it."""
+"""Training loop: steps until the time is over, and a validation after every tenth of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _EXAMINED_EVERY: Final = 0.1
 
 @dataclass(frozen=True)
 class Stepped:
-    """What one step did: pictures or crops that it took, the two losses, and the learning rate."""
+    """Result of one step: number of pictures or crops, the two losses, and the learning rate."""
 
     taken: int
     losses: tuple[float, float]
@@ -30,7 +30,7 @@ class Stepped:
 
 @dataclass
 class Loop:
-    """Trains until the time is over.
+    """Training loop of one network.
 
     `step` trains on one batch, given the share of the time that is done. `written` writes the ONNX file and returns its
     figures; its argument says whether this is the last time.
@@ -45,7 +45,7 @@ class Loop:
     _since: float = field(default_factory=time.monotonic)
 
     def run(self) -> None:
-        """Train, then examine a last time."""
+        """Trains until the time is over, then validates a last time."""
         if self._done() >= 1.0:
             self._examine()
         while (done := self._done()) < 1.0:
@@ -70,7 +70,7 @@ class Loop:
             self.report(Report(done, progress.steps, made.taken / max(took, 1e-6), made.losses))
 
     def _examine(self) -> None:
-        """Writes the ONNX file and the checkpoint, and report the figures of held-out pictures."""
+        """Writes the ONNX file and the checkpoint, and reports the figures on held-out pictures."""
         done = self._done()
         figures = self.written(done >= 1.0)
         self._note({"progress": done, **figures})
@@ -85,7 +85,7 @@ class Loop:
 
 
 def figures_of(found: Score) -> dict[str, float]:
-    """The figures of an examination that are written down."""
+    """Figures of a validation for the journal."""
     named = {
         "mAP50": found.map50,
         "mAP50-95": found.map50_95,

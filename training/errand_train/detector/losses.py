@@ -1,4 +1,4 @@
-"""The losses: scores should be as high as boxes are good, and boxes should overlap."""
+"""Losses of training: scores learn the quality of their boxes, and boxes the overlap."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ _BOX_WEIGHT, _CROP_BOX_WEIGHT = 3.0, 2.0
 
 @dataclass(frozen=True)
 class Losses:
-    """Two scalars, the box loss with its weight, and the sum."""
+    """Score loss and weighted box loss, two scalars."""
 
     scores: Tensor
     boxes: Tensor
 
     @property
     def total(self) -> Tensor:
-        """What is made small."""
+        """Sum that training minimises."""
         return self.scores + self.boxes
 
 
 def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch) -> Losses:
-    """The losses of logits (N, A, K) and boxes (N, A, 4), per answering cell, weighted by how well it does."""
+    """Losses of logits (N, A, K) and boxes (N, A, 4), per assigned cell, weighted by its quality."""
     logits, boxes = logits.float(), boxes.float()
     assigned = assign(logits.detach().sigmoid(), boxes.detach(), middles, truth)
     total = assigned.quality.sum().clamp(min=1.0)
@@ -43,7 +43,7 @@ def losses(logits: Tensor, boxes: Tensor, middles: Tensor, truth: TruthBatch) ->
 
 
 def crop_losses(logits: Tensor, boxes: Tensor, wanted: Tensor, classes: Tensor) -> Losses:
-    """The losses of crops' logits (N, K) and boxes (N, 4), by boxes `wanted` (N, 4) and `classes` (N,), -1 for none."""
+    """Losses of the logits (N, K) and boxes (N, 4) of crops, by `wanted` boxes (N, 4) and `classes` (N,), -1: none."""
     logits, boxes = logits.float(), boxes.float()
     near = classes >= 0
     scores = torch.zeros_like(logits)
@@ -61,7 +61,7 @@ def _wanted_scores(logits: Tensor, truth: TruthBatch, assigned: Assigned) -> Ten
 
 
 def complete_overlap(first: Tensor, second: Tensor) -> Tensor:
-    """Overlap less penalties for distant middles and other proportions (M,), of boxes (M, 4).
+    """Complete IoU (M,) of boxes (M, 4): overlap less penalties for distance and other proportions.
 
     After Zheng et al., "Distance-IoU Loss" (2020).
     """

@@ -1,4 +1,4 @@
-"""Which detections are on which labels, by COCO's own evaluation (pycocotools).
+"""Matching of detections and labels by COCO's own evaluation (pycocotools).
 
 Labels that do not count are passed over by COCO's range of areas: they get an area outside the range, and so do
 detections that are too small to count when they are on nothing.
@@ -26,7 +26,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Match:
-    """A detection of a picture, the number of the label that it is on (or None), and whether it is passed over."""
+    """A detection of a picture, the number of its label (or None), and whether it is ignored."""
 
     picture: int
     detection: Detection
@@ -36,7 +36,7 @@ class Match:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """COCO's evaluation of detections in pictures, with the labels by their numbers."""
+    """COCO's evaluation of detections in pictures, with labels by number."""
 
     labels: tuple[Label, ...]
     class_names: tuple[str, ...]
@@ -44,12 +44,12 @@ class Evaluation:
     _coco: Any
 
     def average_precision(self, name: str) -> NDArray[np.float64] | None:
-        """The average precision of a class at COCO's ten overlaps; None where no label counts."""
+        """Average precision of a class at COCO's ten overlaps; None where no label counts."""
         precision = self._coco.eval["precision"][:, :, self.class_names.index(name), 0, 0]
         return None if (precision < 0).any() else np.asarray(precision.mean(axis=1))
 
     def matches(self, name: str) -> Iterator[Match]:
-        """The detections of a class at an overlap of 0.5, the surest of each picture first."""
+        """Yields the detections of a class matched at an overlap of 0.5, best of each picture first."""
         per_class = len(self._coco.params.imgIds)
         first = self.class_names.index(name) * per_class
         for one in self._coco.evalImgs[first : first + per_class]:
@@ -60,13 +60,13 @@ class Evaluation:
                     yield Match(one["image_id"], self._detections[number - 1], on, bool(passed))
 
 
-def evaluated(
+def evaluate(
     pictures: Sequence[LabelledPicture],
     found: Sequence[Sequence[Detection]],
     class_names: Sequence[str],
     counts: Callable[[Label], bool] = lambda label: label.counts,
 ) -> Evaluation:
-    """Evaluates what was found in each picture. Labels that do not count are passed over."""
+    """Evaluates the detections of each picture. Ignores labels that do not count."""
     from pycocotools.cocoeval import COCOeval  # takes long to import
 
     labels = [(k, one) for k, picture in enumerate(pictures) for one in picture.labels if one.class_name in class_names]

@@ -1,4 +1,4 @@
-"""The network: plain convolutions on three levels (strides 8, 16, 32), one box and one score per class at each cell.
+"""The proposal network: plain convolutions on three levels (strides 8, 16, 32), a box and class scores at each cell.
 
 Cross-stage blocks after Wang et al., "CSPNet" (2020); top-down and bottom-up paths after Liu et al., "Path Aggregation
 Network" (2018); pooled context after Jocher's SPPF; anchor-free boxes as distances from the cell's middle to the four
@@ -24,7 +24,7 @@ FIRST_SCORE: Final = 0.003
 STEM: Final = (16, 32)
 LEVELS: Final = (48, 96, 192)
 NECK: Final = (48, 64, 96)
-"""Channels after each of the first halvings of the picture, at strides 8, 16 and 32, and of the neck's levels."""
+"""Channels after the first halvings of the picture, at strides 8, 16 and 32, and of the neck's levels."""
 _DEPTH: Final = 2
 _HEAD_SCORES, _HEAD_BOXES = 48, 32
 
@@ -41,7 +41,7 @@ class ConvUnit(nn.Sequential):
 
 
 class Bottleneck(nn.Module):
-    """Two 3x3 convolutions, and the input added where `shortcut`."""
+    """Two 3x3 convolutions, with a shortcut if `shortcut`."""
 
     def __init__(self, channels: int, shortcut: bool) -> None:
         super().__init__()
@@ -50,13 +50,13 @@ class Bottleneck(nn.Module):
         self.shortcut = shortcut
 
     def forward(self, x: Tensor) -> Tensor:
-        """(N, C, H, W) to the same shape."""
+        """Applies the block to (N, C, H, W)."""
         y: Tensor = self.second(self.first(x))
         return x + y if self.shortcut else y
 
 
 class CrossStage(nn.Module):
-    """Half of the channels go through `depth` bottlenecks, half pass by; all are joined and mixed."""
+    """Cross-stage block: half of the channels pass `depth` bottlenecks, half bypass them; all are mixed."""
 
     def __init__(self, inputs: int, outputs: int, depth: int, shortcut: bool = True) -> None:
         super().__init__()
@@ -67,14 +67,14 @@ class CrossStage(nn.Module):
         self.mix = ConvUnit(2 * half, outputs)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(N, inputs, H, W) to (N, outputs, H, W)."""
+        """Computes (N, outputs, H, W) from (N, inputs, H, W)."""
         joined = torch.cat([self.blocks(self.through(x)), self.past(x)], dim=1)
         mixed: Tensor = self.mix(joined)
         return mixed
 
 
 class Residual(nn.Module):
-    """Two 3x3 convolutions added to the input, from 0 on, which it passes on unchanged until it is trained.
+    """Residual block of two 3x3 convolutions, whose untrained output is its input.
 
     After He et al., "Deep Residual Learning" (2015); that the last normalisation begins at nought, after Goyal et al.,
     "Accurate, Large Minibatch SGD" (2017).
@@ -89,12 +89,12 @@ class Residual(nn.Module):
         nn.init.zeros_(self.second[1].weight)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(N, C, H, W) to the same shape."""
+        """Applies the block to (N, C, H, W)."""
         return nn.functional.relu(x + self.second(self.first(x)))
 
 
 class PooledContext(nn.Module):
-    """The highest values within 5, 9 and 13 cells beside the cell's own."""
+    """Spatial pyramid pooling: the maxima within 5, 9 and 13 cells beside the cell's own value."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -103,7 +103,7 @@ class PooledContext(nn.Module):
         self.mix = ConvUnit(channels * 2, channels)
 
     def forward(self, x: Tensor) -> Tensor:
-        """(N, C, H, W) to the same shape."""
+        """Applies the block to (N, C, H, W)."""
         near = [self.squeeze(x)]
         for _ in range(3):
             near.append(self.pool(near[-1]))
@@ -118,36 +118,36 @@ class EarlyLayers(nn.Module):
     stage8: nn.Sequential
 
     def early(self, pictures: Tensor) -> Tensor:
-        """Pictures (N, 3, H, W) to features at stride 8: edges and textures."""
+        """Computes features at stride 8 of pictures (N, 3, H, W)."""
         raise NotImplementedError
 
     def take_bytes(self) -> None:
-        """Takes values from 0 to 255 from now on."""
+        """Changes the first layer to inputs from 0 to 255."""
         raise NotImplementedError
 
 
 class CascadeNetwork(nn.Module):
-    """A network of the cascade, whose file is of some `kind`."""
+    """A network of the cascade with the `kind` of its file."""
 
     kind: ClassVar[NetworkKind]
     classes: int
 
     @property
     def early_layers(self) -> EarlyLayers:
-        """What makes the features at stride 8."""
+        """Layers up to the features at stride 8."""
         raise NotImplementedError
 
     @property
     def score_biases(self) -> list[Tensor]:
-        """What is added last to the logits (K,)."""
+        """Last biases of the logits (K,)."""
         raise NotImplementedError
 
     def stop_learning(self) -> None:
-        """Changes what is to be otherwise in use than in training: nothing, unless said."""
+        """Changes the network from training to inference; the default does nothing."""
 
 
 class Backbone(EarlyLayers):
-    """Picture to features at strides 8, 16 and 32; `residuals` are how many blocks follow at strides 16 and 32."""
+    """Backbone from pictures to features at strides 8, 16 and 32, with `residuals` blocks at strides 16 and 32."""
 
     def __init__(self, residuals: tuple[int, int]) -> None:
         super().__init__()
@@ -167,27 +167,27 @@ class Backbone(EarlyLayers):
         )
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """(N, 3, H, W) to three levels."""
+        """Computes three levels of features of pictures (N, 3, H, W)."""
         return self.late(self.early(pictures))
 
     def early(self, pictures: Tensor) -> Tensor:
-        """(N, 3, H, W) to features at stride 8: edges and textures, half of the time that a step of learning takes."""
+        """Computes features at stride 8 of pictures (N, 3, H, W), half of the time of a training step."""
         at8: Tensor = self.stage8(self.stem(pictures))
         return at8
 
     @torch.no_grad()
     def take_bytes(self) -> None:
-        """Takes values from 0 to 255 from now on."""
+        """Changes the first layer to inputs from 0 to 255."""
         self.stem[0][0].weight.mul_(1.0 / 255.0)
 
     def late(self, at8: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Features at stride 8 to three levels."""
+        """Computes three levels from features at stride 8."""
         at16 = self.stage16(at8)
         return at8, at16, self.stage32(at16)
 
 
 class Neck(nn.Module):
-    """Levels exchange what they know: downwards from the coarse one, then upwards again."""
+    """Path aggregation neck: features flow down from the coarse level, then up again."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -204,7 +204,7 @@ class Neck(nn.Module):
         self.up32 = CrossStage(middle + middle, high, 1, shortcut=False)
 
     def forward(self, levels: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Tensor, Tensor]:
-        """Three levels to three levels of the neck's widths."""
+        """Computes three levels of the neck's widths."""
         at8, at16, at32 = levels
         coarse = self.narrow32(at32)
         middle = self.narrow16(self.down16(torch.cat([self.enlarge(coarse), at16], dim=1)))
@@ -215,7 +215,7 @@ class Neck(nn.Module):
 
 
 class Head(nn.Module):
-    """Scores and box sides of one level."""
+    """Head with scores and box sides of one level."""
 
     def __init__(self, inputs: int, classes: int) -> None:
         super().__init__()
@@ -227,12 +227,12 @@ class Head(nn.Module):
         nn.init.constant_(self.sides.bias, 1.0)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, classes, H, W), and the logarithm-like sides (N, 4, H, W)."""
+        """Computes logits (N, classes, H, W) and raw sides (N, 4, H, W)."""
         return self.scores(self.for_scores(x)), self.sides(self.for_boxes(x))
 
 
 class DetectorNetwork(CascadeNetwork):
-    """Pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to logits and boxes of every cell."""
+    """Proposal network from pictures (N, 3, H, W) from 0 to 1, H and W multiples of 32, to logits and boxes."""
 
     kind = PROPOSAL
 
@@ -245,34 +245,34 @@ class DetectorNetwork(CascadeNetwork):
 
     @property
     def early_layers(self) -> Backbone:
-        """What makes the features at stride 8."""
+        """Layers up to the features at stride 8."""
         return self.backbone
 
     @property
     def score_biases(self) -> list[Tensor]:
-        """What is added last to the logits (K,) of each level."""
+        """Last biases of the logits (K,) of each level."""
         return [head.scores.bias for head in self.heads]
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, A, classes) and boxes (N, A, 4) as x0 y0 x1 y1 in pixels."""
+        """Computes logits (N, A, classes) and boxes (N, A, 4) as x0 y0 x1 y1 in pixels."""
         return self.from_early(self.backbone.early(pictures))
 
     def from_early(self, at8: Tensor) -> tuple[Tensor, Tensor]:
-        """The same of what the backbone's early part makes of pictures."""
+        """Computes logits and boxes from features at stride 8."""
         return self.from_levels(self.neck(self.backbone.late(at8)))
 
     def from_levels(self, levels: tuple[Tensor, Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-        """The same of the neck's three levels."""
+        """Computes logits and boxes from the neck's three levels."""
         logits, boxes = [], []
         for head, level, stride in zip(self.heads, levels, STRIDES, strict=True):
             scores, sides = head(level)
             logits.append(scores.flatten(2))
-            boxes.append(decoded(sides, stride).flatten(2))
+            boxes.append(decode_boxes(sides, stride).flatten(2))
         return torch.cat(logits, dim=2).transpose(1, 2), torch.cat(boxes, dim=2).transpose(1, 2)
 
 
-def decoded(sides: Tensor, stride: int) -> Tensor:
-    """Boxes (N, 4, H, W) in pixels of raw sides: distances from the cell's middle are softplus of them, in strides."""
+def decode_boxes(sides: Tensor, stride: int) -> Tensor:
+    """Decodes raw sides to boxes (N, 4, H, W) in pixels: softplus gives distances from the cell's middle in strides."""
     far = nn.functional.softplus(sides.float()) * float(stride)
     middle = cell_middles(int(sides.shape[2]), int(sides.shape[3]), stride, sides.device)
     return torch.cat([middle - far[:, :2], middle + far[:, 2:]], dim=1)

@@ -1,4 +1,4 @@
-"""What is in networks' ONNX files, and how they are written. Needs no torch."""
+"""Contents of the networks' ONNX files, and their writer. Needs no torch."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from skills.perception.detector.model_files import seal
 
 QUANTISED: Final = "eight_bits"
-"""What a file has among its metadata when its network is quantised."""
+"""Metadata entry of a file with a quantised network."""
 OFFSETS: Final = "score_offsets"
-"""What it tells there of what was added to the logits of each class."""
+"""Metadata entry with the offsets of each class's logits."""
 _SEAL: Final = "sha256"
 _TRAINED: Final = "network."
 _SCALE: Final = "_scale"
@@ -36,22 +36,22 @@ def write_sealed(model: onnx.ModelProto, file: Path, facts: Mapping[str, str]) -
 
 
 def offsets_fact(offsets: Iterable[float]) -> dict[str, str]:
-    """What a file tells of what was added to the logits of each class."""
+    """Metadata entry for the offsets of each class's logits."""
     return {OFFSETS: json.dumps([round(float(value), 4) for value in offsets])}
 
 
 def offsets_in(facts: Mapping[str, str], classes: int) -> list[float]:
-    """What a file tells of it; zeros, where nothing was added."""
+    """Offsets in the metadata; zeros without an entry."""
     return [float(value) for value in json.loads(facts[OFFSETS])] if OFFSETS in facts else [0.0] * classes
 
 
 def facts_of(model: onnx.ModelProto) -> dict[str, str]:
-    """What a model's file tells, but for what sealing adds."""
+    """Metadata of a model file without the seal."""
     return {entry.key: entry.value for entry in model.metadata_props if entry.key != _SEAL}
 
 
 def trained_weights(model: onnx.ModelProto) -> dict[str, NDArray[np.floating]]:
-    """What a network has trained, by the names that weights have in it; those of 8 bits as what they stand for.
+    """Trained weights of a network by their names; 8-bit weights are dequantised.
 
     Names of weights of 16 bits, which the files of the repository have, end in `.short`.
     """

@@ -1,4 +1,4 @@
-"""Training goes on from a network's ONNX file, in which normalisation is part of the layers before it already."""
+"""Start of a training from a network's ONNX file, in which normalisation is folded into the layers before it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HINT = "start again without it"
 
 @torch.no_grad()
 def take_over(network: CascadeNetwork, file: Path) -> None:
-    """Gives a network the weights of an ONNX file; it says the same then, but for the shift of the scores.
+    """Loads the weights of an ONNX file into a network, whose output is then equal but for the score offsets.
 
     Every normalisation passes on what it gets and adds the file's bias, until `settle`. A crop network's file may
     belong to any network before it. Raises TrainingDataError.
@@ -77,7 +77,7 @@ def _pass_on(normalisation: nn.BatchNorm1d | nn.BatchNorm2d, bias: Tensor) -> No
 
 @torch.no_grad()
 def settle(network: nn.Module, batches: Iterable[tuple[Tensor, ...]]) -> None:
-    """Gives each normalisation the statistics of batches (what the network takes), and each filter the length 1.
+    """Gives each normalisation the statistics of batches of inputs, and each filter the length 1.
 
     To be done after `take_over`. What the network says stays the same. Without it, learning would begin by forgetting:
     it normalises by the batch.

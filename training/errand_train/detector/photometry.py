@@ -1,4 +1,4 @@
-"""Pictures as other cameras, lights and lenses would show them. Pure functions of a picture and a random source."""
+"""Photometric augmentation: other cameras, lights and lenses. Pure functions of a picture and a random source."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ _DARK: Final = 60.0
 _LUMA: Final = np.array([0.299, 0.587, 0.114], dtype=np.float32)
 
 
-def as_seen_otherwise(picture: Picture, random: np.random.Generator) -> Picture:
-    """A picture (H, W, 3) with other light and colours, sometimes grey, blurred, noisy or partly covered."""
+def change_photometry(picture: Picture, random: np.random.Generator) -> Picture:
+    """Changes light and colours of a picture (H, W, 3), sometimes to grey, blurred, noisy or partly covered."""
     changed = _toned(_recoloured(picture, random), random)
     if random.random() < 0.15:
         changed = _blurred(changed, random)

@@ -1,4 +1,4 @@
-"""Where parts of pictures go on a canvas, and what of their objects is seen there. Pure geometry."""
+"""Geometry of pictures on a training canvas, and of their visible labels."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LEAST_SHORT_PX: Final = 4.0
 
 @dataclass(frozen=True)
 class Cell:
-    """A part of the canvas, in whole pixels: x0 <= x < x1, y0 <= y < y1."""
+    """A part of a canvas, in whole pixels: x0 <= x < x1, y0 <= y < y1."""
 
     x0: int
     y0: int
@@ -32,28 +32,28 @@ class Cell:
 
     @property
     def middle(self) -> Floats:
-        """The middle, (2,)."""
+        """Middle (2,)."""
         return np.array([(self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2], dtype=np.float32)
 
 
 @dataclass(frozen=True)
 class Targets:
-    """What is to be found in a canvas: boxes (N, 4) as x0 y0 x1 y1, class indices (N,), and which to ignore (N,)."""
+    """Targets in a canvas: boxes (N, 4) as x0 y0 x1 y1, class indices (N,), and whether to ignore each (N,)."""
 
     boxes: Floats
     classes: NDArray[np.int64]
     ignored: NDArray[np.bool_]
 
 
-def turning(focus: Floats, to: Floats, *, angle_rad: float, scale: float, flipped: bool) -> Floats:
-    """The affine map (2, 3) that turns by an angle, scales, perhaps mirrors, and brings `focus` to the point `to`."""
+def similarity_map(focus: Floats, to: Floats, *, angle_rad: float, scale: float, flipped: bool) -> Floats:
+    """Affine map (2, 3) that rotates, scales and perhaps mirrors, and moves `focus` to the point `to`."""
     cosine, sine = scale * np.cos(angle_rad), scale * np.sin(angle_rad)
     linear = np.array([[cosine, -sine], [sine, cosine]]) @ np.diag([-1.0 if flipped else 1.0, 1.0])
     return np.concatenate([linear, (to - linear @ focus)[:, None]], axis=1).astype(np.float32)
 
 
-def placed(labels: Labels, affine: Floats, cell: Cell) -> Targets:
-    """The labels under an affine map, cut off at a cell's edges; what is hardly seen or too small is to be ignored."""
+def place_labels(labels: Labels, affine: Floats, cell: Cell) -> Targets:
+    """Places labels by an affine map, cut off at a cell's edges; marks hardly visible and small ones to be ignored."""
     found = [_cut(outline @ affine[:, :2].T + affine[:, 2], cell) for outline in labels.outlines]
     kept = [k for k, one in enumerate(found) if one is not None]
     boxes = np.array([one[0] for one in found if one is not None], dtype=np.float32).reshape(-1, 4)
@@ -81,8 +81,8 @@ def _cut(outline: Floats, cell: Cell) -> tuple[Floats, float] | None:
     return np.concatenate([points.min(axis=0), points.max(axis=0)]), min(1.0, float(area) / whole)
 
 
-def joined(parts: list[Targets]) -> Targets:
-    """The targets of several cells of one canvas."""
+def join_targets(parts: list[Targets]) -> Targets:
+    """Joins the targets of several cells of one canvas."""
     return Targets(
         np.concatenate([part.boxes for part in parts]),
         np.concatenate([part.classes for part in parts]),

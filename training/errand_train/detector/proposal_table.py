@@ -1,4 +1,4 @@
-"""What a network proposes in the training pictures, and what is really there."""
+"""Table of a network's proposals in the training pictures, with the true objects."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Floats = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class ProposalTable:
-    """R regions: picture's number (R,), box (R, 4) in the letterbox, logits (R, K), and the object there.
+    """Table of R proposals: picture number (R,), box (R, 4) in the letterbox, logits (R, K), and the true object.
 
     `classes` (R,) are those of the objects with which regions share NEAR or more, or -1; `wanted` (R, 4) are their
     boxes, and the region's own where there is no object.
@@ -42,43 +42,43 @@ class ProposalTable:
         return len(self.pictures)
 
     def save(self, file: Path) -> None:
-        """Writes it; whole or not at all."""
+        """Writes the table, whole or not at all."""
         fresh = file.with_name(f".{file.name}.new.npz")
         np.savez(fresh, **vars(self))
         fresh.replace(file)
 
     @staticmethod
     def read(file: Path) -> ProposalTable:
-        """Reads what was written."""
+        """Reads a table that `save` has written."""
         with np.load(file) as kept:
             return ProposalTable(**{name: kept[name] for name in ProposalTable.__dataclass_fields__})
 
 
-def proposed(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
-    """Boxes (A, 4) and scores (A, K) of the proposal network in a picture's letterbox."""
+def propose(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
+    """Runs the proposal network on a letterbox: boxes (A, 4) and scores (A, K)."""
     boxes, scores = model.proposal.session.run(["boxes", "scores"], {"images": scales.full[None]})
     return boxes[0], scores[0]
 
 
-def refined_by(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
-    """Boxes (R, 4) and scores (R, K) of the refinement network, as in use. Raises ValueError without one."""
+def refine_proposals(model: DetectorModel, scales: Scales) -> tuple[Floats, Floats]:
+    """Runs the refinement network as the detector does: boxes (R, 4), scores (R, K). Raises ValueError without one."""
     if model.refinement is None:
         raise ValueError("there is no refinement network")
-    return refine(model.refinement.session, scales, *proposed(model, scales), ProposalOptions())
+    return refine(model.refinement.session, scales, *propose(model, scales), ProposalOptions())
 
 
-def proposals_in(model: DetectorModel, scales: Scales) -> Proposals:
-    """The places that the proposal network finds."""
-    return select_proposals(*proposed(model, scales), _LOOKED_AT)
+def first_proposals(model: DetectorModel, scales: Scales) -> Proposals:
+    """Proposals of the proposal network."""
+    return select_proposals(*propose(model, scales), _LOOKED_AT)
 
 
-def refined_in(model: DetectorModel, scales: Scales) -> Proposals:
-    """What the refinement network makes of them. Raises ValueError where there is none."""
-    return select_proposals(*refined_by(model, scales), _SEEN)
+def refined_proposals(model: DetectorModel, scales: Scales) -> Proposals:
+    """Proposals of the refinement network. Raises ValueError without one."""
+    return select_proposals(*refine_proposals(model, scales), _SEEN)
 
 
-def table_of(look: Callable[[Scales], Proposals], pictures: Iterable[tuple[Scales, Labels]]) -> ProposalTable:
-    """The regions that a network finds in all pictures. Those on what is to be ignored are left out."""
+def build_table(look: Callable[[Scales], Proposals], pictures: Iterable[tuple[Scales, Labels]]) -> ProposalTable:
+    """Builds the table of proposals in all pictures. Leaves out those on ignored labels."""
     tables = [_rows(look(scales), number, labels) for number, (scales, labels) in enumerate(pictures)]
     names = ProposalTable.__dataclass_fields__
     return ProposalTable(**{name: np.concatenate([vars(table)[name] for table in tables]) for name in names})
@@ -111,6 +111,6 @@ def _overlaps(boxes: Floats, objects: Floats, *, crowd: bool) -> NDArray[np.floa
 
 
 def label_boxes(labels: Labels) -> Floats:
-    """The boxes (N, 4) of labels' outlines."""
+    """Boxes (N, 4) about the outlines of labels."""
     boxes = [np.concatenate([outline.min(axis=0), outline.max(axis=0)]) for outline in labels.outlines]
     return np.array(boxes, dtype=np.float32).reshape(-1, 4)

@@ -1,4 +1,4 @@
-"""Networks that are quantised to INT8, which processor cores do over twice as fast as with floats.
+"""Quantisation of networks to INT8, which runs over twice as fast on processor cores.
 
     python -m errand_train.detector.quantisation DIR/errand_detector.onnx --data PICTURES --out FOLDER
 
@@ -29,7 +29,7 @@ from onnxruntime.quantization.shape_inference import quant_pre_process
 
 from errand_train.detector.labels import TrainingDataError
 from errand_train.detector.onnx_files import QUANTISED, facts_of, write_sealed
-from errand_train.detector.proposal_table import proposed, refined_by
+from errand_train.detector.proposal_table import propose, refine_proposals
 from errand_train.detector.store import read_picture
 from errand_train.detector.validate import examination
 from skills.perception.detector.letterbox import Scales, halve, letterbox
@@ -50,8 +50,8 @@ _KINDS: Final = ("Conv", "Relu", "Clip", "Concat", "MaxPool", "Resize", "Add")
 Given = Mapping[str, NDArray[Any]]
 
 
-def quantised_detector(file: Path, data: Path, out: Path) -> Path:
-    """Writes the network of a file, and those beside it, into a folder; gives the first's file.
+def quantise_detector(file: Path, data: Path, out: Path) -> Path:
+    """Quantises the networks of a detector into a folder; returns the proposal network's file.
 
     Those that are quantised already stay as they are. Ranges are measured on pictures of the data set `data` that
     were trained on. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
@@ -76,12 +76,12 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
         (
             refinement_file(file),
             model.refinement,
-            lambda: _crops(lambda one: select_proposals(*proposed(model, one), ProposalOptions()), scales),
+            lambda: _crops(lambda one: select_proposals(*propose(model, one), ProposalOptions()), scales),
         ),
         (
             classifier_file(file),
             model.classifier,
-            lambda: _crops(lambda one: select_proposals(*refined_by(model, one), CLASSIFIER_PROPOSALS), scales),
+            lambda: _crops(lambda one: select_proposals(*refine_proposals(model, one), CLASSIFIER_PROPOSALS), scales),
         ),
     )
     belongs: dict[str, str] = {}
@@ -97,8 +97,8 @@ def quantised_detector(file: Path, data: Path, out: Path) -> Path:
     return made
 
 
-def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto:
-    """A network that is quantised, with ranges measured on what is `given` to it, always of as many rows."""
+def quantise(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto:
+    """Quantises a network, with ranges measured on `given` inputs, all of as many rows."""
     plain, count = onnx.ModelProto.FromString(model.SerializeToString()), len(given)
     for number, node in enumerate(plain.graph.node):
         node.name = f"n{number}"
@@ -125,7 +125,7 @@ def quantised(model: onnx.ModelProto, given: Sequence[Given]) -> onnx.ModelProto
 
 
 class _Given(CalibrationDataReader):
-    """What is given to a network, a stretch of it at a time, so that not all that it makes is kept at once."""
+    """Calibration inputs, a range at a time, so that memory holds only some activations."""
 
     def __init__(self, given: Sequence[Given]) -> None:
         self._given = given
@@ -135,17 +135,17 @@ class _Given(CalibrationDataReader):
         return len(self._given)
 
     def set_range(self, start_index: int, end_index: int) -> None:
-        """The stretch of which `get_next` gives the first from now on."""
+        """Sets the range of inputs that `get_next` returns."""
         self._left = iter(self._given[start_index:end_index])
 
     def get_next(self) -> dict[str, NDArray[Any]] | None:
-        """The next, None after the last."""
+        """Next input; None after the last."""
         following = next(self._left, None)
         return None if following is None else dict(following)
 
 
 def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
-    """Names of the nodes that have a convolution both somewhere before them and somewhere after them.
+    """Names of the nodes between convolutions.
 
     Before them are those that open the network; of these there are several where the second convolution takes each
     channel by itself: in 8 bits this is where the classifier network lost, presumably in channels much weaker than
@@ -187,21 +187,21 @@ def _crops(look: Callable[[Scales], Proposals], pictures: Sequence[Scales]) -> l
 def write_quantised(
     file: Path, given: Sequence[Given], out: Path, other_facts: Mapping[str, str] | None = None
 ) -> None:
-    """Writes the network of a file so that it is quantised; it tells what it did, and `other_facts`."""
+    """Quantises the network of a file, with a note and `other_facts` in its metadata."""
     model = onnx.load(file)
     facts = {**facts_of(model), **(other_facts or {}), QUANTISED: "yes"}
-    write_sealed(quantised(model, given), out, facts)
+    write_sealed(quantise(model, given), out, facts)
 
 
 def main() -> int:
-    """The command line."""
+    """Runs the command line."""
     parser = argparse.ArgumentParser(description="A detector that is quantised to INT8.")
     parser.add_argument("file", type=Path, help="the proposal network's ONNX file")
     parser.add_argument("--data", type=Path, required=True, help="the data set's folder")
     parser.add_argument("--out", type=Path, required=True, help="the folder to write to")
     given = parser.parse_args()
     try:
-        quantised_detector(given.file, given.data, given.out)
+        quantise_detector(given.file, given.data, given.out)
     except (TrainingDataError, OSError) as error:
         sys.stderr.write(f"error: {error}\n")
         return 2

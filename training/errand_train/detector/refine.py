@@ -1,4 +1,4 @@
-"""Training of the refinement or the classifier network, from a folder of pictures to its ONNX file."""
+"""Training of the refinement or the classifier network, from a data set to an ONNX file."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from errand_train.detector.crop_batches import CropFeed
 from errand_train.detector.labels import TrainingDataError, TrainingPicture, category_names, read_split
 from errand_train.detector.learner import CropLearner
 from errand_train.detector.loop import CHECKPOINT, Stepped
-from errand_train.detector.proposal_table import ProposalTable, proposals_in, refined_in, table_of
+from errand_train.detector.proposal_table import ProposalTable, build_table, first_proposals, refined_proposals
 from errand_train.detector.schedule import RefineOptions, Report
 from errand_train.detector.store import PictureStore, open_store
 from errand_train.detector.train import MODEL, PICTURES, SETTLED_BY, device, run_loop
@@ -29,7 +29,7 @@ TABLE: Final = "proposals.npz"
 
 
 def refine(options: RefineOptions, report: Callable[[Report], None]) -> Path:
-    """Train, and return the network's ONNX file, beside copies of those before it. Raises TrainingDataError."""
+    """Trains the network; returns its ONNX file, beside copies of those before it. Raises TrainingDataError."""
     options.out.mkdir(parents=True, exist_ok=True)
     pictures, names = read_split(options.data, "train"), category_names(options.data)
     exam, first = examination(options.data, "val", names, options.examined), options.out / MODEL
@@ -68,7 +68,7 @@ def _copy(model: Path, file: Path, options: RefineOptions) -> None:
 
 
 def _networks_before(options: RefineOptions, names: tuple[str, ...]) -> DetectorModel:
-    """What the network that is trained stands behind. Raises TrainingDataError."""
+    """Loads the networks before the trained one. Raises TrainingDataError."""
     try:
         model = load_model(options.out / MODEL, networks=2 if options.classifier else 1)
     except ModelFileError as error:
@@ -83,9 +83,9 @@ def _networks_before(options: RefineOptions, names: tuple[str, ...]) -> Detector
 def _proposals_of(
     options: RefineOptions, model: DetectorModel, pictures: tuple[TrainingPicture, ...], store: PictureStore
 ) -> ProposalTable:
-    """What the networks before find in the training pictures. Raises TrainingDataError."""
+    """Runs the networks before on the training pictures. Raises TrainingDataError."""
     seen = ((store.scales(k), picture.labels) for k, picture in enumerate(pictures))
-    table = table_of(partial(refined_in if options.classifier else proposals_in, model), seen)
+    table = build_table(partial(refined_proposals if options.classifier else first_proposals, model), seen)
     if not (table.classes >= 0).any() or not (table.classes < 0).any():
         raise TrainingDataError(
             f"{options.model}: finds nothing to tell apart in {options.data}", hint="train it for longer first"
@@ -94,7 +94,7 @@ def _proposals_of(
 
 
 def _begin(learner: CropLearner, options: RefineOptions, feed: CropFeed) -> None:
-    """Gives the learner the weights that it begins with. Raises TrainingDataError."""
+    """Loads the initial weights of the learner. Raises TrainingDataError."""
     checkpoint, size = options.out / CHECKPOINT, options.batch
     some = (feed.batch(k * size, size) for k in range(SETTLED_BY))
     if options.resume and checkpoint.is_file():

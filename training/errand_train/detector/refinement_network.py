@@ -1,4 +1,4 @@
-"""The refinement network: what is in a crop about a place that the proposal network found, and where exactly.
+"""The refinement network: class and exact box in a crop about a proposal.
 
 It is the proposal network once more, with weights of its own that begin with that one's, on a crop: of all its cells
 the one counts that is surest of a box about the place's. What all of its coarsest level knows is added, and the
@@ -11,7 +11,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor, nn
 
-from errand_train.detector.crop_network import MOST_LOGIT, CropNetwork, covered, moved
+from errand_train.detector.crop_network import MOST_LOGIT, CropNetwork, coverage, shift_boxes
 from errand_train.detector.network import LEVELS, NECK, Backbone, ConvUnit, DetectorNetwork
 from errand_train.detector.overlaps import overlap
 from skills.perception.detector.model_files import CROP_PX, REFINEMENT
@@ -23,7 +23,7 @@ _SIDES_SCALE = 0.1
 
 
 class RefinementNetwork(CropNetwork):
-    """A crop network that begins with the proposal network's weights."""
+    """Crop network that starts from the proposal network's weights."""
 
     kind = REFINEMENT
 
@@ -38,24 +38,24 @@ class RefinementNetwork(CropNetwork):
 
     @property
     def early_layers(self) -> Backbone:
-        """What makes the features at stride 8."""
+        """Layers up to the features at stride 8."""
         return self.detector.backbone
 
     def from_early(self, at8: Tensor, boxes: Tensor, logits: Tensor) -> tuple[Tensor, Tensor]:
-        """Logits (N, K) and boxes (N, 4) of what the early layers make of crops."""
+        """Logits (N, K) and boxes (N, 4) from the features of the early layers."""
         first_logits = logits.clamp(-MOST_LOGIT, MOST_LOGIT)
-        levels = self.detector.neck(self.detector.backbone.late(at8 + self.place(covered(boxes))))
-        seen_logits, seen_boxes = surest_about(boxes, *self.detector.from_levels(levels))
+        levels = self.detector.neck(self.detector.backbone.late(at8 + self.place(coverage(boxes))))
+        seen_logits, seen_boxes = best_cell_about(boxes, *self.detector.from_levels(levels))
         seen_logits = seen_logits.clamp(-MOST_LOGIT, MOST_LOGIT)
         seen = [self.squeeze(levels[2]).flatten(1), first_logits, seen_logits, boxes / CROP_PX, seen_boxes / CROP_PX]
         known = self.join(torch.cat(seen, dim=1))
         found = self.trust_first * first_logits + self.trust_seen * seen_logits + self.scores(known)
         nearer = boxes + self.nearer * (seen_boxes - boxes)
-        return found, moved(nearer, _SIDES_SCALE * self.sides(known).float())
+        return found, shift_boxes(nearer, _SIDES_SCALE * self.sides(known).float())
 
 
-def surest_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, Tensor]:
-    """Logits (N, K) and box (N, 4) of the cell whose score times its overlap with a box (N, 4) is highest.
+def best_cell_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, Tensor]:
+    """Logits (N, K) and box (N, 4) of the cell with the highest product of score and overlap with a box (N, 4).
 
     Of all cells' logits (N, A, K) and boxes `found` (N, A, 4).
     """

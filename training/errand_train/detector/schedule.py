@@ -1,4 +1,4 @@
-"""What a training is given: how long, how fast, and on what canvases at what time. Needs no torch."""
+"""Options and schedule of a training: length, learning rate and canvases over time. Needs no torch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PICTURES: Final = CanvasOptions(640, 480, mosaic=0.0, scales=(0.8, 1.25), chang
 
 @dataclass(frozen=True)
 class Phase:
-    """From which share of the time on canvases are made in which way, and how many each process takes at once."""
+    """A phase: the share of the time at which it starts, its canvases, and its batch size per process."""
 
     begins: float
     canvas: CanvasOptions
@@ -33,13 +33,13 @@ class Phase:
 
 @dataclass(frozen=True)
 class Budget:
-    """How long to train: so many pictures, or so many seconds of training; whichever is given."""
+    """Length of a training, in pictures or in seconds."""
 
     pictures: int | None = None
     seconds: float | None = None
 
     def progress(self, pictures: int, seconds: float) -> float:
-        """The share that is done, from 0 to 1."""
+        """Completed share, from 0 to 1."""
         shares = [pictures / self.pictures] if self.pictures else []
         shares += [seconds / self.seconds] if self.seconds else []
         return min(1.0, max(shares, default=1.0))
@@ -47,7 +47,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Schedule:
-    """A warm-up of so many steps, then half a cosine from the highest rate to the last.
+    """Learning rates and phases: a warm-up, then half a cosine from the highest rate to the last.
 
     Crops that hold little but an object come first, since they show most objects in the same time; then wider windows;
     whole pictures, as the detector will see them, last. What goes on from trained weights needs no crops:
@@ -63,26 +63,26 @@ class Schedule:
 
     @staticmethod
     def refining(highest_rate: float = REFINING_RATE) -> Schedule:
-        """For weights that have been trained already: the larger windows, then whole pictures.
+        """Schedule for trained weights: the larger windows, then whole pictures.
 
         In seven minutes at a rate of 2e-3 a quarter of the mean average precision was lost; at 8e-4 little of it.
         """
         return Schedule(highest_rate, phases=(Phase(0.0, _LARGER, 8), Phase(0.6, _PICTURES, 4)))
 
     def rate(self, step: int, progress: float) -> float:
-        """The learning rate of a step."""
+        """Learning rate of a step."""
         cosine = 0.5 + 0.5 * math.cos(math.pi * min(progress, 1.0))
         rate = self.highest_rate * (self.last_share + (1.0 - self.last_share) * cosine)
         return rate * min(1.0, (step + 1) / max(self.warm_up_steps, 1))
 
     def phase(self, progress: float) -> Phase:
-        """The phase at some share of the time."""
+        """Phase at a share of the time."""
         return [phase for phase in self.phases if phase.begins <= progress][-1]
 
 
 @dataclass(frozen=True)
 class TrainOptions:
-    """What to train on, where to write, and how long.
+    """Options of a training: data, output folder and length.
 
     `start` names a checkpoint or a detector's ONNX file of which the weights are taken over. With `resume`, training
     goes on where `out` stands.
@@ -100,7 +100,7 @@ class TrainOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class RefineOptions(TrainOptions):
-    """The same for the refinement network behind the proposal network's file `model`, or the `classifier` network.
+    """Options of the refinement network after the proposal network of the file `model`, or of the `classifier` network.
 
     `start` names a checkpoint of such a training, or such a network's ONNX file, of which the weights are taken over.
     """
@@ -112,7 +112,7 @@ class RefineOptions(TrainOptions):
 
 @dataclass(frozen=True)
 class Report:
-    """How far training has come; `figures` of the held-out pictures when they were just taken."""
+    """Progress of a training, with the `figures` on held-out pictures after a validation."""
 
     progress: float
     steps: int
@@ -121,8 +121,8 @@ class Report:
     figures: dict[str, float] | None = None
 
 
-def shuffled(seed: int, first: int, count: int, of: int) -> NDArray[np.int64]:
-    """The numbers `first` to `first + count` of an endless sequence in which every round holds each of `of` once."""
+def shuffled_numbers(seed: int, first: int, count: int, of: int) -> NDArray[np.int64]:
+    """Numbers `first` to `first + count` of an endless shuffled sequence whose rounds hold each of `of` once."""
     numbers = np.arange(first, first + count)
     rounds = {int(k): np.random.default_rng([seed, int(k)]).permutation(of) for k in np.unique(numbers // of)}
     return np.array([rounds[int(n // of)][n % of] for n in numbers], dtype=np.int64)

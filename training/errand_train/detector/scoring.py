@@ -1,4 +1,4 @@
-"""How good a detector is: figures of labels and detections.
+"""Evaluation of a detector: figures of labels and detections.
 
 Average precision as COCO computes it, precision and recall at a score, false detections in pictures that hold nothing,
 and recall by size, distance and visibility.
@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from errand_train.detector.matching import Evaluation, evaluated
+from errand_train.detector.matching import Evaluation, evaluate
 from errand_train.detector.scoring_labels import Label, LabelledPicture, long_side_px
 from skills.detection import Detection
 
@@ -21,7 +21,7 @@ SURE_SCORE: Final = 0.5
 HAND: Final = "hand"
 BODY: Final = "body"
 BODY_CLASSES: Final = ("person",)
-"""What the body cameras are looked through for."""
+"""Classes that the body cameras detect."""
 SIZE_EDGES_PX: Final = (0.0, 12.0, 24.0, 48.0, 96.0, 192.0, np.inf)
 DISTANCE_EDGES_M: Final = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, np.inf)
 VISIBILITY_EDGES: Final = (0.0, 0.25, 0.4, 0.6, 0.8, 0.95, np.inf)
@@ -31,7 +31,7 @@ Found = tuple[Detection, ...]
 
 @dataclass(frozen=True)
 class ClassScore:
-    """Figures of one class; None where nothing counts, or precision where nothing was found."""
+    """Figures of one class; None where no label counts, and for precision without detections."""
 
     name: str
     labels: int
@@ -43,7 +43,7 @@ class ClassScore:
 
 @dataclass(frozen=True)
 class Bin:
-    """How many labels lie between two limits (low <= value < high), and the share of them that is found."""
+    """Number of labels between two limits (low <= value < high), and their recall."""
 
     low: float
     high: float
@@ -53,7 +53,7 @@ class Bin:
 
 @dataclass(frozen=True)
 class Score:
-    """All figures. Precision and recall are of all classes' detections together, at SURE_SCORE and overlap 0.5.
+    """All figures. Precision and recall are over the detections of all classes, at SURE_SCORE and overlap 0.5.
 
     Only labels of at least 24 x 8 pixels of which 40 % are seen count; the rest is passed over, as are detections
     below that size that are on nothing. Bins are of all labels that the file does not mark to be ignored: by size and
@@ -74,10 +74,10 @@ class Score:
 
 
 def score(pictures: Sequence[LabelledPicture], found: Sequence[Found], class_names: Sequence[str]) -> Score:
-    """Judges what was found in each picture. Raises ValueError when there are not as many of one as of the other."""
+    """Evaluates the detections of each picture. Raises ValueError unless both sequences have the same length."""
     if len(pictures) != len(found):
         raise ValueError(f"there are {len(pictures)} pictures, and detections for {len(found)}")
-    evaluation = evaluated(pictures, found, class_names)
+    evaluation = evaluate(pictures, found, class_names)
     counts = {name: _counts(evaluation, name) for name in class_names}
     classes = tuple(_class_score(evaluation, name, counts[name]) for name in class_names)
     together = sum(counts.values(), start=_Counts(0, 0, 0))
@@ -102,7 +102,7 @@ def score(pictures: Sequence[LabelledPicture], found: Sequence[Found], class_nam
 def by_camera(
     pictures: Sequence[LabelledPicture], found: Sequence[Found]
 ) -> dict[str, tuple[list[LabelledPicture], list[Found]]]:
-    """Pictures and detections as the robot uses them: all classes on the hand camera, people on the body cameras.
+    """Splits pictures and detections as the robot uses them: all classes by the hand camera, people by the others.
 
     Without an entry for a camera of which no picture tells.
     """
@@ -122,7 +122,7 @@ def by_camera(
 
 @dataclass(frozen=True)
 class Judged:
-    """What is right and wrong in a picture of the detections from SURE_SCORE on, and which labels are missed.
+    """Right and wrong detections of a picture from SURE_SCORE on, and missed labels.
 
     What is passed over is in neither.
     """
@@ -132,10 +132,10 @@ class Judged:
     missed: tuple[Label, ...]
 
 
-def judged(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> Judged:
-    """Sorts a picture's detections and labels."""
+def judge_picture(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> Judged:
+    """Sorts the detections and labels of a picture into right, wrong and missed."""
     sure = tuple(one for one in found if one.score >= SURE_SCORE)
-    evaluation = evaluated([picture], [sure], class_names)
+    evaluation = evaluate([picture], [sure], class_names)
     matches = [one for name in class_names for one in evaluation.matches(name)]
     on = {one.label for one in matches}
     missed = [label for k, label in enumerate(evaluation.labels) if label.counts and k not in on]
@@ -147,11 +147,11 @@ def judged(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -
 
 
 def picture_errors(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> float:
-    """How wrong a detector is in one picture: scores of what is not there, and 1 - score for what was to be found.
+    """Error in one picture: scores of wrong detections, and 1 - score of each label.
 
     A label on which there is nothing adds 1.
     """
-    evaluation = evaluated([picture], [found], class_names)
+    evaluation = evaluate([picture], [found], class_names)
     matches = [one for name in class_names for one in evaluation.matches(name) if not one.passed]
     right = sum(one.detection.score for one in matches if one.label is not None)
     wrong = sum(one.detection.score for one in matches if one.label is None)
@@ -160,7 +160,7 @@ def picture_errors(picture: LabelledPicture, found: Found, class_names: Sequence
 
 @dataclass(frozen=True)
 class _Counts:
-    """Right and wrong detections from SURE_SCORE on, and how many labels count."""
+    """Numbers of right and wrong detections from SURE_SCORE on, and of labels that count."""
 
     right: int
     wrong: int
@@ -200,9 +200,9 @@ def _class_score(evaluation: Evaluation, name: str, counts: _Counts) -> ClassSco
 def _labels_found(
     pictures: Sequence[LabelledPicture], found: Sequence[Found], class_names: Sequence[str]
 ) -> list[tuple[Label, bool]]:
-    """Every label that the file asks for, of any size and visibility, and whether it is found at SURE_SCORE."""
+    """Yields every label to find, of any size and visibility, and whether it is found at SURE_SCORE."""
     sure = [tuple(one for one in ones if one.score >= SURE_SCORE) for ones in found]
-    evaluation = evaluated(pictures, sure, class_names, lambda label: label.judged)
+    evaluation = evaluate(pictures, sure, class_names, lambda label: label.judged)
     on = {one.label for name in class_names for one in evaluation.matches(name)}
     return [(label, k in on) for k, label in enumerate(evaluation.labels) if label.judged]
 

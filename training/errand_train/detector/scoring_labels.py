@@ -1,4 +1,4 @@
-"""What pictures are known to hold, as a detector is judged by it, and which of it counts."""
+"""Labels for the evaluation of a detector, and rules for which of them count."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Label:
 
     @property
     def judged(self) -> bool:
-        """Returns whether the file asks for it at all."""
+        """Returns whether a detector should find the label."""
         return not (self.crowd or self.ignore)
 
     @property
@@ -44,20 +44,20 @@ class Label:
 
     @property
     def seen_enough(self) -> bool:
-        """Returns whether at least 40 % of it are seen; taken for granted where unknown."""
+        """Returns whether at least 40 % of the object are visible; assumed where unknown."""
         return self.visibility is None or self.visibility >= LEAST_VISIBILITY
 
     @property
     def counts(self) -> bool:
-        """Returns whether it counts in the main figures."""
+        """Returns whether the label counts in the main figures."""
         return self.judged and self.large_enough and self.seen_enough
 
 
 @dataclass(frozen=True)
 class LabelledPicture:
-    """A picture's file, as named by its data set, all that is known to be in it, and its width and height if known.
+    """A picture's file name in its data set, its labels, and its width and height if known.
 
-    `camera` is the name of its camera, and `is_upside_down` whether that hung upside down, where the data set tells.
+    `camera` is the name of its camera, and `is_upside_down` whether it hung upside down, if the data set says so.
     `crowded` ones are of scenes with more objects than usual.
     """
 
@@ -70,22 +70,22 @@ class LabelledPicture:
 
     @property
     def only_distractors(self) -> bool:
-        """Returns whether it holds nothing of any class, not even something to ignore."""
+        """Returns whether the picture has no label at all, ignored ones included."""
         return not self.labels
 
 
 def long_side_px(box: Box) -> float:
-    """The longer side of a box (u0, v0, u1, v1)."""
+    """Longer side of a box (u0, v0, u1, v1)."""
     return max(box[2] - box[0], box[3] - box[1])
 
 
 def large_enough(box: Box) -> bool:
-    """Returns whether a box is of a size that counts."""
+    """Returns whether a box is large enough to count."""
     return long_side_px(box) >= LEAST_LONG_PX and min(box[2] - box[0], box[3] - box[1]) >= LEAST_SHORT_PX
 
 
 def pictures_of_coco(document: object, class_names: Sequence[str]) -> tuple[LabelledPicture, ...]:
-    """The pictures of a COCO file in the order of their ids, with the labels of the named classes.
+    """Reads the pictures of a COCO file in the order of their ids, with the labels of the named classes.
 
     Categories go by their names, in any case of letters; their ids may be any. Labels of other categories are left
     out. Raises ValueError, naming the entry.

@@ -29,12 +29,12 @@ class PictureStore:
     half: Picture
 
     def scales(self, index: int) -> Scales:
-        """The picture of a number."""
+        """Letterbox and half of a picture, by its number."""
         return Scales(self.full[index], self.half[index])
 
 
 def read_picture(file: Path) -> Picture:
-    """A picture (H, W, 3) of a data set, RGB. Raises TrainingDataError."""
+    """Reads a picture (H, W, 3) of a data set, RGB. Raises TrainingDataError."""
     found = cv2.imread(str(file), cv2.IMREAD_COLOR_RGB)
     if found is None:
         raise TrainingDataError(f"{file}: is no picture, or damaged", hint="render the data set again")
@@ -42,14 +42,14 @@ def read_picture(file: Path) -> Picture:
 
 
 def read_scales(file: Path) -> Scales:
-    """A picture's letterbox, RGB, and its half. Raises TrainingDataError."""
+    """Reads the letterbox of a picture, RGB, and its half. Raises TrainingDataError."""
     filled = np.empty((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
     fill_letterbox(read_picture(file), filled)
     return Scales(filled, halve(filled))
 
 
 def open_store(folder: Path, pictures: Sequence[TrainingPicture]) -> PictureStore:
-    """The store of these pictures in a folder, filled first where it holds none or others. Raises TrainingDataError."""
+    """Opens the store of pictures in a folder; fills it if it holds other pictures. Raises TrainingDataError."""
     folder.mkdir(parents=True, exist_ok=True)
     digest = hashlib.sha256("\n".join(str(picture.file) for picture in pictures).encode()).hexdigest()
     done = folder / _DONE

@@ -25,7 +25,7 @@ SETTLED_BY: Final = 24
 
 
 def train(options: TrainOptions, report: Callable[[Report], None]) -> Path:
-    """Train, and return the ONNX file. Raises TrainingDataError."""
+    """Trains the proposal network; returns its ONNX file. Raises TrainingDataError."""
     options.out.mkdir(parents=True, exist_ok=True)
     pictures, names = read_split(options.data, "train"), category_names(options.data)
     exam = examination(options.data, "val", names, options.examined)
@@ -46,7 +46,7 @@ def train(options: TrainOptions, report: Callable[[Report], None]) -> Path:
 
 
 def device() -> torch.device:
-    """What to train on."""
+    """Device of the training."""
     return torch.device("cuda" if torch.cuda.is_available() else "cpu")
 
 
@@ -61,7 +61,7 @@ def run_loop(
     belongs: Mapping[str, str] | None = None,
     networks: int = 1,
 ) -> Path:
-    """Trains until the time is over; return the ONNX `file` of the averaged network, the last of so many `networks`.
+    """Trains until the time is over; returns the ONNX `file` of the averaged network, the last of `networks`.
 
     `belongs` tells of the network before it. At the end scores are calibrated by pictures of the training split.
     """

@@ -1,4 +1,4 @@
-"""How good a network's file is, by the same detector and figures that will judge it later."""
+"""Validation of a network's file by the detector and the figures of the evaluation."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from skills.perception.detector.onnx_detector import DetectorOptions, OnnxDetect
 
 LEAST_SCORE = 0.02
 CALIBRATED_BY: Final = 3600
-"""By how many pictures the shifts of scores are found."""
+"""Number of pictures that calibrate the scores."""
 
 
 @dataclass(frozen=True)
 class Examination:
-    """Pictures of a data set that are not trained on, their labels, and the classes."""
+    """Held-out pictures of a data set, their labels, and the classes."""
 
     folder: Path
     pictures: Sequence[LabelledPicture]
@@ -32,7 +32,7 @@ class Examination:
 
 
 def examination(folder: Path, split: str, class_names: Sequence[str], most: int | None = None) -> Examination:
-    """The pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError.
+    """Reads the pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError.
 
     Those of crowded scenes are left out, since in them more of what is seen is an object than elsewhere.
     """
@@ -47,12 +47,12 @@ def examination(folder: Path, split: str, class_names: Sequence[str], most: int 
 
 
 def examine(model: Path, exam: Examination, *, networks: int) -> Score:
-    """The figures of an ONNX file, and of those beside it, up to so many `networks`."""
+    """Evaluates an ONNX file, and those beside it, up to so many `networks`."""
     return score(exam.pictures, _found(model, exam, networks), exam.class_names)
 
 
 def offsets_by(model: Path, exam: Examination, *, networks: int) -> tuple[float, ...]:
-    """What to add to the logits of each class, by the pictures of an examination."""
+    """Offsets of each class's logits that the pictures of an examination calibrate."""
     return score_offsets(exam.pictures, _found(model, exam, networks), exam.class_names)
 
 

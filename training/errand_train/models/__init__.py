@@ -1,1 +1,1 @@
-"""Makes the object models that come with Errand: `python -m errand_train.models`."""
+"""Generator of the object models that come with Errand: `python -m errand_train.models`."""

@@ -58,7 +58,7 @@ def _can_label() -> FloatArray:
 
 
 def _lettering(text: str, corner: tuple[int, int], font: int, thick: int) -> NDArray[np.bool_]:
-    """Which pixels of a label a word covers."""
+    """Mask of the pixels of a label that a word covers."""
     canvas = np.zeros(LABEL_SHAPE, np.uint8)
     cv2.putText(canvas, text, corner, font, 1.7, 255, thick, cv2.LINE_AA)
     return np.asarray(canvas > 127)
@@ -139,7 +139,7 @@ def hammer_appearance() -> Appearance:
 
 
 def _handle_parts(half: float, head_x: float) -> dict[str, tuple[tuple[float, float], tuple[float, float]]]:
-    """Material -> (x, half width) at both ends."""
+    """Returns (x, half width) at both ends by material."""
     return {"grip": ((-half, 0.015), (-half + 0.02, 0.015)), "ash": ((-half + 0.02, 0.0148), (head_x, 0.0115))}
 
 

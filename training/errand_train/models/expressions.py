@@ -36,7 +36,7 @@ _FUNCTIONS: Final[Mapping[str, Callable[..., float]]] = {
 
 
 def evaluate(value: Number, names: Mapping[str, float], rng: np.random.Generator) -> float:
-    """The value of a number or an expression. Raises ValueError for what is no arithmetic over the known names."""
+    """Evaluates a number or an expression. Raises ValueError for anything but arithmetic over the known names."""
     return float(value) if isinstance(value, int | float) else _value(_parsed(value), names, rng)
 
 

@@ -1,4 +1,4 @@
-"""The glTF form of a mesh: one primitive for each material, buffers inside the file, pictures beside it."""
+"""Writer of glTF: one primitive for each material, buffers inside the file, pictures beside it."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _Z_UP_TO_Y_UP = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1]
 
 
 def gltf_text(mesh: Mesh) -> str:
-    """The mesh as a glTF 2.0 file with its z axis up once a reader has turned glTF's y axis up."""
+    """Writes a mesh as a glTF 2.0 text; its z axis is up after a reader has rotated glTF's y axis up."""
     file = _File()
     primitives = [file.primitive(mesh.materials[name], *arrays) for name, *arrays in mesh.groups()]
     return json.dumps(file.document(primitives), separators=(",", ":"))
 
 
 class _File:
-    """Gathers buffers, materials and pictures."""
+    """Builder of buffers, materials and pictures."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
@@ -37,7 +37,7 @@ class _File:
         self._images: list[str] = []
 
     def primitive(self, material: Material, points: FloatArray, normals: FloatArray, uvs: FloatArray) -> dict[str, Any]:
-        """Triangles of one material: points and normals (N, 3), texture coordinates (N, 2), three rows a triangle."""
+        """Adds triangles of one material: points and normals (N, 3), texture coordinates (N, 2), three rows each."""
         flipped = np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]])
         rows = np.round(np.column_stack([points, normals, flipped]), 5).astype(np.float32)
         unique, order = np.unique(rows, axis=0, return_inverse=True)
@@ -76,7 +76,7 @@ class _File:
         return len(self._materials) - 1
 
     def document(self, primitives: list[dict[str, Any]]) -> dict[str, Any]:
-        """The whole glTF document of some primitives, with all bytes in it."""
+        """Builds the whole glTF document of some primitives, with all bytes in it."""
         data = base64.b64encode(bytes(self._bytes)).decode("ascii")
         uri = f"data:application/octet-stream;base64,{data}"
         document: dict[str, Any] = {

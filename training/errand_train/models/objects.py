@@ -1,4 +1,4 @@
-"""The loose things: a can, a bottle, a hammer and a cube. The origin of each is the centre of its bounding box.
+"""The loose objects: a can, a bottle, a hammer and a cube. The origin of each is the centre of its bounding box.
 
 A primitive that lies on a box has a single contact point in point contact and would wobble. So each thing carries
 small spheres at its rim or corners, which stand out by `PROUD_M` and bear it.
@@ -23,14 +23,14 @@ HEAD_WIDTH_M, HEAD_LENGTH_M = 0.032, 0.12
 
 
 def coke() -> Model:
-    """A 0.33 l can."""
+    """Makes a 0.33 l can."""
     bodies = [Cylinder(radius=CAN_RADIUS_M, length=CAN_HEIGHT_M - 2 * PROUD_M)]
     rims = [*_rim(0.029, -CAN_HEIGHT_M / 2), *_rim(0.028, CAN_HEIGHT_M / 2)]
     return Model("coke", "coke.obj", [*bodies, *rims], join_masses([shape_mass(bodies[0], 0.35)]), comment="a red can")
 
 
 def beer() -> Model:
-    """A glass bottle of beer: body, sloping shoulder and neck."""
+    """Makes a glass bottle of beer: body, sloping shoulder and neck."""
     bottom, top = -BOTTLE_HEIGHT_M / 2, BOTTLE_HEIGHT_M / 2
     neck_from = bottom + BOTTLE_BODY_M
     body = Cylinder(radius=BOTTLE_RADIUS_M, length=BOTTLE_BODY_M - PROUD_M, p=(0, 0, bottom + BOTTLE_BODY_M / 2))
@@ -41,14 +41,14 @@ def beer() -> Model:
 
 
 def cube() -> Model:
-    """A wooden cube, painted blue."""
+    """Makes a wooden cube, painted blue."""
     box = Box(size=(CUBE_M - 2 * PROUD_M,) * 3)
     corners = _corners((0, 0, 0), (CUBE_M, CUBE_M, CUBE_M))
     return Model("cube", "cube.obj", [box, *corners], join_masses([shape_mass(box, 0.12)]), comment="a blue cube")
 
 
 def hammer() -> Model:
-    """A claw hammer that lies flat: handle along x, head at its +x end, face towards +y, claw towards -y."""
+    """Makes a claw hammer that lies flat: handle along x, head at its +x end, face towards +y, claw towards -y."""
     half, thick = HAMMER_LENGTH_M / 2, HAMMER_THICKNESS_M - 2 * PROUD_M
     head_x = half - HEAD_WIDTH_M / 2
     handle_length = HAMMER_LENGTH_M - HEAD_WIDTH_M

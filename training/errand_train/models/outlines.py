@@ -20,7 +20,7 @@ def area(outline: ArrayLike) -> float:
 
 
 def inset(outline: FloatArray, distance: float) -> FloatArray:
-    """The counter-clockwise outline moved inward at every corner; corners turn into no new ones."""
+    """Moves a counter-clockwise outline inward at every corner, without new corners."""
     if distance == 0:
         return outline
     ahead, behind = np.roll(outline, -1, axis=0) - outline, outline - np.roll(outline, 1, axis=0)
@@ -32,7 +32,7 @@ def inset(outline: FloatArray, distance: float) -> FloatArray:
 
 
 def triangles_of(outline: ArrayLike) -> list[Triangle]:
-    """Triangles (corner indices, counter-clockwise) that fill a simple counter-clockwise outline, by cutting ears."""
+    """Triangulates a simple counter-clockwise outline by ear clipping: corner indices, counter-clockwise."""
     p = np.asarray(outline, dtype=float)
     left, found = list(range(len(p))), list[Triangle]()
     while len(left) > 3:
@@ -62,7 +62,7 @@ def _is_ear(p: FloatArray, left: Sequence[int], k: int) -> bool:
 
 
 def curve(points: Sequence[tuple[float, ...]], steps: int = 6) -> FloatArray:
-    """A smooth line (Catmull and Rom 1974) through points of any dimension, `steps` between each two."""
+    """Interpolates points of any dimension by a smooth line (Catmull and Rom 1974), with `steps` between each two."""
     p = np.asarray(points, dtype=float)
     padded = np.concatenate([2 * p[:1] - p[1:2], p, 2 * p[-1:] - p[-2:-1]])
     t = np.linspace(0, 1, steps, endpoint=False)[:, None]

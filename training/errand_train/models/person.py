@@ -1,4 +1,4 @@
-"""A standing person of about 1.75 m. The origin lies on the floor between the feet; the person looks along x."""
+"""A standing person of about 1.75 m. The origin lies on the floor between the feet; the person faces x."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ Colour = tuple[float, float, float]
 
 
 def noise(rng: np.random.Generator, shape: tuple[int, int], sigma: tuple[float, float]) -> FloatArray:
-    """Smooth periodic noise of zero mean and unit deviation, (H, W).
+    """Draws smooth periodic noise of zero mean and unit deviation, (H, W).
 
     `sigma` is the blur along rows and columns in pixels.
     """
@@ -21,35 +21,35 @@ def noise(rng: np.random.Generator, shape: tuple[int, int], sigma: tuple[float, 
     return np.asarray(field / (field.std() + 1e-12))
 
 
-def shaded(colour: Colour, brightness: FloatArray) -> FloatArray:
-    """A colour (0..1) times a brightness picture: (H, W, 3)."""
+def shade(colour: Colour, brightness: FloatArray) -> FloatArray:
+    """Multiplies a colour (0..1) by a brightness picture: (H, W, 3)."""
     return np.asarray(np.array(colour) * brightness[..., None])
 
 
 def to_picture(values: FloatArray, levels: int = 64) -> Picture:
-    """RGB values in 0..1 as uint8, in few levels so that the file stays small."""
+    """Converts RGB values in 0..1 to uint8, in few levels so that the file stays small."""
     steps = np.round(np.clip(values, 0, 1) * (levels - 1)) / (levels - 1)
     return np.asarray(np.round(steps * 255), dtype=np.uint8)
 
 
 def wood(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, contrast: float = 0.10) -> FloatArray:
-    """Wood whose grain runs along the columns' direction (horizontally): values (H, W, 3)."""
+    """Draws wood whose grain runs along the columns' direction (horizontally): values (H, W, 3)."""
     rings = noise(rng, shape, (5, 90))
     lines = np.sin(rings * 7 + noise(rng, shape, (12, 160)) * 2)
     fibres = noise(rng, shape, (0.7, 14))
     brightness = 1 + contrast * (0.5 * lines + 0.35 * fibres + 0.2 * noise(rng, shape, (40, 120)))
-    return shaded(colour, brightness)
+    return shade(colour, brightness)
 
 
 def cloth(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, contrast: float = 0.08) -> FloatArray:
-    """Woven cloth: values (H, W, 3)."""
+    """Draws woven cloth: values (H, W, 3)."""
     rows, columns = np.indices(shape)
     weave = np.sin(rows * np.pi / 2) * np.sin(columns * np.pi / 2)
     brightness = 1 + contrast * (0.5 * weave + 0.5 * noise(rng, shape, (0.8, 0.8)) + 0.2 * noise(rng, shape, (20, 20)))
-    return shaded(colour, brightness)
+    return shade(colour, brightness)
 
 
 def speckle(rng: np.random.Generator, shape: tuple[int, int], colour: Colour, contrast: float = 0.05) -> FloatArray:
-    """Stone, plaster or concrete: values (H, W, 3)."""
+    """Draws stone, plaster or concrete: values (H, W, 3)."""
     brightness = 1 + contrast * (0.5 * noise(rng, shape, (1, 1)) + 0.5 * noise(rng, shape, (25, 25)))
-    return shaded(colour, brightness)
+    return shade(colour, brightness)

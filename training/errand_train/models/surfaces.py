@@ -67,7 +67,7 @@ def _areas(points: FloatArray) -> FloatArray:
 def add_tube(
     mesh: Mesh, material: str, path: ArrayLike, radii: Radii, *, sides: int = 12, caps: bool = True, up: ArrayLike = ()
 ) -> None:
-    """Add a round tube along a path (K, 3); `radii` (K) or (K, 2) for an oval whose first half axis lies along `up`."""
+    """Adds a round tube along a path (K, 3); `radii` (K), or (K, 2) for an oval with its first half axis along `up`."""
     line = np.asarray(path, dtype=float)
     wide = np.broadcast_to(np.asarray(radii, dtype=float).reshape(-1, (np.ndim(radii) == 2 and 2) or 1), (len(line), 2))
     first, second = _frames(line, np.asarray(up, dtype=float))
@@ -84,7 +84,7 @@ def add_tube(
 
 
 def _frames(line: FloatArray, up: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two directions square to each point of a path, carried along it without twist; first x second is the path's."""
+    """Two normals at each point of a path, parallel-transported along it; first x second is the tangent."""
     tangent = np.gradient(line, axis=0)
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     seed = up if up.size else np.eye(3)[int(np.argmin(np.abs(tangent[0])))]
@@ -113,7 +113,7 @@ def add_fan(mesh: Mesh, material: str, ring: ArrayLike) -> None:
 def add_ellipsoid(
     mesh: Mesh, material: str, centre: ArrayLike, radii: ArrayLike, R: ArrayLike | None = None, *, sides: int = 20
 ) -> None:
-    """Adds an ellipsoid with half axes `radii`, turned by R."""
+    """Adds an ellipsoid with half axes `radii`, rotated by R."""
     height, angle = np.linspace(-np.pi / 2, np.pi / 2, sides // 2 + 3), np.linspace(0, 2 * np.pi, sides + 1)
     part = Mesh(mesh.materials)
     across, up = np.meshgrid(np.cos(height), angle, indexing="ij")
@@ -155,7 +155,7 @@ def add_extruded(
     top: str | None = None,
     sharp_rad: float = 0.7,
 ) -> None:
-    """Extrude a simple outline (N, 2) of any form from z0 to z1, with rounded edges when `bevel` is given.
+    """Extrudes a simple outline (N, 2) of any form from z0 to z1, with rounded edges when `bevel` is given.
 
     Faces meet in an edge where the outline turns by more than `sharp_rad`; the rest is smooth.
     """
@@ -200,6 +200,6 @@ def _add_face(mesh: Mesh, material: str, ring: FloatArray, faces: NDArray[np.int
 def add_ring(
     mesh: Mesh, material: str, inner_m: float, outer_m: float, z0: float, z1: float, *, centre: ArrayLike = (0, 0, 0)
 ) -> None:
-    """A flat ring about the vertical: a tyre, a ring spanner's end, a roll of tape."""
+    """Adds a flat ring about the vertical: a tyre, a ring spanner's end, a roll of tape."""
     profile: Sequence[tuple[float, float]] = [(inner_m, z0), (outer_m, z0), (outer_m, z1), (inner_m, z1), (inner_m, z0)]
     mesh.add_lathe(material, profile, centre=centre, sides=28)

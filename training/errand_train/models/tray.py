@@ -1,4 +1,4 @@
-"""The tray on which a person receives what is handed over. Its origin is the middle of the plate's upper side.
+"""The tray on which a person receives an object. Its origin is the middle of the plate's upper side.
 
 The plate lies level, its handle is along -x. Its mass is that of the tray with the arms that bear it, which hardly give
 way to what is laid on it. Its collision shape reaches deeper than the plate that is seen: a thin one would let through

@@ -1,1 +1,1 @@
-"""Trains the adapter with which the recogniser hears in noise."""
+"""Training of the adapter with which the recogniser understands speech in noise."""

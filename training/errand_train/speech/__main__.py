@@ -1,4 +1,4 @@
-"""`python -m errand_train.speech`: teaches the recogniser to hear in noise, and writes what it learned."""
+"""`python -m errand_train.speech`: trains the recogniser for noise, and writes the adapter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _BAD_INPUT = 2
 
 
 def main() -> int:
-    """Train as the arguments say; 2 when something is missing."""
+    """Trains as the arguments say; returns 2 when a library or file is missing."""
     args = _arguments()
     try:
         check_libraries(("torch",))

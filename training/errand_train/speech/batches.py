@@ -1,4 +1,4 @@
-"""Training sentences as the network takes them: features, what was told before, and the tokens of the text."""
+"""Batches of training sentences: features, prompts, and the tokens of the text."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from errand_train.speech.data import SpokenSentence
-from errand_train.speech.noises import Conditions, Draw, heard_in
+from errand_train.speech.noises import Conditions, Draw, hear
 from executive.speech.whisper import start_tokens
 
 __all__ = ["Batch", "Batches"]
@@ -28,8 +28,8 @@ Features = np.ndarray[Any, np.dtype[np.float32]]
 
 @dataclass(frozen=True)
 class Batch:
-    """Several sentences: features as heard and as said (batch, 80, frames), the prompts and their lengths, the tokens
-    that go in and those that should come out (batch, tokens; -100 behind the end)."""
+    """Several sentences: features noisy and clean (batch, 80, frames), the prompts and their lengths, the input tokens
+    and the target tokens (batch, tokens; -100 behind the end)."""
 
     heard: Tensor
     said: Tensor
@@ -48,7 +48,7 @@ class _Sample:
 
 
 class Batches:
-    """Draws batches of `size`; `features` is the recogniser's own extractor and `tokens` its tokenizer."""
+    """Source of batches of `size`; `features` is the recogniser's own extractor and `tokens` its tokenizer."""
 
     def __init__(
         self, sentences: Sequence[SpokenSentence], features: Callable[..., Any], tokens: Any, size: int
@@ -56,23 +56,23 @@ class Batches:
         self._sentences, self._features, self._tokens, self._size = sentences, features, tokens, size
 
     def training(self, conditions: Conditions, draw: Draw) -> Iterator[Batch]:
-        """Batches without end, each sentence heard in new conditions each time; alike in length within a batch."""
+        """Yields batches without end, each of sentences of similar length, with new conditions for each sentence."""
         while True:
             order = list(draw.permutation(len(self._sentences)))
             while len(order) >= min(_POOL, len(self._sentences)) and order:
                 pool = [self._sentences[order.pop()] for _ in range(min(_POOL, len(order)))]
                 for some in self._alike(pool, draw):
-                    yield self.heard(some, conditions, draw, silence_s=draw.uniform(*_SILENCE_S))
+                    yield self.batch(some, conditions, draw, silence_s=draw.uniform(*_SILENCE_S))
 
     def validation(self, conditions: Conditions, *, seed: int, silence_s: float) -> Iterator[Batch]:
-        """All sentences once, heard in the same conditions each time."""
+        """Yields all sentences once, in equal conditions each time."""
         draw = np.random.default_rng(seed)
         ordered = sorted(self._sentences, key=lambda one: len(one.samples))
         for first in range(0, len(ordered), self._size):
-            yield self.heard(ordered[first : first + self._size], conditions, draw, silence_s=silence_s)
+            yield self.batch(ordered[first : first + self._size], conditions, draw, silence_s=silence_s)
 
-    def heard(self, some: Sequence[SpokenSentence], conditions: Conditions, draw: Draw, *, silence_s: float) -> Batch:
-        """Those sentences as a batch, with so much silence behind the longest."""
+    def batch(self, some: Sequence[SpokenSentence], conditions: Conditions, draw: Draw, *, silence_s: float) -> Batch:
+        """Makes a batch of sentences, with silence after the longest."""
         chosen = draw.integers(len(self._sentences), size=_TALKERS)
         talkers = [self._sentences[number].samples for number in chosen]
         return self._batch([self._sample(one, conditions, talkers, draw) for one in some], silence_s)
@@ -85,7 +85,7 @@ class Batches:
         return [batches[number] for number in draw.permutation(len(batches))]
 
     def _sample(self, one: SpokenSentence, conditions: Conditions, talkers: Sequence[Any], draw: Draw) -> _Sample:
-        both = heard_in(conditions, one.samples, talkers, draw)
+        both = hear(conditions, one.samples, talkers, draw)
         text = [*self._tokens.encode(f" {one.text}"), self._tokens.eot]
         return _Sample(
             self._features(both.heard), self._features(both.said), start_tokens(self._tokens, one.prompt), text

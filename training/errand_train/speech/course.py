@@ -1,4 +1,4 @@
-"""A whole training: sentences are spoken, the network is trained on them, and the adapter is kept."""
+"""A whole training: synthesis of sentences, training of the network, and the adapter file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from errand_train.speech.batches import Batches
-from errand_train.speech.data import spoken_sentences, usual
+from errand_train.speech.data import spoken_sentences, without_long
 from errand_train.speech.learning import Lessons, learn, text_loss
 from errand_train.speech.model import AdaptedWhisper
 from errand_train.speech.noises import Conditions
@@ -32,7 +32,7 @@ _SILENCE_S: Final = 1.5
 
 @dataclass(frozen=True)
 class Course:
-    """What a training is made of.
+    """Options of a training.
 
     Attributes:
         out: the file of the adapter.
@@ -53,7 +53,7 @@ class Course:
 
 
 def train(course: Course) -> None:
-    """Train, and write the adapter.
+    """Trains the network and writes the adapter.
 
     Raises:
         InputError: a voice or an extra is missing, or the folder holds a damaged file.
@@ -64,7 +64,7 @@ def train(course: Course) -> None:
     torch.manual_seed(course.seed)
     model, small = base_weights()
     net = AdaptedWhisper(read_model_file(model.getbuffer()), _RANKS)
-    sentences = usual(spoken_sentences(course.folder, course.sentences, course.seed))
+    sentences = without_long(spoken_sentences(course.folder, course.sentences, course.seed))
     batches = _batches(sentences, small, course).training(Conditions(), np.random.default_rng(course.seed))
     kept = spoken_sentences(course.folder, _VALIDATED, course.seed, validation=True)
     validation = _batches(kept, small, course)
@@ -82,7 +82,7 @@ def _batches(sentences: Any, small: dict[str, bytes], course: Course) -> Batches
 
 
 def _validated(net: AdaptedWhisper, validation: Batches) -> str:
-    """The cross entropy per token of sentences with words that were never trained, clear and in noise of 8 to 12 dB."""
+    """Cross entropy per token of sentences with untrained words, clean and in noise of 8 to 12 dB."""
     told = {
         name: text_loss(net, validation.validation(conditions, seed=_VALIDATION_SEED, silence_s=_SILENCE_S))
         for name, conditions in (("clear", _CLEAR), ("noisy", _NOISY))

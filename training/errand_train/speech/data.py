@@ -1,4 +1,4 @@
-"""Sentences spoken by synthetic voices, made once and kept in a folder as they are needed again and again."""
+"""Sentences spoken by synthetic voices, cached in a folder."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from typing import Final
 import numpy as np
 
 from errand_train.speech.grammar import Grammar, load_grammar
-from errand_train.speech.voices import Speaker, drawn_speaker, speakers, speech
+from errand_train.speech.voices import Speaker, draw_speaker, speak, speakers
 from executive.speech.sound import RATE_HZ, Samples
 from skills.files.errors import InputError
 
-__all__ = ["SpokenSentence", "spoken_sentences", "usual"]
+__all__ = ["SpokenSentence", "spoken_sentences", "without_long"]
 
 _SHARD: Final = 500
 _MOST_LETTERS: Final = 110
@@ -29,7 +29,7 @@ _FULL_SCALE: Final = 32767.0
 
 @dataclass(frozen=True)
 class SpokenSentence:
-    """A sentence, what the recogniser is told before it, the kind of voice, and its sound at RATE_HZ."""
+    """A sentence, its prompt, the kind of voice, and its sound at RATE_HZ."""
 
     text: str
     prompt: str
@@ -38,7 +38,7 @@ class SpokenSentence:
 
 
 def spoken_sentences(folder: Path, count: int, seed: int, *, validation: bool = False) -> list[SpokenSentence]:
-    """So many sentences, from the folder as far as they are there, else spoken now and kept.
+    """Loads `count` sentences from the folder; synthesises and stores the missing ones.
 
     Raises:
         InputError: no synthetic voice is installed, or a file in the folder is damaged.
@@ -55,8 +55,8 @@ def spoken_sentences(folder: Path, count: int, seed: int, *, validation: bool = 
     return sentences
 
 
-def usual(sentences: list[SpokenSentence]) -> list[SpokenSentence]:
-    """Without most of those that are long, or have a long prompt: they cost much and teach little more."""
+def without_long(sentences: list[SpokenSentence]) -> list[SpokenSentence]:
+    """Drops most of the sentences that are long or have a long prompt: they cost much and teach little more."""
     return [
         one
         for number, one in enumerate(sentences)
@@ -73,10 +73,10 @@ def _spoken(grammar: Grammar, found: tuple[Speaker, ...], count: int, seed: str)
 def _one_spoken(grammar: Grammar, found: tuple[Speaker, ...], draw: random.Random) -> SpokenSentence:
     """The first that is neither too long nor too short."""
     while True:
-        sentence, speaker = grammar.sentence(draw), drawn_speaker(found, draw)
+        sentence, speaker = grammar.sentence(draw), draw_speaker(found, draw)
         if len(sentence.text) > _MOST_LETTERS:
             continue
-        samples = speech(speaker, sentence.text, draw)
+        samples = speak(speaker, sentence.text, draw)
         if _SHORTEST_S < len(samples) / RATE_HZ < _LONGEST_S:
             return SpokenSentence(sentence.text, sentence.vocabulary.prompt, speaker.name, samples)
 

@@ -28,26 +28,26 @@ _SAID: Final = 0.22
 _POLITE: Final = 0.4
 _TOLD_IN_PASSING: Final = 0.25
 _TOLD: Final = 0.85
-"""The share of the sentences whose names the recogniser is told before, among others."""
+"""Share of the sentences whose prompt holds their names, among others."""
 _FEWEST_OTHERS, _MOST_OTHERS = 3, 40
 
 
 @dataclass(frozen=True)
 class TrainingSentence:
-    """A sentence as the recogniser writes it, and the vocabulary that it is told before."""
+    """A sentence as the recogniser writes it, and the vocabulary of its prompt."""
 
     text: str
     vocabulary: Vocabulary
 
 
 class Grammar:
-    """Draws sentences. `words` are the words of each kind, `forms` the patterns they are put into."""
+    """Grammar of sentences. `words` are the words of each kind, `forms` the patterns for them."""
 
     def __init__(self, words: Mapping[str, Sequence[str]], forms: Mapping[str, Sequence[str]]) -> None:
         self._words, self._forms = words, forms
 
     def sentence(self, draw: random.Random) -> TrainingSentence:
-        """One sentence and what the recogniser is told before it."""
+        """Draws one sentence with its prompt."""
         names = list[str]()
         robot = draw.choice(self._words["robot"])
         if draw.random() < _SAID:
@@ -101,7 +101,7 @@ class Grammar:
 
 
 def load_grammar(*, validation: bool = False) -> Grammar:
-    """The grammar of `words.yaml` and `forms.yaml`; those for validation have other words."""
+    """Loads the grammar of `words.yaml` and `forms.yaml`; validation has other words."""
     words, forms = (read_yaml(Path(__file__).with_name(name)).data for name in _FILES)
     return Grammar({kind: tuple(_kept(words[kind], validation=validation)) for kind in _KINDS}, forms)
 

@@ -29,8 +29,8 @@ _NO_TOKEN: Final = -100
 
 @dataclass(frozen=True)
 class Lessons:
-    """How it learns: steps in all and to warm up, the highest rate (it falls as a cosine to 0), the weight of the
-    second loss, the greatest gradient, and after how many steps progress is told."""
+    """Options of the optimiser: steps in all and of the warm-up, the highest rate (it falls as a cosine to 0), the
+    weight of the second loss, the greatest gradient, and the steps between reports."""
 
     steps: int
     warm_up: int = 40
@@ -40,12 +40,12 @@ class Lessons:
     told_every: int = 10
 
     def rate_at(self, step: int) -> float:
-        """The rate of a step, from 0."""
+        """Learning rate of a step, from 0."""
         return self.rate * min((step + 1) / self.warm_up, 1.0) * (0.5 + 0.5 * math.cos(math.pi * step / self.steps))
 
 
 def learn(net: AdaptedWhisper, batches: Iterator[Batch], lessons: Lessons) -> Iterator[int]:
-    """Learns step by step; yields the number of steps so far."""
+    """Trains step by step; yields the number of steps so far."""
     learned = [part for part in net.parameters() if part.requires_grad]
     optimiser = torch.optim.AdamW(learned, weight_decay=0.0, betas=(0.9, 0.98))
     for step, batch in enumerate(islice(batches, lessons.steps)):
@@ -62,19 +62,19 @@ def learn(net: AdaptedWhisper, batches: Iterator[Batch], lessons: Lessons) -> It
 
 
 def losses(net: AdaptedWhisper, batch: Batch) -> tuple[Tensor, Tensor]:
-    """The cross entropy of the texts per token, and the squared distance from the clear sound per its variance."""
-    heard = net.encoded(batch.heard)
+    """Cross entropy of the texts per token, and squared distance from the clean encoding over its variance."""
+    heard = net.encode(batch.heard)
     with net.as_published():
-        clear = net.encoded(batch.said).float()
+        clear = net.encode(batch.said).float()
     return _text(net, heard, batch, "mean"), torch.mean((heard.float() - clear) ** 2) / clear.var()
 
 
 def text_loss(net: AdaptedWhisper, batches: Iterable[Batch]) -> float:
-    """The cross entropy of all texts per token."""
+    """Cross entropy of all texts per token."""
     total, tokens = 0.0, 0
     with torch.no_grad():
         for batch in batches:
-            total += float(_text(net, net.encoded(batch.heard), batch, "sum"))
+            total += float(_text(net, net.encode(batch.heard), batch, "sum"))
             tokens += int((batch.wanted != _NO_TOKEN).sum())
     return total / max(tokens, 1)
 

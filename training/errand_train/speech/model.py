@@ -25,7 +25,7 @@ _START_SCALE: Final = 0.02
 
 
 class AdaptedWhisper(nn.Module):
-    """The network. `ranks` gives the rank of the adapter for every matrix whose name begins with the key."""
+    """Whisper with adapters. `ranks` gives the rank of the adapter of every matrix whose name begins with the key."""
 
     def __init__(self, weights: ModelFile, ranks: Mapping[str, int], dtype: torch.dtype = torch.bfloat16) -> None:
         super().__init__()
@@ -40,8 +40,8 @@ class AdaptedWhisper(nn.Module):
         self.register_buffer("places", make.tensor("decoder/position_encodings/encodings", torch.float32))
         self.register_buffer("words", make.tensor("decoder/embeddings/weight", dtype))
 
-    def encoded(self, features: Tensor) -> Tensor:
-        """The features (batch, 80, frames) as the encoder hears them: (batch, frames / 2, 512)."""
+    def encode(self, features: Tensor) -> Tensor:
+        """Encodes features (batch, 80, frames) to (batch, frames / 2, 512)."""
         heard = features.to(self.dtype)
         for convolution in self.convolutions:
             heard = tf.gelu(convolution(heard))
@@ -52,7 +52,7 @@ class AdaptedWhisper(nn.Module):
         return self.listened(state).to(self.dtype)
 
     def states(self, heard: Tensor, prompt: Tensor, lengths: Tensor, text: Tensor) -> Tensor:
-        """What the decoder knows behind each token of a text: (batch, tokens, 512).
+        """States of the decoder after each token of a text: (batch, tokens, 512).
 
         Before it stand the first `lengths` (batch,) tokens of `prompt` (batch, most). What the prompt does to the
         decoder is taken as it is: nothing is learned through it, which halves the work.
@@ -78,13 +78,13 @@ class AdaptedWhisper(nn.Module):
         return told
 
     def logits(self, states: Tensor) -> Tensor:
-        """The score of each next token (any, 51865) from (any, 512)."""
+        """Logits of the next token (any, 51865) from states (any, 512)."""
         return tf.linear(states, self.words).float()
 
     @contextmanager
     def as_published(self) -> Iterator[None]:
-        """Without its adapters, as long as this lasts, and without learning."""
-        adapted = tuple(self.adapted())
+        """Context without adapters and without gradients."""
+        adapted = tuple(self.adapted_layers())
         for part in adapted:
             part.active = False
         try:
@@ -94,17 +94,17 @@ class AdaptedWhisper(nn.Module):
             for part in adapted:
                 part.active = True
 
-    def adapted(self) -> Iterator[AdaptedLinear]:
-        """The matrices that have an adapter."""
+    def adapted_layers(self) -> Iterator[AdaptedLinear]:
+        """Yields the matrices that have an adapter."""
         return (part for part in self.modules() if isinstance(part, AdaptedLinear) and part.rank)
 
     def adapter(self) -> Adapter:
-        """What was learned."""
-        return Adapter({part.name: part.low_rank() for part in self.adapted()})
+        """Trained weights of the adapters."""
+        return Adapter({part.name: part.low_rank() for part in self.adapted_layers()})
 
 
 class AdaptedLinear(nn.Module):
-    """One matrix that stays as it is, with an adapter beside it where `rank` is not 0."""
+    """One frozen matrix, with an adapter beside it where `rank` is not 0."""
 
     def __init__(self, name: str, weight: Tensor, bias: Tensor, rank: int) -> None:
         super().__init__()
@@ -116,14 +116,14 @@ class AdaptedLinear(nn.Module):
             self.up = nn.Parameter(torch.zeros(weight.shape[0], rank))
 
     def forward(self, x: Tensor) -> Tensor:
-        """(..., inputs) to (..., outputs)."""
+        """Computes (..., outputs) from (..., inputs)."""
         y = tf.linear(x, self.weight, self.bias)
         if not (self.rank and self.active):
             return y
         return y + tf.linear(tf.linear(x, self.down.to(x.dtype)), self.up.to(x.dtype))
 
     def low_rank(self) -> LowRank:
-        """What was learned here."""
+        """Trained weights of the adapter."""
         up, down = (part.detach().float().numpy().astype(np.float16) for part in (self.up, self.down))
         return LowRank(up, down)
 

@@ -1,4 +1,4 @@
-"""Rooms, microphones and noises, made by numbers alone, that training sentences are heard through."""
+"""Simulated rooms, microphones and noises for training sentences."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.signal import fftconvolve, resample_poly
 
 from executive.speech.sound import RATE_HZ, Samples
 
-__all__ = ["Conditions", "Heard", "heard_in"]
+__all__ = ["Conditions", "Heard", "hear"]
 
 Sound = npt.NDArray[np.float64]
 Draw = np.random.Generator
@@ -22,8 +22,8 @@ _LOUDEST, _SOFTEST = 0.95, 0.05
 
 @dataclass(frozen=True)
 class Conditions:
-    """How hard it is to hear: the shares of sentences that are clear, and heard in a room that echoes, and the range of
-    the ratio of speech to noise (dB) of the others; and how far voices are made higher or deeper (1 not at all)."""
+    """Acoustic conditions: the shares of sentences that are clean, and in a room with echo, the range of the
+    signal-to-noise ratio (dB) of the others, and the range of pitch changes (1: none)."""
 
     clear: float = 0.3
     echoing: float = 0.35
@@ -33,14 +33,14 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Heard:
-    """The same speech as it was said and as it was heard, moment by moment."""
+    """Clean and noisy samples of the same speech."""
 
     said: Samples
     heard: Samples
 
 
-def heard_in(conditions: Conditions, speech: Samples, talkers: Sequence[Samples], draw: Draw) -> Heard:
-    """The speech as heard by some microphone in some room with some noise; `talkers` may be heard in the background."""
+def hear(conditions: Conditions, speech: Samples, talkers: Sequence[Samples], draw: Draw) -> Heard:
+    """Simulates speech by a microphone in a room with noise; `talkers` may speak in the background."""
     said = _another_voice(speech.astype(np.float64), conditions.voice_change, draw)
     said = np.pad(said, (int(draw.uniform(0.05, 0.5) * RATE_HZ), int(draw.uniform(0.1, 0.6) * RATE_HZ)))
     sound = _echoed(said, draw) if draw.random() < conditions.echoing else said

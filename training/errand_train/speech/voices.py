@@ -17,7 +17,7 @@ from typing import Final
 from executive.speech.sound import Samples, concatenate, read_wav
 from skills.files.errors import InputError
 
-__all__ = ["Speaker", "drawn_speaker", "speakers", "speech"]
+__all__ = ["Speaker", "draw_speaker", "speak", "speakers"]
 
 _ACCENTS: Final = ("en-us", "en-us", "en-gb", "en-gb", "en-us-nyc", "en-gb-x-gbclan", "en-gb-x-gbcwmd")
 _VARIANTS: Final = (
@@ -28,7 +28,7 @@ _VARIANTS: Final = (
 
 @dataclass(frozen=True)
 class Speaker:
-    """A kind of voice: its program, how often it is drawn, and the arguments of one such voice (with {wav})."""
+    """A kind of voice: its program, its weight in draws, and the arguments of one such voice (with {wav})."""
 
     name: str
     program: str
@@ -37,7 +37,7 @@ class Speaker:
 
 
 def speakers(left_out: tuple[str, ...] = ()) -> tuple[Speaker, ...]:
-    """The kinds of voices of this machine, without those named.
+    """Finds the kinds of voices of this machine, without those named.
 
     Raises:
         InputError: none of the programs is installed.
@@ -49,13 +49,13 @@ def speakers(left_out: tuple[str, ...] = ()) -> tuple[Speaker, ...]:
     return found
 
 
-def drawn_speaker(found: tuple[Speaker, ...], draw: random.Random) -> Speaker:
-    """One of them, by their weights."""
+def draw_speaker(found: tuple[Speaker, ...], draw: random.Random) -> Speaker:
+    """Draws a kind of voice by weight."""
     return draw.choices(found, [one.weight for one in found])[0]
 
 
-def speech(speaker: Speaker, text: str, draw: random.Random) -> Samples:
-    """The text as spoken by a voice of that kind, at RATE_HZ."""
+def speak(speaker: Speaker, text: str, draw: random.Random) -> Samples:
+    """Synthesises a text by a voice of a kind, at RATE_HZ."""
     with tempfile.TemporaryDirectory() as folder:
         wav = Path(folder) / "spoken.wav"
         command = [speaker.program, *(part.format(wav=wav) for part in speaker.arguments(draw))]

@@ -1,4 +1,4 @@
-"""Builds the pieces of `furniture.yaml`, which describes their frame and their parts."""
+"""Builder of the pieces in `furniture.yaml`, which describes their frame and their parts."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def _pieces() -> Mapping[str, Any]:
 
 
 class Piece:
-    """A piece of furniture: visual geometry, and the primitive shapes that are solid about it."""
+    """A piece of furniture: visual geometry and primitive collision shapes."""
 
     def __init__(self, name: str, materials: Mapping[str, Material], **values: float | str) -> None:
-        """Builds the piece with these parameters. Raises KeyError, ValueError for those that do not fit."""
+        """Builds a piece by its parameters. Raises KeyError, ValueError for wrong parameters."""
         self.mesh, self.collisions = Mesh(materials), list[Shape]()
         defaults: Mapping[str, Any] = _pieces()[name].get("let", {})
         self._rng = np.random.default_rng(int({**defaults, **values}.get("seed", 0)))

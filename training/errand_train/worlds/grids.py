@@ -12,12 +12,12 @@ from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Bools, Grid
 from skills.robot import FloatArray
 
 DRAWN = frozenset({"low_scan"})
-"""Grids that are drawn for the robots, too, where they have mapped the others themselves."""
+"""Grids that the robots get as well, where they have mapped the others themselves."""
 
 
 @dataclass(frozen=True)
 class Placement:
-    """A shape whose model stands at (x, y) on the floor, turned by yaw (rad)."""
+    """A shape whose model stands at (x, y) on the floor with a yaw (rad)."""
 
     shape: Shape
     x: float
@@ -32,7 +32,8 @@ def rasterise(
     resolution_m: float = 0.025,
     margin_m: float = 0.5,
 ) -> Grid:
-    """Cells whose centre lies in a shape that reaches into the height band are occupied; outside the walls unknown."""
+    """Rasterises shapes that reach into the height band: cells with their centre in one are occupied, those outside
+    the walls are unknown."""
     size = [round((length + 2 * margin_m) / resolution_m) for length in outline_m]
     x = (np.arange(size[0]) + 0.5) * resolution_m - margin_m
     y = (np.arange(size[1]) + 0.5) * resolution_m - margin_m
@@ -61,7 +62,7 @@ def _reaches(shape: Shape, band_m: tuple[float, float]) -> bool:
 
 
 def covers(placed: Placement, points: FloatArray) -> Bools:
-    """Which of the (..., 2) points lie inside the shape as seen from above."""
+    """Returns which points (..., 2) lie inside the shape seen from above."""
     offset = points - np.array([placed.x, placed.y])
     in_model = _turn(offset, -placed.yaw_rad) - np.array(placed.shape.p[:2])
     local = _turn(in_model, -placed.shape.rpy[2])

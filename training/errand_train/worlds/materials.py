@@ -1,4 +1,4 @@
-"""Appearance of the surfaces: the materials in `materials.yaml`, and the pictures behind them."""
+"""Appearance of surfaces: the materials in `materials.yaml`, and their textures."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ TEXTURE_PX = 384
 
 @cache
 def materials() -> Mapping[str, Material]:
-    """All materials of the world by name."""
+    """Materials of the worlds by name."""
     return TypeAdapter(dict[str, Material]).validate_python(read_yaml(Path(__file__).with_name("materials.yaml")).data)
 
 
 def pictures(seed: int = 7) -> dict[str, Picture]:
-    """All texture pictures by file name."""
+    """Draws all textures by file name."""
     makers: dict[str, Callable[[np.random.Generator], FloatArray]] = {
         "oak_floor.png": _planks,
         "floor_tiles.png": lambda rng: _tiles(rng, 3, (0.88, 0.87, 0.84), (0.66, 0.65, 0.63)),

@@ -18,7 +18,7 @@ _FACING_YAW_RAD = {"south": 0.0, "east": math.pi / 2, "north": math.pi, "west": 
 
 
 class Room(NamedTuple):
-    """A room: its free inside, and the materials of its floor and walls."""
+    """A room: its inner rectangle, and the materials of its floor and walls."""
 
     name: str
     inside: Rectangle
@@ -41,7 +41,7 @@ class Door(NamedTuple):
 
 
 class Hanging(NamedTuple):
-    """Something flat on a wall: `side` of the room, position along it, centre height, width, height."""
+    """A flat object on a wall: `side` of the room, position along it, centre height, width, height."""
 
     room: str
     side: Literal["n", "e", "s", "w"]
@@ -54,7 +54,7 @@ class Hanging(NamedTuple):
 
 
 class Placed(BaseModel):
-    """A piece of furniture in the world, by its own name unless `piece` says another; other keys are its parameters."""
+    """A piece of furniture in the world; `piece` is its kind unless its name is; other keys are parameters."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
@@ -64,12 +64,12 @@ class Placed(BaseModel):
 
     @property
     def yaw_rad(self) -> float:
-        """Turns of the piece's frame about the vertical."""
+        """Yaw of the piece's frame in the world (rad)."""
         return _FACING_YAW_RAD[self.facing]
 
 
 class Plan(BaseModel):
-    """The schema of a plan's file."""
+    """A plan as its file holds it."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -84,11 +84,11 @@ class Plan(BaseModel):
     furniture: dict[str, Placed]
 
     def width_m(self, door: Door) -> float:
-        """Clears width of a door."""
+        """Clear width of a door (m)."""
         return self.door_width_m if door.own_width_m is None else door.own_width_m
 
 
 @cache
 def load_plan(name: str) -> Plan:
-    """The plan of one of `PLANS`."""
+    """Loads the plan of one of `PLANS`."""
     return Plan.model_validate(read_yaml(Path(__file__).with_name(f"{name}.yaml")).data)

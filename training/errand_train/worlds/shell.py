@@ -1,4 +1,4 @@
-"""The shell of a world: floor, walls with door openings, frames, skirting and what hangs on the walls."""
+"""The shell of a world: floor, walls with door openings, frames, skirting and hangings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _Gap = tuple[Rectangle, Door]
 
 
 def shell_collisions(plan: Plan) -> list[Shape]:
-    """The floor and the wall boxes, lintels included."""
+    """Collision shapes of the floor and the walls, with lintels."""
     x, y = plan.outline_m
     floor = Box(size=(x + 2, y + 2, 0.2), p=(x / 2, y / 2, -0.1))
     return [floor, *(box for wall in plan.walls for box in _wall_boxes(plan, wall))]
@@ -67,7 +67,7 @@ def _around(
 
 
 def shell_mesh(plan: Plan, materials: Mapping[str, Material]) -> Mesh:
-    """The visual geometry of the shell."""
+    """Visual geometry of the shell."""
     mesh = Mesh(materials)
     for one in plan.rooms:
         x0, y0, x1, y1 = one.inside

@@ -16,10 +16,10 @@ from errand_train.dataset.objects import (
     DISTRACTORS,
     held_out,
     instance,
+    is_repainted,
     is_untextured,
     make,
     numbers,
-    repainted,
 )
 from errand_train.dataset.objects.draft import Draft, Finished
 from errand_train.dataset.objects.recipes import Part, Recipe, build
@@ -89,7 +89,7 @@ def test_validation_sees_the_same_instances_however_many_there_are() -> None:
 
 def test_validation_sees_no_untextured_ones_and_nothing_repainted() -> None:
     assert not any(
-        is_untextured(category, n) or repainted(category, n)
+        is_untextured(category, n) or is_repainted(category, n)
         for category in (*CLASSES, *DISTRACTORS)
         for n in numbers(category, for_training=False)
     )
@@ -121,7 +121,7 @@ def test_an_untextured_distractor_keeps_its_form_and_loses_its_pictures() -> Non
 
 @pytest.mark.parametrize("category", ["extinguisher", "hammer", "screwdriver", "wrench"])
 def test_a_repainted_thing_keeps_its_form_and_loses_its_pictures(category: str) -> None:
-    seeds = [number for number in range(48, 80) if repainted(category, number)][:4]
+    seeds = [number for number in range(48, 80) if is_repainted(category, number)][:4]
     for seed in seeds:
         made, kind, _ = make(category, seed)
         assert (kind != "untextured", made.pictures) == (True, {})
@@ -131,7 +131,7 @@ def test_a_repainted_thing_keeps_its_form_and_loses_its_pictures(category: str) 
 
 def test_some_repainted_tools_are_of_one_colour_and_no_extinguisher_is() -> None:
     def colours(category: str) -> list[int]:
-        made = [make(category, number)[0] for number in range(48, 80) if repainted(category, number)]
+        made = [make(category, number)[0] for number in range(48, 80) if is_repainted(category, number)]
         return [len({material.colour for material in each.mesh.materials.values()}) for each in made]
 
     assert 1 in colours("hammer")

@@ -16,7 +16,7 @@ import numpy as np
 from errand_train.dataset.objects.draft import Draft, Finished
 from errand_train.dataset.objects.model import ObjectModel, Surface, held_out, read_model, write_model
 from errand_train.dataset.objects.recipes import build, load_recipes
-from errand_train.dataset.objects.repainting import in_one_colour, plainly_painted
+from errand_train.dataset.objects.repainting import paint_in_one_colour, paint_plainly
 from plant.models.catalogue import MODELS_FOLDER, cached_folder, load_catalogue, user_cache
 
 __all__ = [
@@ -34,26 +34,26 @@ __all__ = [
 ]
 
 INSTANCES = 960
-"""How many instances of each class there are for the data set, but of people."""
+"""Instances of each class in the data set, except people."""
 PEOPLE = 72
-"""How many people: each textured one takes seconds to make."""
+"""Instances of people: each textured one takes seconds to make."""
 DISTRACTOR_INSTANCES = 96
-"""How many of each kind of distractor there are."""
+"""Instances of each distractor category."""
 VALIDATION_BELOW, DISTRACTOR_VALIDATION_BELOW = 48, 8
 """Validation takes held-out instances below these numbers, so that its pictures stay the same when more are added."""
 UNTEXTURED_OF_FIVE = (0, 2)
 """Remainders by five of the numbers that are untextured, among the instances that validation does not take."""
 REPAINTED_OF_FIVE = 4
-"""Of those of some classes, the ones whose number leaves this are detailed in form and plain in colour."""
+"""Remainders of the numbers in some classes that are detailed in form and plain in colour."""
 _ONE_COLOUR: Mapping[str, float] = {"extinguisher": 0.0, "hammer": 0.4, "screwdriver": 0.4, "wrench": 0.4}
-"""Those classes, and how often they are of a single colour: not what is told by its colours."""
+"""Those classes, and the share that has a single colour; excludes classes recognised by their colours."""
 CLASSES: tuple[str, ...] = tuple(load_recipes("classes"))
 DISTRACTORS: tuple[str, ...] = tuple(sorted(load_recipes("distractors")))
 
 
 @cache
 def sources_digest() -> str:
-    """Ten hexadecimal digits that change whenever a source of the models does."""
+    """Digest (ten hexadecimal digits) of the sources of the models."""
     objects, digest = Path(__file__).resolve().parent, hashlib.sha256()
     for folder in (objects, objects.parents[1] / "models", MODELS_FOLDER / "builder"):
         for path in sorted(path for path in folder.rglob("*") if path.suffix in (".py", ".yaml")):
@@ -62,7 +62,7 @@ def sources_digest() -> str:
 
 
 def numbers(category: str, *, for_training: bool) -> list[int]:
-    """The instances of a category that training may see, or those that validation does.
+    """Numbers of the instances of a category for training, or for validation.
 
     Every fourth number is kept from training.
     """
@@ -84,8 +84,8 @@ def is_untextured(category: str, seed: int) -> bool:
     return category == "person" or seed % 5 in UNTEXTURED_OF_FIVE
 
 
-def repainted(category: str, seed: int) -> bool:
-    """Returns whether an instance of a class is of its usual form, but in plain colours without pictures."""
+def is_repainted(category: str, seed: int) -> bool:
+    """Returns whether an instance of a class has its usual form, but plain colours without pictures."""
     return category in _ONE_COLOUR and seed >= VALIDATION_BELOW and seed % 5 == REPAINTED_OF_FIVE
 
 
@@ -101,17 +101,17 @@ def make(category: str, seed: int) -> tuple[Finished, str, str]:
     draft = Draft(np.random.default_rng([seed, *category.encode()]))
     made, kind, colour = build(category, recipe, draft)
     if plain and category not in basic:
-        made = plainly_painted(made, draft.rng)
-    if repainted(category, seed):
+        made = paint_plainly(made, draft.rng)
+    if is_repainted(category, seed):
         if draft.rng.random() < _ONE_COLOUR[category]:
-            made, colour = in_one_colour(made, draft.rng)
+            made, colour = paint_in_one_colour(made, draft.rng)
         else:
-            made = plainly_painted(made, draft.rng, own_colours=1.0)
+            made = paint_plainly(made, draft.rng, own_colours=1.0)
     return made, kind, colour
 
 
 def instance(category: str, seed: int) -> ObjectModel:
-    """The instance of a category by its number, made now unless the cache has it. Raises KeyError, ValueError.
+    """Makes the instance of a category by its number, or reads it from the cache. Raises KeyError, ValueError.
 
     `ERRAND_MODEL_CACHE` names another place than the user's cache.
     """

@@ -1,4 +1,4 @@
-"""A model while it is made: visual geometry, pictures, collision shapes and mass, gathered from parts."""
+"""Construction of a model from parts: visual geometry, pictures, collision shapes and mass."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SHORTEST_M = 0.001
 
 @dataclass(frozen=True)
 class Finished:
-    """A model ready to be written; all in its own frame."""
+    """A finished model in its own frame."""
 
     mesh: Mesh
     pictures: dict[str, Picture]
@@ -41,7 +41,7 @@ class Finished:
 
 
 class Draft:
-    """Grows part by part. Lengths in metres, densities in kg/m^3 (solids) or kg/m^2 (shells)."""
+    """A model under construction. Lengths in metres, densities in kg/m^3 (solids) or kg/m^2 (shells)."""
 
     def __init__(self, rng: np.random.Generator) -> None:
         self.rng = rng
@@ -52,28 +52,28 @@ class Draft:
         self._collisions: list[Shape] = []
 
     def paint(self, name: str, colour: ArrayLike, *, shine: float = 0.3, metal: float = 0.0) -> str:
-        """A plain material; its name."""
+        """Adds a plain material and returns its name."""
         r, g, b = (float(v) for v in np.clip(np.asarray(colour, dtype=float), 0.0, 1.0))
         self.materials[name] = Material((r, g, b), None, None, shine, metal)
         return name
 
     def picture(self, name: str, values: FloatArray, *, shine: float = 0.3, metal: float = 0.0) -> str:
-        """A material that shows a picture (H, W, 3; 0..1), stretched over each surface; its name."""
+        """Adds a material with a picture (H, W, 3; 0..1) stretched over each surface, and returns its name."""
         self._pictures[f"{name}.png"] = to_picture(values, 128)
         self.materials[name] = Material((1.0, 1.0, 1.0), f"{name}.png", None, shine, metal)
         return name
 
     def part(self) -> Mesh:
-        """An empty mesh with this draft's materials."""
+        """Makes an empty mesh with this draft's materials."""
         return Mesh(self.materials)
 
     def solid(
         self, part: Mesh, density: float, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0), *, body: Mesh | None = None
     ) -> None:
-        """Adds a part of solid matter at a pose, its triangles turned outward. An open part needs its closed `body`."""
-        placed = outward(part, R, p)
+        """Adds a solid part at a pose, with outward triangles. An open part needs its closed `body`."""
+        placed = orient_outward(part, R, p)
         self.mesh.add_mesh(placed)
-        self._bodies.append(solid_mass(outward(body, R, p) if body else placed, density))
+        self._bodies.append(solid_mass(orient_outward(body, R, p) if body else placed, density))
         self._collide(placed)
 
     def shell(self, part: Mesh, density: float, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> None:
@@ -83,7 +83,7 @@ class Draft:
         self._collide(placed)
 
     def visual(self, part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Mesh:
-        """Adds a part that weighs nothing; the part as placed."""
+        """Adds a part without mass, and returns it at its pose."""
         placed = Mesh(self.materials)
         placed.add_mesh(part, R, p)
         self.mesh.add_mesh(placed)
@@ -104,7 +104,7 @@ class Draft:
             self._collisions.append(Sphere(radius=small, p=_tuple(middle + (size / 2 + PROUD_M - small) * signs)))
 
     def finish(self, mass_kg: float | None = None, *, on_floor: bool = False) -> Finished:
-        """The model about the centre of its bounding box (`on_floor`: about the point below it).
+        """Finishes the model about the centre of its bounding box (`on_floor`: about the point below it).
 
         `mass_kg` replaces the mass that follows from densities and keeps its distribution.
         """
@@ -159,8 +159,8 @@ def _tuple(values: ArrayLike) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def outward(part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Mesh:
-    """The closed part at a pose, each triangle wound as its normals say, all of them looking outward."""
+def orient_outward(part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Mesh:
+    """Moves a closed part to a pose, with every triangle and normal facing outward."""
     placed, groups, volume = Mesh(part.materials), [], 0.0
     placed.add_mesh(part, R, p)
     for name, points, normals, uvs in placed.groups():
@@ -178,8 +178,8 @@ def outward(part: Mesh, R: ArrayLike = IDENTITY, p: ArrayLike = (0, 0, 0)) -> Me
     return whole
 
 
-def turned(axis: str, angle_rad: float) -> FloatArray:
-    """The (3, 3) rotation about x, y or z."""
+def rotation(axis: str, angle_rad: float) -> FloatArray:
+    """Rotation (3, 3) about x, y or z."""
     c, s = float(np.cos(angle_rad)), float(np.sin(angle_rad))
     k = "xyz".index(axis)
     R = np.eye(3)
@@ -189,17 +189,17 @@ def turned(axis: str, angle_rad: float) -> FloatArray:
 
 
 def pick(rng: np.random.Generator, *options: Colour) -> Colour:
-    """One of several colours."""
+    """Picks one of several colours."""
     return options[int(rng.integers(len(options)))]
 
 
-def shade(rng: np.random.Generator, colour: ArrayLike, spread: float = 0.05) -> FloatArray:
-    """A colour a little beside the one given."""
+def vary_shade(rng: np.random.Generator, colour: ArrayLike, spread: float = 0.05) -> FloatArray:
+    """Varies a colour a little, as an array."""
     base = np.asarray(colour, dtype=float)
     return np.asarray(np.clip(base * (1 + spread * rng.standard_normal()) + spread * rng.normal(0, 0.4, 3), 0, 1))
 
 
-def varied(rng: np.random.Generator, colour: ArrayLike, spread: float = 0.05) -> Colour:
-    """The same as a tuple of numbers."""
-    r, g, b = (float(v) for v in shade(rng, colour, spread))
+def vary_colour(rng: np.random.Generator, colour: ArrayLike, spread: float = 0.05) -> Colour:
+    """Varies a colour a little, as a tuple of numbers."""
+    r, g, b = (float(v) for v in vary_shade(rng, colour, spread))
     return (r, g, b)

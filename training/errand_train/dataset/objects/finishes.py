@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
-from errand_train.dataset.objects.draft import Draft, shade
+from errand_train.dataset.objects.draft import Draft, vary_shade
 from errand_train.dataset.objects.lettering import COLOURS, printed_label, write_word
-from errand_train.dataset.objects.wear import brushed, plain, rusty, used
+from errand_train.dataset.objects.wear import add_rust, add_wear, brushed_metal, plain_picture
 from errand_train.models.expressions import Number, evaluate
 from errand_train.models.pictures import cloth, noise, speckle, wood
 from plant.models.builder.mesh import Colour
@@ -38,24 +38,24 @@ class Finish(BaseModel):
 
 
 def draw_colour(rng: np.random.Generator, colours: Colours, main: tuple[str, ArrayLike]) -> tuple[str, FloatArray]:
-    """One of the colours, a little varied, and what one would call it. Raises ValueError for an unknown name."""
+    """Draws one of the colours, a little varied, with its name. Raises ValueError for an unknown name."""
     if isinstance(colours, dict):
         name = str(rng.choice(list(colours)))
         return name, draw_colour(rng, colours[name], main)[1]
     if isinstance(colours, tuple | list):
         if all(isinstance(each, int | float) for each in colours):
-            return _called(colours), shade(rng, colours)
+            return _called(colours), vary_shade(rng, colours)
         return draw_colour(rng, colours[int(rng.integers(len(colours)))], main)
     if colours == "main":
         return main[0], np.asarray(main[1], dtype=float)
     if colours != "any" and colours not in COLOURS:
         raise ValueError(f"no colour {colours!r}; there are any, main, {', '.join(COLOURS)}")
     name = str(rng.choice(list(COLOURS))) if colours == "any" else colours
-    return name, shade(rng, COLOURS[name])
+    return name, vary_shade(rng, COLOURS[name])
 
 
 def _called(colour: ArrayLike) -> str:
-    """The name that is nearest to a colour."""
+    """Name nearest to a colour."""
     return min(COLOURS, key=lambda name: float(np.sum((np.array(COLOURS[name]) - np.asarray(colour, float)) ** 2)))
 
 
@@ -72,7 +72,7 @@ def apply_finish(
         raise ValueError(f"no texture {finish.texture!r}; there are plain, {', '.join(_TEXTURES)}")
     picture = _TEXTURES[finish.texture](draft.rng, colour, finish)
     wear = evaluate(finish.wear, names, draft.rng)
-    draft.picture(name, used(picture, draft.rng, wear) if wear else picture, shine=finish.shine, metal=finish.metal)
+    draft.picture(name, add_wear(picture, draft.rng, wear) if wear else picture, shine=finish.shine, metal=finish.metal)
 
 
 def _rgb(colour: FloatArray) -> Colour:
@@ -80,13 +80,13 @@ def _rgb(colour: FloatArray) -> Colour:
 
 
 def _striped(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArray:
-    image = plain(colour)
+    image = plain_picture(colour)
     image[(np.indices((128, 128))[int(rng.integers(2))] // int(rng.integers(8, 40))) % 2 == 0] = _second(rng)
     return image
 
 
 def _checked(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArray:
-    image, size = plain(colour), 128 // int(rng.integers(2, 9))
+    image, size = plain_picture(colour), 128 // int(rng.integers(2, 9))
     image[(np.indices((128, 128)) // size).sum(axis=0) % 2 == 0] = _second(rng)
     return image
 
@@ -96,13 +96,13 @@ def _second(rng: np.random.Generator) -> FloatArray:
 
 
 def _lettered(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArray:
-    image, letter = plain(colour), str(rng.choice(list("ABCDEFGHKMRSTX123456789")))
+    image, letter = plain_picture(colour), str(rng.choice(list("ABCDEFGHKMRSTX123456789")))
     write_word(image, letter, (0.12, 0.12, 0.88, 0.88), _second(rng), face=int(rng.integers(9)))
     return image
 
 
 def _screen(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArray:
-    image = plain(colour, (160, 256))
+    image = plain_picture(colour, (160, 256))
     for _window in range(int(rng.integers(0, 7))):
         y, x = int(rng.integers(0, 110)), int(rng.integers(0, 180))
         image[y : y + int(rng.integers(15, 60)), x : x + int(rng.integers(20, 90))] = rng.uniform(0.05, 0.95, 3)
@@ -110,14 +110,14 @@ def _screen(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArr
 
 
 def _keys(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArray:
-    image, (rows, columns) = plain(colour * 0.8, (96, 256)), np.indices((96, 256))
+    image, (rows, columns) = plain_picture(colour * 0.8, (96, 256)), np.indices((96, 256))
     image[(rows % 18 > 3) & (columns % 17 > 3)] = rng.choice([0.08, 0.9, 0.3])
     return image
 
 
 def _dial(_: np.random.Generator, colour: FloatArray, __: Finish) -> FloatArray:
     """A clock's or a gauge's face: marks all around and two hands."""
-    image, (rows, columns) = plain(colour), np.indices((128, 128)) - 63.5
+    image, (rows, columns) = plain_picture(colour), np.indices((128, 128)) - 63.5
     angle, radius = np.arctan2(rows, columns), np.hypot(rows, columns)
     image[(np.abs((angle * 6 / np.pi + 0.05) % 1 - 0.05) < 0.05) & (radius > 44) & (radius < 56)] = 0.1
     image[(np.abs(columns) < 2) & (rows < 0) & (rows > -42)] = 0.1
@@ -127,13 +127,13 @@ def _dial(_: np.random.Generator, colour: FloatArray, __: Finish) -> FloatArray:
 
 def _streaked(rng: np.random.Generator, colour: FloatArray, _: Finish) -> FloatArray:
     """Light and dark streaks: thick glass, leaves, hair."""
-    return np.asarray(plain(colour) * (1 + 0.13 * noise(rng, (128, 128), (20, 3)))[..., None])
+    return np.asarray(plain_picture(colour) * (1 + 0.13 * noise(rng, (128, 128), (20, 3)))[..., None])
 
 
 _TEXTURES: Final[Mapping[str, Callable[[np.random.Generator, FloatArray, Finish], FloatArray]]] = {
-    "painted": lambda rng, colour, _: plain(colour),
-    "brushed": lambda rng, colour, _: brushed(rng, colour),
-    "rusty": lambda rng, colour, _: rusty(brushed(rng, colour), rng, 0.7),
+    "painted": lambda rng, colour, _: plain_picture(colour),
+    "brushed": lambda rng, colour, _: brushed_metal(rng, colour),
+    "rusty": lambda rng, colour, _: add_rust(brushed_metal(rng, colour), rng, 0.7),
     "wood": lambda rng, colour, _: wood(rng, (128, 256), _rgb(colour), 0.08),
     "cloth": lambda rng, colour, _: cloth(rng, (128, 128), _rgb(colour), 0.12),
     "speckled": lambda rng, colour, _: speckle(rng, (128, 128), _rgb(colour), 0.03),

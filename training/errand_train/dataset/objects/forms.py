@@ -37,7 +37,7 @@ FORMS: Final[Mapping[tuple[str, str], int]] = MappingProxyType(
         ("cylinder", "striped"): 5,
     }
 )
-"""By class and name of the form: the number of the instance that it is."""
+"""Number of the instance of each form, by class and name of the form."""
 
 
 def write_forms(folder: Path) -> None:

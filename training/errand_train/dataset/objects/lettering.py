@@ -36,12 +36,12 @@ def _face(index: int) -> cv2.FontFace:
 
 
 def brand(rng: np.random.Generator) -> str:
-    """An invented name."""
+    """Invents a brand name."""
     return "".join(str(rng.choice(_DECORATION[part])) for part in ("starts", "middles", "ends"))
 
 
 def word_mask(text: str, shape: tuple[int, int], *, face: int = 0, fill: float = 0.9) -> FloatArray:
-    """The word's coverage (0..1) of a picture (H, W), as large as fits into the share `fill` of it."""
+    """Coverage (0..1) of a picture (H, W) by a word that fills the share `fill` of it."""
     height, width = shape
     size = 100
     (_, _, w, h), font = cv2.getTextSize((1, 1), text, (0, 0), _face(face), size), _face(face)
@@ -74,7 +74,7 @@ def write_word(
 def small_print(
     image: FloatArray, rng: np.random.Generator, box: tuple[float, float, float, float], colour: ArrayLike
 ) -> None:
-    """Lines that look like fine print (in place)."""
+    """Draws lines that look like fine print (in place)."""
     h, w = image.shape[:2]
     top, left, bottom, right = (round(v * s) for v, s in zip(box, (h, w, h, w), strict=True))
     mask = np.zeros((max(bottom - top, 1), max(right - left, 1)))
@@ -88,7 +88,7 @@ def small_print(
 
 
 def bar_code(image: FloatArray, rng: np.random.Generator, box: tuple[float, float, float, float]) -> None:
-    """A bar code on white (in place)."""
+    """Draws a bar code on white (in place)."""
     h, w = image.shape[:2]
     top, left, bottom, right = (round(v * s) for v, s in zip(box, (h, w, h, w), strict=True))
     bars = np.repeat(rng.random(max((right - left) // 2, 1)) < 0.5, 2)[: right - left]
@@ -97,7 +97,7 @@ def bar_code(image: FloatArray, rng: np.random.Generator, box: tuple[float, floa
 
 
 def emblem(size: int, rng: np.random.Generator) -> FloatArray:
-    """A simple figure's coverage (0..1) of a square: a disc, a star, a shield, a crown, a leaf or a mountain."""
+    """Coverage (0..1) of a square by a disc, a star, a shield, a crown, a leaf or a mountain."""
     points = int(rng.integers(5, 9))
     angle = np.arange(2 * points) * np.pi / points - np.pi / 2
     radius = np.where(np.arange(2 * points) % 2 == 0, 0.48, rng.choice([0.22, 0.48]))
@@ -117,7 +117,7 @@ def printed_label(
     brands: Sequence[str] = (),
     repeats: int = 2,
 ) -> FloatArray:
-    """A label (256, 512): a name (one of `brands`, else invented), what is inside, an emblem, fine print, a bar code.
+    """Draws a label (256, 512): a name (one of `brands`, else invented), content, emblem, fine print, bar code.
 
     All of it stands `repeats` times beside each other, over a band, a wave, or nothing.
     """

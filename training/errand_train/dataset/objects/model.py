@@ -1,4 +1,4 @@
-"""What a made model is: its files, class, mass and form."""
+"""A generated model: its files, class, mass and form."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from skills.robot import FloatArray
 
 HELD_OUT_EVERY = 4
 MODEL_FACTS = "model.json"
-"""The file that tells what a model in a folder is."""
+"""File with the data of a model in its folder."""
 
 
 def held_out(number: int) -> bool:
-    """Returns whether an instance, texture or layout of this number is kept from training: every fourth is."""
+    """Returns whether an instance, texture or layout of this number is held out from training: every fourth."""
     return number % HELD_OUT_EVERY == HELD_OUT_EVERY - 1
 
 
 @dataclass(frozen=True)
 class Surface:
-    """The triangles of a model: corner points (N, 3) in metres and their indices (T, 3)."""
+    """Triangles of a model: corner points (N, 3) in metres and their indices (T, 3)."""
 
     points: FloatArray
     faces: NDArray[np.int64]
@@ -60,27 +60,27 @@ class ObjectModel:
 
     @property
     def path(self) -> Path:
-        """The SDF file."""
+        """Path of the SDF file."""
         return self.folder / f"{self.category}.sdf"
 
     @property
     def obj_path(self) -> Path:
-        """The visual geometry as OBJ, for rendering with plain shading."""
+        """Path of the visual geometry as OBJ, for rendering with plain shading."""
         return self.folder / f"{self.category}.obj"
 
     @property
     def gltf_path(self) -> Path:
-        """The visual geometry as glTF, for rendering with physical shading."""
+        """Path of the visual geometry as glTF, for rendering with physical shading."""
         return self.folder / f"{self.category}.gltf"
 
     @property
     def held_out(self) -> bool:
-        """Returns whether it is kept from training."""
+        """Returns whether the instance is held out from training."""
         return held_out(self.seed)
 
     @cached_property
     def surface(self) -> Surface:
-        """Its triangles."""
+        """Triangles of the model."""
         with np.load(self.folder / "surface.npz") as data:
             return Surface(data["points"].astype(np.float64), data["faces"].astype(np.int64))
 
@@ -107,14 +107,14 @@ def write_model(folder: Path, model: ObjectModel, made: Finished) -> None:
 
 
 def read_model(folder: Path) -> ObjectModel:
-    """A model that `write_model` has written."""
+    """Reads a model that `write_model` has written."""
     facts = json.loads((folder / MODEL_FACTS).read_text(encoding="utf-8"))
     facts["com_m"], facts["size_m"] = tuple(facts["com_m"]), tuple(facts["size_m"])
     return ObjectModel(folder=folder, **facts)
 
 
 def surface_of(mesh: Mesh) -> Surface:
-    """The triangles of a mesh with every point once (to 0.01 mm)."""
+    """Triangles of a mesh with equal points merged (to 0.01 mm)."""
     corners = np.concatenate([points for _, points, _, _ in mesh.groups()])
     points, order = np.unique(np.round(corners, 5), axis=0, return_inverse=True)
     return Surface(points, order.reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""Objects by recipe: tables of parts with ranges, in the YAML files beside this module, and what builds them.
+"""Recipes of objects: tables of parts with ranges in the YAML files beside this module, and their builder.
 
 `docs/dataset.md` describes the keys. A recipe draws its names (`let`), its colours and one of its kinds at random,
 and adds its parts.
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
-from errand_train.dataset.objects.draft import Draft, Finished, turned
+from errand_train.dataset.objects.draft import Draft, Finished, rotation
 from errand_train.dataset.objects.finishes import Colours, Finish, apply_finish, draw_colour
 from errand_train.models.expressions import Number, evaluate
 from errand_train.models.outlines import arc, curve
@@ -44,7 +44,7 @@ Arc = dict[str, Vector]
 
 
 class Part(BaseModel):
-    """A shape by the key that names its material, or a group of parts; where it is, and what it weighs."""
+    """A shape under the key of its material, or a group of parts, with its pose and density."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -83,7 +83,7 @@ class Part(BaseModel):
 
 
 class Kind(BaseModel):
-    """What one kind of an object adds to its recipe, or has in its place."""
+    """One kind of an object: additions to its recipe, and replacements."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -95,7 +95,7 @@ class Kind(BaseModel):
 
 
 class Recipe(BaseModel):
-    """How to make any instance of a category: names, colours, materials and parts, and its kinds."""
+    """Recipe of all instances of a category: names, colours, materials and parts, and its kinds."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -107,18 +107,18 @@ class Recipe(BaseModel):
     mass_kg: Number | None = None
     on_floor: bool = False
     may_be_plain: bool = True
-    """Whether it still differs from the classes without its pictures."""
+    """Whether it differs from the classes even without its pictures."""
 
 
 @cache
 def load_recipes(name: str) -> Mapping[str, Recipe]:
-    """The recipes of a file beside this module, by category. Keys with an underscore hold what several share."""
+    """Loads the recipes of a file beside this module, by category. Keys with an underscore hold shared parts."""
     table: dict[str, Any] = read_yaml(_FOLDER / f"{name}.yaml").data
     return {key: Recipe.model_validate(value) for key, value in table.items() if not key.startswith("_")}
 
 
 def build(category: str, recipe: Recipe, draft: Draft) -> tuple[Finished, str, str]:
-    """Makes an instance: the model, its kind and its main colour. Raises ValueError for what the recipe gets wrong."""
+    """Makes an instance: the model, its kind and its main colour. Raises ValueError for a faulty recipe."""
     rng, name = draft.rng, category.replace("_", " ")
     kind = Kind()
     if recipe.kinds:
@@ -150,12 +150,12 @@ def _draw(names: Names, table: Mapping[str, Range], rng: np.random.Generator) ->
 
 @dataclass(frozen=True)
 class _Assembly:
-    """Adds parts to a draft."""
+    """Builder that adds parts to a draft."""
 
     draft: Draft
 
     def add(self, part: Part, names: Names, R: ArrayLike, p: FloatArray) -> None:
-        """Adds a part at a pose, so often as it says."""
+        """Adds a part at a pose, with its repetitions."""
         rng = self.draft.rng
         for scope in self._rounds(part, names):
             if rng.random() >= evaluate(part.chance, scope, rng):
@@ -164,7 +164,7 @@ class _Assembly:
             at = p + np.asarray(R) @ self._vector(part.at, scope)
             turn = np.asarray(R)
             for axis, angle in part.turn:
-                turn = turn @ turned(axis, float(np.radians(evaluate(angle, scope, rng))))
+                turn = turn @ rotation(axis, float(np.radians(evaluate(angle, scope, rng))))
             for child in self._children(part):
                 self.add(child, scope, turn, at)
             self._shape(part, scope, turn, at)

@@ -1,4 +1,4 @@
-"""Finished models in plain colours, without their pictures: the form alone."""
+"""Repainting of finished models in plain colours, without pictures."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from errand_train.dataset.objects.draft import Finished, pick, varied
+from errand_train.dataset.objects.draft import Finished, pick, vary_colour
 from errand_train.dataset.objects.lettering import COLOURS, GREYS
 from plant.models.builder.mesh import Material, Mesh
 
-__all__ = ["in_one_colour", "plainly_painted"]
+__all__ = ["paint_in_one_colour", "paint_plainly"]
 
 
-def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
-    """The same object with every picture on it replaced by its mean colour (so often), or by any plain one."""
+def paint_plainly(made: Finished, rng: np.random.Generator, *, own_colours: float = 0.5) -> Finished:
+    """Replaces every picture of a model by its mean colour (with a probability), or by any plain colour."""
     own = rng.random() < own_colours
     painted: dict[str, Material] = {}
     for name, material in made.mesh.materials.items():
@@ -22,19 +22,19 @@ def plainly_painted(made: Finished, rng: np.random.Generator, *, own_colours: fl
         mean = None if picture is None else np.asarray(picture, dtype=float).reshape(-1, 3).mean(axis=0) / 255.0
         colour = np.array(COLOURS[str(rng.choice(list(COLOURS)))]) if mean is None or not own else mean
         keep = picture is None and (own or rng.random() < 0.5)
-        painted[name] = material if keep else Material(varied(rng, colour), None, None, material.shine, 0.0)
+        painted[name] = material if keep else Material(vary_colour(rng, colour), None, None, material.shine, 0.0)
     mesh = Mesh(painted)
     mesh.add_mesh(made.mesh)
     return replace(made, mesh=mesh, pictures={})
 
 
-def in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
-    """The same object in a single plain colour, as it comes from a drawing; what one would call that."""
+def paint_in_one_colour(made: Finished, rng: np.random.Generator) -> tuple[Finished, str]:
+    """Paints a model in a single plain colour, as CAD files have it, and returns the colour's name."""
     word = str(rng.choice(list(COLOURS)))
     colour = COLOURS[word]
     if rng.random() < 0.6:
         word, colour = "grey", pick(rng, *GREYS)
-    paint = Material(varied(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)
+    paint = Material(vary_colour(rng, colour, 0.04), None, None, float(rng.uniform(0.0, 0.6)), 0.0)
     mesh = Mesh(dict.fromkeys(made.mesh.materials, paint))
     mesh.add_mesh(made.mesh)
     return replace(made, mesh=mesh, pictures={}), word

@@ -1,4 +1,4 @@
-"""Pictures of many models at once, to look at: `python -m errand_train.dataset.objects.sheet FOLDER [FAMILY ...]`."""
+"""Contact sheets of models: `python -m errand_train.dataset.objects.sheet FOLDER [FAMILY ...]`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from skills.robot import Picture
 
 
 def sheet(models: Sequence[ObjectModel], columns: int, cell: tuple[int, int] = (160, 160)) -> Picture:
-    """A grid of pictures, each model filling its cell (width, height)."""
+    """Draws a grid of models, each filling its cell (width, height)."""
     cells = [_cell(model, cell) for model in models]
     blank = np.full((cell[1], cell[0], 3), 255, np.uint8)
     cells += [blank] * (-len(cells) % columns)

@@ -1,4 +1,4 @@
-"""Use leaves marks: scratches, dirt, rust and worn edges on pictures (H, W, 3; 0..1)."""
+"""Wear on pictures (H, W, 3; 0..1): scratches, dirt, rust and worn edges."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from errand_train.models.pictures import noise
 from skills.robot import FloatArray
 
 
-def plain(colour: ArrayLike, shape: tuple[int, int] = (128, 128)) -> FloatArray:
-    """One colour all over."""
+def plain_picture(colour: ArrayLike, shape: tuple[int, int] = (128, 128)) -> FloatArray:
+    """Makes a picture of one colour."""
     return np.asarray(np.zeros((*shape, 3)) + np.asarray(colour, dtype=float))
 
 
-def scratched(
+def add_scratches(
     image: FloatArray, rng: np.random.Generator, amount: float, colour: ArrayLike = (0.75, 0.75, 0.75)
 ) -> FloatArray:
-    """Fine lines through the paint; `amount` 0..1."""
+    """Adds fine scratches to the paint; `amount` 0..1."""
     height, width = image.shape[:2]
     mask = np.zeros((height, width), np.uint8)
     for _ in range(int(amount * 40)):
@@ -30,36 +30,40 @@ def scratched(
     return np.asarray(image * (1 - share) + share * np.asarray(colour, dtype=float))
 
 
-def dirty(
+def add_dirt(
     image: FloatArray, rng: np.random.Generator, amount: float, colour: ArrayLike = (0.22, 0.18, 0.13)
 ) -> FloatArray:
-    """Cloudy dirt; `amount` 0..1."""
+    """Adds cloudy dirt; `amount` 0..1."""
     height, width = image.shape[:2]
     clouds = noise(rng, (height, width), (height / 12, width / 12)) + 0.5 * noise(rng, (height, width), (2, 2))
     share = amount * np.clip((clouds - 0.6) * 0.5, 0, 1)[..., None]
     return np.asarray(image * (1 - share) + share * np.asarray(colour, dtype=float))
 
 
-def uneven(image: FloatArray, rng: np.random.Generator, amount: float = 0.04) -> FloatArray:
-    """Slight changes of brightness, as on any real surface."""
+def add_unevenness(image: FloatArray, rng: np.random.Generator, amount: float = 0.04) -> FloatArray:
+    """Adds slight changes of brightness, as on any real surface."""
     height, width = image.shape[:2]
     field = noise(rng, (height, width), (height / 8, width / 8)) + 0.6 * noise(rng, (height, width), (0.8, 0.8))
     return np.asarray(image * (1 + amount * field)[..., None])
 
 
-def used(image: FloatArray, rng: np.random.Generator, amount: float, bare: ArrayLike = (0.7, 0.7, 0.7)) -> FloatArray:
-    """All of it at once; `amount` 0 (new) to 1 (old)."""
-    return dirty(scratched(uneven(image, rng, 0.02 + 0.05 * amount), rng, amount, bare), rng, 0.7 * amount)
+def add_wear(
+    image: FloatArray, rng: np.random.Generator, amount: float, bare: ArrayLike = (0.7, 0.7, 0.7)
+) -> FloatArray:
+    """Adds unevenness, scratches and dirt; `amount` 0 (new) to 1 (old)."""
+    return add_dirt(
+        add_scratches(add_unevenness(image, rng, 0.02 + 0.05 * amount), rng, amount, bare), rng, 0.7 * amount
+    )
 
 
-def brushed(rng: np.random.Generator, colour: ArrayLike, shape: tuple[int, int] = (128, 128)) -> FloatArray:
-    """Metal brushed along the rows."""
+def brushed_metal(rng: np.random.Generator, colour: ArrayLike, shape: tuple[int, int] = (128, 128)) -> FloatArray:
+    """Makes a picture of metal brushed along the rows."""
     lines = noise(rng, shape, (0.6, 30)) + 0.5 * noise(rng, shape, (10, 40))
-    return np.asarray(plain(colour, shape) * (1 + 0.07 * lines)[..., None])
+    return np.asarray(plain_picture(colour, shape) * (1 + 0.07 * lines)[..., None])
 
 
-def rusty(image: FloatArray, rng: np.random.Generator, amount: float) -> FloatArray:
-    """Brown patches; `amount` 0..1."""
+def add_rust(image: FloatArray, rng: np.random.Generator, amount: float) -> FloatArray:
+    """Adds rusty patches; `amount` 0..1."""
     height, width = image.shape[:2]
     field = noise(rng, (height, width), (height / 10, width / 10)) + 0.4 * noise(rng, (height, width), (1.5, 1.5))
     share = np.clip((field - 1.6 + 1.8 * amount) * 1.2, 0, 0.9)[..., None]

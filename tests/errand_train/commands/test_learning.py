@@ -46,3 +46,14 @@ def test_a_training_that_is_there_already_is_not_overwritten(command: str, data:
     assert result.exit_code == 2
     assert "--resume" in result.stderr
     assert (tmp_path / "checkpoint.pt").read_bytes() == b"kept"
+
+
+def test_a_proposal_network_that_is_not_there_is_named(
+    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda _name: object())
+    missing = tmp_path / "missing.onnx"
+    result = run("refine", "--data", str(data), "--out", str(tmp_path / "out"), "--model", str(missing))
+    assert result.exit_code == 2
+    assert "missing.onnx" in result.stderr
+    assert "--model" in result.stderr

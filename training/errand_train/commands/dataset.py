@@ -14,9 +14,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from errand_train.commands.refine import refine_command
+from errand_train.commands.learning import refine_command, train_command
 from errand_train.commands.score import score_command
-from errand_train.commands.train import train_command
 from errand_train.dataset.errors import DatasetError
 from executive.app.evaluate.workers import Pool, Workers
 from executive.cli.number_options import quantity_option

@@ -204,7 +204,7 @@ def test_routes_are_planned_on_the_map_for_the_whole_body(walled):
     here = Pose2D(-1.0, -1.0, 0.0)
     assert ways.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
     for _ in range(2):
-        with pytest.raises(ValueError, match="no way"):
+        with pytest.raises(ValueError, match="no path"):
             ways.route(here, Pose2D(1.0, 1.0, 0.0))
     with pytest.raises(ValueError, match="blocked"):
         ways.route(here, Pose2D(-1.9, 1.0, 0.0))

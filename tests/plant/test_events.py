@@ -1,4 +1,4 @@
-"""Doors that close and open, and objects that somebody moves, in the flat."""
+"""Sliding doors and moved objects in the flat."""
 
 import math
 from dataclasses import replace
@@ -29,7 +29,7 @@ def panel_W(simulation):
 
 
 def rays_in_doorway(simulation):
-    """How many returns of the newest scan are in the doorway."""
+    """Number of returns of the latest scan in the doorway."""
     X_WB = simulation.true_pose("Alice").transform(0.52)
     points_W = X_WB.multiply(simulation.robots["Alice"].scan().points_B().T).T
     near = (np.abs(points_W[:, 0] - AT[0]) < 0.4) & (np.abs(points_W[:, 1] - AT[1]) < 0.15) & (points_W[:, 2] > 0.2)
@@ -79,7 +79,7 @@ def test_a_closed_door_blocks_the_body_and_the_referee_sees_the_bump():
     assert any("door" in bump.sentence for bump in simulation.referee.collisions)
 
 
-def test_a_door_waits_for_who_is_in_the_doorway():
+def test_a_door_waits_for_a_robot_in_the_doorway():
     simulation = simulated(start=Pose2D(9.0, 5.4, math.pi / 2))
     simulation.clock.advance(4.0)
     assert panel_W(simulation)[0] == pytest.approx(AT[0] - 0.9)
@@ -106,7 +106,7 @@ def test_an_object_is_put_on_the_floor_at_a_point():
     assert simulation.referee.drops == 0
 
 
-def test_where_a_surface_has_no_room_nobody_moves_it():
+def test_an_object_stays_when_the_goal_surface_has_no_free_spot():
     stool = SurfaceTop("stool", ((9.0, 3.0), (9.05, 3.0), (9.05, 3.05)), 0.5)
     world = replace(FLAT, surfaces={**FLAT.surfaces, "stool": stool})
     world = world.with_events((), (MoveRule(name="beer", at=0.5, to="stool"),))
@@ -131,7 +131,7 @@ def test_doors_and_moves_go_on_after_a_restart(tmp_path):
     assert thing_W(after, "beer") == pytest.approx(thing_W(before, "beer"), abs=0.01)
 
 
-def test_somebody_who_stands_sets_off_from_there():
+def test_a_standing_person_sets_off_from_their_place():
     world = FLAT.with_walks({"Robin": Route(waypoints=((9.5, 3.0),), start=1.0)})
     (stands,) = place_people(FLAT, seed=1)
     simulation = Simulation(world, seed=1, visuals=False, robots=[PlacedRobot("Alice", "spot", Pose2D(4.0, 4.5, 0.0))])

@@ -1,4 +1,4 @@
-"""Friction of what moves, multiplied."""
+"""Friction of moving bodies is multiplied."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def friction_of(plant: MultibodyPlant, scene_graph: SceneGraph, body: str) -> tu
     return found.static_friction(), found.dynamic_friction()
 
 
-def test_the_friction_of_what_moves_is_multiplied_and_that_of_the_floor_stays() -> None:
+def test_friction_is_multiplied_for_moving_bodies_only() -> None:
     builder = DiagramBuilder()
     plant, scene_graph = MultibodyPlant(0.01), builder.AddSystem(SceneGraph())
     plant.RegisterAsSourceForSceneGraph(scene_graph)

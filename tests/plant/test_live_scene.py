@@ -12,7 +12,7 @@ from plant.worlds.world import load_world
 
 @pytest.fixture(scope="module")
 def simulation() -> Simulation:
-    """A plant that no test commands; each shows it anew."""
+    """A plant that no test commands; each test shows it again."""
     return Simulation(load_world("flat"), seed=1, visuals=False)
 
 
@@ -38,7 +38,7 @@ def test_it_is_refreshed_a_few_times_a_second_of_the_wall(simulation, monkeypatc
     assert len(shown) == pytest.approx(1.6 * refreshed, rel=0.4)
 
 
-def test_the_camera_goes_along_with_the_robot_where_that_is_wanted(simulation, monkeypatch):
+def test_the_camera_follows_the_robot_on_request(simulation, monkeypatch):
     # at first the whole world; following: beside the robot's body; no longer: the whole world again
     scene = simulation.show_live()
     cameras = []

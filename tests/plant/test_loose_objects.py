@@ -1,4 +1,4 @@
-"""Objects at rest sleep, and wake for whatever may move them."""
+"""Loose objects sleep at rest and wake before a contact; carried objects follow the hand."""
 
 import itertools
 
@@ -86,7 +86,7 @@ def test_objects_at_rest_sleep_and_stay_where_they_are(stage):
     assert before[2] == pytest.approx(0.05, abs=1e-3)
 
 
-def test_what_falls_is_awake_until_it_lies(stage):
+def test_a_falling_object_is_awake_until_it_rests(stage):
     engine = stage(0.3, one=(0, 0, 1.0))
     assert engine.asleep == frozenset()
     engine.advance(2.0)
@@ -94,7 +94,7 @@ def test_what_falls_is_awake_until_it_lies(stage):
     assert place(engine, "one")[2] == pytest.approx(0.05, abs=2e-3)
 
 
-def test_what_lies_on_an_object_that_is_taken_away_falls(stage):
+def test_an_object_falls_when_its_support_is_taken_away(stage):
     engine = stage(under=(0, 0, 0.051), top=(0, 0, 0.152))
     assert engine.asleep == {"under", "top"}
     put(engine, "under", (3.0, 0.0, 0.05))
@@ -178,7 +178,7 @@ BENT_MM = 1e3 * 0.5 * DT_S**2 * TURN_RAD_S**2 * REACH_M
         ([2.0, 0.0, 0.2], [0.0, TURN_RAD_S * 2.0, 0.0], 0.0, 0.0),  # far from the hand
     ],
 )
-def test_what_moves_with_the_hand_is_moved_towards_the_axis_about_which_it_turns(scene, p_W, v_W, along_m_s, moved_mm):
+def test_a_carried_object_is_moved_towards_the_axis_of_the_turn(scene, p_W, v_W, along_m_s, moved_mm):
     plant, context, hand, thing = scene
     _move(plant, context, along_m_s, TURN_RAD_S)
     _set(plant, context, thing, p_W, [0.0, 0.0, TURN_RAD_S], v_W)
@@ -223,7 +223,7 @@ TABLE = """<sdf version="1.7"><model name="table"><link name="table"><collision 
 
 
 @pytest.mark.parametrize("steps_before", [1, 2, 3, 4])
-def test_a_can_that_is_wrung_out_of_the_fingers_over_a_table_is_not_hurled_away(tmp_path, steps_before):
+def test_a_can_that_spins_out_of_the_fingers_stays_near_the_table(tmp_path, steps_before):
     """It spins at 600 rad/s, 1 mm over a table: it falls over there, wherever in the engine's periods that happens."""
     path = tmp_path / "table.sdf"
     path.write_text(TABLE)

@@ -64,7 +64,7 @@ def test_pictures_and_scans_show_the_world_as_of_the_last_readings(world):
     assert np.array_equal(scans[0].ranges_m, scans[1].ranges_m, equal_nan=True)
 
 
-def test_time_stands_still_between_two_ticks_whatever_the_lease_waits_for(engine):
+def test_lease_verbs_do_not_advance_the_time(engine):
     pipeline = Pipeline(engine)
     robot = pipeline.robots["Alice"]
     pipeline.advance(TICK_S)
@@ -78,7 +78,7 @@ def test_time_stands_still_between_two_ticks_whatever_the_lease_waits_for(engine
     assert pipeline.now() == pytest.approx(2 * TICK_S) == robot.odometry().stamp_s
 
 
-def test_what_is_commanded_before_the_lease_is_returned_is_begun_before(engine):
+def test_commands_before_the_return_of_the_lease_begin_first(engine):
     pipeline = Pipeline(engine)
     robot = pipeline.robots["Alice"]
     lease = robot.acquire_lease("test")
@@ -131,7 +131,7 @@ def test_stopping_one_command_leaves_the_others(engine):
     assert states == [CommandState.STOPPED, CommandState.RUNNING]
 
 
-def test_what_happens_in_the_step_under_way_is_told_at_the_next_tick(engine):
+def test_events_of_the_step_under_way_appear_at_the_next_tick(engine):
     pipeline = Pipeline(engine)
     pipeline.advance(TICK_S)
     engine.note("the lamp falls over")  # the engine is a tick ahead by now
@@ -140,7 +140,7 @@ def test_what_happens_in_the_step_under_way_is_told_at_the_next_tick(engine):
     assert list(pipeline.events) == [(2 * TICK_S, "the lamp falls over")]
 
 
-def test_what_goes_wrong_in_a_step_is_raised_where_time_is_advanced(engine):
+def test_advance_raises_the_exception_of_a_step(engine):
     def fail(now_s: float) -> None:
         raise ArithmeticError("nothing is finite")
 
@@ -168,7 +168,7 @@ def _x_m(engine) -> float:
 
 
 def _drive_about(pipeline: Pipeline) -> list[str]:
-    """Readings of a short drive, with a lease that is given back and taken on the way."""
+    """Readings of a short drive, during which the lease is returned and taken again."""
     robot = pipeline.robots["Alice"]
     lease, readings = robot.acquire_lease("test"), []
     for tick in range(30):

@@ -51,7 +51,7 @@ def moved():
     return Recorder(SimpleNamespace(plant=plant), None, most_frames=100), positions
 
 
-def test_a_long_recording_keeps_few_frames_and_most_of_them_where_something_moves(moved):
+def test_a_long_recording_has_few_frames_mostly_of_motion(moved):
     recorder, positions = moved
     for number in range(20_000):
         time_s = number / 16.0

@@ -1,4 +1,4 @@
-"""The referee sees what truly happened."""
+"""The referee records the true events and judges goal conditions by them."""
 
 import dataclasses
 import time
@@ -162,7 +162,7 @@ def test_pushed_or_barely_raised_object_is_not_grasped():
     assert not Stage().lift(height=0.02).holds(GRASPED)
 
 
-def test_object_borne_clear_of_the_table_but_low_and_far_away_is_grasped():
+def test_an_object_moved_low_but_far_away_is_grasped():
     barely = np.add(ON_TABLE, (0, 0, 0.015))
     stage = Stage().hold("coke", ON_TABLE).watch(0.3).carry("coke", ON_TABLE, barely)
     assert not stage.holds(GRASPED)
@@ -225,7 +225,7 @@ def test_let_go_and_at_rest_on_the_persons_tray_is_handed_over():
     assert verdict.drops == 0
 
 
-def test_what_turns_over_on_the_tray_is_no_drop_but_what_falls_off_it_is():
+def test_an_object_that_falls_off_the_tray_is_dropped_but_not_one_that_tips():
     stage = given().watch(0.1)
     assert stage.put("coke", np.subtract(ON_TRAY, (0, 0, TOUCH))).watch().referee.drops == 0
     stage = given().watch(0.1).fall("coke", ON_TRAY, (0.6, 2.4, HALF - TOUCH))
@@ -245,7 +245,7 @@ def test_taken_from_the_tray_again_it_was_handed_over():
 
 
 @pytest.mark.parametrize("end", [(0.0, 2.4, 0.9), (0.0, 2.4, 0.3)])
-def test_what_is_held_out_and_never_let_go_is_no_hand_over(end):
+def test_an_object_that_is_never_released_is_not_handed_over(end):
     stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), np.add(end, (0.5, 0, 0)))
     verdict = stage.referee.judge([HANDED])
     assert not verdict.success
@@ -265,7 +265,7 @@ def test_object_let_go_near_the_person_is_no_hand_over():
     assert verdict.drops == 1
 
 
-def test_hand_over_of_what_came_from_elsewhere_does_not_count():
+def test_a_hand_over_from_another_source_does_not_count():
     stage = given().watch()
     assert not stage.holds(dataclasses.replace(HANDED, source=(SHELF,)))
     assert stage.holds(dataclasses.replace(HANDED, source=(TABLE,)))
@@ -292,7 +292,7 @@ def test_still_in_the_gripper_is_not_placed():
     assert not placed_stage().watch().holds(PLACED)
 
 
-def test_what_lies_there_from_the_start_is_not_placed():
+def test_an_object_in_the_goal_from_the_start_is_not_placed():
     there = GoalCondition(GoalKind.PLACED, ("hammer",), goal=(SHELF,))
     assert not Stage().watch().holds(there)
 
@@ -336,7 +336,7 @@ def test_an_object_that_was_put_there_only_after_its_step_was_not_put_by_it():
     assert not stage.holds(late)
 
 
-def test_what_one_round_put_there_does_not_count_for_the_next():
+def test_a_placement_of_one_round_does_not_count_for_the_next():
     stage = placed_stage().let_go().watch()
     first = put_then(stage)
     second = dataclasses.replace(PLACED, began_s=stage.time, ended_s=stage.time + 2.0)
@@ -360,7 +360,7 @@ def test_a_grasped_object_must_be_held_at_the_end_of_its_step():
     assert not stage.holds(dataclasses.replace(held, when=When.END_OF_MISSION))
 
 
-def test_what_is_always_held_was_let_go_at_no_time():
+def test_an_always_held_object_is_never_released():
     stage = Stage().lift().watch(2.0)
     always = GoalCondition(GoalKind.GRASPED, when=When.ALWAYS, began_s=1.5, ended_s=stage.time)
     assert stage.holds(always)
@@ -375,18 +375,18 @@ def moved(stage, name, p_WO):
     return stage.watch()
 
 
-def test_what_somebody_else_puts_on_the_goal_was_not_placed_by_the_robot():
+def test_an_object_put_there_by_a_person_was_not_placed_by_the_robot():
     stage = placed_stage().let_go().watch()
     assert not moved(moved(stage, "coke", ON_TABLE), "coke", ON_SHELF).holds(PLACED)
 
 
-def test_what_somebody_else_moves_down_is_neither_a_drop_nor_a_knock():
+def test_an_object_moved_down_by_a_person_is_neither_dropped_nor_knocked():
     stage = moved(Stage(), "coke", (0.0, 0.0, HALF - TOUCH))
     assert stage.referee.drops == 0
     assert stage.referee.events == ("Somebody moved the coke at 0.50 s.",)
 
 
-def test_what_the_robot_placed_stays_placed_when_somebody_takes_it_away_later():
+def test_a_placement_counts_when_a_person_takes_the_object_away_later():
     stage = placed_stage().let_go().watch()
     put = put_then(stage, (stage.time, stage.time + 9.0))
     moved(stage.watch(2.0), "coke", ON_TABLE)
@@ -424,7 +424,7 @@ def test_flickering_contact_of_a_held_object_is_no_drop():
     assert stage.holds(GRASPED)
 
 
-def test_object_knocked_off_the_table_is_told_but_no_drop():
+def test_a_knocked_object_is_reported_but_no_drop():
     stage = Stage().fall("coke", (1.5, 1.0, TABLE_Z), (1.5, 1.0, HALF - TOUCH))
     assert stage.referee.drops == 0
     assert any("knocked down" in event for event in stage.referee.events)
@@ -451,7 +451,7 @@ def test_every_part_that_touches_the_person_collides(link):
     assert "robin" in stage.referee.collisions[0].sentence
 
 
-def test_all_parts_that_touch_one_person_are_one_contact_and_who_stood_did_not_cause_it():
+def test_contacts_with_one_person_count_once_and_a_standing_robot_causes_none():
     stage = Stage().put("body", (0, 3 - 0.2 - 0.049, 0.9)).put("fl_lleg", (0, 3 + 0.2 + 0.049, 0.9)).watch()
     verdict = stage.referee.judge([])
     assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (0, 0, 1)
@@ -601,7 +601,7 @@ def test_a_door_that_never_moves_is_open():
     )
 
 
-def test_path_is_kept():
+def test_the_path_is_recorded():
     stage = Stage()
     for x in np.linspace(0, 1, 21):
         stage.put("body", (x, 0, 0.5)).watch(0.05)
@@ -658,19 +658,19 @@ def test_a_table_is_cleared_when_all_that_stood_there_rests_on_the_other():
     assert verdict.why == "Nothing is left on the table. The coke stands on the shelf."
 
 
-def test_what_is_left_is_named_and_so_is_what_is_missing():
+def test_left_and_missing_objects_are_named():
     verdict = Stage().referee.judge([LEFT, THERE])
     assert not verdict.success
     assert verdict.why == "The coke is left on the table. The coke does not stand on the shelf."
 
 
-def test_what_fell_off_is_not_left_but_missing():
+def test_a_fallen_object_is_missing_and_not_left():
     stage = Stage().fall("coke", (1.5, 1.0, TABLE_Z), (1.5, 1.0, HALF - TOUCH))
     assert stage.holds(LEFT)
     assert not stage.holds(THERE)
 
 
-def test_what_is_still_in_the_gripper_does_not_stand_there():
+def test_an_object_in_the_gripper_does_not_stand_there():
     assert not placed_stage().watch().holds(THERE)
 
 
@@ -685,7 +685,7 @@ def since_now(stage, *conditions):
     return [dataclasses.replace(condition, since_s=stage.time) for condition in conditions]
 
 
-def test_a_second_mission_is_not_fulfilled_by_what_the_first_lifted_and_placed():
+def test_lifts_and_placements_of_the_first_mission_do_not_count_for_the_second():
     stage = Stage().lift().carry("coke", np.add(ON_TABLE, (0, 0, 0.3)), ON_SHELF).let_go().watch()
     assert stage.holds(GRASPED, PLACED)
     second = since_now(stage.watch(0.1), GRASPED, PLACED)
@@ -696,7 +696,7 @@ def test_a_second_mission_is_not_fulfilled_by_what_the_first_lifted_and_placed()
     assert not stage.holds(second[0])  # it was not on the table any more
 
 
-def test_a_second_mission_is_not_fulfilled_by_what_the_first_handed_over_or_was_near():
+def test_hand_overs_and_visits_of_the_first_mission_do_not_count_for_the_second():
     stage = given().watch()
     second = since_now(stage, HANDED)
     assert stage.holds(HANDED)
@@ -707,7 +707,7 @@ def test_a_second_mission_is_not_fulfilled_by_what_the_first_handed_over_or_was_
     assert not stage.holds(*since_now(stage, there))
 
 
-def test_where_the_robot_stood_when_its_mission_began_counts_as_passed():
+def test_the_start_of_a_mission_counts_as_a_passed_place():
     stage = Stage().put("body", (0, 0, 0.6)).watch(1.0)
     there = GoalCondition(GoalKind.WENT, goal=(square("the gate", 0.0, 0.0),), when=When.SOME_TIME)
     began = since_now(stage, there)

@@ -1,4 +1,4 @@
-"""Pictures show what happened where it happened."""
+"""Pictures of a run show paths, objects and scale at their places."""
 
 import cv2
 import numpy as np
@@ -35,13 +35,13 @@ def scene():
 
 
 def red_centre(picture):
-    """Mean pixel (x, y) of what is red."""
+    """Mean pixel (x, y) of the red pixels."""
     rgb = picture.astype(int)
     rows, columns = np.nonzero((rgb[..., 0] > 80) & (rgb[..., 0] > 2 * rgb[..., 1]) & (rgb[..., 0] > 2 * rgb[..., 2]))
     return np.array([columns.mean(), rows.mean()])
 
 
-def test_map_looks_through_the_ceiling_and_knows_its_scale(scene):
+def test_the_map_is_cut_below_the_ceiling_and_to_scale(scene):
     view = top_view(scene[2], (-4, -3, 4, 3), width=400)
     assert view.picture.shape == (300, 400, 3)
     np.testing.assert_allclose(red_centre(view.picture), view.pixels(np.array([[2.0, 1.0]]), 0.5)[0], atol=1.0)
@@ -50,7 +50,7 @@ def test_map_looks_through_the_ceiling_and_knows_its_scale(scene):
     assert view.pixels_per_m == pytest.approx(50.0)
 
 
-def test_path_is_drawn_where_it_was_walked(scene):
+def test_the_path_is_drawn_at_its_place_on_the_map(scene):
     view = top_view(scene[2], (-4, -3, 4, 3), width=800)
     path = np.array([[-3.0, -2.0], [0.0, -2.0], [0.0, 2.0]])
     picture = draw_map(view, path, labels={"hall": (-2, 1)}, marks={"coke": (1.0, -1.0)})
@@ -72,7 +72,7 @@ def test_flat_bounds_are_refused(scene):
         top_view(scene[2], (1, 0, 1, 3))
 
 
-def test_free_view_looks_at_its_target(scene):
+def test_a_free_view_faces_its_target(scene):
     picture = render_view(scene[2], look_at((-1.0, -1.0, 1.6), (2.0, 1.0, 0.5)), (320, 240))
     np.testing.assert_allclose(red_centre(picture), [160, 120], atol=4)
 

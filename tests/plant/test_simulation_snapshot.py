@@ -1,4 +1,4 @@
-"""A plant goes on from the state that another plant kept."""
+"""A plant continues from the saved state of another plant."""
 
 import time
 
@@ -19,7 +19,7 @@ def make(seed=3):
 
 @pytest.fixture(scope="module")
 def kept(tmp_path_factory):
-    """A plant that was given up while its robot walked, and where it kept its state."""
+    """A plant that was abandoned while its robot walked, and the path of its snapshots."""
     simulation, path = make(), tmp_path_factory.mktemp("kept") / "flat.plant"
     keep = simulation.save_snapshots(path, label="7")
     robot = simulation.robots["Alice"]
@@ -56,7 +56,7 @@ def test_the_robot_stops_where_it_was_and_nobody_has_its_lease(kept, restored):
         before.robots["Alice"].acquire_lease("somebody else")
 
 
-def test_things_stay_where_they_were(kept, restored):
+def test_objects_stay_in_place_after_a_restart(kept, restored):
     for name in restored.referee._histories:
         was, now = (each.referee._histories[name].last.p_WO for each in (kept[0], restored))
         assert np.linalg.norm(now - was) < 0.002

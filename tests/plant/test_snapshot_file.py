@@ -1,4 +1,4 @@
-"""The snapshot's files: whole after a kill at any byte, refused when damaged."""
+"""Snapshot files stay valid after a kill at any byte, and are refused when damaged."""
 
 import errno
 import math
@@ -39,8 +39,8 @@ def test_a_write_that_was_cut_off_leaves_the_one_before(path):
         assert read_snapshot(path).values["value"] == 2
 
 
-def test_on_a_disk_that_is_full_the_one_before_stays_whole(path, monkeypatch):
-    """A disk that fills up takes a part of what is written, says so, and refuses the rest."""
+def test_a_full_disk_leaves_the_previous_snapshot_valid(path, monkeypatch):
+    """A disk that becomes full: writes a part, reports its size, and refuses the rest."""
     file, room, write = SnapshotFile(path), [math.inf], os.pwrite
 
     def filling(descriptor, data, offset):
@@ -99,7 +99,7 @@ def write_with_rows(file, value):
     file.write(encode(file.next_number, {"value": value}, {}, file.rows))
 
 
-def test_what_grows_is_appended_and_read_as_far_as_it_belongs_to_the_snapshot(path):
+def test_rows_are_appended_and_read_up_to_the_snapshots_count(path):
     file = SnapshotFile(path, width=2)
     for value in (1, 2, 3):
         write_with_rows(file, value)
@@ -107,7 +107,7 @@ def test_what_grows_is_appended_and_read_as_far_as_it_belongs_to_the_snapshot(pa
     assert read_snapshot(path).rows.tolist() == rows(1, 2, 3).tolist()
 
 
-def test_what_is_written_for_a_snapshot_does_not_grow_with_the_rows_before(path):
+def test_the_size_of_a_snapshot_does_not_grow_with_its_rows(path):
     file, written = SnapshotFile(path, width=2), []
     for _ in range(5):
         write_with_rows(file, 1)

@@ -10,7 +10,7 @@ MOST_BYTES_PER_MINUTE = 500_000
 
 
 class Plant:
-    """An engine and a referee of two robots that walk without end; only what the writer asks of them."""
+    """Engine and referee of two robots that walk without end, as far as the writer calls them."""
 
     def __init__(self):
         self.now_s, self.paths, self.restored = 0.0, {"Alice": [], "Bob": []}, None
@@ -60,7 +60,7 @@ def written_in(writer, plant, seconds):
     return writer.bytes_written - before
 
 
-def test_what_is_written_in_a_minute_stays_within_its_budget_however_long_the_mission_is(writer, plant):
+def test_the_bytes_written_in_a_minute_stay_within_a_budget(writer, plant):
     first = written_in(writer, plant, 60)
     written_in(writer, plant, 3480)
     last = written_in(writer, plant, 60)

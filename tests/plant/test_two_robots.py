@@ -9,7 +9,7 @@ from skills.robot import Pose2D
 
 
 def test_a_crash_of_two_robots_is_one_contact_between_them() -> None:
-    """Alice drives into Bob, who stands, and stays there."""
+    """Alice drives into Bob, who stands, and stays in contact."""
     alice, bob = Pose2D(2.0, 4.5, 0.0), Pose2D(2.95, 4.5, 3.14)
     robots = [PlacedRobot("Alice", "spot", alice), PlacedRobot("Bob", "fetch", bob)]
     simulation = Simulation(load_world("flat"), seed=1, visuals=False, robots=robots)

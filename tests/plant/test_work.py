@@ -1,4 +1,4 @@
-"""The plant counts what it does; the same run counts the same."""
+"""The plant counts its work; the same run gives the same counts."""
 
 from plant.simulation import Simulation
 from plant.worlds.world import load_world

@@ -1,4 +1,4 @@
-"""Folders of imported objects: what is written is read, and what is damaged is refused."""
+"""Folders of imported objects are read back, and damaged ones are refused."""
 
 import re
 from pathlib import Path
@@ -27,7 +27,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_what_is_written_is_read(folder: Path) -> None:
+def test_a_written_object_is_read_back(folder: Path) -> None:
     assert read_imported(folder) == DRILL
 
 

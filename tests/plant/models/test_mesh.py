@@ -96,7 +96,7 @@ def test_faces_point_at_lines_that_exist() -> None:
     assert tuple(corners.max(axis=0)) == tuple(counts)
 
 
-def test_the_material_file_names_only_what_is_used() -> None:
+def test_the_material_file_has_only_used_materials() -> None:
     mesh = Mesh(MATERIALS)
     add_box(mesh)
     text = mtl_text(mesh, "palette.png")

@@ -1,4 +1,4 @@
-"""The loose things: they rest still, weigh what they should, and their files are those that the builder makes."""
+"""Loose objects rest still, have their masses, and their files equal the builder's output."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_class_ids_are_distinct_and_leave_zero_to_nothing() -> None:
     assert min(ids) > 0
 
 
-def test_committed_models_are_what_the_builder_writes(tmp_path: Path) -> None:
+def test_committed_models_equal_the_builders_output(tmp_path: Path) -> None:
     build(tmp_path)
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl")]
     assert len(written) == 18
@@ -129,7 +129,7 @@ def test_committed_models_are_what_the_builder_writes(tmp_path: Path) -> None:
         assert committed.read_text(encoding="utf-8") == path.read_text(encoding="utf-8"), committed.name
 
 
-def test_committed_forms_are_what_the_recipes_make(tmp_path: Path) -> None:
+def test_committed_forms_equal_the_recipes_output(tmp_path: Path) -> None:
     write_forms(tmp_path)
     written = [path for path in tmp_path.rglob("*") if path.suffix in (".sdf", ".obj", ".mtl")]
     assert len(written) == 3 * len(FORMS)

@@ -1,4 +1,4 @@
-"""People who take what a robot holds out, in the plant."""
+"""People who receive offered objects in the plant."""
 
 import math
 
@@ -34,7 +34,7 @@ X_WP = RigidTransform(RollPitchYaw(0.0, 0.0, math.pi), [1.45, 0.0, 0.0])
 
 
 class Hall:
-    """Alice holds a can out to Kim, who stands before her or walks by."""
+    """Alice offers a can to Kim, who stands in front of her or walks past."""
 
     def __init__(self, folder, receiving=TAKES, *, route=None):
         (folder / "floor.sdf").write_text(FLOOR)
@@ -104,7 +104,7 @@ class Hall:
         self.robot.set_gripper(1.2, 20.0, until_s=self.engine.now() + 3.0, lease=self.lease)
 
 
-def test_the_tray_goes_down_before_the_body_before_it_comes_near_what_may_hang_low(tmp_path):
+def test_the_tray_moves_down_at_the_body_before_it_nears_the_object(tmp_path):
     hall = Hall(tmp_path).until(Phase.BRINGING)
     tray, lowest_m = hall.world.trays["Kim"], hall.place_W(hall.can)[2] - 0.06
     while hall.kim.phase is not Phase.PULLING:
@@ -114,7 +114,7 @@ def test_the_tray_goes_down_before_the_body_before_it_comes_near_what_may_hang_l
         hall.engine.advance(0.05)
 
 
-def test_the_tray_comes_under_what_is_held_out_without_touching_it(tmp_path):
+def test_the_tray_moves_below_an_offered_object_without_contact(tmp_path):
     hall = Hall(tmp_path)
     tray, before_W = hall.world.trays["Kim"], hall.place_W(hall.can)
     assert hall.place_W(tray) == pytest.approx([1.45, 0.0, 1.08], abs=1e-6)
@@ -130,7 +130,7 @@ def test_the_tray_comes_under_what_is_held_out_without_touching_it(tmp_path):
     assert hall.place_W(hall.can) == pytest.approx(before_W, abs=0.005)
 
 
-def test_what_is_let_go_under_the_pull_comes_to_rest_on_the_tray(tmp_path):
+def test_an_object_released_under_the_pull_rests_on_the_tray(tmp_path):
     hall = Hall(tmp_path).until(Phase.PULLING)
     hall.engine.advance(0.4)
     hall.let_go()
@@ -184,14 +184,14 @@ def test_the_tray_goes_home_when_the_object_is_drawn_in(tmp_path):
     assert not hall.kim.busy
 
 
-def test_who_does_not_receive_has_no_tray(tmp_path):
+def test_a_person_who_does_not_receive_has_no_tray(tmp_path):
     hall = Hall(tmp_path, None)
     hall.engine.advance(4.0)
     assert not hall.world.trays
     assert hall.robot.gripper().holding
 
 
-def test_somebody_who_walks_stops_to_take_it(tmp_path):
+def test_a_walking_person_stops_to_take_an_object(tmp_path):
     route = PointRoute((PointStop((1.45, 0.0), 4.0), PointStop((1.45, 3.0))), speed_m_s=1.0, yields=False)
     hall = Hall(tmp_path, Receiving(reaction_s=0.5), route=route).until(Phase.BRINGING)
     person = hall.world.plant.GetBodyByName("person")
@@ -216,7 +216,7 @@ def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
 
 # how far (m) the object has moved in the hand while the tray still comes -> whether it counts as let go of
 @pytest.mark.parametrize(("moved_m", "let_go"), [(0.013, False), (0.02, True)])
-def test_what_creeps_in_the_hand_before_anybody_pulls_is_not_let_go_of(tmp_path, moved_m, let_go):
+def test_a_small_creep_before_the_pull_does_not_count_as_released(tmp_path, moved_m, let_go):
     hall = Hall(tmp_path).until(Phase.BRINGING)
     state = hall.kim.state()
     hall.kim.restore({**state, "p_HO": pack(unpack(state["p_HO"]) + [moved_m, 0.0, 0.0])})

@@ -45,13 +45,13 @@ def test_waits_for_its_start_and_at_a_stop():
     assert after(walk, 1.0).place_W[1] == pytest.approx(0.5, abs=0.05)
 
 
-def test_sets_off_when_told():
+def test_a_person_ends_the_pause_on_request():
     walk = walk_of(Leg(((0.0, 0.0), (3.0, 0.0)), 0.0), start_s=1000.0)
     walk.set_off()
     assert after(walk, 1.0).place_W == pytest.approx((1.0, 0.0))
 
 
-def test_turns_to_where_it_goes_no_faster_than_a_person_does():
+def test_a_person_turns_to_the_path_at_a_limited_rate():
     walk = walk_of(Leg(((0.0, 0.0), (0.0, 3.0)), 0.0))
     assert after(walk, 0.1).yaw_rad == pytest.approx(0.4, abs=0.06)
     assert walk.heading_rad == pytest.approx(math.pi / 2)
@@ -63,7 +63,7 @@ def test_goes_round_and_round_on_a_loop():
     assert after(walk_of(*legs, loops=True), 4.5).place_W == pytest.approx((0.5, 0.0), abs=0.05)
 
 
-def test_somebody_without_a_way_stands():
+def test_a_person_without_a_path_stands():
     assert after(walk_of(), 1.0).place_W == (0.0, 0.0)
 
 
@@ -134,14 +134,14 @@ def hall(tmp_path):
     )
 
 
-def test_walks_where_the_route_leads_and_is_there_in_the_plant(hall):
+def test_the_body_in_the_plant_follows_the_route(hall):
     stage = hall((0.0, 2.0), (0.0, -2.0), speed_m_s=1.0)
     stage.engine.advance(2.0)
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((0.0, 0.0), abs=1e-6)
     assert stage.person_W.yaw_rad == pytest.approx(-math.pi / 2, abs=0.01)
 
 
-def test_goes_around_the_wall_and_touches_it_nowhere(hall):
+def test_a_person_walks_around_a_wall_without_contact(hall):
     stage = hall((1.0, 0.0), (3.0, 0.0), speed_m_s=2.0)
     places = []
     for _ in range(60):
@@ -157,7 +157,7 @@ def test_a_route_into_the_wall_is_refused(hall):
         hall((1.0, 0.0), (2.0, 0.0))
 
 
-def test_the_lidar_sees_somebody_walk(hall):
+def test_the_lidar_sees_a_walking_person(hall):
     stage = hall((-1.0, 0.0), (0.0, 0.0), speed_m_s=1.0)
 
     def ahead_m():
@@ -170,7 +170,7 @@ def test_the_lidar_sees_somebody_walk(hall):
     assert ahead_m() - near_m == pytest.approx(0.9, abs=0.12)
 
 
-def test_who_yields_stops_for_a_robot_close_ahead_and_goes_on_when_it_has_left(hall):
+def test_a_yielding_person_waits_for_a_robot_ahead_and_walks_on_later(hall):
     stage = hall((-1.0, -2.0), (-1.0, 3.0), robot=Pose2D(-1.0, 0.5, 0.0))
     stage.engine.advance(4.0)
     held = stage.person_W.y_m
@@ -179,7 +179,7 @@ def test_who_yields_stops_for_a_robot_close_ahead_and_goes_on_when_it_has_left(h
     assert stage.person_W.y_m > 1.0 and not stage.referee.collisions
 
 
-def test_who_does_not_yield_walks_into_a_standing_robot_and_has_caused_it(hall):
+def test_a_person_who_does_not_yield_walks_into_a_standing_robot(hall):
     stage = hall((-1.0, -2.0), (-1.0, 1.0), robot=Pose2D(-1.0, 0.5, 0.0), yields=False)
     stage.engine.advance(4.0)
     verdict = stage.referee.judge([])
@@ -188,7 +188,7 @@ def test_who_does_not_yield_walks_into_a_standing_robot_and_has_caused_it(hall):
     assert stage.person_W.y_m == pytest.approx(1.0, abs=1e-6)
 
 
-def test_a_robot_that_drives_into_somebody_has_caused_it_and_does_not_push_them_away(hall):
+def test_a_robot_that_drives_into_a_person_causes_the_collision(hall):
     stage = hall((-1.0, 0.0), (-1.0, 0.0))
     stage.drive(0.6, 4.0)
     verdict = stage.referee.judge([])
@@ -196,7 +196,7 @@ def test_a_robot_that_drives_into_somebody_has_caused_it_and_does_not_push_them_
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 0.0), abs=0.02)
 
 
-def test_a_restored_walk_goes_on_where_it_was(hall):
+def test_a_restored_walk_continues(hall):
     stage = hall((0.0, 2.0), (0.0, -2.0), loops=True)
     stage.engine.advance(1.0)
     state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
@@ -207,14 +207,14 @@ def test_a_restored_walk_goes_on_where_it_was(hall):
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
 
 
-def test_who_has_yielded_for_long_goes_around_the_robot(hall):
+def test_a_person_who_has_yielded_for_long_walks_around_the_robot(hall):
     stage = hall((-1.0, -2.5), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
     stage.engine.advance(12.0)
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 3.5), abs=1e-6)
     assert not stage.referee.collisions
 
 
-def test_who_is_on_a_way_around_goes_on_with_it_after_a_restart(hall):
+def test_a_detour_continues_after_a_restart(hall):
     stage = hall((-1.0, -2.5), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
     stage.engine.advance(6.0)
     state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}

@@ -1,4 +1,4 @@
-"""Cameras see what is in front of them, as noisily as real ones, from where Spot's cameras sit."""
+"""Cameras render the scene at the poses of Spot's cameras, with noise."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ BODY_BOX_CENTRES_B = {  # where a box stands, in the body frame, for each body c
 
 
 class Scene:
-    """A floor, a coloured box, and a body whose cameras look at them."""
+    """A floor, a coloured box, and a body whose cameras face them."""
 
     def __init__(self, box_centre_B):
         builder = DiagramBuilder()
@@ -78,7 +78,7 @@ def test_body_camera_depth_lands_on_the_box_and_the_floor(name):
     assert np.mean(on_floor | (np.abs(off_box) < 0.02)) > 0.99
 
 
-def test_body_cameras_look_where_their_names_say():
+def test_body_cameras_face_the_directions_of_their_names():
     views = {name: spec.X_link_camera().rotation().matrix()[:, 2] for name, spec in load_cameras(CAMERAS).items()}
     for name in ("frontleft", "frontright", "hand"):
         assert views[name][0] > 0.3
@@ -203,7 +203,7 @@ def test_broken_yaml_is_refused_with_its_line(tmp_path):
         load_cameras(path)
 
 
-def test_only_what_is_asked_for_is_rendered():
+def test_only_the_requested_part_is_rendered():
     scene = Scene(BODY_BOX_CENTRES_B["left"])
     camera = scene.camera("left")
     visual = camera.take(scene.query, 1.0, FrameTree({}), depth=False)

@@ -1,4 +1,4 @@
-"""The LiDAR measures what stands around it."""
+"""The LiDAR measures the distances of the shapes around it."""
 
 import time
 

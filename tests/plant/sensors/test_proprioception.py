@@ -1,4 +1,4 @@
-"""Odometry drifts with the way gone, and only then."""
+"""Odometry drifts with the travelled distance, and only then."""
 
 import numpy as np
 import pytest

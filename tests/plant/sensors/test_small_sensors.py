@@ -80,7 +80,7 @@ def test_gripper_pressing_on_itself_holds_nothing():
     assert not feel(GripperModel(rng()), 0.0, 40.0, 0.0)[-1].holding
 
 
-def test_gripper_that_loses_its_thing_knows_it():
+def test_gripper_notices_a_lost_object():
     gripper = GripperModel(rng())
     assert feel(gripper, 0.6, 30.0, 0.0)[-1].holding
     assert not feel(gripper, 0.0, 30.0, 1.0)[-1].holding

@@ -24,7 +24,7 @@ OBJECTS = "objects:\n  - {name: my tool, model: tool, surfaces: [workbench]}\n"
 
 
 def import_tool(folder: Path, name: str = "tool") -> Path:
-    """A T of 0.5 kg, 28 mm thick, as a hammer, in a folder whose name has a space."""
+    """A T of 0.5 kg, 28 mm thick, as a hammer, in a folder with a space in its name."""
     file = folder / "tool.stl"
     trimesh.creation.extrude_triangulation(OUTLINE, np.array(triangles_of(OUTLINE)), 0.028).export(file)
     out = folder / f"my {name}"

@@ -1,4 +1,4 @@
-"""Where the seed puts things in the flat, for seeds 0 to 50."""
+"""Placement of objects in the flat for the seeds 0 to 50."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def keepout(world: World) -> Map:
 
 @pytest.fixture(scope="module")
 def furnished(world: World) -> tuple[Diagram, Context]:
-    """The world with all things of seed 1 in Drake."""
+    """The world with all objects of seed 1 in Drake."""
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=0.005, discrete_contact_approximation="sap")
     plant, _ = AddMultibodyPlant(config, builder)

@@ -1,4 +1,4 @@
-"""Loading a world, and what a wrong one is told."""
+"""A world is loaded, and a wrong file is refused with its place."""
 
 from __future__ import annotations
 

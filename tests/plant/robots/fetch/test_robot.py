@@ -25,7 +25,7 @@ def test_the_lidar_sees_220_degrees_in_662_points():
     assert math.degrees(azimuths[0] + azimuths[-1]) == pytest.approx(0.0, abs=0.5)
 
 
-def test_a_wall_ahead_is_where_the_scan_says(floor, tmp_path):
+def test_the_scan_measures_the_distance_of_a_wall(floor, tmp_path):
     """A wall's face at x = 2.9 m, the robot at 0: the scan's middle lies there in the body frame."""
     path = tmp_path / "wall.sdf"
     path.write_text(WALL)
@@ -40,7 +40,7 @@ def test_a_wall_ahead_is_where_the_scan_says(floor, tmp_path):
     assert scan.ranges_m.shape == (1, 662)
 
 
-def test_wheels_that_turn_alike_count_a_straight_way_and_against_each_other_a_turn():
+def test_equal_wheel_turns_count_as_straight_and_opposite_ones_as_a_turn():
     """Radius 0.05 m, half track 0.2 m: 10 rad each are 0.5 m; -4 and 4 rad are 1 rad."""
     odometer = WheelOdometer(Axle(0.05, 0.2), np.zeros(2))
     odometer.count(np.array([10.0, 10.0]))
@@ -59,7 +59,7 @@ def test_odometry_follows_a_driven_arc(engine, fetch, lease):
     assert read.yaw_rad == pytest.approx(true.yaw_rad, abs=0.03)
 
 
-def test_its_capabilities_say_what_differs_from_a_walking_robot():
+def test_capabilities_describe_a_wheeled_robot():
     known = fetch_capabilities()
     assert known.base_kind is BaseKind.DIFFERENTIAL
     assert [camera.mount for camera in known.cameras] == [Mount.HEAD]
@@ -68,7 +68,7 @@ def test_its_capabilities_say_what_differs_from_a_walking_robot():
     assert len(known.arm.joint_names) == 7
 
 
-def test_the_head_of_the_capabilities_is_where_the_plant_has_it(engine, fetch, lease):
+def test_the_head_pose_of_the_capabilities_equals_the_plants(engine, fetch, lease):
     """The frame `head` of the capabilities at the encoders' angles is the plant's link, to the encoders' error."""
     fetch.point_head(0.5, 0.3, until_s=5.0, lease=lease)
     engine.advance(2.0)
@@ -103,7 +103,7 @@ def test_it_stands_still_without_creeping(engine):
 
 
 def test_it_drives_a_metre_ahead_within_two_centimetres(engine, fetch, lease):
-    """1.0 m: half a metre a second for two seconds, and what it rolls while it stops makes up for the start."""
+    """1.0 m: half a metre a second for two seconds; the braking distance equals the loss at the start."""
     x0, y0 = pose(engine)[:2]
     while fetch.odometry().pose.x_m < 1.0 - 0.5**2 / (2 * 2.0):
         fetch.drive(0.5, 0.0, 0.0, until_s=engine.now() + 0.1, lease=lease)
@@ -125,7 +125,7 @@ def test_it_turns_a_quarter_on_the_spot_within_two_degrees(engine, fetch, lease)
     assert (x, y) == pytest.approx((x0, y0), abs=0.01)
 
 
-def test_it_refuses_to_drive_sideways(engine, fetch, lease):
+def test_fetch_refuses_to_drive_sideways(engine, fetch, lease):
     command = fetch.drive(0.3, 0.1, 0.0, until_s=1.0, lease=lease)
     assert fetch.command_status(command).state is CommandState.REFUSED
     assert "sideways" in fetch.command_status(command).reason
@@ -190,7 +190,7 @@ def test_a_pitch_is_refused(fetch, lease):
     assert fetch.command_status(command).state is CommandState.REFUSED
 
 
-def test_the_head_turns_to_where_it_is_told(engine, fetch, lease):
+def test_the_head_turns_to_its_goal(engine, fetch, lease):
     command = fetch.point_head(0.8, 0.4, until_s=5.0, lease=lease)
     engine.advance(2.0)
     assert fetch.command_status(command).state is CommandState.DONE
@@ -251,7 +251,7 @@ def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, fetch, leas
     assert "no longer counts" in fetch.command_status(refused).reason
 
 
-def test_state_and_restore_go_on_as_if_nothing_had_been(floor):
+def test_a_restored_robot_moves_like_the_original(floor):
     """The same commands after a restore end at the same place as without one."""
 
     def new():
@@ -275,7 +275,7 @@ def test_state_and_restore_go_on_as_if_nothing_had_been(floor):
 
 @pytest.fixture
 def boxed(floor, tmp_path):
-    """A Fetch that looks at a box between its open fingers, held up by nothing until they close."""
+    """A Fetch with a box between its open fingers, which falls unless they close."""
     path = tmp_path / "box.sdf"
     path.write_text(BOX)
     box = LooseModel("box", path, Pose2D(5.0, 5.0, 0.0).transform(0.06))

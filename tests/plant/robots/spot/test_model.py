@@ -29,7 +29,7 @@ def test_vertices_of_one_cell_are_joined_and_faces_share_them():
     assert len(first & second) == 2
 
 
-def test_a_face_whose_corners_fall_together_vanishes():
+def test_a_face_whose_corners_merge_vanishes():
     assert len(rows("f")) == 2
 
 

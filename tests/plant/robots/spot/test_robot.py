@@ -109,7 +109,7 @@ def test_move_arm_is_done_when_the_arm_has_arrived(engine, spot, lease):
     assert spot.joints().position_rad["arm_sh1"] == pytest.approx(trajectory.positions_rad[-1][1], abs=0.02)
 
 
-def test_an_arm_command_that_expires_leaves_the_arm_where_it_is(engine, spot, lease):
+def test_an_expired_arm_command_holds_the_arm_in_place(engine, spot, lease):
     command = spot.move_arm(arm_to(spot, 1.5, 3.0), until_s=1.0, lease=lease)
     engine.advance(1.5)
     assert spot.command_status(command).state is CommandState.STOPPED

@@ -1,4 +1,4 @@
-"""Spot's own legs, without the floating base."""
+"""Spot stands on its own legs, without the floating base."""
 
 import numpy as np
 import pytest

@@ -70,7 +70,7 @@ def test_the_arm_is_at_rest_in_time(engine, spot, lease, part):
     assert arm_rate(spot) < 0.1
 
 
-def test_a_moving_gripper_stays_where_it_is(engine, spot, lease):
+def test_a_stopped_gripper_stays_in_place(engine, spot, lease):
     spot.set_gripper(1.4, 20.0, until_s=engine.now() + 5.0, lease=lease)
     engine.advance(0.2)
     spot.stop(lease=lease)
@@ -88,7 +88,7 @@ def test_a_gripper_that_is_stopped_before_it_opens_stays_closed(engine, spot, le
     assert spot.gripper().opening < 0.05
 
 
-def test_a_body_on_its_way_down_stays_where_it_is(engine, spot, lease):
+def test_a_stopped_body_stays_at_its_height(engine, spot, lease):
     spot.stand(0.43, 0.0, until_s=engine.now() + 5.0, lease=lease)
     engine.advance(0.2)
     spot.stop(lease=lease)
@@ -100,7 +100,7 @@ def test_a_body_on_its_way_down_stays_where_it_is(engine, spot, lease):
     assert height_m > 0.45
 
 
-def test_the_lease_that_counts_can_be_seen(spot, lease):
+def test_lease_holder_returns_the_current_lease(spot, lease):
     assert spot.lease_holder() == lease
     taken = spot.take_lease("tablet")
     assert spot.lease_holder() == taken

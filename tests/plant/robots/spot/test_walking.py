@@ -1,4 +1,4 @@
-"""The carried Spot walks so that it looks like walking: feet that stand do not slide."""
+"""Spot walks on its floating base without sliding of its standing feet."""
 
 import numpy as np
 import pytest

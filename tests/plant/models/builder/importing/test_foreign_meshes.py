@@ -69,7 +69,7 @@ def test_a_collada_file_has_its_unit_and_its_axis(tmp_path, kind, meter, up, siz
     assert "Kd 1" in (tmp_path / "model/gadget.mtl").read_text() or (tmp_path / "model/palette.png").is_file()
 
 
-def test_a_node_of_a_collada_file_moves_and_scales_what_is_in_it(tmp_path):
+def test_a_collada_node_moves_and_scales_its_geometry(tmp_path):
     node = "<translate>5 0 0</translate><rotate>0 0 1 90</rotate><scale>2 1 -1</scale>"
     (tmp_path / "box.dae").write_text(collada(trimesh.creation.box(BOX), up="Z_UP", node=node))
     made = imported(tmp_path / "box.dae", tmp_path / "model")
@@ -134,7 +134,7 @@ def test_pieces_that_are_inside_out_count_and_hollows_stay_hollow():
         hollow.invert()
 
 
-def test_a_pointer_of_git_lfs_and_a_pipe_are_told(tmp_path):
+def test_a_git_lfs_pointer_and_a_pipe_are_refused(tmp_path):
     (tmp_path / "lfs.stl").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 9\n")
     assert "git lfs pull" in refusal(tmp_path / "lfs.stl", tmp_path / "model").hint
     os.mkfifo(tmp_path / "pipe.stl")

@@ -1,4 +1,4 @@
-"""Meshes become models: sizes, masses, collision parts, appearance; what is no solid body is refused."""
+"""Imported meshes: sizes, masses, collision parts and appearance; refusal of meshes that are no solid body."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def test_a_hollow_body_is_few_convex_parts_none_larger_than_it(tmp_path, make):
     assert sdf.count("<drake:mu_dynamic>0.8<") == sdf.count("<collision ")
 
 
-def test_no_sphere_that_bears_it_stands_out_of_it(tmp_path):
+def test_the_bearing_spheres_stay_within_the_body(tmp_path):
     made, folder = imported(l_shape(), tmp_path)
     text = (folder / "gadget.sdf").read_text()
     found = re.findall(r"<pose>(\S+ \S+ \S+) 0 0 0</pose>\s*<geometry><sphere><radius>([0-9.]+)<", text)
@@ -104,14 +104,14 @@ def test_millimetres_are_scaled(tmp_path):
     assert made.size_m == pytest.approx((0.2, 0.2, 0.05), abs=1e-6)
 
 
-def test_what_cannot_stand_is_laid_down_along_x(tmp_path):
+def test_an_object_that_cannot_stand_is_laid_down_along_x(tmp_path):
     rod = trimesh.creation.cylinder(0.01, 0.3)
     rod.apply_transform(trimesh.transformations.rotation_matrix(0.4, [1, 1, 0]))
     made, _ = imported(rod, tmp_path)
     assert made.size_m == pytest.approx((0.3, 0.02, 0.02), abs=2e-4)
 
 
-def test_what_stands_is_left_standing(tmp_path):
+def test_a_standing_object_is_left_standing(tmp_path):
     assert imported(trimesh.creation.box((0.04, 0.06, 0.2)), tmp_path)[0].size_m == pytest.approx((0.04, 0.06, 0.2))
 
 
@@ -197,7 +197,7 @@ def test_an_open_body_can_be_closed(tmp_path):
         (lambda: trimesh.PointCloud(np.eye(3)), "it is no mesh: there are no triangles in it"),
     ],
 )
-def test_what_is_no_body_is_refused(tmp_path, make, why):
+def test_a_mesh_that_encloses_no_body_is_refused(tmp_path, make, why):
     with pytest.raises(ObjectImportError, match=re.escape(why)):
         imported(make(), tmp_path)
 

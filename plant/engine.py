@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 
 from plant.diagram import TIME_STEP_S, WorldDiagram
 from plant.events import Doors, Moves
-from plant.loose_objects import Carried, Sleepers
+from plant.loose_objects import CarriedObjects, Sleepers
 from plant.people.receivers import Receivers
 from plant.people.walkers import Walkers
 from plant.robots.robot_kind import SensorOptions
@@ -46,11 +46,11 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self._sleepers = Sleepers(world, self.root_context)
         plant = world.plant
         loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
-        self._carried = Carried(plant, self.context, loose)
+        self._carried = CarriedObjects(plant, self.context, loose)
         self._hands = {name: robot.hand for name, robot in world.robots.items()}
         self.receivers = Receivers(world, self.context)
         self._events: list[tuple[float, str]] = []
-        self.doors = Doors(plant, self.context, world.config.doors, self._outlines_W, self.note)
+        self.doors = Doors(plant, self.context, world.config.doors, self._outlines_W, self.record_event)
         self.moves: Moves | None = None
         self._steps = 0
         self._observers: list[tuple[int, Callable[[float], None]]] = []
@@ -170,7 +170,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self._command_robots()
         self._simulator.Initialize()
 
-    def note(self, sentence: str) -> None:
+    def record_event(self, sentence: str) -> None:
         """Records a sentence about an event that happens now."""
         self._events.append((round(self.now(), 6), sentence))
 

@@ -226,7 +226,7 @@ _FASTEST_ALONG_RAD_S: Final = FASTEST_SPIN_RAD_S / 3.0**0.5
 _AT_HAND_M: Final = 0.5
 
 
-class Carried:
+class CarriedObjects:
     """Correction of the loose bodies that a hand carries; call `after_step` after each step of the plant."""
 
     def __init__(self, plant: MultibodyPlant, context: Context, loose: Sequence[RigidBody]) -> None:

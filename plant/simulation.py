@@ -67,7 +67,7 @@ class Simulation:
         )
         self.engine = Engine(built, seed=seed)
         if world.moves:
-            moves = Moves(built.plant, self.engine.context, world, objects, seed=seed, tell=self.engine.note)
+            moves = Moves(built.plant, self.engine.context, world, objects, seed=seed, tell=self.engine.record_event)
             moves.listen(self._moved)
             self.engine.moves = moves
         self.referee = Referee(

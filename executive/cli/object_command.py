@@ -49,11 +49,11 @@ def import_command(
     as_json: AS_JSON = False,
 ) -> None:
     """Imports a mesh as a model: visual geometry, convex collision parts, and inertia from volume and mass."""
-    from plant.models.builder.importing import Wanted, import_object
+    from plant.models.builder.importing import ImportOptions, import_object
 
-    wanted = Wanted(name, mass, class_name, scale, up, close_holes)
+    wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
-        wanted.refuse_wrong()
+        wanted.check()
     with _refused(mesh), new_folder(out) as draft:
         made = import_object(mesh, wanted, draft)
     if (doubt := _unlike_its_class(made)) is not None:

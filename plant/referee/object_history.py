@@ -82,7 +82,7 @@ class ObjectHistory(Stateful):
     _by_others: list[int] = field(default_factory=list)
 
     def own_rests_W(self, from_s: float, until_s: float = math.inf) -> list[FloatArray]:
-        """Places where it came to rest in an interval, without its first place and moves by people."""
+        """Places where the object came to rest in an interval, without its first place and moves by people."""
         rests = enumerate(zip(self.rested_s, self.rests_W, strict=True))
         own = [(when_s, p_W) for number, (when_s, p_W) in rests if number > 0 and number not in self._by_others]
         return [p_W for when_s, p_W in own if from_s <= when_s <= until_s]
@@ -98,7 +98,7 @@ class ObjectHistory(Stateful):
 
     @property
     def placed_by_person(self) -> bool:
-        """Returns whether a person moved it last."""
+        """Returns whether a person moved the object last."""
         return len(self.rests_W) - 1 in self._by_others and not self._carried
 
     @property
@@ -110,40 +110,40 @@ class ObjectHistory(Stateful):
 
     @property
     def resting(self) -> bool:
-        """Returns whether it is still, supported, and in no gripper."""
+        """Returns whether the object is still, supported, and in no gripper."""
         return self.holder is None and self._supported and self.speed_m_s < STILL_M_S
 
     @property
     def holder(self) -> str | None:
-        """Robot whose gripper holds it, or held it a moment ago."""
+        """Robot whose gripper holds the object, or held it a moment ago."""
         return self._grip_robot if self.last.time_s - self._grip_s <= FLICKER_S else None
 
     @property
     def in_the_air(self) -> bool:
-        """Returns whether a gripper carries it and it touches only the robot."""
+        """Returns whether a gripper carries the object, and the object touches only the robot."""
         return self._carried and self.holder is not None and not self._supported
 
     @property
     def on_tray_of(self) -> str | None:
-        """Person on whose tray it rests."""
+        """Person on whose tray the object rests."""
         return self._tray_of if self.resting and self.last.time_s - self._tray_s <= FLICKER_S else None
 
     @property
     def _supported(self) -> bool:
-        """Returns whether a body other than a robot supports it, or did a moment ago."""
+        """Returns whether a body other than a robot supports the object, or did a moment ago."""
         return self.last.time_s - self._supported_s <= FLICKER_S
 
     def place_at(self, time_s: float) -> FloatArray | None:
-        """Resting place at a time; None when it was carried or moved."""
+        """Resting place of the object at a time; None when it was carried or moved."""
         places = [(since_s, p_W) for since_s, p_W in zip(self.rested_s, self.rests_W, strict=True) if since_s <= time_s]
         since_s, p_W = places[-1] if places else (self.rested_s[0], self.rests_W[0])
         lifted = any(since_s < lift.time_s <= time_s for lift in self.lifts)
         return None if lifted else p_W
 
     def rest_at(self, time_s: float) -> tuple[float, FloatArray] | None:
-        """Time and place of its rest at a time, or of a rest that began within SETTLE_S after it; None without a rest.
+        """Time and place of the rest at a time, or of a rest that began within SETTLE_S after it; None without a rest.
 
-        Its first place and places where a person put it do not count.
+        The first place of the object and places where a person put it do not count.
         """
         lifted_s = max((lift.time_s for lift in self.lifts if lift.time_s <= time_s), default=-math.inf)
         again_s = min((lift.time_s for lift in self.lifts if lift.time_s > time_s), default=math.inf)
@@ -161,20 +161,20 @@ class ObjectHistory(Stateful):
         return when_s, self.rests_W[number]
 
     def holder_at(self, time_s: float) -> str | None:
-        """Robot that held it at a time, or lifted it within SETTLE_S after it; None when no robot did."""
+        """Robot that held the object at a time, or lifted it within SETTLE_S after that; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= time_s]
         after = [lift for lift in self.lifts if time_s < lift.time_s <= time_s + SETTLE_S]
         held = [lift for lift in before[-1:] if not self._ended_between(lift.time_s, time_s)]
         return next((lift.robot for lift in (*held, *after)), None)
 
     def holder_during(self, from_s: float, until_s: float) -> str | None:
-        """Robot that held it during the whole interval; None when no robot did."""
+        """Robot that held the object during a whole interval; None when no robot did."""
         before = [lift for lift in self.lifts if lift.time_s <= from_s + SETTLE_S]
         held = (lift.robot for lift in before[-1:] if not self._ended_between(lift.time_s, until_s))
         return next(held, None)
 
     def _ended_between(self, from_s: float, until_s: float) -> bool:
-        """Returns whether it came to rest or was dropped in an interval."""
+        """Returns whether the object came to rest or was dropped in an interval."""
         return any(from_s < when_s <= until_s for when_s in (*self.rested_s, *self.dropped_s))
 
     def add(self, sample: ObjectSample) -> None:
@@ -211,7 +211,7 @@ class ObjectHistory(Stateful):
         self._supported_s = time_s
 
     def record_move(self, p_WO: FloatArray, time_s: float) -> None:
-        """Records that a person has moved it to p_WO, which is no drop and no placement by a robot."""
+        """Records that a person has moved the object to p_WO; that is no drop and no placement by a robot."""
         self._last = replace(self.last, time_s=time_s, p_WO=p_WO, gripper=None, X_WH=None, tray_of=None)
         self._grip_s = self._tray_s = float("-inf")
         self._carried, self._left_z_m, self._dropped, self._still_since_s = False, None, False, None
@@ -228,7 +228,7 @@ class ObjectHistory(Stateful):
         self.events, self.dropped_s, self.touches = [], [], 0
 
     def _moves_with_hand(self, sample: ObjectSample) -> bool:
-        """Returns whether it has kept its place in the hand since the last sample."""
+        """Returns whether the object has not moved in the hand since the last sample."""
         last = self._last
         if last is None or sample.X_WH is None or last.X_WH is None or sample.time_s <= last.time_s:
             return False
@@ -236,7 +236,7 @@ class ObjectHistory(Stateful):
         return float(np.linalg.norm(slip)) / (sample.time_s - last.time_s) < WITH_HAND_M_S
 
     def _note_lift(self, sample: ObjectSample, with_hand: bool) -> None:
-        """Begins a carry once the gripper has raised it off its place, or moved it well away from there."""
+        """Begins a carry once the gripper has raised the object off its place, or moved it well away from there."""
         if sample.gripper is None or sample.supported or not with_hand:
             return
         moved_W = sample.p_WO - self.rests_W[-1]
@@ -256,7 +256,7 @@ class ObjectHistory(Stateful):
             self._left_z_m = float(sample.p_WO[2])
 
     def _note_fall(self, sample: ObjectSample) -> None:
-        """Counts a drop once it has fallen, or lies on the floor without having been set down there."""
+        """Counts a drop once the object has fallen, or lies on the floor without having been set down there."""
         if self._left_z_m is None or self._dropped:
             return
         set_down = self._grip_s - self._set_down_s <= SET_DOWN_S
@@ -266,7 +266,7 @@ class ObjectHistory(Stateful):
             self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")
 
     def _note_rest(self, sample: ObjectSample) -> None:
-        """Ends a carry and records the place, once it has rested for a while."""
+        """Ends a carry and records the place, once the object has rested for a while."""
         if not self.resting:
             self._still_since_s = None
             return

@@ -109,7 +109,7 @@ class RobotBody(ABC):
         return (self.instance,)
 
     def filter_collisions(self, filters: CollisionFilterManager, floor: GeometrySet) -> None:
-        """Lets links of this robot pass each other, and links that never stand on the floor pass it."""
+        """Filters collisions between links of this robot, and between the floor and links that never stand on it."""
         from pydrake.geometry import CollisionFilterDeclaration, GeometrySet
 
         filters.Apply(CollisionFilterDeclaration().ExcludeWithin(GeometrySet(self.geometries())))

@@ -71,7 +71,7 @@ class ImuModel(NoisySensor, saved=("_last",)):
         self._last: list[Any] | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Imu:
-        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
+        """Reads the IMU at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
         acceleration_W = self._acceleration(stamp_s, np.asarray(v_WB_W, dtype=np.float64))
         R_BW = X_WB.rotation().matrix().T
         rates = R_BW @ w_WB_W + self._gyro_bias + self._rng.normal(0.0, self._noise.gyro_rad_s, 3)
@@ -136,7 +136,7 @@ def charge_after(charge: float, elapsed_s: float, load: float, spec: BatterySpec
 
 @dataclass(frozen=True)
 class OdometryNoise:
-    """Standard deviations.
+    """Errors of odometry, as standard deviations.
 
     `scale` is the relative error of distances, `turn_scale` that of turns, and `drift_rad_per_m` a steady turn per
     metre; each is drawn once per run and cut at two sigma. `wander_*` are random walks per square root of a metre.
@@ -179,7 +179,7 @@ class OdometryModel(NoisySensor, saved=("_last",)):
         self._last: _Last | None = None
 
     def update(self, stamp_s: float, X_WB: RigidTransform, w_WB_W: FloatArray, v_WB_W: FloatArray) -> Odometry:
-        """Reading at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body in W."""
+        """Reads odometry at stamp_s from the true pose, angular velocity (rad/s) and velocity (m/s) of the body."""
         true = Pose2D.from_transform(X_WB)
         if self._last is None:
             estimate = Pose2D(0.0, 0.0, 0.0)

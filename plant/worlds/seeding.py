@@ -40,7 +40,7 @@ class PointRoute:
     yields: bool = True
     yaw_rad: float | None = None
 
-    def begun_at(self, at_W: Point, yaw_rad: float) -> PointRoute:
+    def from_pose(self, at_W: Point, yaw_rad: float) -> PointRoute:
         """Returns the route for a person who stands at a pose first."""
         return replace(self, stops=(PointStop(at_W), *self.stops), yaw_rad=yaw_rad)
 
@@ -178,7 +178,7 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
     route = None if rule.route is None else point_route(rule.route, world.standing)
     if rule.ranges is not None:
         x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
-        route = None if route is None else route.begun_at((x, y), yaw)
+        route = None if route is None else route.from_pose((x, y), yaw)
     else:
         assert route is not None
         (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad

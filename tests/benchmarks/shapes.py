@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from plant.models.builder.importing import Wanted, import_object
+from plant.models.builder.importing import ImportOptions, import_object
 from skills.robot import FloatArray
 
 __all__ = ["Shape", "random_shape", "written_shape"]
@@ -78,5 +78,5 @@ def written_shape(seed: int, folder: Path) -> Path:
     faces = [f"f {3 * k + 1} {3 * k + 2} {3 * k + 3}" for k in range(len(lines) // 3)]
     mesh = folder / f"{name}_mesh.obj"
     mesh.write_text("\n".join([*lines, *faces]) + "\n", encoding="utf-8")
-    import_object(mesh, Wanted(name, round(shape.mass_kg, 4)), made)
+    import_object(mesh, ImportOptions(name, round(shape.mass_kg, 4)), made)
     return made

@@ -12,7 +12,7 @@ from pydrake.systems.analysis import Simulator
 
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
-from plant.loose_objects import FASTEST_SPIN_RAD_S, Carried, arc_m
+from plant.loose_objects import FASTEST_SPIN_RAD_S, CarriedObjects, arc_m
 from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
@@ -182,7 +182,7 @@ def test_a_carried_object_is_moved_towards_the_axis_of_the_turn(scene, p_W, v_W,
     plant, context, hand, thing = scene
     _move(plant, context, along_m_s, TURN_RAD_S)
     _set(plant, context, thing, p_W, [0.0, 0.0, TURN_RAD_S], v_W)
-    Carried(plant, context, [thing]).after_step(hand, DT_S)
+    CarriedObjects(plant, context, [thing]).after_step(hand, DT_S)
     moved = plant.EvalBodyPoseInWorld(context, thing).translation() - p_W
     assert np.allclose(1e3 * moved, [-moved_mm, 0.0, 0.0], atol=1e-9)
 
@@ -205,7 +205,7 @@ def _spinning_bar(limited):
     simulator = Simulator(plant)
     context = simulator.get_mutable_context()
     _set(plant, context, bar, np.zeros(3), [30.0, 3.0, 35.0], np.zeros(3))
-    carried = Carried(plant, context, [bar])
+    carried = CarriedObjects(plant, context, [bar])
     for step in range(160):
         simulator.AdvanceTo((step + 1) * DT_S)
         if limited:

@@ -34,7 +34,7 @@ def fetch_facts() -> Mapping[str, Any]:
 
 @cache
 def head_camera() -> CameraSpec:
-    """Camera of the head: colour and depth with the same intrinsics."""
+    """Camera of the head: a colour picture, and depth of the same view."""
     camera = fetch_facts()["camera"]
     width, height = camera["width"], camera["height"]
     focal = width / 2.0 / math.tan(math.radians(camera["horizontal_field_of_view_deg"]) / 2.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from errand_train.models.outlines import triangles_of
-from plant.models.builder.importing import Wanted, import_object
+from plant.models.builder.importing import ImportOptions, import_object
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import WORLDS_FOLDER, ObjectRule, load_world
@@ -29,7 +29,7 @@ def import_tool(folder: Path, name: str = "tool") -> Path:
     trimesh.creation.extrude_triangulation(OUTLINE, np.array(triangles_of(OUTLINE)), 0.028).export(file)
     out = folder / f"my {name}"
     out.mkdir()
-    import_object(file, Wanted(name, 0.5, "hammer"), out)
+    import_object(file, ImportOptions(name, 0.5, "hammer"), out)
     return out
 
 

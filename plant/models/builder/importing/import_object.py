@@ -50,7 +50,7 @@ _ROUND_SAME, _ROUND_WIDEST = 0.02, 0.52
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ImportOptions:
     """Options of an import: name, mass (kg), class, metres per unit, the axis that is up, and closing of holes.
 
     Without a class, the object has a class of its own, which no detector knows.
@@ -63,7 +63,7 @@ class Wanted:
     up: str | None = None
     close_holes: bool = False
 
-    def refuse_wrong(self) -> None:
+    def check(self) -> None:
         """Checks the options. Raises ObjectImportError for an invalid value."""
         catalogue = load_catalogue()
         if re.fullmatch(NAME, self.name) is None:
@@ -92,12 +92,12 @@ class _Body:
     patches: tuple[Patch, ...]
     solid: Solid
 
-    def moved(self, R: FloatArray, p: FloatArray) -> _Body:
-        patches = tuple(patch.moved(R, p) for patch in self.patches)
+    def transform(self, R: FloatArray, p: FloatArray) -> _Body:
+        patches = tuple(patch.transform(R, p) for patch in self.patches)
         return _Body(patches, Solid(self.solid.points @ R.T + p, self.solid.faces))
 
 
-def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
+def import_object(mesh: Path, options: ImportOptions, folder: Path) -> ImportedObject:
     """Writes the model of a mesh file into an existing folder: SDF, OBJ, pictures, and its facts.
 
     The object keeps its bottom side if it can rest on it; else it lies on the side with the lowest centre of mass.
@@ -107,37 +107,37 @@ def import_object(mesh: Path, wanted: Wanted, folder: Path) -> ImportedObject:
         ObjectsExtraMissingError: the libraries are not installed.
         OSError: the folder cannot be written.
     """
-    wanted.refuse_wrong()
-    body = _at_rest(_placed(mesh, wanted))
-    mass = scale_mass(_mass(body.solid), wanted.mass_kg)
+    options.check()
+    body = _at_rest(_placed(mesh, options))
+    mass = scale_mass(_mass(body.solid), options.mass_kg)
     _refuse_impossible(mass)
     parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
     bearing = feet(body.solid.points, mass.com)
-    files = [f"{wanted.name}_part_{number}.obj" for number in range(len(parts))]
+    files = [f"{options.name}_part_{number}.obj" for number in range(len(parts))]
     for file, part in zip(files, parts, strict=True):
         write_text(folder / file, _hull_text(part))
     model = Model(
-        wanted.name,
-        f"{wanted.name}.obj",
+        options.name,
+        f"{options.name}.obj",
         [*(ConvexMesh(file=file) for file in files), *bearing],
         mass,
-        comment=wanted.name,
+        comment=options.name,
         maker="`errand object import`",
     )
-    write_text(folder / f"{wanted.name}.sdf", model_sdf(model))
-    _write_appearance(folder, wanted.name, body.patches)
-    made = _facts(wanted, body, mass, len(parts))
+    write_text(folder / f"{options.name}.sdf", model_sdf(model))
+    _write_appearance(folder, options.name, body.patches)
+    made = _facts(options, body, mass, len(parts))
     write_imported(folder, made)
     return made
 
 
-def _placed(mesh: Path, wanted: Wanted) -> _Body:
+def _placed(mesh: Path, options: ImportOptions) -> _Body:
     """Reads the mesh in metres, z up. Raises ObjectImportError."""
     read, own_up = read_patches(mesh)
-    patches = tuple(patch.moved(wanted.scale * _UP[wanted.up or own_up], np.zeros(3)) for patch in read)
+    patches = tuple(patch.transform(options.scale * _UP[options.up or own_up], np.zeros(3)) for patch in read)
     triangles = np.concatenate([patch.triangles for patch in patches])
-    _refuse_size(np.ptp(triangles.reshape(-1, 3), axis=0), wanted.scale)
-    solid, turned = solid_of(triangles, close_holes=wanted.close_holes)
+    _refuse_size(np.ptp(triangles.reshape(-1, 3), axis=0), options.scale)
+    solid, turned = solid_of(triangles, close_holes=options.close_holes)
     ends = np.cumsum([len(patch.triangles) for patch in patches])[:-1]
     patches = tuple(_turned(patch, which) for patch, which in zip(patches, np.split(turned, ends), strict=True))
     return _Body(patches, solid)
@@ -178,9 +178,9 @@ def _refuse_impossible(mass: MassProperties) -> None:
 
 def _at_rest(body: _Body) -> _Body:
     """Lays the body down as it would rest, with the centre of its bounding box at the origin."""
-    turned = body.moved(resting_rotation(body.solid.points, _mass(body.solid).com), np.zeros(3))
+    turned = body.transform(resting_rotation(body.solid.points, _mass(body.solid).com), np.zeros(3))
     points = turned.solid.points
-    return turned.moved(np.eye(3), -(points.min(axis=0) + points.max(axis=0)) / 2.0)
+    return turned.transform(np.eye(3), -(points.min(axis=0) + points.max(axis=0)) / 2.0)
 
 
 def _mass(solid: Solid) -> MassProperties:
@@ -269,7 +269,7 @@ def _corner_angles(triangles: FloatArray) -> FloatArray:
     return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
-def _facts(wanted: Wanted, body: _Body, mass: MassProperties, parts: int) -> ImportedObject:
+def _facts(options: ImportOptions, body: _Body, mass: MassProperties, parts: int) -> ImportedObject:
     points = body.solid.points
     size = np.ptp(points, axis=0)
     x, y, z = (round(float(value), 6) for value in size)
@@ -277,9 +277,9 @@ def _facts(wanted: Wanted, body: _Body, mass: MassProperties, parts: int) -> Imp
     widest = float(np.hypot(points[:, 0], points[:, 1]).max())
     m = mass.inertia
     return ImportedObject(
-        name=wanted.name,
-        class_name=wanted.class_name or wanted.name,
-        mass_kg=wanted.mass_kg,
+        name=options.name,
+        class_name=options.class_name or options.name,
+        mass_kg=options.mass_kg,
         size_m=(x, y, z),
         com_m=(com_x, com_y, com_z),
         inertia_kg_m2=(m[0, 0], m[1, 1], m[2, 2], m[0, 1], m[0, 2], m[1, 2]),

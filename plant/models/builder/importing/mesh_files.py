@@ -43,7 +43,7 @@ class Patch:
     colour: Colour = GREY
     picture: Picture | None = None
 
-    def moved(self, R: FloatArray, p: FloatArray) -> Patch:
+    def transform(self, R: FloatArray, p: FloatArray) -> Patch:
         """Returns the patch transformed by the (3, 3) matrix R, then moved by p."""
         return replace(self, triangles=self.triangles @ R.T + p)
 

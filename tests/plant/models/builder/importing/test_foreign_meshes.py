@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.models.builder.importing import ObjectImportError, Wanted, import_object
+from plant.models.builder.importing import ImportOptions, ObjectImportError, import_object
 from plant.models.builder.importing.solid import solid_of
 from plant.models.catalogue import ImportedObject
 
@@ -21,7 +21,7 @@ BOX = (0.06, 0.08, 0.12)
 
 def imported(path: Path, folder: Path, **wanted) -> ImportedObject:
     folder.mkdir()
-    return import_object(path, Wanted(**{"name": "gadget", "mass_kg": 0.6, **wanted}), folder)
+    return import_object(path, ImportOptions(**{"name": "gadget", "mass_kg": 0.6, **wanted}), folder)
 
 
 def refusal(path: Path, folder: Path, **wanted) -> ObjectImportError:

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from errand_train.models.outlines import triangles_of
-from plant.models.builder.importing import ObjectImportError, ObjectsExtraMissingError, Wanted, import_object
+from plant.models.builder.importing import ImportOptions, ObjectImportError, ObjectsExtraMissingError, import_object
 from plant.models.catalogue import ImportedObject, read_imported
 
 trimesh = pytest.importorskip("trimesh")
@@ -26,7 +26,7 @@ def imported(mesh, tmp_path: Path, ending: str = "ply", **wanted) -> tuple[Impor
     path, folder = tmp_path / f"mesh.{ending}", tmp_path / "model"
     mesh.export(path)
     folder.mkdir()
-    return import_object(path, Wanted(**{"name": "gadget", "mass_kg": 0.6, **wanted}), folder), folder
+    return import_object(path, ImportOptions(**{"name": "gadget", "mass_kg": 0.6, **wanted}), folder), folder
 
 
 def l_shape():
@@ -205,7 +205,7 @@ def test_a_mesh_that_encloses_no_body_is_refused(tmp_path, make, why):
 def test_points_that_are_no_numbers_are_refused(tmp_path):
     (tmp_path / "m.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n")
     with pytest.raises(ObjectImportError, match="no finite numbers"):
-        import_object(tmp_path / "m.off", Wanted("gadget", 1.0), tmp_path)
+        import_object(tmp_path / "m.off", ImportOptions("gadget", 1.0), tmp_path)
 
 
 def test_a_million_triangles_are_counted_and_refused(tmp_path):
@@ -215,11 +215,11 @@ def test_a_million_triangles_are_counted_and_refused(tmp_path):
     data["corners"] = np.random.default_rng(1).uniform(size=(count, 3, 3))
     (tmp_path / "m.stl").write_bytes(b" " * 80 + np.uint32(count).tobytes() + data.tobytes())
     with pytest.raises(ObjectImportError, match="it has 1000000 triangles, and at most 100000 are taken"):
-        import_object(tmp_path / "m.stl", Wanted("gadget", 1.0), tmp_path)
+        import_object(tmp_path / "m.stl", ImportOptions("gadget", 1.0), tmp_path)
 
 
 def test_without_the_extra_the_library_is_named(tmp_path, monkeypatch):
     (tmp_path / "m.stl").write_text("")
     monkeypatch.setitem(sys.modules, "trimesh", None)
     with pytest.raises(ObjectsExtraMissingError, match="trimesh"):
-        import_object(tmp_path / "m.stl", Wanted("gadget", 1.0), tmp_path)
+        import_object(tmp_path / "m.stl", ImportOptions("gadget", 1.0), tmp_path)

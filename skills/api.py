@@ -29,16 +29,16 @@ from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC, Traffic
 from skills.world_model import FLOOR as FLOOR
 from skills.world_model import NO_WORK_COUNTER as NO_WORK_COUNTER
+from skills.world_model import ClearableCostmap as ClearableCostmap
 from skills.world_model import Costmap as Costmap
-from skills.world_model import ForgettingCostmap as ForgettingCostmap
+from skills.world_model import ExcludesRobots as ExcludesRobots
 from skills.world_model import FreeSpace as FreeSpace
-from skills.world_model import LayeredView as LayeredView
-from skills.world_model import LeavesOthersOut as LeavesOthersOut
 from skills.world_model import LocalisationEstimate as LocalisationEstimate
 from skills.world_model import Localiser as Localiser
 from skills.world_model import NoWorkCounter as NoWorkCounter
 from skills.world_model import ObjectKind as ObjectKind
 from skills.world_model import ObjectObservation as ObjectObservation
+from skills.world_model import ObstacleLayerView as ObstacleLayerView
 from skills.world_model import ParticleView as ParticleView
 from skills.world_model import PlanningError as PlanningError
 from skills.world_model import ReturnsView as ReturnsView

@@ -1,4 +1,4 @@
-"""What a detector is, apart from the simulator's types; skills import these names from `skills.api`."""
+"""Interface of a detector, without types of the simulator; skills import these names from `skills.api`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["NO_DETECTOR", "Detection", "Detector", "NoDetector", "NoDetectorErro
 
 @dataclass(frozen=True)
 class Detection:
-    """An object of a class in a picture: how sure (0 to 1), and its box (u0, v0, u1, v1) in pixels of that picture.
+    """Detected object in a picture: class, score (0 to 1), and box (u0, v0, u1, v1) in pixels of that picture.
 
     `alternatives` are the other classes that it may be, with their scores, the likeliest first.
     """
@@ -26,27 +26,27 @@ class Detection:
 
 
 class Detector(Protocol):
-    """Finds objects of known classes in pictures."""
+    """Detects objects of known classes in pictures."""
 
     @property
     def class_names(self) -> tuple[str, ...]:
-        """The classes that it knows."""
+        """Names of the known classes."""
 
     def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
-        """What is in each picture, the surest first.
+        """Returns the detections in each picture, the highest score first.
 
         Pictures are (H, W, 3) RGB or (H, W) grey, of any sizes. May take long: call it inside a Worker job. Raises
-        ValueError for what is no such picture.
+        ValueError for an array of another shape.
         """
 
 
 class NoDetectorError(RuntimeError):
-    """Pictures were to be looked through where there is no detector."""
+    """Error of a detection without a detector."""
 
 
 @dataclass(frozen=True)
 class NoDetector:
-    """Stands where nobody gave a detector: knows no classes, and says so when it is used."""
+    """Stand-in where there is no detector: knows no classes, and raises an error when it is used."""
 
     class_names: tuple[str, ...] = ()
 

@@ -11,7 +11,7 @@ __all__ = ["DURATION_FORM", "DURATION_PATTERN", "seconds_in"]
 
 DURATION_FORM: Final = 'seconds, or as in "2 min", "1 h 30 min" or "PT5M"'
 DURATION_PATTERN: Final = r"^(\d+(\.\d+)?[ ]?[a-z]+,?[ ]?(and )?)+$|^P[0-9.DTHMS]+$"
-"""What an editor takes for a duration that is a text."""
+"""Pattern of a duration that is a text, for editors."""
 _MOST_LETTERS: Final = 60
 _SPELLED: Final = {
     0.001: ("ms", "millisecond", "milliseconds"),
@@ -31,7 +31,7 @@ _ISO: Final = re.compile(
 
 
 def seconds_in(text: str) -> float | None:
-    """The seconds of a text; None where it is no duration. Each unit may stand once."""
+    """Returns the seconds of a text; None where it is no duration. Each unit may stand once."""
     words = " ".join(text.split()).lower()
     if not words or len(words) > _MOST_LETTERS:
         return None

@@ -14,12 +14,12 @@ AngleT = TypeVar("AngleT", float, FloatArray)
 
 
 def wrap(angle_rad: AngleT) -> AngleT:
-    """The same angle, or angles, in [-pi, pi)."""
+    """Returns the same angle, or angles, in [-pi, pi)."""
     return (angle_rad + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def compose(X_AB: Pose2D, X_BC: Pose2D) -> Pose2D:
-    """X_AC."""
+    """Returns X_AC."""
     c, s = math.cos(X_AB.yaw_rad), math.sin(X_AB.yaw_rad)
     x_m = X_AB.x_m + c * X_BC.x_m - s * X_BC.y_m
     y_m = X_AB.y_m + s * X_BC.x_m + c * X_BC.y_m
@@ -27,13 +27,13 @@ def compose(X_AB: Pose2D, X_BC: Pose2D) -> Pose2D:
 
 
 def inverse(X_AB: Pose2D) -> Pose2D:
-    """X_BA."""
+    """Returns X_BA."""
     c, s = math.cos(X_AB.yaw_rad), math.sin(X_AB.yaw_rad)
     return Pose2D(-c * X_AB.x_m - s * X_AB.y_m, s * X_AB.x_m - c * X_AB.y_m, -X_AB.yaw_rad)
 
 
-def relative(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
-    """X_AB of two poses in one frame."""
+def relative_pose(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
+    """Returns X_AB of two poses in one frame."""
     return compose(inverse(X_WA), X_WB)
 
 
@@ -50,7 +50,7 @@ def grid_inside(
 def inside_polygon(
     xy: FloatArray, polygon: tuple[tuple[float, float], ...], margin_m: float = 0.0
 ) -> NDArray[np.bool_]:
-    """Which rows of xy (N, 2) lie in a convex polygon grown by margin_m; corners in either order."""
+    """Mask (N,) of the rows of xy (N, 2) in a convex polygon grown by margin_m; corners in either order."""
     import shapely  # commands that move nothing do without
 
     grown = shapely.Polygon(polygon).buffer(margin_m, join_style="mitre", mitre_limit=100.0)

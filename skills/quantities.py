@@ -25,17 +25,17 @@ if TYPE_CHECKING:
 __all__ = [
     "Quantity",
     "QuantityError",
+    "base_type",
     "bounds",
     "clock_text",
+    "display_text",
     "in_range",
-    "likely",
     "number_in",
     "number_of",
     "quantity_of",
     "range_text",
-    "shown",
-    "without_range",
-    "without_unit",
+    "unit_hint",
+    "unitless_name",
 ]
 
 MOST_DIGITS: Final = 100
@@ -43,7 +43,7 @@ LARGEST: Final = 10**300
 
 
 class QuantityError(ValueError):
-    """A value does not fit: `what` it should be, with the range, and a `hint` at the likely mistake."""
+    """Error of a value that does not fit: `what` it should be, with the range, and a `hint` at the likely mistake."""
 
     def __init__(self, what: str, hint: str) -> None:
         super().__init__(f"{what}; {hint}")
@@ -52,7 +52,7 @@ class QuantityError(ValueError):
 
 @dataclass(frozen=True)
 class Quantity:
-    """Marks a number with its range and unit; `mistake` replaces the hint at a likely mistake of units."""
+    """Mark of a number with its range and unit; `mistake` replaces the hint at a likely mistake of units."""
 
     ge: float | None = None
     gt: float | None = None
@@ -62,7 +62,7 @@ class Quantity:
     mistake: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], CoreSchema]) -> CoreSchema:
-        """Checks a field of this quantity by `number_of`; its JSON schema keeps the range."""
+        """Checks a field of this quantity by `number_of`; its JSON schema has the range."""
         from pydantic_core import core_schema
 
         hint = Annotated[source, self]
@@ -82,56 +82,56 @@ class Quantity:
 Coordinate = Annotated[
     float, Quantity(ge=-10_000.0, le=10_000.0, unit="m", mistake="subtract the same from all places")
 ]
-"""x or y of the world frame."""
+"""Coordinate x or y of the world frame."""
 Length = Annotated[float, Quantity(gt=0.0, le=100.0, unit="m")]
-"""A size, reach or resolution."""
+"""Size, reach or resolution."""
 Margin = Annotated[float, Quantity(ge=0.0, le=10.0, unit="m")]
-"""A distance that may be none."""
+"""Distance that may be zero."""
 Height = Annotated[float, Quantity(ge=-1.0, le=3.0, unit="m")]
-"""Above the floor."""
+"""Height above the floor."""
 TopHeight = Annotated[float, Quantity(gt=0.0, le=3.0, unit="m")]
-"""Of a surface above the floor."""
+"""Height of a surface above the floor."""
 Opening = Annotated[float, Quantity(gt=0.0, le=10.0, unit="m")]
-"""The clear width of a door."""
+"""Clear width of a door."""
 Angle = Annotated[float, Quantity(ge=-2.0 * math.pi, le=2.0 * math.pi, unit="rad")]
-"""A heading or a signed turn."""
+"""Heading or signed turn."""
 Turn = Annotated[float, Quantity(gt=0.0, le=math.pi, unit="rad")]
-"""A turn or a tolerance without a sign."""
+"""Turn or tolerance without a sign."""
 Speed = Annotated[float, Quantity(gt=0.0, le=3.0, unit="m/s")]
-"""Of the base or the hand."""
+"""Speed of the base or the hand."""
 TurnRate = Annotated[float, Quantity(gt=0.0, le=6.0, unit="rad/s")]
-"""Of the base or a joint."""
+"""Turn rate of the base or a joint."""
 Acceleration = Annotated[float, Quantity(gt=0.0, le=20.0, unit="m/s^2")]
 TurnAcceleration = Annotated[float, Quantity(gt=0.0, le=50.0, unit="rad/s^2")]
 Duration = Annotated[float, Quantity(gt=0.0, le=86_400.0, unit="s")]
-"""A period or a time limit."""
+"""Period or time limit."""
 Delay = Annotated[float, Quantity(ge=0.0, le=86_400.0, unit="s")]
-"""A wait that may be none."""
+"""Wait that may be zero."""
 LongDuration = Annotated[float, Quantity(gt=0.0, le=604_800.0, unit="s")]
-"""The limit of a whole run."""
+"""Limit of a whole run."""
 Wait = Annotated[float, Quantity(ge=0.0, le=1e9, unit="s")]
-"""How long a page or a queue is served."""
+"""Time for which a page or a queue is served."""
 Share = Annotated[float, Quantity(ge=0.0, le=1.0)]
-"""A part of a whole: a charge, a score."""
+"""Part of a whole: a charge, a score."""
 Cosine = Annotated[float, Quantity(ge=-1.0, le=1.0)]
-"""A part of a direction of length 1."""
+"""Component of a direction of length 1."""
 Factor = Annotated[float, Quantity(gt=0.0, le=1_000.0)]
-"""A gain or a weight."""
+"""Gain or weight."""
 Force = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N")]
 Torque = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N m")]
 Mass = Annotated[float, Quantity(gt=0.0, le=100.0, unit="kg")]
 Count = Annotated[int, Quantity(ge=1, le=100_000)]
-"""How many, at least one."""
+"""Number of items, at least one."""
 Tries = Annotated[int, Quantity(ge=0, le=1_000)]
-"""How often, perhaps never."""
+"""Number of tries, perhaps none."""
 Seed = Annotated[int, Quantity(ge=0, le=2**31 - 1)]
-"""What chooses the objects of a world and all noise."""
+"""Seed of a world's objects and of all noise."""
 Port = Annotated[int, Quantity(ge=0, le=65_535)]
-"""A port of this machine; 0 takes a free one."""
+"""Port of this machine; 0 takes a free one."""
 Number = Annotated[float, Quantity()]
-"""A number of any size: a value of a mission."""
+"""Number of any size: a value of a mission."""
 Whole = Annotated[int, Quantity()]
-"""A whole number of any size: a value of a mission."""
+"""Whole number of any size: a value of a mission."""
 
 _UNIT: Final = re.compile(r"_(m|rad|s|n|m_s|rad_s|kg|deg)$")
 _WORDS: Final[Mapping[str, str]] = {"gt": "above", "ge": "at least", "lt": "below", "le": "at most"}
@@ -175,11 +175,12 @@ _COUNTED: Final = (
 
 
 def number_of(value: Any, hint: Any) -> float:
-    """The number that a file gives for a quantity. A duration may be a text with units.
+    """Returns the number that a file gives for a quantity. A duration may be a text with units.
 
-    Raises QuantityError: it is no number, is not finite, is no whole number where one is wanted, or is out of range.
+    Raises QuantityError when the value is no number, is not finite, is no whole number where one is wanted, or is out
+    of range.
     """
-    whole = without_range(hint) is int
+    whole = base_type(hint) is int
     wanted = "should be a whole number" if whole else "should be a number"
     if isinstance(value, str):
         seconds = seconds_in(value) if _unit(hint) == "s" else None
@@ -188,21 +189,23 @@ def number_of(value: Any, hint: Any) -> float:
             raise QuantityError(f"{wanted}{form}", _text_hint(value, hint))
         value = seconds
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise QuantityError(wanted, f"it reads {shown(value)} now")
+        raise QuantityError(wanted, f"it reads {display_text(value)} now")
     if isinstance(value, float) and not math.isfinite(value):
-        raise QuantityError("should be a finite number", f"it reads {shown(value)} now")
+        raise QuantityError("should be a finite number", f"it reads {display_text(value)} now")
     if isinstance(value, int) and abs(value) > LARGEST:
-        raise QuantityError("should be a smaller number", f"it reads {shown(value)} now")
+        raise QuantityError("should be a smaller number", f"it reads {display_text(value)} now")
     if not in_range(value, hint):
-        raise QuantityError(f"should be {range_text(hint)}", f"it reads {shown(value)} now{_then(likely(value, hint))}")
+        meant = unit_hint(value, hint)
+        now = f"it reads {display_text(value)} now{f'; {meant}' if meant else ''}"
+        raise QuantityError(f"should be {range_text(hint)}", now)
     if whole and isinstance(value, float):
-        hint_at = f"write {int(value)}" if value.is_integer() else f"it reads {shown(value)} now"
+        hint_at = f"write {int(value)}" if value.is_integer() else f"it reads {display_text(value)} now"
         raise QuantityError(wanted, hint_at)
     return int(value) if whole else float(value)
 
 
 def number_in(text: str, hint: Any) -> float:
-    """The number that a word of the command line gives for a quantity. Raises QuantityError as `number_of`."""
+    """Returns the number that a word of the command line gives for a quantity. Raises QuantityError as `number_of`."""
     words = text.strip()
     if _unit(hint) == "s" or not _NUMBER.fullmatch(words) or re.match(r"[+-]?0\d", words):
         finite = words.lower().lstrip("+-") not in ("inf", "nan", "infinity")
@@ -214,7 +217,7 @@ def number_in(text: str, hint: Any) -> float:
 
 
 def clock_text(value: Any) -> str:
-    """A time of day as "08:30". Raises QuantityError: it is none from 00:00 to 23:59."""
+    """Returns a time of day as "08:30". Raises QuantityError when the value is none from 00:00 to 23:59."""
     match = _CLOCK.fullmatch(value.strip()) if isinstance(value, str) else None
     if match is not None and int(match[1]) < 24 and int(match[2]) < 60:
         return f"{int(match[1]):02d}:{match[2]}"
@@ -223,11 +226,11 @@ def clock_text(value: Any) -> str:
         hint = "write '00:00' for midnight"
     elif isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 24:
         hint = f"write '{value:02d}:00'"
-    raise QuantityError("should be a time of day from 00:00 to 23:59", f"it reads {shown(value)} now; {hint}")
+    raise QuantityError("should be a time of day from 00:00 to 23:59", f"it reads {display_text(value)} now; {hint}")
 
 
-def shown(value: Any) -> str:
-    """A value as a user wrote it: text in quotes, `true`, `nothing`, `a list`; never longer than a line."""
+def display_text(value: Any) -> str:
+    """Returns a value as the user wrote it: text in quotes, `true`, `nothing`, `a list`; never longer than a line."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -250,7 +253,7 @@ def _digits(value: float) -> str:
 
 
 def _text_hint(text: str, hint: Any) -> str:
-    """What to write in place of a text that gives no number."""
+    """Returns the correction of a text that gives no number."""
     words = text.strip()
     if len(words) > MOST_DIGITS:
         return "write a shorter one"
@@ -261,7 +264,7 @@ def _text_hint(text: str, hint: Any) -> str:
     if _NUMBER.fullmatch(words):
         return f"write {float(words):g}, without quotes"
     if re.fullmatch(r"\d+:\d\d(?::\d\d)?", words) and _unit(hint) == "s":
-        return f"write as in '1 h 30 min': {shown(words)} could be hours or minutes"
+        return f"write as in '1 h 30 min': {display_text(words)} could be hours or minutes"
     if words.lower() in _COUNTED:
         return f"write {_COUNTED.index(words.lower())}"
     match = _WITH_UNIT.fullmatch(words)
@@ -269,28 +272,24 @@ def _text_hint(text: str, hint: Any) -> str:
     size = 1.0 if unit and unit == _unit(hint) else _OTHERS.get(_unit(hint), {}).get(unit)
     if match is not None and size is not None:
         return f"write {float(match[1]) * size:.3g} for {words}"
-    return f"it reads {shown(text)} now"
+    return f"it reads {display_text(text)} now"
 
 
-def likely(value: float, hint: Any) -> str:
-    """The number in the quantity's own unit where another unit would bring it into the range; else nothing."""
+def unit_hint(value: float, hint: Any) -> str:
+    """Returns the number in the quantity's own unit, if that brings it into the range; else nothing."""
     quantity = quantity_of(hint)
     if quantity is not None and quantity.mistake:
         return quantity.mistake
     if abs(value) > 1e15:
         return ""
-    sizes = _OTHERS.get(_unit(hint), {}) if without_range(hint) is float else {}
+    sizes = _OTHERS.get(_unit(hint), {}) if base_type(hint) is float else {}
     meant = {unit: value * size for unit, size in sizes.items() if in_range(value * size, hint)}
-    told = [f"{number:.3g} for {value:g} {unit}" for unit, number in meant.items()]
-    return f"write {' or '.join(told)}" if told else ""
-
-
-def _then(words: str) -> str:
-    return f"; {words}" if words else ""
+    choices = [f"{number:.3g} for {value:g} {unit}" for unit, number in meant.items()]
+    return f"write {' or '.join(choices)}" if choices else ""
 
 
 def quantity_of(hint: Any) -> Quantity | None:
-    """The mark of an annotated type; None where it has none."""
+    """Returns the mark of an annotated type; None where it has none."""
     return next((mark for mark in _marks(hint) if isinstance(mark, Quantity)), None)
 
 
@@ -300,14 +299,14 @@ def _unit(hint: Any) -> str:
 
 
 def bounds(hint: Any) -> dict[str, Any]:
-    """The bounds of an annotated type by the names that pydantic gives them: {"gt": 0.0, "le": 3.0}."""
+    """Bounds of an annotated type by the names that pydantic gives them: {"gt": 0.0, "le": 3.0}."""
     marks = list(_marks(hint))
     found = {name: getattr(mark, name, None) for name in _WORDS for mark in marks if hasattr(mark, name)}
     return {name: limit for name, limit in found.items() if limit is not None}
 
 
 def _marks(hint: Any) -> Iterator[Any]:
-    """The marks of an annotated type one by one; an interval and pydantic's `Field` hold several."""
+    """Yields the marks of an annotated type one by one; an interval and pydantic's `Field` hold several."""
     for mark in getattr(hint, "__metadata__", ()):
         if isinstance(mark, GroupedMetadata):
             yield from mark
@@ -315,13 +314,13 @@ def _marks(hint: Any) -> Iterator[Any]:
             yield from getattr(mark, "metadata", (mark,))
 
 
-def without_range(hint: Any) -> Any:
-    """The type itself, where `hint` is an annotated one."""
+def base_type(hint: Any) -> Any:
+    """Returns the type without its annotation."""
     return get_args(hint)[0] if get_origin(hint) is Annotated else hint
 
 
-def without_unit(name: str) -> str:
-    """A field's name without the unit that it ends in: "max_speed_m_s" is "max_speed"."""
+def unitless_name(name: str) -> str:
+    """Returns a field's name without the unit that it ends in: "max_speed_m_s" is "max_speed"."""
     return _UNIT.sub("", name)
 
 
@@ -331,7 +330,7 @@ def in_range(value: float, hint: Any) -> bool:
 
 
 def range_text(hint: Any) -> str:
-    """The bounds in words, with the unit: "from 0 to 1", "above 0 and at most 3 m/s"; empty without bounds."""
+    """Returns the bounds in words, with the unit: "from 0 to 1", "above 0 and at most 3 m/s"; empty without bounds."""
     limits = {name: _limit(limit) for name, limit in bounds(hint).items()}
     if limits.keys() == {"ge", "le"}:
         words = f"from {limits['ge']} to {limits['le']}"

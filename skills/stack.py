@@ -1,8 +1,8 @@
-"""The stack of a robot: which localiser, costmap, planners, controller, detector and locomotion it uses, with options.
+"""Stack of a robot: its localiser, costmap, planners, controller, detector and locomotion, with their options.
 
-Each slot is filled by a component. A component is a frozen dataclass that a distribution registers as an entry point in
-the slot's group (`SLOTS`), ours in `pyproject.toml` in the same way. Its fields are the options that a stack file may
-set, its docstring explains them, and it keeps the slot's protocol below.
+A component fills each slot. It is a frozen dataclass that a distribution registers as an entry point in the slot's
+group (`SLOTS`); ours are registered in `pyproject.toml` in the same form. Its fields are the options that a stack file
+may set, its docstring explains them, and it implements the slot's protocol below.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from skills.files.errors import suggestion
 from skills.files.plugins import OURS, PluginDefect, distribution_of, installed_plugins, run_plugin
 from skills.files.schema import first_error
-from skills.quantities import shown
+from skills.quantities import display_text
 from skills.robot import FloatArray, GripperCapabilities, Pose2D
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ __all__ = [
     "StackError",
     "default_component",
     "default_stack",
-    "plain",
+    "stack_data",
     "stack_of",
     "stack_schema",
 ]
@@ -58,7 +58,7 @@ SLOTS: Final[Mapping[str, str]] = {
     "detector": "errand.detectors",
     "locomotion": "errand.locomotions",
 }
-"""The slots of a stack file, and the entry-point group of each."""
+"""Slots of a stack file, and the entry-point group of each."""
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
 USE: Final = "use"
@@ -66,20 +66,20 @@ DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
 
 class LocaliserComponent(Protocol):
-    """Makes the localiser of one robot."""
+    """Builds the localiser of one robot."""
 
     def build(self, grid: GridMap, start: Pose2D | None, *, surely: bool) -> Localiser:
-        """A localiser on a surveyed grid, told where the robot starts, or not (None).
+        """Builds a localiser on a surveyed grid, with the robot's start pose if it is known.
 
         Not `surely` when the robot may have been moved since it was at the start.
         """
 
 
 class CostmapComponent(Protocol):
-    """Makes the costmap of one robot."""
+    """Builds the costmap of one robot."""
 
     def build(self, keepout: GridMap) -> Costmap:
-        """A costmap on a surveyed keep-out grid."""
+        """Builds a costmap on a surveyed keep-out grid."""
 
 
 class GlobalPlanner(Protocol):
@@ -95,9 +95,9 @@ class GlobalPlanner(Protocol):
         max_speed_m_s: float,
         work: WorkCounter = ...,
     ) -> Callable[[], WayPath]:
-        """Samples the costmap now; the call that comes back plans on that sample, in any thread.
+        """Samples the costmap now; returns a function that plans on that sample, in any thread.
 
-        That call raises PlanningError, and counts in `work` what it computes.
+        That function raises PlanningError, and counts its computations in `work`.
         """
 
 
@@ -114,29 +114,32 @@ class LocalController(Protocol):
         costmap: FreeSpace,
         most_m_s: float = np.inf,
     ) -> Drive:
-        """The velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""
+        """Returns the velocity for now, at a world pose, body velocity and the velocity commanded `last` (3,)."""
 
     def ahead(self, way_m: float) -> FloatArray:
-        """The path's poses (N, 3) from where the robot was last, so far on."""
+        """Returns the path's poses (N, 3) from where the robot was last, for a distance (m)."""
 
     def pose_after(self, way_m: float) -> Pose2D:
-        """The path's pose so far on from where the robot was last."""
+        """Returns the path's pose at a distance (m) from where the robot was last."""
 
 
 class ControllerComponent(Protocol):
-    """Makes a controller for each path; farther off than `lost_path_m` the path is given up."""
+    """Builds a controller for each path; a robot farther off than `lost_path_m` gives the path up."""
 
     lost_path_m: float
 
     def build(self, path: WayPath, footprint: Footprint, *, max_speed_m_s: float) -> LocalController:
-        """A controller that follows a path."""
+        """Builds a controller that follows a path."""
 
 
 class GraspPlanner(Protocol):
-    """Finds grasps and the motions to them."""
+    """Plans grasps and the motions to them."""
 
     def candidates(self, target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> list[GraspCandidate]:
-        """Grasps, the best first; empty when it is too wide or too flat. p_BS is the shoulder."""
+        """Returns grasps, the best first; an empty list for an object that is too wide or too flat.
+
+        p_BS is the shoulder.
+        """
 
     def plan(
         self,
@@ -147,19 +150,19 @@ class GraspPlanner(Protocol):
         arm_planner: ArmPlanner,
         rng: np.random.Generator,
     ) -> GraspPlan:
-        """The best candidate that can be carried out. Raises PlanningError when there is none."""
+        """Plans the best feasible candidate. Raises PlanningError when there is none."""
 
 
 class DetectorComponent(Hashable, Protocol):
     """Loads a detector."""
 
     def build(self) -> Detector:
-        """The detector, loaded. Raises ValueError when its model cannot be used."""
+        """Loads the detector. Raises ValueError when its model cannot be used."""
 
 
 @dataclass(frozen=True)
 class RobotStack:
-    """The components of one robot and the options of its skills by the skill's name. `names` are the components'."""
+    """Components of one robot, their `names`, and the options of its skills by the skill's name."""
 
     localiser: LocaliserComponent
     costmap: CostmapComponent
@@ -174,7 +177,7 @@ class RobotStack:
 
 
 class StackError(ValueError):
-    """A stack cannot be used as it is written: where (keys from the top), what is wrong, and what would fit."""
+    """Error of a stack that cannot be used: where (keys from the top), what is wrong, and what would fit."""
 
     def __init__(self, path: tuple[str | int, ...], message: str, hint: str = "") -> None:
         super().__init__(f"{'.'.join(map(str, path)) or 'the stack'}: {message}")
@@ -183,7 +186,7 @@ class StackError(ValueError):
 
 @cache
 def default_stack() -> RobotStack:
-    """The stack that comes with the project."""
+    """Returns the stack that comes with the project."""
     return stack_of(_default_data())
 
 
@@ -196,12 +199,12 @@ def _default_data() -> dict[str, Any]:
 
 
 def default_component(slot: str) -> Any:
-    """The component that fills a slot of the stack that comes with the project; of the others nothing is imported."""
+    """Returns the component of a slot in the project's own stack; imports nothing of the other slots."""
     return _component(slot, _default_data()[slot])[1]
 
 
 def stack_of(data: Any) -> RobotStack:
-    """The stack of a file's data; slots and skills that it leaves out are as in the default. Raises StackError."""
+    """Returns the stack of a file's data, with the default for missing slots and skills. Raises StackError."""
     _known((), data, (*SLOTS, SKILLS))
     chosen = {slot: data.get(slot, {}) for slot in SLOTS}
     parts = {slot: _component(slot, given) for slot, given in chosen.items()}
@@ -217,13 +220,13 @@ def stack_of(data: Any) -> RobotStack:
 
 
 def _component(slot: str, given: Any) -> tuple[str, Any]:
-    """The name and the component of one slot. Raises StackError."""
+    """Returns name and component of one slot. Raises StackError."""
     if not isinstance(given, Mapping):
         raise StackError((slot,), "should be a mapping", f"write '{slot}: {{{USE}: NAME}}', then the options")
     known = _names(slot)
     name = given.get(USE, known[0])
     if name not in known:
-        raise StackError((slot, USE), f"there is no {slot} {shown(name)}", suggestion(str(name), known))
+        raise StackError((slot, USE), f"there is no {slot} {display_text(name)}", suggestion(str(name), known))
     return name, _typed(
         (slot,), _loaded(slot, name, SLOTS[slot]), {key: value for key, value in given.items() if key != USE}
     )
@@ -231,7 +234,7 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
 
 @cache
 def components(slot: str) -> Mapping[str, type]:
-    """The components that are installed for a slot by name, the default one first. Raises StackError."""
+    """Returns the installed components of a slot by name, the default one first. Raises StackError."""
     return MappingProxyType({name: _loaded(slot, name, SLOTS[slot]) for name in _names(slot)})
 
 
@@ -255,19 +258,19 @@ def _loaded(slot: str, name: str, group: str) -> type:
 
 
 def _is_ours(entry: EntryPoint) -> bool:
-    """Returns whether it is the project's own, whose name nobody else takes."""
+    """Returns whether an entry is the project's own, whose name nobody else takes."""
     return distribution_of(entry) == OURS
 
 
 def skill_options() -> Mapping[str, type]:
-    """The options class of each installed skill that has one and can be loaded."""
+    """Returns the options class of each installed skill that has one and can be loaded."""
     found = {name: _options_of(name) for name in sorted({entry.name for entry in installed_plugins(SKILL_GROUP)})}
     return MappingProxyType({name: kind for name, kind in found.items() if kind is not None})
 
 
 @cache
 def _options_of(name: str) -> type | None:
-    """The options class of an installed skill; None where it has none or cannot be loaded."""
+    """Returns the options class of an installed skill; None where it has none or cannot be loaded."""
     entry = max(installed_plugins(SKILL_GROUP).select(name=name), key=_is_ours)
     try:
         kind = getattr(run_plugin(entry, entry.load), "Options", None)
@@ -279,7 +282,10 @@ def _options_of(name: str) -> type | None:
 
 
 def _options(name: str, given: Any) -> Any:
-    """The options that a stack gives to a skill. Raises StackError: there are none, or it cannot be loaded."""
+    """Returns the options that a stack gives to a skill.
+
+    Raises StackError when there are none, or it cannot be loaded.
+    """
     entries = installed_plugins(SKILL_GROUP).select(name=name)
     kind = _options_of(name) if entries else None
     if kind is None:
@@ -289,7 +295,7 @@ def _options(name: str, given: Any) -> Any:
 
 
 def _typed(path: tuple[str | int, ...], kind: type, given: Any) -> Any:
-    """Options of a dataclass from a file's data. Raises StackError."""
+    """Returns options of a dataclass from a file's data. Raises StackError."""
     from pydantic import TypeAdapter, ValidationError
 
     _check_keys(path, kind, given)
@@ -317,8 +323,8 @@ def _known(path: tuple[str | int, ...], given: Any, known: Sequence[str]) -> Non
             raise StackError((*path, key), f"unknown {named}", suggestion(str(key), known))
 
 
-def plain(stack: RobotStack) -> dict[str, Any]:
-    """The resolved stack with all options, as plain data that `stack_of` takes again."""
+def stack_data(stack: RobotStack) -> dict[str, Any]:
+    """Returns the resolved stack with all options, as plain data that `stack_of` takes again."""
     slots = {slot: {USE: stack.names[slot], **_plain(getattr(stack, slot))} for slot in SLOTS}
     skills = {name: _plain(stack.skills.get(name) or kind()) for name, kind in skill_options().items()}
     return {**slots, SKILLS: skills}
@@ -332,7 +338,7 @@ def _plain(options: Any) -> dict[str, Any]:
 
 
 def stack_schema() -> dict[str, Any]:
-    """The JSON schema of stack files, for editors and the reference."""
+    """Returns the JSON schema of stack files, for editors and the reference."""
     defs: dict[str, Any] = {}
     slots = {slot: {"anyOf": [_schema(kind, defs, name) for name, kind in components(slot).items()]} for slot in SLOTS}
     skills = {name: _schema(kind, defs) for name, kind in skill_options().items()}
@@ -342,7 +348,7 @@ def stack_schema() -> dict[str, Any]:
 
 
 def _schema(kind: type, defs: dict[str, Any], name: str | None = None) -> dict[str, Any]:
-    """The schema of one options class; what it refers to is added to `defs`."""
+    """Returns the schema of one options class; adds the schemas that it refers to to `defs`."""
     from pydantic import TypeAdapter
 
     schema = TypeAdapter(kind).json_schema()

@@ -134,10 +134,10 @@ class Costmap(FreeSpace, Protocol):
 
 
 @runtime_checkable
-class ForgettingCostmap(Protocol):
+class ClearableCostmap(Protocol):
     """Costmap whose obstacle layer can be cleared; the surveyed grid stays."""
 
-    def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
+    def clear_obstacles(self, within_W: NDArray[np.float64] | None = None) -> int:
         """Clears the obstacle layer; returns the number of cells that it blocked.
 
         With discs, rows of x, y and radius (m, world), clears only the cells within them.
@@ -145,18 +145,18 @@ class ForgettingCostmap(Protocol):
 
 
 @runtime_checkable
-class LeavesOthersOut(Protocol):
+class ExcludesRobots(Protocol):
     """Costmap or localiser that ignores other robots, whose poses are known."""
 
-    def leave_out(self, discs_W: NDArray[np.float64]) -> None:
+    def exclude_robots(self, discs_W: NDArray[np.float64]) -> None:
         """Ignores from now on all that is seen within these discs, rows of x, y and radius (m, world)."""
 
 
 @runtime_checkable
-class LayeredView(Protocol):
+class ObstacleLayerView(Protocol):
     """Costmap that shows its obstacle layer."""
 
-    def seen_m(self) -> NDArray[np.float64]:
+    def obstacle_cells(self) -> NDArray[np.float64]:
         """Returns the centres (N, 2) of the cells blocked by a seen obstacle that the map does not explain."""
 
 
@@ -164,7 +164,7 @@ class LayeredView(Protocol):
 class ReturnsView(Protocol):
     """Costmap that gives the LiDAR returns of the last scan that the survey does not explain."""
 
-    def unexplained(self) -> tuple[float, NDArray[np.float64]]:
+    def unexplained_returns(self) -> tuple[float, NDArray[np.float64]]:
         """Returns the scan's stamp and those returns (N, 3) in the world; of one scan alone, so not confirmed."""
 
 

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7419,
     "executive/cli": 3815,
-    "skills": 25189,
+    "skills": 25201,
     "plant": 11617,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 449, 73, 9

@@ -97,13 +97,13 @@ def _map_cells() -> None:
     """Adds a depth picture to the arm's occupied cells."""
     from pydrake.math import RigidTransform
 
-    from skills.manipulation.arm.solid_cells import Outline, with_picture
+    from skills.manipulation.arm.solid_cells import Outline, add_picture
     from skills.robot import FrameTree, Image, Intrinsics
 
     lens, depth_m = Intrinsics(2, 2, 1.0, 1.0, 1.0, 1.0), np.ones((2, 2), dtype=np.float32)
     image = Image(0.0, "hand", "odom", lens, lens, None, np.zeros((2, 2), dtype=np.uint8), depth_m, FrameTree({}))
     own = Outline(RigidTransform(), np.zeros(2), np.zeros(2))
-    with_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
+    add_picture(np.empty((0, 3), dtype=np.int64), image, RigidTransform(), own)
 
 
 def _survey() -> None:

@@ -25,7 +25,7 @@ from skills.files.errors import InputError
 from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 from skills.files.yaml_source import yaml_of
 from skills.quantities import Duration
-from skills.stack import SLOTS, plain
+from skills.stack import SLOTS, stack_data
 
 _WORKERS: Final = 4
 _MORE_S: Final = 30.0
@@ -126,4 +126,4 @@ def _group() -> None:
 @takes_request("stack")
 def show(request: Request) -> None:
     """Prints a stack with all its options as YAML, which --stack takes again."""
-    typer.echo(yaml_of(plain(load_stack(request.stack)), flow_style=False), nl=False)
+    typer.echo(yaml_of(stack_data(load_stack(request.stack)), flow_style=False), nl=False)

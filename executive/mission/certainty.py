@@ -17,7 +17,7 @@ from typing import Any, Final
 
 from executive.words.condition import AllOf, AnyOf, Condition, Not, ValueIs, parts_of
 from executive.words.expression import CLOCK, COMPARISONS, TIME_OF_DAY, Expression, ExpressionError
-from skills.quantities import bounds, likely, range_text
+from skills.quantities import bounds, range_text, unit_hint
 
 Ranges = Mapping[str, Any]
 """Quantities of the names that have one."""
@@ -270,5 +270,5 @@ def _range_words(line: _Line, ranges: Ranges) -> tuple[str, str]:
     if line.name is None or line.name not in ranges:
         return "0 or more", "compare it with a number above 0"
     hint = ranges[line.name]
-    meant = "" if line.turn is None else likely(float(line.turn), hint)
+    meant = "" if line.turn is None else unit_hint(float(line.turn), hint)
     return range_text(hint), meant or "compare it with a number within this range"

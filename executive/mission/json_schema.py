@@ -9,7 +9,7 @@ from typing import Any, Final, get_type_hints
 
 from executive.words.leaf_steps import COMMAND_KEYS
 from executive.words.mission import Mission
-from skills.quantities import bounds, without_range, without_unit
+from skills.quantities import base_type, bounds, unitless_name
 
 _NO_SKILLS: Final[Mapping[str, type]] = MappingProxyType({})
 
@@ -43,9 +43,9 @@ def _ports(record: type) -> Iterator[tuple[str, Any]]:
     for name, hint in get_type_hints(record, include_extras=True).items():
         limits = {_KEYWORDS[bound]: limit for bound, limit in bounds(hint).items()}
         if limits:
-            kind = "integer" if without_range(hint) is int else "number"
+            kind = "integer" if base_type(hint) is int else "number"
             taken = [{"type": kind, **limits}, dict(_PARAMETER), {"type": "object", "required": ["from"]}]
-            yield from ((each, {"anyOf": taken}) for each in dict.fromkeys((name, without_unit(name))))
+            yield from ((each, {"anyOf": taken}) for each in dict.fromkeys((name, unitless_name(name))))
         elif isinstance(hint, type) and dataclasses.is_dataclass(hint):
             yield from _ports(hint)
 

@@ -20,7 +20,7 @@ from executive.words.mission import Parameter
 from skills.files.errors import InputError, did_you_mean, listing, suggestion
 from skills.files.outside import json_object, plain_text
 from skills.files.yaml_source import KeyPath, YamlSource, scalar_of
-from skills.quantities import LARGEST, Number, QuantityError, number_of, shown
+from skills.quantities import LARGEST, Number, QuantityError, display_text, number_of
 
 _REFERENCE: Final = re.compile(r"\$(\$)?\{([^{}]*)\}")
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -164,7 +164,7 @@ def _declared(source: YamlSource) -> dict[str, Parameter]:
             continue
         if default is not None and not isinstance(default, _SCALARS):
             hint = "give it a text, a number, true or false, or {type: .., default: ..}"
-            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {shown(default)}", hint)
+            raise source.error((DECLARED, name), f"parameter '{name}' cannot hold {display_text(default)}", hint)
         fitting = (kind for kind in ("truth", "number", "text") if isinstance(default, _TYPES[kind]))
         found[name] = Parameter.model_construct(type=next(fitting, None), default=default)
     return found

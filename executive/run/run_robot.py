@@ -206,10 +206,10 @@ class RunRobot:
     def sense(self) -> None:
         """Updates the estimators, and reports the robot's estimated pose to the others."""
         context = self.context
-        if estimators := context.leave_others_out:
+        if estimators := context.robot_excluders:
             covered_W = self._traffic.covered_W(self.name)
             for estimator in estimators:
-                estimator.leave_out(covered_W)
+                estimator.exclude_robots(covered_W)
         context.localiser.update(context.robot)
         estimate = context.localiser.estimate()
         context.costmap.update(context.robot, estimate)

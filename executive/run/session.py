@@ -21,7 +21,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeState, Snapshot
 from executive.tree.plan import start_key
 from executive.words.slug import slug
-from skills.api import Cause, LayeredView, LocalisationEstimate, ParticleView
+from skills.api import Cause, LocalisationEstimate, ObstacleLayerView, ParticleView
 from skills.files.errors import disk_is_full
 from skills.robot import Pose2D
 
@@ -340,7 +340,7 @@ class Session(RunRobot):
         """Logs particles of the localiser and obstacles that the map lacks (x, y in m), when either is new."""
         localiser, costmap = self.context.localiser, self.context.costmap
         particles = localiser.particles_W(MOST_PARTICLES) if isinstance(localiser, ParticleView) else _NOTHING
-        seen = costmap.seen_m() if isinstance(costmap, LayeredView) else _NOTHING
+        seen = costmap.obstacle_cells() if isinstance(costmap, ObstacleLayerView) else _NOTHING
         columns = np.round(np.concatenate([particles[:, :2].T, seen.T], axis=1), 2)
         (x, y), count = columns.tolist(), len(particles)
         new = {"particle_x": x[:count], "particle_y": y[:count], "seen_x": x[count:], "seen_y": y[count:]}

@@ -11,7 +11,7 @@ from typing import Any
 from py_trees.behaviour import Behaviour
 
 from executive.tree.board import Board
-from skills.api import LeavesOthersOut, Part, Skill, SkillContext
+from skills.api import ExcludesRobots, Part, Skill, SkillContext
 from skills.robot import Pose2D
 
 
@@ -85,9 +85,9 @@ class RunContext(SkillContext):
     arm_order: ArmOrder = field(default_factory=ArmOrder)
 
     @cached_property
-    def leave_others_out(self) -> tuple[LeavesOthersOut, ...]:
+    def robot_excluders(self) -> tuple[ExcludesRobots, ...]:
         """Estimators that ignore readings of other robots, whose poses are known."""
-        return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, LeavesOthersOut))
+        return tuple(each for each in (self.localiser, self.costmap) if isinstance(each, ExcludesRobots))
 
     def known_pose(self) -> Pose2D | None:
         """Returns the robot's estimated pose, the planar part of X_WB; None while it is not localised."""

@@ -21,7 +21,7 @@ from executive.words.command import parse_object
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Surface
 from skills.files.errors import listing, suggestion
-from skills.quantities import QuantityError, bounds, number_of, without_unit
+from skills.quantities import QuantityError, bounds, number_of, unitless_name
 from skills.robot import Pose2D
 
 __all__ = ["FROM_KEY", "PortValueError", "assign_ports", "port_value"]
@@ -95,7 +95,7 @@ def port_value(value: Any, hint: Any, knowledge: Knowledge, path: Path = ()) -> 
 def _named(key: str, names: Iterable[str]) -> str | None:
     """Returns the name that a key means, with or without its unit, or None."""
     known = list(names)
-    return key if key in known else next((name for name in known if without_unit(name) == key), None)
+    return key if key in known else next((name for name in known if unitless_name(name) == key), None)
 
 
 def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable[str]) -> str:
@@ -106,7 +106,7 @@ def _port_of(loose: Mapping[str, Any], hints: Mapping[str, Any], taken: Iterable
     ]
     if len(fitting) == 1:
         return fitting[0]
-    fields = {without_unit(name) for names in (*records.values(), hints) for name in names}
+    fields = {unitless_name(name) for names in (*records.values(), hints) for name in names}
     known = {**dict.fromkeys(hints), **dict.fromkeys(sorted(fields))}
     wrong = next((key for key in loose if _named(key, known) is None), next(iter(loose)))
     ports = f"its ports are {listing(hints)}" if hints else "it has no input ports"
@@ -147,7 +147,7 @@ def _tuple(value: Any, arguments: tuple[Any, ...], knowledge: Knowledge, path: P
 def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
     """Converts a mapping of fields to a dataclass."""
     hints = field_types(record)
-    plain = [without_unit(field.name) for field in dataclasses.fields(record)]
+    plain = [unitless_name(field.name) for field in dataclasses.fields(record)]
     if not isinstance(value, dict):
         raise _refusal(value, f"a mapping with {listing(plain)}", path)
     read: dict[str, Any] = {}
@@ -160,7 +160,7 @@ def _record(value: Any, record: type, knowledge: Knowledge, path: Path) -> Any:
     filled = {**_DEFAULTS.get(record, {}), **read}
     for name in required_fields(record):
         if name not in filled:
-            raise PortValueError(path, f"'{without_unit(name)}' is missing", f"give {listing(plain)}")
+            raise PortValueError(path, f"'{unitless_name(name)}' is missing", f"give {listing(plain)}")
     try:
         return record(**filled)
     except (ValueError, TypeError) as error:

@@ -9,13 +9,13 @@ import typing
 from collections.abc import Mapping
 from typing import Any, Final, Union
 
-from skills.quantities import bounds, in_range, range_text, without_range
+from skills.quantities import base_type, bounds, in_range, range_text
 
 
 def conforms(value: Any, hint: Any) -> bool:
     """Returns whether `value` is of the type `hint` and in its range; an int passes as a float."""
     if bounds(hint):
-        return conforms(value, without_range(hint)) and in_range(value, hint)
+        return conforms(value, base_type(hint)) and in_range(value, hint)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if hint is Any:
         return True
@@ -34,7 +34,7 @@ def conforms(value: Any, hint: Any) -> bool:
 
 def assignable(source: Any, target: Any) -> bool:
     """Returns whether a port of type `target` takes every value of type `source`; ranges are not compared."""
-    source, target = without_range(source), without_range(target)
+    source, target = base_type(source), base_type(target)
     if target is Any or source == target or (source is int and target is float):
         return True
     if typing.get_origin(target) in (Union, types.UnionType):
@@ -52,7 +52,7 @@ def required_fields(record: type) -> tuple[str, ...]:
 def describe_type(hint: Any) -> str:
     """Describes a type hint to users: "number above 0 and at most 3 m/s", "list of text", "text or nothing"."""
     if bounds(hint):
-        return f"{describe_type(without_range(hint))} {range_text(hint)}"
+        return f"{describe_type(base_type(hint))} {range_text(hint)}"
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is tuple and arguments[1:] == (Ellipsis,):
         return f"list of {describe_type(arguments[0])}"

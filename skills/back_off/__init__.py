@@ -1,1 +1,1 @@
-"""Getting a little away from what blocks the path."""
+"""The back_off skill."""

@@ -1,4 +1,4 @@
-"""What the back_off skill takes and gives: all that a tree is compiled from."""
+"""Ports of the back_off skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from skills.quantities import Length
 
 @dataclass(frozen=True)
 class BackOffInputs:
-    """The distance (m), and the least distance (m) that counts as success."""
+    """Distance (m), and the least distance (m) that counts as success."""
 
     distance_m: Length = 0.4
     least_m: Length = 0.15
 
 
 class BackOffPorts(Skill[BackOffInputs]):
-    """Moves a short way out of a tight place: straight, slowly, in the first direction with enough clearance."""
+    """Drives a short distance out of a tight place: straight, slowly, in the first direction with enough clearance."""
 
     done_by: ClassVar[str] = "skills.back_off.skill:BackOff"
     name: ClassVar[str] = "back_off"

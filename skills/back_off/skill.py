@@ -1,4 +1,4 @@
-"""The skill that drives a short distance to where there is more clearance."""
+"""The back_off skill: drives a short distance to where there is more clearance."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from skills.api import Cause, Running, Succeeded
 from skills.back_off.ports import BackOffInputs, BackOffPorts
-from skills.geometry import compose, relative
+from skills.geometry import compose, relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
@@ -21,14 +21,14 @@ from skills.robot import BaseKind, Pose2D
 from skills.routine import Routine, SkillFailure
 
 DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
-"""Ways to go, in the body frame; backwards is tried first. A base that cannot go sideways takes the first and the last.
-"""
+"""Directions in the body frame, backwards first; a base that cannot go sideways uses the first and the last."""
 _STEP_M = 0.05
+"""Distance between the checks of a direction."""
 
 
 @dataclass(frozen=True)
 class BackOffOptions:
-    """How fast the robot goes, how near the goal it stops (m), and how long it takes to come to rest (s)."""
+    """Speed of the robot, distance from the goal at which it stops (m), and time to come to rest (s)."""
 
     speed_m_s: Speed = 0.25
     arrived_m: Length = 0.03
@@ -47,7 +47,7 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
         self._scans = ScanHealth(self.context)
 
     def trouble(self) -> SkillFailure | None:
-        """Reports a LiDAR that does not work."""
+        """Returns a failure when the LiDAR does not work."""
         trouble = self._scans.trouble()
         if trouble is None:
             return None
@@ -55,9 +55,9 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
         return SkillFailure(Cause.PRECONDITION, f"{trouble} The robot does not back off blindly.")
 
     def run(self, inputs: BackOffInputs) -> Routine[Succeeded]:
-        """Choose a direction, drive on until the costmap shows something ahead, and come to rest.
+        """Chooses a direction, drives until the costmap shows something ahead, and comes to rest.
 
-        Raises SkillFailure: there is no clearance, or the robot does not get on.
+        Raises SkillFailure when there is no clearance, or the robot makes no progress.
         """
         clock, odometry = self.context.clock, self.context.robot.odometry
         footprint = ArmFootprint(self.context).now()
@@ -65,7 +65,7 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
         goal_O = compose(odometry().pose, self._chosen(inputs, footprint, sideways))
         least_m, best_s = math.inf, clock.now()
         while True:
-            off = relative(odometry().pose, goal_O)
+            off = relative_pose(odometry().pose, goal_O)
             left_m = math.hypot(off.x_m, off.y_m) if sideways else abs(off.x_m)
             if left_m < least_m - 0.02:
                 least_m, best_s = left_m, clock.now()
@@ -81,9 +81,9 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
         return Succeeded("backed off a little")
 
     def _chosen(self, inputs: BackOffInputs, footprint: Footprint, sideways: bool) -> Pose2D:
-        """Where to go, in the body frame: the first direction that is clear all along, else the longest.
+        """Returns the goal in the body frame: the first direction that is clear all along, else the longest.
 
-        Raises SkillFailure: none is clear for `least_m`.
+        Raises SkillFailure when none is clear for `least_m`.
         """
         directions = DIRECTIONS_RAD if sideways else (DIRECTIONS_RAD[0], DIRECTIONS_RAD[-1])
         lengths = [(self._free_m(inputs.distance_m, footprint, direction), direction) for direction in directions]
@@ -94,7 +94,10 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
         return Pose2D(length * math.cos(direction), length * math.sin(direction), 0.0)
 
     def _free_m(self, most_m: float, footprint: Footprint, direction_rad: float) -> float:
-        """How far the body can go in a direction, at most `most_m`; out of what it touches, but not further in."""
+        """Returns how far (m) the body can go in a direction, at most `most_m`.
+
+        A body in contact may go out of the contact but not further into it.
+        """
         steps = np.arange(1, max(1, round(most_m / _STEP_M)) + 1) * _STEP_M
         here = self.context.pose()
         poses = [compose(here, Pose2D(s * math.cos(direction_rad), s * math.sin(direction_rad), 0.0)) for s in steps]

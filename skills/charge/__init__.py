@@ -1,1 +1,1 @@
-"""Charging the battery at the dock."""
+"""The charge skill."""

@@ -1,4 +1,4 @@
-"""The skill that stands on the dock until the battery is charged."""
+"""The charge skill: stands on the dock until the battery is charged."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from skills.quantities import Duration, Share
 
 @dataclass(frozen=True)
 class ChargeInputs:
-    """The state of charge (0 to 1) to wait for."""
+    """State of charge (0 to 1) to wait for."""
 
     level: Share = 0.8
 
 
 @dataclass(frozen=True)
 class ChargeOptions:
-    """A battery that has not gained `least_gain` (a share) within `no_gain_s` does not charge."""
+    """Limits on which a battery counts as not charging: it has not gained `least_gain` (a share) within `no_gain_s`."""
 
     no_gain_s: Duration = 30.0
     least_gain: Share = 0.005
@@ -41,13 +41,13 @@ class Charge(Skill[ChargeInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"battery": 10.0}
 
     def begin(self, inputs: ChargeInputs) -> None:
-        """Starts anew."""
+        """Forgets an earlier attempt."""
         self._level = inputs.level
         self._begun_at = self._best = self.context.robot.battery().charge
         self._best_s = self.context.clock.now()
 
     def step(self) -> Step:
-        """Looks at the battery."""
+        """Checks the battery."""
         if not 0.0 <= self._level <= 1.0:
             return Failed(Cause.PRECONDITION, f"a charge is from 0 to 1, not {self._level:g}")
         charge, now_s = self.context.robot.battery().charge, self.context.clock.now()

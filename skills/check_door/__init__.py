@@ -1,1 +1,1 @@
-"""Looking whether a door is open."""
+"""The check_door skill."""

@@ -1,4 +1,4 @@
-"""The check_door skill: look from where the robot stands whether the robot can go through a doorway."""
+"""The check_door skill: looks from where the robot stands whether a doorway is open."""
 
 from __future__ import annotations
 
@@ -18,13 +18,14 @@ if TYPE_CHECKING:
 
 _SCAN_PATIENCE_S = PATIENCE_S
 _CLOSED_M = 0.1
+"""A door with a gap up to this is closed."""
 _FEW_RAYS = 50
+"""Number of rays below which hardly anything is seen."""
 
 
 @dataclass(frozen=True)
 class CheckDoorInputs:
-    """The middle (x, y) of the doorway `middle_W`, its clear width, the direction in which one goes through it, from
-    either side, and what it is called."""
+    """Doorway: its centre `middle_W` (x, y), clear width, direction of passage from either side, and name."""
 
     middle_W: tuple[Coordinate, Coordinate]
     width_m: Length
@@ -34,10 +35,10 @@ class CheckDoorInputs:
 
 @dataclass(frozen=True)
 class CheckDoorOptions:
-    """How the robot looks: `scans` at a time, up to `looks` times, `pause_s` apart, until it can tell.
+    """Number of `scans` in a look, of `looks` and the `pause_s` between them, until the skill can tell.
 
-    It can from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is open when the
-    robot's outline fits through with `margin_m` on each side.
+    The skill can tell from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is open
+    when the robot's outline fits through with `margin_m` on each side.
     """
 
     scans: Count = 5
@@ -49,9 +50,11 @@ class CheckDoorOptions:
 
 
 class CheckDoor(RoutineSkill[CheckDoorInputs]):
-    """Looks with the LiDAR whether a door is open, from where the robot stands. A gap too narrow for it is not open.
+    """Looks with the LiDAR whether a door is open, from where the robot stands.
 
-    Rays that go through and clearly beyond the doorway show where it is free. It does not judge what lies on the floor.
+    A gap too narrow for the robot is not open.
+
+    Rays that go through and clearly beyond the doorway show where it is free. Objects on the floor are not judged.
     """
 
     name = "check_door"
@@ -68,22 +71,22 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
     max_data_age_s: ClassVar[Mapping[str, float]] = {"scan": 0.5, "localisation": 1.0}
 
     def run(self, inputs: CheckDoorInputs) -> Routine[Succeeded]:
-        """Looks until it can be told."""
+        """Looks until the skill can tell."""
         door = Doorway(inputs.middle_W, inputs.width_m, inputs.through_rad)
         for look in range(self.options.looks):
             if look:
                 yield from self.pause(self.options.pause_s, f"waiting until more is seen of the {inputs.door}")
             seen = yield from self._look(door, inputs.door)
             if seen.least_m >= self._needed_m() or seen.most_m < self._needed_m():
-                return self._told(inputs, seen)
+                return self._answer(inputs, seen)
         few = f"hardly anything is seen of the {inputs.door}"
         why = few if seen.rays < _FEW_RAYS else f"something stands in the {inputs.door} or before it"
         raise SkillFailure(Cause.POSTCONDITION, why)
 
     def _look(self, door: Doorway, name: str) -> Routine[Opening]:
-        """How wide it is open in the next scans.
+        """Measures the opening in the next scans.
 
-        Raises SkillFailure: there are none, the robot is lost, or stands where it cannot tell.
+        Raises SkillFailure when there are none, the robot is lost, or stands where the skill cannot tell.
         """
         scans: list[tuple[Scan, RigidTransform]] = []
         while len(scans) < self.options.scans:
@@ -100,7 +103,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
         return measure_opening(door, scans)
 
     def _next_scan(self, message: str) -> Routine[Scan]:
-        """The first scan that is taken from now on. Raises SkillFailure: there is none."""
+        """Returns the first scan that is taken from now on. Raises SkillFailure when there is none."""
         now_s = self.context.clock.now()
         while (scan := self.context.robot.scan()) is None or scan.stamp_s <= now_s:
             if self.context.clock.now() > now_s + _SCAN_PATIENCE_S:
@@ -109,12 +112,12 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
         return scan
 
     def _needed_m(self) -> float:
-        """How wide the robot is, with a margin on each side."""
+        """Width of the robot with a margin on each side."""
         sides = [y for _, y in self.context.robot.capabilities().footprint_m]
         return max(sides) - min(sides) + 2.0 * self.options.margin_m
 
-    def _told(self, inputs: CheckDoorInputs, seen: Opening) -> Succeeded:
-        """The answer."""
+    def _answer(self, inputs: CheckDoorInputs, seen: Opening) -> Succeeded:
+        """Returns the answer."""
         door, needed_m = inputs.door, self._needed_m()
         outputs = {"open": seen.least_m >= needed_m, "free_m": seen.least_m}
         if outputs["open"]:

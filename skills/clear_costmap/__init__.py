@@ -1,1 +1,1 @@
-"""Forgetting what was seen on the path, to see it anew."""
+"""The clear_costmap skill."""

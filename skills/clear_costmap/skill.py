@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
-from skills.api import Cause, Failed, ForgettingCostmap, Part, Running, Skill, Step, Succeeded
+from skills.api import Cause, ClearableCostmap, Failed, Part, Running, Skill, Step, Succeeded
 from skills.quantities import Delay
 
 
 @dataclass(frozen=True)
 class ClearCostmapInputs:
-    """How long (s) to sense again before success; two scans must agree on an obstacle."""
+    """Time (s) to sense again before success; two scans must agree on an obstacle."""
 
     look_s: Delay = 1.0
 
@@ -29,19 +29,19 @@ class ClearCostmap(Skill[ClearCostmapInputs]):
     default_timeout_s: ClassVar[float] = 10.0
 
     def begin(self, inputs: ClearCostmapInputs) -> None:
-        """Starts anew."""
+        """Forgets an earlier attempt."""
         self._inputs = inputs
         self._cleared: int | None = None
         self._end_s = 0.0
 
     def step(self) -> Step:
-        """Clears at the first step, then look."""
+        """Clears at the first step, then looks."""
         costmap, now_s = self.context.costmap, self.context.clock.now()
         if self._cleared is None:
-            if not isinstance(costmap, ForgettingCostmap):
-                return Failed(Cause.PRECONDITION, "the costmap of this robot cannot forget what was seen")
-            self._cleared = costmap.forget_seen()
+            if not isinstance(costmap, ClearableCostmap):
+                return Failed(Cause.PRECONDITION, "the costmap of this robot has no obstacle layer that can be cleared")
+            self._cleared = costmap.clear_obstacles()
             self._end_s = now_s + self._inputs.look_s
         if now_s < self._end_s:
-            return Running("looking anew at what stands around")
-        return Succeeded(f"{self._cleared} blocked cells were forgotten, and what stands there was seen anew")
+            return Running("looking again at the surroundings")
+        return Succeeded(f"cleared {self._cleared} blocked cells and looked again")

@@ -84,15 +84,15 @@ class LayeredCostmap:
         x0_m, y0_m = self._layer.origin_m
         return np.minimum(clearance, distances(field, self._layer.resolution_m, x0_m, y0_m, points))
 
-    def seen_m(self) -> FloatArray:
+    def obstacle_cells(self) -> FloatArray:
         """Centres (x, y) of the blocked cells of the obstacle layer."""
         return self._layer.centres(np.argwhere(self._until_s > self._now_s))
 
-    def unexplained(self) -> tuple[float, FloatArray]:
+    def unexplained_returns(self) -> tuple[float, FloatArray]:
         """The last scan's stamp, and its returns (N, 3) that the surveyed grid does not explain."""
         return self._scan_stamp_s, self._returns_W
 
-    def forget_seen(self, within_W: FloatArray | None = None) -> int:
+    def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
         """Clears the obstacle layer, or only what lies within discs; returns the number of cells that were blocked."""
         cells = self._active()
         if within_W is None:
@@ -104,10 +104,10 @@ class LayeredCostmap:
         self._note_change()
         return len(cells)
 
-    def leave_out(self, discs_W: FloatArray) -> None:
+    def exclude_robots(self, discs_W: FloatArray) -> None:
         """Leaves out of the obstacle layer what lies within these discs, rows of x, y and radius (m, world).
 
-        `unexplained` still returns it.
+        `unexplained_returns` still returns it.
         """
         self._left_out_W = discs_W
 

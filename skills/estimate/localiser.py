@@ -12,7 +12,7 @@ from skills.api import LocalisationEstimate
 from skills.estimate.grid_map import GridMap
 from skills.estimate.matching import Match, MatchOptions, grid_surfaces, match, score_poses
 from skills.estimate.scan_points import has_moved, outside_discs, placed_points, scan_points
-from skills.geometry import compose, inverse, relative
+from skills.geometry import compose, inverse, relative_pose
 from skills.quantities import Count, Height, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Robot, Scan
 
@@ -115,7 +115,7 @@ class ScanMatchingLocaliser:
         if len(rest_F) >= self._options.min_points:
             self._take_in(rest_F)
 
-    def leave_out(self, discs_W: FloatArray) -> None:
+    def exclude_robots(self, discs_W: FloatArray) -> None:
         """Leaves out of later scans what lies within these discs, rows of x, y and radius (m, world).
 
         The discs are placed by the believed pose. A scan of which too little is left neither confirms nor refutes it.
@@ -173,7 +173,7 @@ class ScanMatchingLocaliser:
     def _predict(self, X_OB: Pose2D) -> None:
         """Moves the belief along with odometry and increases its covariance."""
         before, self._X_OB = self._X_OB or X_OB, X_OB
-        step = relative(before, X_OB)
+        step = relative_pose(before, X_OB)
         distance, turn = math.hypot(step.x_m, step.y_m), abs(step.yaw_rad)
         old, new = compose(self._X_WO, before), compose(self._X_WO, X_OB)
         options = self._options
@@ -315,6 +315,6 @@ class OdometryLocaliser:
         if self._last is None:
             self._X_WO = compose(self._start, inverse(odometry.pose))
             self._last = odometry.pose
-        step = relative(self._last, odometry.pose)
+        step = relative_pose(self._last, odometry.pose)
         self._driven_m += math.hypot(step.x_m, step.y_m)
         self._last, self._stamp_s = odometry.pose, odometry.stamp_s

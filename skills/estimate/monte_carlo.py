@@ -13,7 +13,7 @@ from skills.estimate.grid_map import GridMap
 from skills.estimate.localiser import LocaliserOptions, ScanMatchingLocaliser
 from skills.estimate.matching import Match, match
 from skills.estimate.particle_filter import MODE_RADIUS_M, MODE_TURN_RAD, FilterOptions, Mode, ParticleFilter
-from skills.geometry import compose, inverse, relative, wrap
+from skills.geometry import compose, inverse, relative_pose, wrap
 from skills.quantities import Count, Length, Share, Turn
 from skills.robot import FloatArray, Pose2D, Scan
 
@@ -145,7 +145,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         assert self._X_OB is not None
         if self._weighed_at is None:
             return True
-        step = relative(self._weighed_at, self._X_OB)
+        step = relative_pose(self._weighed_at, self._X_OB)
         if math.hypot(step.x_m, step.y_m) > self._own.update_m or abs(step.yaw_rad) > self._own.update_rad:
             self._at_rest = 0
             return True
@@ -157,7 +157,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         assert self._X_OB is not None
         particles, self._scans = self._filter, 0
         self._at_rest += 1
-        particles.move(relative(self._weighed_at or self._X_OB, self._X_OB))
+        particles.move(relative_pose(self._weighed_at or self._X_OB, self._X_OB))
         self._weighed_at = self._X_OB
         beams = _thinned(points_F, self._own.particles.beams)
         particles.weigh(beams)

@@ -92,11 +92,11 @@ class RollingCostmap:
             self._all = self._distances(slice(None), slice(None))
         return _looked_up(self._all, self._options.cell_m, *(self._corner_m or (0.0, 0.0)), points)
 
-    def unexplained(self) -> tuple[float, FloatArray]:
+    def unexplained_returns(self) -> tuple[float, FloatArray]:
         """The last scan's stamp, and its returns (N, 3) that lie away from all obstacles seen before."""
         return self._stamp_s, self._returns_W
 
-    def forget_seen(self, within_W: FloatArray | None = None) -> int:
+    def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
         """Clears all cells, or those within discs; returns the number of cells that were blocked."""
         forgotten = np.ones(self._odds.shape, dtype=np.bool_)
         if within_W is not None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydrake.math import RotationMatrix
 
 from skills.estimate.compiled import compiled
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.robot import Capabilities, FloatArray, Joints, Pose2D, Robot, Scan
 
 _MOVED_M = 0.02
@@ -138,7 +138,7 @@ def outside_discs(points_W: FloatArray, discs_W: FloatArray) -> NDArray[np.bool_
 
 def has_moved(before: Scan, scan: Scan) -> bool:
     """Returns whether the robot moved between two scans, by odometry; equal scans then come from a frozen LiDAR."""
-    step = relative(Pose2D.from_transform(before.X_OB), Pose2D.from_transform(scan.X_OB))
+    step = relative_pose(Pose2D.from_transform(before.X_OB), Pose2D.from_transform(scan.X_OB))
     return math.hypot(step.x_m, step.y_m) > _MOVED_M or abs(step.yaw_rad) > _MOVED_RAD
 
 

@@ -14,7 +14,7 @@ from typing_extensions import TypeAliasType
 
 from skills.files.errors import MOST_LISTED, InputError, did_you_mean, few, listing, suggestion
 from skills.files.yaml_source import KeyPath, YamlSource, quoted_key
-from skills.quantities import QuantityError, shown, without_range
+from skills.quantities import QuantityError, base_type, display_text
 
 __all__ = ["Name", "Text", "first_error", "validate"]
 
@@ -180,9 +180,9 @@ def _inside(kind: Any, part: str | int) -> tuple[Any, ...]:
 
 def _choices(hint: Any) -> tuple[Any, ...]:
     """Types that a type hint allows, without ranges and aliases."""
-    plain = without_range(hint)
+    plain = base_type(hint)
     if isinstance(plain, TypeAliasType):
-        value = without_range(plain.__value__)
+        value = base_type(plain.__value__)
         named = isinstance(value, ForwardRef) and vars(sys.modules[str(plain.__module__)])[value.__forward_arg__]
         return _choices(named or value)
     if get_origin(plain) in (Union, UnionType):
@@ -222,11 +222,11 @@ def _plain_hint(error: ErrorDetails, word: str | None = None) -> str:
         said = word or ("yes" if value else "no")
         return f'put it in quotes: "{said}"' if word else f'put it in quotes, as in "{said}"'
     if error["type"] == "string_type" and isinstance(value, int | float):
-        return f'put it in quotes: "{value if isinstance(value, float) else shown(value)}"'
+        return f'put it in quotes: "{value if isinstance(value, float) else display_text(value)}"'
     if error["type"] == "invalid_key":
         return "put the key in quotes"
     near = did_you_mean(str(value), _allowed(error))
-    return f"it reads {shown(value)} now" if near is None else f"did you mean '{near}'?"
+    return f"it reads {display_text(value)} now" if near is None else f"did you mean '{near}'?"
 
 
 def _allowed(error: ErrorDetails) -> list[str]:

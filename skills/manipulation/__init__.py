@@ -1,1 +1,1 @@
-"""The skills that use the arm, and the arm that they share: motion, collisions, poses, gaze, holding."""
+"""Manipulation: the skills that use the arm, and the arm's motion, collisions, poses and forces that they share."""

@@ -20,7 +20,7 @@ from skills.estimate.grid_map import GridMap
 from skills.estimate.localiser import moved_covariance
 from skills.estimate.matching import Match, MatchOptions, match
 from skills.estimate.scan_points import SelfFilter, has_moved
-from skills.geometry import compose, inverse, relative
+from skills.geometry import compose, inverse, relative_pose
 from skills.mapping.closures import Window, find_pose
 from skills.mapping.distributions import Distributions
 from skills.mapping.keyframe import Keyframe, matching_points
@@ -157,7 +157,7 @@ class Mapper:
         step = Pose2D(0.0, 0.0, 0.0)
         X_OF, self._X_OF = self._X_OF, Pose2D.from_transform(scan.X_OB)
         if before is not None:
-            step = relative(X_OF, self._X_OF)
+            step = relative_pose(X_OF, self._X_OF)
         self._predict(step)
         if self._active and scan.stamp_s - self._matched_s < options.period_s:
             return
@@ -177,7 +177,7 @@ class Mapper:
         """Localises the robot on the map to continue, about its first pose; returns whether that worked."""
         options, first = self._options, self.graph.poses[0]
         for submap in sorted(self.submaps, key=lambda each: self._off_m(each, first))[: options.recognised_in]:
-            guess = relative(self.graph.poses[submap.anchor], first)
+            guess = relative_pose(self.graph.poses[submap.anchor], first)
             found = self.find_in(submap, points_F, guess, options.recognised_window)
             if found is not None:
                 self._joint = Edge(submap.anchor, len(self.keyframes), found.pose, self._at_least(found.covariance))
@@ -234,7 +234,7 @@ class Mapper:
         self._add_to(current, index)
         current.driven_m += driven_m
         for follower in self._active[1:]:
-            follower.members[index] = relative(current.members[follower.anchor], self._X_AF)
+            follower.members[index] = relative_pose(current.members[follower.anchor], self._X_AF)
             self._add_to(follower, index)
             follower.driven_m += driven_m
         self._change_submaps(index)
@@ -261,7 +261,7 @@ class Mapper:
         elif len(self._active) > 1 and full > 1.0:
             follower = self._active[1]
             X_AB = current.members[follower.anchor]
-            self._X_AF = relative(X_AB, self._X_AF)
+            self._X_AF = relative_pose(X_AB, self._X_AF)
             self._covariance = np.diag([1e-5, 1e-5, 1e-6])
             current.distributions = None
             self._active.pop(0)
@@ -305,9 +305,9 @@ class Mapper:
         if edge.second == other.second:
             return False
         poses = self.graph.poses
-        through = compose(edge.measured, relative(poses[edge.second], poses[other.second]))
-        across = compose(relative(poses[edge.first], poses[other.first]), other.measured)
-        off = relative(through, across)
+        through = compose(edge.measured, relative_pose(poses[edge.second], poses[other.second]))
+        across = compose(relative_pose(poses[edge.first], poses[other.first]), other.measured)
+        off = relative_pose(through, across)
         options = self._options
         return math.hypot(off.x_m, off.y_m) < options.agree_m and abs(off.yaw_rad) < options.agree_rad
 
@@ -322,7 +322,7 @@ class Mapper:
             min(options.widest.place_m, options.closure_window.place_m + options.window_per_m.place_m * driven_m),
             min(options.widest.yaw_rad, options.closure_window.yaw_rad + options.window_per_m.yaw_rad * driven_m),
         )
-        guess = relative(self.graph.poses[submap.anchor], self.graph.poses[index])
+        guess = relative_pose(self.graph.poses[submap.anchor], self.graph.poses[index])
         found = self.find_in(submap, self.keyframes[index].points_F, guess, window)
         if found is None:
             return None

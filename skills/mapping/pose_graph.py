@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.robot import FloatArray, Pose2D
 
 _HUBER_SIGMAS = 1.5
@@ -31,7 +31,7 @@ class Edge:
 
     def sigmas(self, poses: list[Pose2D]) -> float:
         """Distance of the poses from the measurement, in standard deviations (Mahalanobis)."""
-        off = relative(self.measured, relative(poses[self.first], poses[self.second]))
+        off = relative_pose(self.measured, relative_pose(poses[self.first], poses[self.second]))
         error = np.array([off.x_m, off.y_m, off.yaw_rad])
         return math.sqrt(float(error @ np.linalg.solve(self.covariance, error)))
 

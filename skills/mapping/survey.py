@@ -14,7 +14,7 @@ import numpy as np
 from skills.api import PlanningError
 from skills.estimate.costmap import CostmapOptions, LayeredCostmap
 from skills.estimate.grid_map import BoolGrid, GridMap
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.mapping.frontiers import Frontier, Ground
 from skills.mapping.mapper import Mapper
 from skills.mapping.occupancy import LayeredOccupancy
@@ -404,7 +404,7 @@ class Survey:
         self._goal = None
 
     def _at(self, pose: Pose2D) -> bool:
-        off = relative(pose, self.mapper.pose)
+        off = relative_pose(pose, self.mapper.pose)
         return math.hypot(off.x_m, off.y_m) < 0.1 and abs(off.yaw_rad) < 0.15
 
 

@@ -43,7 +43,7 @@ class Base:
         if status.state is CommandState.REFUSED:
             return status.reason or "no reason given"
         self.accepted = True
-        self.patience.over()
+        self.patience.reset()
         return None
 
     def ask_again(self) -> bool:

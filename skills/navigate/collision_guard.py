@@ -62,7 +62,7 @@ class CollisionGuard:
         costmap, now_s = self._context.costmap, self._context.clock.now()
         if not isinstance(costmap, ReturnsView):
             return None
-        stamp_s, returns_W = costmap.unexplained()
+        stamp_s, returns_W = costmap.unexplained_returns()
         moving = self._watch.update(stamp_s, returns_W)
         found = self._suddenly_ahead(here, returns_W) or self._crossing(here, follower, most_m_s, moving, now_s)
         if found is not None:

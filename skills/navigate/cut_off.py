@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.api import ForgettingCostmap, FreeSpace, SkillContext
+from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.navigate.footprint import Footprint, clearance_on_grid
 from skills.navigate.obstacles import with_segments
 from skills.perception.doorway import Doorway, measure_opening
@@ -96,9 +96,9 @@ class DoorWatch:
         costmap, place = self._context.costmap, (here.x_m, here.y_m)
         far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M]
         far = [door for door in far if door not in self._closed]
-        if not self._closed or not far or not isinstance(costmap, ForgettingCostmap):
+        if not self._closed or not far or not isinstance(costmap, ClearableCostmap):
             return False
-        return bool(costmap.forget_seen(np.array([[*door.middle_W, 0.5 * door.width_m + _JAMB_M] for door in far])))
+        return bool(costmap.clear_obstacles(np.array([[*door.middle_W, 0.5 * door.width_m + _JAMB_M] for door in far])))
 
     def regions(
         self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()

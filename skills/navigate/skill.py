@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, Failed, PlanningError, Running, SkillContext, Step, Succeeded
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import Base
 from skills.navigate.follower import Drive
@@ -142,9 +142,9 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
             if self._blind.is_left():
                 return Running(f"standing: {trouble}")
             return Failed(self._refusal_cause, f"{trouble} The robot does not drive without it.")
-        self._blind.over()
+        self._blind.reset()
         if self.context.localiser.estimate().localised:
-            self._lost.over()
+            self._lost.reset()
         elif not self._lost.is_left():
             self._base.stop()
             if self._placed:
@@ -219,7 +219,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self._follower: LocalController = controller.build(path, self._around.footprint, max_speed_m_s=speed)
         self._progress.whole_m = self._progress.whole_m or max(self._follower.length_m, 1e-3)
         self._progress.restart(self._now())
-        self._blocked.over()
+        self._blocked.reset()
         poses = [[round(float(v), 3) for v in pose] for pose in path.poses[::4]]
         self.context.publish("path", {"robot": self.context.robot.name, "frame": "world", "poses": poses})
 
@@ -267,7 +267,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
             vx, vy, wz = self.context.robot.odometry().velocity
             still = math.hypot(vx, vy) < self.options.still_m_s and abs(wz) < self.options.still_rad_s
         self._base.stop()
-        off = relative(self._inputs.goal, self.context.pose())
+        off = relative_pose(self._inputs.goal, self.context.pose())
         sentence = f"{math.hypot(off.x_m, off.y_m):.2f} m and {abs(off.yaw_rad):.2f} rad off the goal"
         if not still:
             raise SkillFailure(Cause.POSTCONDITION, f"The robot does not come to rest; it is {sentence}.")
@@ -327,7 +327,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     def _waits(self, message: str) -> str:
         """Counts this tick neither as blocked nor as stuck; returns the message."""
         self._progress.best_s = self._now()
-        self._blocked.over()
+        self._blocked.reset()
         return message
 
     def _waiting_sentence(self) -> str:
@@ -348,7 +348,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     def _trouble(self, answer: Drive) -> str | None:
         """The reason to give up the path; None when there is none."""
         if answer.blocked_at is None:
-            self._blocked.over()
+            self._blocked.reset()
         else:
             self._planning.obstacle_W = answer.blocked_at
             if not self._blocked.is_left():
@@ -376,7 +376,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     def _replan(self, why: str) -> str:
         """Plans again from where the robot will be. Raises SkillFailure after too many plans."""
         self._progress.restart(self._now())
-        self._blocked.over()
+        self._blocked.reset()
         self._planning.plan_again(why, self._pose_then())
         return f"{why} Planning another path."
 
@@ -384,13 +384,13 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         """The pose on the path where a plan that is requested now will arrive; None when the robot is off the path."""
         vx, vy, _ = self.context.robot.odometry().velocity
         then = self._follower.pose_after(math.hypot(vx, vy) * self.options.planning_latency_s)
-        off = relative(self.context.pose(), then)
+        off = relative_pose(self.context.pose(), then)
         on_path = math.hypot(off.x_m, off.y_m) < _ON_PATH_M and abs(off.yaw_rad) < _ON_PATH_RAD
         return then if on_path else None
 
     def _arrived(self, share: float) -> bool:
         """Returns whether the robot is within a share of the tolerances of its present goal."""
-        off = relative(self._planning.goal, self.context.pose())
+        off = relative_pose(self._planning.goal, self.context.pose())
         near = math.hypot(off.x_m, off.y_m) <= share * self._inputs.position_tolerance_m
         return near and abs(off.yaw_rad) <= share * self._inputs.yaw_tolerance_rad
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from skills.api import ForgettingCostmap, FreeSpace, SkillContext
+from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
@@ -134,4 +134,4 @@ class Surroundings:
     def clear_obstacles(self) -> bool:
         """Clears the obstacle layer of the costmap; returns whether a cell was cleared."""
         costmap = self._context.costmap
-        return isinstance(costmap, ForgettingCostmap) and bool(costmap.forget_seen())
+        return isinstance(costmap, ClearableCostmap) and bool(costmap.clear_obstacles())

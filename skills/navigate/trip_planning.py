@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from skills.api import Cause, ForgettingCostmap, Job, SkillContext
+from skills.api import Cause, ClearableCostmap, Job, SkillContext
 from skills.geometry import compose
 from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.giving_way import Avoided
@@ -195,7 +195,7 @@ class TripPlanning:
             final = not may_go and self._around.cut_off(self._goals)
             raise SkillFailure(Cause.PLANNING, why + seen, final=final)
         self.wait_until_s = self._now() + self._options.replan_pause_s
-        if robot and not self._map_leads and isinstance(self._context.costmap, ForgettingCostmap):
+        if robot and not self._map_leads and isinstance(self._context.costmap, ClearableCostmap):
             self.ask(map_alone=True)
 
     def _waits_for_doors(self) -> bool:

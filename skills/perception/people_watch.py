@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import Detection, Detector, Job, LayeredView, SkillContext
-from skills.geometry import relative
+from skills.api import Detection, Detector, Job, ObstacleLayerView, SkillContext
+from skills.geometry import relative_pose
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import detect_class_in_grey
 from skills.perception.people import SeenPerson, add_person
@@ -70,7 +70,7 @@ class _Look:
 
     def shows(self, one: SeenPerson, reach_m: float) -> bool:
         """Returns whether a still person would be visible: from the pose of the last view, or well in a picture."""
-        off = relative(one.here_W, self.here_W)
+        off = relative_pose(one.here_W, self.here_W)
         if math.hypot(off.x_m, off.y_m) < _SAME_PLACE_M and abs(off.yaw_rad) < _SAME_YAW_RAD:
             return True
         upright_W = np.array([[*one.place_W, height_m] for height_m in _HEIGHTS_M])
@@ -128,9 +128,9 @@ class PeopleWatch:
     def _may_show_person(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
         """Cameras with a known person or an unexplained obstacle in view; all of them without a layered costmap."""
         costmap, here = self._context.costmap, self._context.pose()
-        if not isinstance(costmap, LayeredView):
+        if not isinstance(costmap, ObstacleLayerView):
             return cameras
-        places_W = np.vstack([costmap.seen_m(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)])
+        places_W = np.vstack([costmap.obstacle_cells(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)])
         off_W = places_W - (here.x_m, here.y_m)
         near_W = off_W[np.linalg.norm(off_W, axis=1) < self._options.near_m]
         bearings_rad = np.arctan2(near_W[:, 1], near_W[:, 0]) - here.yaw_rad

@@ -1,1 +1,1 @@
-"""Finding out where the robot is when it has lost its place."""
+"""The relocalise skill."""

@@ -1,4 +1,4 @@
-"""What the relocalise skill takes and gives: all that a tree is compiled from."""
+"""Ports of the relocalise skill, from which trees are compiled."""
 
 from __future__ import annotations
 
@@ -12,10 +12,7 @@ from skills.quantities import Tries
 
 @dataclass(frozen=True)
 class RelocaliseInputs:
-    """`turns`: the most headings to search in, an eighth of a turn apart.
-
-    `drives`: how often it then drives a little and begins anew.
-    """
+    """Largest numbers of headings to search in, an eighth of a turn apart, and of drives elsewhere."""
 
     turns: Tries = 8
     drives: Tries = 3

@@ -1,4 +1,4 @@
-"""The skill that finds the robot's place on the whole map: standing still, then turning, then driving a little."""
+"""The relocalise skill: searches the whole map for the robot's pose, standing, then turning, then driving a little."""
 
 from __future__ import annotations
 
@@ -18,11 +18,12 @@ from skills.robot import Capabilities, FloatArray, NoImageError, Scan
 from skills.routine import Routine, SkillFailure
 
 _BEYOND_M = 5.0
+"""Distance beyond which points are ignored."""
 
 
 @dataclass(frozen=True)
 class FreeSpaceOptions:
-    """Points between `heights_m` above the floor are in the way; what the body keeps off them (m)."""
+    """Heights of obstacles above the floor, and the body's clearance from them (m)."""
 
     heights_m: tuple[Height, Height] = (0.1, 1.2)
     side_m: Margin = 0.15
@@ -31,19 +32,19 @@ class FreeSpaceOptions:
 
 
 def obstacles_B(scan: Scan, capabilities: Capabilities, options: FreeSpaceOptions) -> FloatArray:
-    """Points (N, 2) of a scan in the body frame that the body would hit; what is within its outline is itself."""
+    """Returns the points (N, 2) of a scan in the body frame that the body would hit, without its own outline."""
     points = scan.points_B()
     heights = points[:, 2] + scan.X_OB.translation()[2]
     x, y = points[:, 0], points[:, 1]
     corners = np.asarray(capabilities.footprint_m)
     own = np.all((points[:, :2] > corners.min(axis=0)) & (points[:, :2] < corners.max(axis=0)), axis=1)
     low, high = options.heights_m
-    kept = ~own & (heights > low) & (heights < high) & (np.hypot(x, y) < _BEYOND_M)
-    return np.ascontiguousarray(points[kept, :2])
+    near = ~own & (heights > low) & (heights < high) & (np.hypot(x, y) < _BEYOND_M)
+    return np.ascontiguousarray(points[near, :2])
 
 
 def free_m(obstacles: FloatArray, heading_rad: float, capabilities: Capabilities, options: FreeSpaceOptions) -> float:
-    """How far (m) the body can go straight once it has turned to a heading in the body frame."""
+    """Returns how far (m) the body can go straight once it has turned to a heading in the body frame."""
     corners = np.asarray(capabilities.footprint_m)
     front, half = corners[:, 0].max(), np.abs(corners[:, 1]).max() + options.side_m
     c, s = math.cos(heading_rad), math.sin(heading_rad)
@@ -60,14 +61,15 @@ def can_turn(obstacles: FloatArray, capabilities: Capabilities, options: FreeSpa
 
 _SCAN_PATIENCE_S = PATIENCE_S
 _LEAST_STEP_M = 0.15
+"""Shortest step of a drive."""
 
 
 @dataclass(frozen=True)
 class RelocaliseOptions:
-    """How long a search takes (s), how fast and how far the robot turns between searches.
+    """Time of a search (s), speed and angle of the turns between searches.
 
-    Between rounds of turns it drives up to `drive_m`, in steps of `step_m` with a look ahead before each. It knows the
-    place once scans have agreed for `agree_s` and the estimate's health is at least `good_health`.
+    Between rounds of turns the robot drives up to `drive_m`, in steps of `step_m` with a look ahead before each. It
+    knows its pose once scans have agreed for `agree_s` and the estimate's health is at least `good_health`.
     """
 
     search_latency_s: Delay = 1.0
@@ -89,7 +91,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
     options: RelocaliseOptions
 
     def run(self, inputs: RelocaliseInputs) -> Routine[Succeeded]:
-        """Searches the whole map; turn a little, and again; after a round of that, from somewhere else."""
+        """Searches the whole map; turns a little and searches again; after a full round drives elsewhere."""
         localiser = self.context.localiser
         if not isinstance(localiser, SearchingLocaliser):
             raise SkillFailure(Cause.PRECONDITION, "the localiser of this robot cannot search the map")
@@ -107,7 +109,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         raise SkillFailure(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
 
     def _found(self, localiser: Localiser) -> Routine[bool]:
-        """Searches with a new scan, believe what is found, and see whether the next scans agree."""
+        """Searches with a new scan, uses the pose found, and checks whether the next scans agree."""
         message = "searching the whole map"
         scan = yield from self._new_scan(message)
         assert isinstance(localiser, SearchingLocaliser)
@@ -136,7 +138,7 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         return False
 
     def _new_scan(self, message: str) -> Routine[Scan]:
-        """A scan that was taken since now."""
+        """Returns a scan that is taken from now on."""
         context = self.context
         begun_s = context.clock.now()
         while (scan := context.robot.scan()) is None or scan.stamp_s < begun_s - 0.11:
@@ -146,8 +148,8 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         return scan
 
     def _turn(self, turn_rad: float) -> Routine[None]:
-        """Turns slowly on the spot by a signed angle, where there is room for it; then rest."""
-        scan = yield from self._new_scan("looking for room to turn")
+        """Turns slowly on the spot by a signed angle, where there is space, and comes to rest."""
+        scan = yield from self._new_scan("looking for space to turn")
         capabilities, free_space = self.context.robot.capabilities(), self.options.free_space
         if not can_turn(obstacles_B(scan, capabilities, free_space), capabilities, free_space):
             return
@@ -156,9 +158,9 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         yield from self.move((0.0, 0.0, rate), abs(turn_rad / rate), "turning slowly to see more", enough=enough)
 
     def _drive(self) -> Routine[bool]:
-        """Face the direction with the most room and go there step by step; False when there is no room at all."""
+        """Turns to the direction with the most free space and drives there step by step; returns whether it drove."""
         options = self.options
-        scan = yield from self._new_scan("looking for room to drive")
+        scan = yield from self._new_scan("looking for space to drive")
         body, free_space = self.context.robot.capabilities(), options.free_space
         seen = obstacles_B(scan, body, free_space)
         turns = range(-3, 5) if can_turn(seen, body, free_space) else (0,)
@@ -168,8 +170,8 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
             yield from self._turn(heading)
         left_m, driven_m = options.drive_m, 0.0
         while left_m > 0.05:
-            room_m = yield from self._room_ahead()
-            step_m = min(options.step_m, left_m, room_m)
+            free_ahead_m = yield from self._free_ahead_m()
+            step_m = min(options.step_m, left_m, free_ahead_m)
             if step_m < min(_LEAST_STEP_M, left_m):
                 break
             ahead, message = (options.drive_m_s, 0.0, 0.0), "driving to see more"
@@ -177,8 +179,8 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
             left_m, driven_m = left_m - step_m, driven_m + step_m
         return driven_m > 0.0
 
-    def _room_ahead(self) -> Routine[float]:
-        """How far (m) the robot can go straight on, by a new scan and a depth picture of each front camera."""
+    def _free_ahead_m(self) -> Routine[float]:
+        """Returns how far (m) the robot can go straight, by a new scan and a depth picture of each front camera."""
         message, robot, low = "looking ahead", self.context.robot, self.options.low
         scan = yield from self._new_scan(message)
         capabilities, free_space = robot.capabilities(), self.options.free_space
@@ -191,13 +193,13 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
         return free_m(np.concatenate(points), 0.0, capabilities, free_space)
 
     def _low_points(self, source: str, low: WatchOptions) -> Routine[FloatArray]:
-        """What a depth camera sees low above the floor, (N, 3) in the odom frame."""
+        """Returns the points (N, 3) that a depth camera sees low above the floor, in the odom frame."""
         robot = self.context.robot
         job = self.context.worker.sense(
             lambda: robot.image(source, visual=False),
             lambda image: low_points(image, low),
             latency_s=low.latency_s,
-            name=f"look for low things by {source}",
+            name=f"look for low obstacles by {source}",
         )
         while not job.done():
             yield Running("looking ahead")

@@ -1,4 +1,4 @@
-"""The skill that says a sentence to the people around."""
+"""The speak skill: says a sentence to the people around."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from skills.quantities import Delay
 
 SPEECH_TOPIC: Final = "speech"
 LONGEST_TEXT: Final = 500
-"""Characters."""
+"""Largest number of characters."""
 
 
 @dataclass(frozen=True)
 class SpeakInputs:
-    """What is said, 500 characters at most."""
+    """Text to say, 500 characters at most."""
 
     text: str
 
 
 @dataclass(frozen=True)
 class SpeakOptions:
-    """How long the robot takes to say something: so much a word, and no less than `at_least_s`."""
+    """Duration of speech: `word_s` for each word, and at least `at_least_s`."""
 
     word_s: Delay = 0.35
     at_least_s: Delay = 0.5
@@ -32,7 +32,7 @@ class SpeakOptions:
 class Speak(Skill[SpeakInputs]):
     """Says a text once, and waits as long as saying it takes. Moves nothing.
 
-    The text is published under the topic `speech` when it begins; whoever shows the run says it aloud or in writing.
+    The text is published under the topic `speech` when it begins; a viewer of the run says it aloud or in writing.
     """
 
     name: ClassVar[str] = "speak"
@@ -45,7 +45,7 @@ class Speak(Skill[SpeakInputs]):
     _begun_s: float | None = None
 
     def begin(self, inputs: SpeakInputs) -> None:
-        """Says it, unless it cannot be said."""
+        """Says the text, unless that is refused."""
         self._text = " ".join(inputs.text.split())
         self._refusal = _refusal(self._text)
         self._begun_s = begun_s = self.context.clock.now()
@@ -55,7 +55,7 @@ class Speak(Skill[SpeakInputs]):
             self.context.publish(SPEECH_TOPIC, message)
 
     def step(self) -> Step:
-        """Waits until it is said."""
+        """Waits until the text is said."""
         if self._refusal is not None:
             return self._refusal
         assert self._begun_s is not None
@@ -65,13 +65,13 @@ class Speak(Skill[SpeakInputs]):
         return Succeeded(f'said "{self._text}"')
 
     def resume(self, inputs: SpeakInputs) -> None:
-        """Not said twice after a pause; after a restart nobody knows how much was heard, and it is said again."""
+        """Says the text again only after a restart, when nobody knows how much of it was heard."""
         if self._begun_s is None:
             self.begin(inputs)
 
 
 def _refusal(text: str) -> Failed | None:
-    """Why a text cannot be said; None when it can."""
+    """Returns a failure for a text that cannot be said; None otherwise."""
     if not text:
         return Failed(Cause.PRECONDITION, "there is nothing to say")
     if len(text) > LONGEST_TEXT:

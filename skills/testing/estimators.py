@@ -71,7 +71,7 @@ class BlockCostmap:
     def add_points(self, points_W: NDArray[np.float64], stamp_s: float) -> None:
         """Does nothing: the blocks are known."""
 
-    def forget_seen(self, within_W: NDArray[np.float64] | None = None) -> int:
+    def clear_obstacles(self, within_W: NDArray[np.float64] | None = None) -> int:
         """Clears nothing, since there are no other obstacles, and returns 0."""
         return 0
 

@@ -23,7 +23,7 @@ import plant
 from skills.api import Costmap, PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.geometry import compose, relative
+from skills.geometry import compose, relative_pose
 from skills.navigate.footprint import Footprint, footprint_clear, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
 from skills.robot import BaseKind, Pose2D
@@ -69,11 +69,11 @@ def drive(
             velocity = velocity + (last - velocity) * min(1.0, 0.2 * TICK_S / LAG_S)
             pose = compose(pose, Pose2D(*(0.2 * TICK_S * velocity).tolist()))
         least_m = min(least_m, float(footprint_clearance_m(costmap, footprint, pose_array([pose]))[0]))
-        off = relative(goal, pose)
+        off = relative_pose(goal, pose)
         near = math.hypot(off.x_m, off.y_m) < 0.4 * REACHED[0] and abs(off.yaw_rad) < 0.4 * REACHED[1]
         if near and float(np.max(np.abs(velocity))) < 0.05:
             break
-    off = relative(goal, pose)
+    off = relative_pose(goal, pose)
     reached = math.hypot(off.x_m, off.y_m) <= REACHED[0] and abs(off.yaw_rad) <= REACHED[1]
     return Driven(reached, TICK_S * len(commands), least_m, np.array(commands), pose)
 

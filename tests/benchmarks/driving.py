@@ -19,7 +19,7 @@ from plant.simulation import Simulation
 from plant.worlds.world import World
 from skills.api import Failed, PlanningError, Running, SkillContext
 from skills.estimate.grid_map import GridMap
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import plan_path
 from skills.navigate.sensor_watch import WatchOptions
@@ -150,7 +150,7 @@ class Driver:
         skill.end()
         ended_s = clock.now()
         while cancel_at_s < math.inf and clock.now() - ended_s < 3.0:
-            off = relative(poses[-2], poses[-1])
+            off = relative_pose(poses[-2], poses[-1])
             if math.hypot(off.x_m, off.y_m) < 0.02 * TICK_S and abs(off.yaw_rad) < 0.03 * TICK_S:
                 break
             self.tick()

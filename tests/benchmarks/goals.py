@@ -28,7 +28,7 @@ from plant.worlds.world import World, load_world
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.path import path_length
 from skills.navigate.planner import LatticePlanner, plan_path
@@ -91,7 +91,7 @@ def shortest_m(grid: GridMap, start: Pose2D, goal: Pose2D) -> float | None:
 
 def within(goal: Pose2D, pose: Pose2D, limits: tuple[float, float]) -> bool:
     """Whether a pose is that near (m, rad) to a goal."""
-    off = relative(goal, pose)
+    off = relative_pose(goal, pose)
     return math.hypot(off.x_m, off.y_m) <= limits[0] and abs(off.yaw_rad) <= limits[1]
 
 
@@ -121,7 +121,7 @@ def measure(
         trips.append(trip)
         own, true = within(goal, trip.estimate, OWN), within(goal, trip.pose, TRUE)
         reached += trip.succeeded and own and true
-        apart, real = relative(goal, trip.estimate), relative(goal, trip.pose)
+        apart, real = relative_pose(goal, trip.estimate), relative_pose(goal, trip.pose)
         off.append([math.hypot(e.x_m, e.y_m) * 100 for e in (apart, real)] + [abs(math.degrees(real.yaw_rad))])
         if not (trip.succeeded and own and true) or trip.hits:
             misses.append({"goal": [round(v, 2) for v in (goal.x_m, goal.y_m, goal.yaw_rad)], "why": trip.message})

@@ -37,7 +37,7 @@ from plant.worlds.world import World, load_world
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.estimate.monte_carlo import MonteCarloLocaliser, MonteCarloOptions
 from skills.estimate.particle_filter import FilterOptions, ParticleFilter
-from skills.geometry import compose, relative
+from skills.geometry import compose, relative_pose
 from skills.robot import Odometry, Pose2D, Scan
 from skills.stack import components
 
@@ -74,7 +74,7 @@ class Seen:
 def errors(localiser, seen: Seen) -> tuple[float, float]:
     """Metres and radians off."""
     estimate = Pose2D.from_transform(localiser.estimate().X_WO @ seen.scan.X_OB)
-    off = relative(seen.true, estimate)
+    off = relative_pose(seen.true, estimate)
     return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
 
 
@@ -147,7 +147,7 @@ def replay(path: Path, name: str, *, start: bool = True) -> dict[str, object]:
         begun = time.perf_counter()
         localiser.update(robot)
         took.append(1000.0 * (time.perf_counter() - begun))
-        step = relative(before.true, seen.true)
+        step = relative_pose(before.true, seen.true)
         dt = seen.scan.stamp_s - before.scan.stamp_s
         moving.append(math.hypot(step.x_m, step.y_m) > 0.05 * dt or abs(step.yaw_rad) > 0.05 * dt)
         off.append(errors(localiser, seen))

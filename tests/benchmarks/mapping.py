@@ -29,7 +29,7 @@ from plant.sensors.proprioception import OdometryModel
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
-from skills.geometry import compose, relative
+from skills.geometry import compose, relative_pose
 from skills.mapping.map_folder import map_grids, save_graph, save_grids
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
@@ -127,7 +127,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
         slowest = max(slowest, took) if len(mapper.keyframes) > 3 else 0.0
         if plant.now() > told:
             told += 20.0
-            off = relative(plant.true, mapper.pose)
+            off = relative_pose(plant.true, mapper.pose)
             print(
                 f"{plant.now():6.0f} s {mapper.driven_m:6.1f} m  {len(mapper.keyframes)} keyframes  "
                 f"{len(mapper.graph.closures)} closures  off {math.hypot(off.x_m, off.y_m):.3f} m "
@@ -170,7 +170,7 @@ def survey(name: str, seed: int, route: Path | None, out: Path | None, *, dynami
 def false_closures(mapper: Mapper, true: list[Pose2D]) -> int:
     count = 0
     for edge in mapper.graph.closures:
-        off = relative(edge.measured, relative(true[edge.first], true[edge.second]))
+        off = relative_pose(edge.measured, relative_pose(true[edge.first], true[edge.second]))
         count += int(math.hypot(off.x_m, off.y_m) > FALSE_M or abs(off.yaw_rad) > FALSE_RAD)
     return count
 

@@ -9,7 +9,7 @@ from planar_robot import Bench
 from executive.tree.registry import built_in_skills
 from executive.tree.types import conforms, field_types
 from skills.navigate.skill import Navigate
-from skills.quantities import bounds, without_range
+from skills.quantities import base_type, bounds
 from skills.robot import Pose2D
 from skills.stack import (
     DEFAULT_FILE,
@@ -17,21 +17,21 @@ from skills.stack import (
     StackError,
     components,
     default_stack,
-    plain,
     skill_options,
+    stack_data,
     stack_of,
     stack_schema,
 )
 
 
 def test_what_a_file_leaves_out_is_as_in_the_default():
-    assert plain(stack_of({})) == plain(default_stack())
+    assert stack_data(stack_of({})) == stack_data(default_stack())
     assert set(default_stack().names) == set(SLOTS)
 
 
 def test_the_resolved_stack_reads_back_to_itself():
-    assert stack_of(plain(default_stack())).planner == default_stack().planner
-    assert plain(stack_of(plain(default_stack()))) == plain(default_stack())
+    assert stack_of(stack_data(default_stack())).planner == default_stack().planner
+    assert stack_data(stack_of(stack_data(default_stack()))) == stack_data(default_stack())
 
 
 def test_options_are_set_and_the_others_stay():
@@ -88,7 +88,7 @@ def numbers(record, where):
     """Every number in a dataclass, in what it holds as well, by its place."""
     for name, hint in get_type_hints(record, include_extras=True).items():
         parts = [hint, *get_args(hint)] if not bounds(hint) else [hint]
-        yield from ((f"{where}.{name}", part) for part in parts if without_range(part) in (int, float))
+        yield from ((f"{where}.{name}", part) for part in parts if base_type(part) in (int, float))
         for part in parts:
             if dataclasses.is_dataclass(part):
                 yield from numbers(part, f"{where}.{name}")

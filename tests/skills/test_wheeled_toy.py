@@ -19,7 +19,7 @@ DRIVING = ("navigate", "approach", "back_off", "place", "hand_over", "relocalise
 
 def well(name):
     """The tests of a skill in which all goes well, with their indices."""
-    path = Path(__file__).parent / name / f"{name}.skilltest.yaml"
+    (path,) = Path(__file__).parent.rglob(f"{name}.skilltest.yaml")
     file = load_skill_tests(path, SKILLS, [*STANDARD_FAULTS])
     return file, [n for n, test in enumerate(file.tests) if test.expect.outcome == "success" and not test.faults]
 

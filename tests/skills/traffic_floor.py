@@ -50,7 +50,7 @@ class Surveyed:
     def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
         """Nothing is seen."""
 
-    def forget_seen(self, within_W: FloatArray | None = None) -> int:
+    def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
         """There is nothing to forget."""
         return 0
 

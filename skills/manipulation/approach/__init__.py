@@ -1,1 +1,1 @@
-"""Choosing a place to stand from which an object is within reach, and going there."""
+"""The approach skill, and the base placements that other skills share."""

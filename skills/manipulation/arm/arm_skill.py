@@ -201,7 +201,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         tip_B = self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
         return np.vstack([self.model.points_B(q_rad), tip_B])
 
-    def hand_near(self, p_W: FloatArray, within_m: float) -> bool:
+    def is_hand_near(self, p_W: FloatArray, within_m: float) -> bool:
         """Returns whether the hand is within a distance of a point in the world."""
         p_BP = self.X_WB().inverse() @ np.asarray(p_W)
         return float(np.linalg.norm(self.model.X_BH(self.q_rad()).translation() - p_BP)) < within_m
@@ -251,7 +251,7 @@ class ArmSkill(RoutineSkill[InputsT]):
         corners = np.array(self.context.robot.capabilities().footprint_m)
         return Outline(self.X_WB(), corners.min(axis=0) - _OUTLINE_MARGIN_M, corners.max(axis=0) + _OUTLINE_MARGIN_M)
 
-    def from_a_height(
+    def attempt_at_heights(
         self, heights_m: Sequence[float], message: str, attempt: Callable[[], Routine[PlannedT]]
     ) -> Routine[PlannedT]:
         """Runs `attempt` with the body at the first of some heights (m) at which it finds a plan.
@@ -286,7 +286,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             if turn is not None:
                 scene.set_opening(turn.narrow)
             path = planner.path(scene, start, goal(scene, start), self._rng)
-            trajectory = planner.timed(path, speed_rad_s=speed_rad_s, scene=scene)
+            trajectory = planner.trajectory(path, speed_rad_s=speed_rad_s, scene=scene)
             return trajectory, path[-1], None if turn is None else turn.begins_s(scene, trajectory)
 
         trajectory, q_goal_rad, turn_s = yield from self.compute(
@@ -341,7 +341,7 @@ class ArmSkill(RoutineSkill[InputsT]):
             if scene is not None:
                 scene.set_padding(0.0)
             planner = self.context.stack.arm_planner
-            return planner.timed(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
+            return planner.trajectory(planner.line(self.model, q, X_BH, scene), speed_rad_s=LINE_SPEED_RAD_S)
 
         trajectory = yield from self.compute(plan, latency_s=0.1, name="plan straight line", message=message)
         return (yield from self.follow(trajectory, message, guard))
@@ -369,10 +369,12 @@ class ArmSkill(RoutineSkill[InputsT]):
         X_BH, planner = self.model.X_BH(self.q_rad()), self.context.stack.arm_planner
         path = planner.line(self.model, self.q_rad(), RigidTransform(X_BH.rotation(), X_BH.translation() + offset_B))
         return (
-            yield from self.follow(planner.timed(path, speed_rad_s=speed_rad_s), message, self.held_up(direction_B))
+            yield from self.follow(
+                planner.trajectory(path, speed_rad_s=speed_rad_s), message, self.contact_guard(direction_B)
+            )
         )
 
-    def held_up(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
+    def contact_guard(self, direction_B: FloatArray, lag_m: float = CONTACT_LAG_M) -> Callable[[FloatArray], bool]:
         """A guard for `follow` that stops a slow hand when it lags along a direction as it does only in contact."""
 
         def guard(q_wanted_rad: FloatArray) -> bool:

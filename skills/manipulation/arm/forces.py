@@ -56,7 +56,7 @@ class PullWatch:
     _stamp_s: float = field(default=-math.inf, init=False)
     _felt: int = field(default=0, init=False)
 
-    def felt(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
+    def feels_pull(self, stamp_s: float, q_rad: FloatArray, efforts_nm: FloatArray) -> bool:
         """Takes in a reading that is newer than the last one; returns whether somebody pulls."""
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s

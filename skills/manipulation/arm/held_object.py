@@ -113,7 +113,7 @@ def held_object(payload: Payload, gripper: GripperCapabilities, R_BH: RotationMa
     return HeldObject(hand_rotation(0.5 * math.pi, 0.0, 1.0), np.array([tip_H, tip_H - [_TOP_DEPTH_M, 0.0, 0.0]]))
 
 
-def turned_in_hand(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
+def square_hand_pose(X_BH: RigidTransform, p_HT: FloatArray) -> RigidTransform:
     """Returns the hand pose that would have taken an upright object, held at p_HT of the hand, square to the fingers.
 
     The fingers are a groove: an upright object that a slightly tilted hand takes turns in it on the way until it is

@@ -14,7 +14,7 @@ from skills.estimate.scan_points import segment_distance
 from skills.manipulation.arm.arm_skill import ArmSkill, Goal
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.poses import look_configuration
-from skills.manipulation.arm.solid_cells import with_picture, with_view
+from skills.manipulation.arm.solid_cells import add_picture, add_view
 from skills.patience import PATIENCE_S
 from skills.perception.detector.camera_images import is_dark, lacks_depth
 from skills.perception.visibility import APART_S, is_at_rest
@@ -117,10 +117,10 @@ class LookingSkill(ArmSkill[InputsT]):
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
             self._doubted_s += self.context.clock.now() - begun_s
         if not camera.on_hand:
-            image = without_arm(image, self.arm_points_B(), _HELD_RADIUS_M if robot.gripper().holding else None)
+            image = mask_arm(image, self.arm_points_B(), _HELD_RADIUS_M if robot.gripper().holding else None)
         solid, X_WO = self.context.solid, self.context.localiser.estimate().X_WO
-        solid.cells = with_picture(solid.cells, image, X_WO, self._outline())
-        solid.views = with_view(solid.views, image, X_WO)
+        solid.cells = add_picture(solid.cells, image, X_WO, self._outline())
+        solid.views = add_view(solid.views, image, X_WO)
         return image
 
     def _picture_now(self, camera: CameraCapabilities, message: str) -> Routine[Image]:
@@ -136,7 +136,7 @@ class LookingSkill(ArmSkill[InputsT]):
 
         return (yield from self.sense(taken, latency_s=PICTURE_LATENCY_S, name=f"{name} picture", message=message))
 
-    def at_rest_since(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
+    def stays_at_rest(self, image: Image, p_W: FloatArray, within_m: float, message: str) -> Routine[bool]:
         """Returns whether later depth pictures show the same as `image` within a distance of p_W.
 
         The intervals between them differ, because a rolling object may be back after one interval and not after two.
@@ -175,7 +175,7 @@ def _within(angle_rad: float, range_rad: tuple[float, float]) -> float:
     return min(max(angle_rad, range_rad[0]), range_rad[1])
 
 
-def without_arm(image: Image, arm_B: FloatArray, held_radius_m: float | None = None) -> Image:
+def mask_arm(image: Image, arm_B: FloatArray, held_radius_m: float | None = None) -> Image:
     """Returns the picture without depth on the robot's own arm, a line of points (N, 3) in the body frame.
 
     `held_radius_m` is the radius around the last segment of the line, where an object is held.

@@ -51,7 +51,7 @@ class ArmPlanner(Protocol):
         Raises PlanningError.
         """
 
-    def timed(
+    def trajectory(
         self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
     ) -> ArmTrajectory:
         """Times a path from rest to rest; rounds corners where `scene` is given.
@@ -134,7 +134,7 @@ class RrtConnect:
             path.append(q)
         return np.array(path)
 
-    def timed(
+    def trajectory(
         self, path_rad: FloatArray, *, speed_rad_s: float | None = None, scene: ArmScene | None = None
     ) -> ArmTrajectory:
         """Times a path from rest to rest, at the usual speed without `speed_rad_s`.

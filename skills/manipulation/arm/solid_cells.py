@@ -58,7 +58,7 @@ class Outline:
         return np.asarray(np.all((points_B > self.low_m) & (points_B < self.high_m), axis=1))
 
 
-def with_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
+def add_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
     """Returns the cells (N, 3) with those in which a depth picture has points, without those that it sees past.
 
     Points within the outline `own` are ignored.
@@ -127,13 +127,13 @@ def solid_boxes(
     deep = deep[np.linalg.norm(deep - origin_W, axis=1) < reach_m]
     X_BW = X_WB.inverse()
     solid = np.floor(deep[~left_out(deep)] / CELL_M).astype(np.int64)
-    return [_box(low, high, X_BW) for low, high in merged(solid)]
+    return [_box(low, high, X_BW) for low, high in merge_cells(solid)]
 
 
-def boxes_of(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
+def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArray], NDArray[np.bool_]]) -> list[Box]:
     """Boxes in the body frame around the cells whose centres p_W (N, 3) are `chosen`."""
     X_BW = X_WB.inverse()
-    return [_box(low, high, X_BW) for low, high in merged(cells[chosen(cell_centres(cells))])]
+    return [_box(low, high, X_BW) for low, high in merge_cells(cells[chosen(cell_centres(cells))])]
 
 
 def cell_centres(cells: Cells) -> FloatArray:
@@ -151,7 +151,7 @@ def _cells(keys: NDArray[np.int64]) -> Cells:
     return np.stack([keys // _STRIDES[0], keys // _STRIDES[1] % _SPAN, keys % _SPAN], axis=1) - _OFFSET
 
 
-def with_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
+def add_view(views: Sequence[View], image: Image, X_WO: RigidTransform) -> tuple[View, ...]:
     """Returns the last views with one more, of which each eighth row and column of the depth is stored."""
     lens, thin = image.depth_intrinsics, _STRIDE_PX
     depth_m = image.depth_m[thin // 2 :: thin, thin // 2 :: thin]
@@ -202,7 +202,7 @@ def _at_pixels(
     return inside, z, depth
 
 
-def merged(cells: Cells) -> list[tuple[Cells, Cells]]:
+def merge_cells(cells: Cells) -> list[tuple[Cells, Cells]]:
     """Returns few boxes (first cell, cell after the last) that cover exactly these cells: runs, joined where equal."""
     boxes = np.concatenate([cells, cells + 1], axis=1)
     for axis, others in ((2, (0, 1, 3, 4)), (1, (0, 2, 3, 5)), (0, (1, 4, 2, 5))):

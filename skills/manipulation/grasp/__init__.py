@@ -1,1 +1,1 @@
-"""Grasping an object that was seen."""
+"""The grasp skill."""

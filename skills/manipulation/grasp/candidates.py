@@ -98,7 +98,7 @@ class GraspCandidate:
     tilt_rad: float
     lever_m: float = 0.0
 
-    def retreated(self, distance_m: float) -> RigidTransform:
+    def retreat(self, distance_m: float) -> RigidTransform:
         """Returns the hand pose drawn back along the fingers."""
         return self.X_BH @ RigidTransform([-distance_m, 0.0, 0.0])
 
@@ -314,7 +314,7 @@ def least_mass_kg(seen: ObjectObservation) -> float:
     return 0.0 if form is None else form.least_mass_kg(seen.size_m)
 
 
-def known_too_heavy(seen: ObjectObservation, max_payload_kg: float) -> str | None:
+def why_too_heavy(seen: ObjectObservation, max_payload_kg: float) -> str | None:
     """Returns why an object is surely too heavy for the arm; None when it is not, or only weighing can decide."""
     mass_kg = least_mass_kg(seen)
     if mass_kg <= max_payload_kg:

@@ -45,7 +45,7 @@ class CloseView:
     X_WB: RigidTransform
     others: tuple[Obstacle, ...] = ()
 
-    def moved(self, offset_B: FloatArray) -> CloseView:
+    def shift(self, offset_B: FloatArray) -> CloseView:
         """Returns the view with the object shifted level by offset_B (3,)."""
         x, y = np.array(self.target.centre_B) + offset_B[:2]
         target = replace(self.target, points_B=self.target.points_B + offset_B, centre_B=(float(x), float(y)))

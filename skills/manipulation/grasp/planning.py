@@ -140,9 +140,9 @@ class GeometricGraspPlanner:
             except PlanningError as error:
                 reasons.append(str(error))
                 continue
-            to_grasp = arm_planner.timed(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
-            last_bit = arm_planner.timed(approach[-_SLOW_POINTS - 1 :], speed_rad_s=self.last_rad_s)
-            return GraspPlan(candidate, arm_planner.timed(path, scene=scene), to_grasp, last_bit, lift_B)
+            to_grasp = arm_planner.trajectory(approach[:-_SLOW_POINTS], speed_rad_s=self.approach_rad_s)
+            last_bit = arm_planner.trajectory(approach[-_SLOW_POINTS - 1 :], speed_rad_s=self.last_rad_s)
+            return GraspPlan(candidate, arm_planner.trajectory(path, scene=scene), to_grasp, last_bit, lift_B)
         if reasons and set(reasons) == {_OUT_OF_REACH}:
             raise PlanningError(_out_of_reach(scene.model, around))
         in_the_way = self._in_the_way(scene, q_start_rad, candidates, around, arm_planner)
@@ -193,7 +193,7 @@ class GeometricGraspPlanner:
         scene.set_padding(self.final_padding_m)
         reason, no_lift_rad = _OUT_OF_REACH, list[FloatArray]()
         for distance in PREGRASPS_M:
-            solutions = scene.model.inverse(candidate.retreated(distance), margin_rad=0.06)
+            solutions = scene.model.inverse(candidate.retreat(distance), margin_rad=0.06)
             turned = [scene.model.turned_near(q, q_near_rad) for q in solutions]
             for q in sorted(turned, key=lambda q: float(np.max(np.abs(q - q_near_rad)))):
                 if not scene.free(q):
@@ -228,7 +228,7 @@ def _behind(model: ArmModel, around: Surroundings, others: Sequence[Obstacle]) -
 def within_reach(model: ArmModel, candidate: GraspCandidate, up_B: FloatArray, margin_rad: float = 0.08) -> bool:
     """Returns whether the arm reaches a grasp, its pre-grasp and the end of its lift; contact is not checked."""
     X_BH, distance = candidate.X_BH, PREGRASPS_M[-1]
-    if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreated(distance), margin_rad)):
+    if not (model.reaches(X_BH, margin_rad) and model.reaches(candidate.retreat(distance), margin_rad)):
         return False
     lifted = (X_BH.translation() + offset for offset in lifts(model, X_BH, up_B))
     return any(model.reaches(RigidTransform(X_BH.rotation(), p), margin_rad) for p in lifted)

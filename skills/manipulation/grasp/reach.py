@@ -22,7 +22,7 @@ from skills.manipulation.arm.arm_skill import ArmSkill
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.arm.looking_skill import LookingSkill
-from skills.manipulation.arm.solid_cells import boxes_of, never_seen
+from skills.manipulation.arm.solid_cells import boxes_around, never_seen
 from skills.manipulation.grasp.candidates import GraspCandidate, Target
 from skills.manipulation.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
@@ -184,7 +184,7 @@ def _postures(scene: ArmScene, candidate: GraspCandidate, up_B: FloatArray) -> l
     X_BH = candidate.X_BH
     lifted = (RigidTransform(X_BH.rotation(), X_BH.translation() + lift_B) for lift_B in lifts(scene.model, X_BH, up_B))
     found = list[FloatArray]()
-    for poses in ([X_BH], map(candidate.retreated, PREGRASPS_M), lifted):
+    for poses in ([X_BH], map(candidate.retreat, PREGRASPS_M), lifted):
         q_rad = next((q for X in poses for q in scene.model.inverse(X, _MARGIN_RAD) if scene.free(q)), None)
         if q_rad is None:
             return []
@@ -243,7 +243,7 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
     return Target(points, (float(centre[0]), float(centre[1])), yaw, length, width, height, base_m, is_round)
 
 
-def resting_on(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectObservation:
+def raise_onto_surface(seen: ObjectObservation, surfaces: Sequence[Surface]) -> ObjectObservation:
     """Returns the observation raised onto its surface, because fingers cannot get around a sunken object.
 
     From a distance a flat object seems lower than it is, by as much as its height.
@@ -296,13 +296,13 @@ def reach_check(
     the object.
     """
     X_WB, known_W = skill.X_WB(), skill.known_W
-    seen = resting_on(seen, surfaces)
+    seen = raise_onto_surface(seen, surfaces)
     skill.known_W = space_about(seen)
     boxes = [*surface_boxes(surfaces, X_WB), *skill.seen_boxes(beyond_m)]
     skill.known_W = known_W
     candidates = partial(skill.context.stack.grasp_planner.candidates, p_BS=skill.model.p_BS, gripper=skill.gripper)
     cells = skill.context.solid.cells
-    beside = [_less(box) for box in boxes_of(cells, X_WB, partial(_beside, seen))]
+    beside = [_less(box) for box in boxes_around(cells, X_WB, partial(_beside, seen))]
     scene_now, widest, wide = skill.scene_now(boxes), skill.gripper.widest, wide_share(skill.gripper)
 
     def check() -> ReachCheck:

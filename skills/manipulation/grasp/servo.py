@@ -64,7 +64,7 @@ class SeenShift:
     overlap: float
 
 
-def seen_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift | None:
+def measure_shift(target: Target, image: Image, X_BC: RigidTransform) -> SeenShift | None:
     """Returns the shift of the object since `target` was seen, by the depth of a picture taken at X_BC.
 
     None when the picture does not show its position. The body is level: its z axis points up.
@@ -86,7 +86,7 @@ Aim = tuple[FloatArray, tuple[ArmTrajectory, ArmTrajectory] | None]
 """Offset (3,) in B by which to shift the hand, and the approach from there, or None where that is not free."""
 
 
-def aimed_approach(
+def aim_approach(
     found: SeenShift | None, plan: GraspPlan, model: ArmModel, scene_now: Callable[[], ArmScene]
 ) -> Aim | None:
     """Aims a grasp across the fingers at the object's present position; None when the object is no longer there."""
@@ -98,14 +98,14 @@ def aimed_approach(
     offset_B = (found.offset_B @ closing_B) * closing_B * [1.0, 1.0, 0.0]
     if np.linalg.norm(offset_B) < _AIMED_M:
         return np.zeros(3), None
-    approach = [shifted(model, each, offset_B) for each in (plan.to_grasp, plan.last_bit)]
+    approach = [shift_trajectory(model, each, offset_B) for each in (plan.to_grasp, plan.last_bit)]
     scene = scene_now()
     scene.set_padding(0.0)
     free = [each for each in approach if each is not None and scene.path_free(each.positions_rad)]
     return offset_B, (free[0], free[1]) if len(free) == len(approach) else None
 
 
-def shifted(model: ArmModel, trajectory: ArmTrajectory, offset_B: FloatArray) -> ArmTrajectory | None:
+def shift_trajectory(model: ArmModel, trajectory: ArmTrajectory, offset_B: FloatArray) -> ArmTrajectory | None:
     """Returns a trajectory with the hand shifted by offset_B (3,) at each time; None beyond the arm's reach."""
     positions = list[FloatArray]()
     for q_rad in trajectory.positions_rad:

@@ -15,15 +15,15 @@ from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.detect.viewpoints import surface_boxes
 from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N
 from skills.manipulation.arm.collision import ArmScene, box_corners
-from skills.manipulation.arm.held_object import held_box, turned_in_hand
+from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, sees_closely
 from skills.manipulation.grasp.candidates import (
     THIN_M,
     GraspCandidate,
-    known_too_heavy,
     least_mass_kg,
     why_no_candidates,
+    why_too_heavy,
 )
 from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
 from skills.manipulation.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
@@ -37,7 +37,7 @@ from skills.manipulation.grasp.reach import (
     space_about,
     up_B,
 )
-from skills.manipulation.grasp.servo import Aim, aimed_approach, seen_shift
+from skills.manipulation.grasp.servo import Aim, aim_approach, measure_shift
 from skills.manipulation.grasp.tried_grasps import others_first, tried_grasp
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import detections_3d
@@ -124,7 +124,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
         arm = self.context.robot.capabilities().arm
-        too_heavy = None if arm is None else known_too_heavy(seen, arm.max_payload_kg)
+        too_heavy = None if arm is None else why_too_heavy(seen, arm.max_payload_kg)
         if too_heavy is not None:
             raise SkillFailure(Cause.PRECONDITION, too_heavy)
         try:
@@ -143,7 +143,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """Keeps an object that is in the gripper; starts again with an empty gripper."""
         seen, self._watch = inputs.observation, None
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
-        at_object = self.hand_near(np.array(seen.position_W), _AT_OBJECT_M)
+        at_object = self.is_hand_near(np.array(seen.position_W), _AT_OBJECT_M)
         if not self.context.robot.gripper().holding:
             if at_object:
                 yield from self._let_go()
@@ -178,7 +178,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         seen = inputs.observation
         heights_m = yield from self._heights(seen)
         attempt = partial(self._look_and_plan, seen, inputs.avoid)
-        view, plan = yield from self.from_a_height(heights_m, f"standing up to the {seen.kind}", attempt)
+        view, plan = yield from self.attempt_at_heights(heights_m, f"standing up to the {seen.kind}", attempt)
         if not (yield from self._take_unmoved(view, plan, inputs)):
             view, plan = yield from self._look_and_plan(seen, inputs.avoid)
             if not (yield from self._take_unmoved(view, plan, inputs)):
@@ -213,8 +213,8 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         scene_now = self.scene_now([*view.boxes, *self.seen_boxes()])
 
         def aim() -> Aim | None:
-            found = seen_shift(view.target, image, X_BC)
-            return aimed_approach(found, plan, self.model, scene_now)
+            found = measure_shift(view.target, image, X_BC)
+            return aim_approach(found, plan, self.model, scene_now)
 
         aimed = yield from self.compute(aim, latency_s=_AIM_LATENCY_S, name="aim", message=message)
         if aimed is None:
@@ -224,7 +224,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
             return view, plan
         X_BH = RigidTransform(offset_B) @ plan.candidate.X_BH
         plan = replace(plan, candidate=replace(plan.candidate, X_BH=X_BH), to_grasp=approach[0], last_bit=approach[1])
-        return view.moved(offset_B), plan
+        return view.shift(offset_B), plan
 
     def _look_and_plan(
         self, seen: ObjectObservation, avoid: tuple[TriedGrasp, ...]
@@ -342,7 +342,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         name, least_kg = str(seen.kind), least_mass_kg(seen)
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
-        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.held_up(ahead))
+        touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
         relax_m = _RELAX_M if view.target.height_m > THIN_M else _RELAX_THIN_M
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
@@ -353,7 +353,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         opening = self._check_held(name, None)
         turns = view.target.upright and self.gripper.kind is GripperKind.HINGED
-        X_BH = turned_in_hand(X_BH, self.p_HT) if turns else X_BH
+        X_BH = square_hand_pose(X_BH, self.p_HT) if turns else X_BH
         self.held = [held_box(X_BH.inverse(), view.target_box)]
         self.context.payload.corners_H = box_corners(self.held[0])
         self.context.payload.R_BH = X_BH.rotation()

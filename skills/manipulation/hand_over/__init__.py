@@ -1,1 +1,1 @@
-"""Holding an object out to a person."""
+"""The hand_over skill."""

@@ -160,7 +160,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
                 efforts_nm = np.array([joints.effort_nm[name] for name in self.model.names])
                 confirmed = asked.done() and asked.result() == _LETS_GO
                 gone = hold.judge(robot.gripper(), self.context.clock.now()) is Grip.LOST
-                if gone or confirmed or watch.felt(joints.stamp_s, self.q_rad(), efforts_nm):
+                if gone or confirmed or watch.feels_pull(joints.stamp_s, self.q_rad(), efforts_nm):
                     return True
                 yield Running(message)
             return False
@@ -200,7 +200,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         turns = [q + turn_rad * wrist for turn_rad in _SHAKE_RAD]
         inside = [each for each in turns if np.all((each > self.model.lower_rad) & (each < self.model.upper_rad))]
         path = np.array([q, *inside, q])
-        yield from self.follow(self.context.stack.arm_planner.timed(path, speed_rad_s=_SHAKE_RAD_S), message)
+        yield from self.follow(self.context.stack.arm_planner.trajectory(path, speed_rad_s=_SHAKE_RAD_S), message)
         yield from self.pause(_STILL_S, message)
 
     def _find(self, name: str) -> Routine[SeenPerson]:
@@ -218,7 +218,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
                 end_s = clock.now() + _SCAN_PATIENCE_S
                 yield Running(f"looking for {name}; waits for a scan")
                 continue
-            patience.over()
+            patience.reset()
             if scan.stamp_s > stamp_s:
                 stamp_s = scan.stamp_s
                 people = people_in_scan(scan, self.X_WB(), self.context.robot.capabilities().footprint_m)

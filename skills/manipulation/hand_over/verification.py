@@ -119,7 +119,7 @@ def release_of(X_WH: RigidTransform, p_HT: FloatArray, corners_H: FloatArray | N
     return Release(float(x_m), float(y_m), float(heights_m.min()), float(heights_m.max()))
 
 
-def seen_given(
+def judge_release(
     image: Image, X_WO: RigidTransform, found: Iterable[Detection3D], names: Sequence[str], release: Release
 ) -> Sight:
     """Judges the release from a picture without the robot's arm and the objects detected in it.
@@ -216,7 +216,7 @@ class HandOverVerification(LookingSkill[InputsT]):
             sight = yield from self._sight(image, name, release, message)
             if sight.seen is not Seen.GIVEN:
                 return sight.seen
-            at_rest = yield from self.at_rest_since(image, sight.p_W, _MOVES_ABOUT_M, message)
+            at_rest = yield from self.stays_at_rest(image, sight.p_W, _MOVES_ABOUT_M, message)
         except SkillFailure as failure:
             raise _unseen(name, failure) from failure
         return Seen.GIVEN if at_rest else Seen.MOVES
@@ -254,7 +254,7 @@ class HandOverVerification(LookingSkill[InputsT]):
 
         def look() -> Sight:
             found = detections_3d(image, place, detect_in_image(context.detector, image), ())
-            return seen_given(image, place.X_WO, found, names, release)
+            return judge_release(image, place.X_WO, found, names, release)
 
         return (yield from self.compute(look, latency_s=DETECTION_LATENCY_S, name="look who has it", message=message))
 

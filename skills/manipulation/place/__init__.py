@@ -1,1 +1,1 @@
-"""Putting a held object down on a surface."""
+"""The place skill."""

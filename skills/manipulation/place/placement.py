@@ -143,7 +143,7 @@ def above_goal(
     return goal
 
 
-def with_held(goal: Goal, box_H: Box) -> Goal:
+def hold_on_path(goal: Goal, box_H: Box) -> Goal:
     """Returns that goal with the object's box in the hand on the path, unless the box is in contact at either end."""
 
     def chosen(scene: ArmScene, q: FloatArray) -> FloatArray:

@@ -31,11 +31,11 @@ from skills.manipulation.place.placement import (
     clear_spots,
     clearest_first,
     free_spots,
+    hold_on_path,
     reaches,
     spaced_spots,
     spots,
     unseen_view,
-    with_held,
 )
 from skills.manipulation.place.ports import PlaceInputs, PlacePorts
 from skills.navigate.arm_footprint import ArmFootprint
@@ -147,7 +147,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         yield from self.pause(_FEEL_S, "feeling what the gripper holds")
         spot = self.checkpoint.get("spot_W")
         spot_W = None if spot is None else np.array([*spot, surface.height_m])
-        over_spot = spot_W is not None and self.hand_near(spot_W, _OVER_SPOT_M)
+        over_spot = spot_W is not None and self.is_hand_near(spot_W, _OVER_SPOT_M)
         if self.context.robot.gripper().holding:
             if over_spot:
                 yield from self.try_shift_hand(_LIFT_AGAIN_M * UP_B, "lifting the object again")
@@ -187,7 +187,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
                 above, X_WB = partial(self._go_above, surface, view, held), self.X_WB()
                 corners_W = X_WB.multiply(box_corners(held.box(self.model.X_BH(self.q_rad()))).T).T
                 clear_m = clear_heights(heights_m, float(X_WB.translation()[2]), corners_W, surface)
-                return (yield from self.from_a_height(clear_m, standing, above))
+                return (yield from self.attempt_at_heights(clear_m, standing, above))
             except SkillFailure as failure:
                 others = clearest_first(free_spots(view, self._spots(surface)), view, [*gone_to, spot_W])
                 if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
@@ -366,7 +366,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
             return found[0]
 
         try:
-            return (yield from self.move_to(with_held(noted, held.box_H), message, speed_rad_s=0.8))
+            return (yield from self.move_to(hold_on_path(noted, held.box_H), message, speed_rad_s=0.8))
         except SkillFailure as failure:
             if failure.cause is not Cause.PLANNING or not found:
                 raise
@@ -381,7 +381,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         """
         message = f"putting the object down on the {surface.name}"
         p_BH = self.model.X_BH(above.q_rad).translation() - (above.height_m - _SURELY_FREE_M) * UP_B
-        early = self.held_up(-UP_B, _LAG_IN_CONTACT_M)
+        early = self.contact_guard(-UP_B, _LAG_IN_CONTACT_M)
         stopped = yield from self.move_straight(p_BH, message, q_from_rad=above.q_rad, guard=early)
         if not stopped:
             stopped = yield from self._press_down(message)
@@ -424,7 +424,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
                 where = f"on the {surface.name} where it was put down"
                 raise SkillFailure(Cause.POSTCONDITION, f"the object is not seen {where}")
             p_WO = np.array([*spot_W, surface.height_m])
-            at_rest = yield from self.at_rest_since(image, p_WO, _MOVES_ABOUT_M, "looking whether it is at rest")
+            at_rest = yield from self.stays_at_rest(image, p_WO, _MOVES_ABOUT_M, "looking whether it is at rest")
             if not at_rest and self.context.clock.now() > end_s:
                 yield from self.try_stow()
                 raise SkillFailure(Cause.POSTCONDITION, f"the object still moves on the {surface.name}")

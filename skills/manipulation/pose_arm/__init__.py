@@ -1,1 +1,1 @@
-"""Taking an arm pose that is given as joint angles."""
+"""The pose_arm skill."""

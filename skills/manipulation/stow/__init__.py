@@ -1,1 +1,1 @@
-"""Folding the arm away."""
+"""The stow skill."""

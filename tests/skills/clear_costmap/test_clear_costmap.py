@@ -25,29 +25,29 @@ def seen_bench():
     bench = Bench(Pose2D(3.0, 5.5, 0.0), unmapped=[CRATE])
     for _ in range(40):
         bench.tick()
-    assert len(bench.costmap.seen_m()) > 0
+    assert len(bench.costmap.obstacle_cells()) > 0
     return bench
 
 
 def test_what_stands_there_still_is_seen_again():
     bench = seen_bench()
     assert isinstance(outcome(bench.context(), bench), Succeeded)
-    assert len(bench.costmap.seen_m()) > 0
+    assert len(bench.costmap.obstacle_cells()) > 0
 
 
 def test_what_is_gone_is_forgotten():
     bench = seen_bench()
     bench.robot.boxes.remove(CRATE)
     assert isinstance(outcome(bench.context(), bench), Succeeded)
-    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.obstacle_cells()) == 0
 
 
 def test_what_was_surveyed_stays():
     bench = seen_bench()
     near_wall = np.array([[0.5, 5.5]])
     before = bench.costmap.clearance_m(near_wall)
-    assert bench.costmap.forget_seen() > 0
-    assert len(bench.costmap.seen_m()) == 0
+    assert bench.costmap.clear_obstacles() > 0
+    assert len(bench.costmap.obstacle_cells()) == 0
     assert bench.costmap.clearance_m(near_wall) == before
 
 

@@ -17,7 +17,7 @@ def ticked(bench: Bench, ticks: int = 10) -> Bench:
 
 def test_without_unmapped_objects_only_the_survey_counts():
     bench = ticked(Bench(START), 40)
-    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.obstacle_cells()) == 0
     assert bench.costmap.clearance_m(np.array([[3.0, 5.6]]))[0] == pytest.approx(1.4, abs=0.02)
 
 
@@ -53,20 +53,20 @@ def test_what_is_below_the_beams_stays_remembered_and_then_decays():
 def test_single_depth_points_count_as_noise():
     bench = ticked(Bench(START))
     bench.costmap.add_points(np.array([[3.0, 5.4, 0.3], [3.5, 5.0, 0.3]]), bench.clock.now())
-    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.obstacle_cells()) == 0
 
 
 def test_points_on_the_robot_are_ignored():
     bench = ticked(Bench(START))
     on_body = np.tile([[1.8, 5.5, 0.4]], (20, 1))
     bench.costmap.add_points(on_body, bench.clock.now())
-    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.obstacle_cells()) == 0
 
 
 def test_points_on_surveyed_furniture_are_ignored():
     bench = ticked(Bench(START))
     bench.costmap.add_points(np.tile([[5.0, 6.52, 0.4]], (20, 1)), bench.clock.now())
-    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.obstacle_cells()) == 0
 
 
 def test_scans_are_ignored_while_the_robot_is_not_localised():
@@ -74,16 +74,16 @@ def test_scans_are_ignored_while_the_robot_is_not_localised():
     bench.tick()
     bench.tick()
     assert not bench.localiser.estimate().localised
-    assert len(bench.costmap.seen_m()) == 0
+    assert len(bench.costmap.obstacle_cells()) == 0
 
 
 def test_returns_from_a_reported_robot_are_left_out_but_unexplained():
     bench = Bench(START, unmapped=[PERSON])
-    bench.costmap.leave_out(np.array([[3.4, 5.4, 0.5]]))
+    bench.costmap.exclude_robots(np.array([[3.4, 5.4, 0.5]]))
     ticked(bench)
     bench.costmap.add_points(np.tile([[3.3, 5.4, 0.4]], (20, 1)), bench.clock.now())
-    assert len(bench.costmap.seen_m()) == 0
-    assert len(bench.costmap.unexplained()[1]) > 0
-    bench.costmap.leave_out(np.empty((0, 3)))
+    assert len(bench.costmap.obstacle_cells()) == 0
+    assert len(bench.costmap.unexplained_returns()[1]) > 0
+    bench.costmap.exclude_robots(np.empty((0, 3)))
     ticked(bench)
     assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05

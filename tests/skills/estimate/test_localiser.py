@@ -153,7 +153,7 @@ def test_localisation_holds_among_robots_that_report_their_poses(reported: bool)
     """Most of what it sees are the others: left out, the rest is enough; taken for walls, it is lost."""
     bench, discs_W = surrounded_bench()
     if reported:
-        bench.localiser.leave_out(discs_W)
+        bench.localiser.exclude_robots(discs_W)
     for _ in range(30):
         bench.tick()
     assert bench.localiser.estimate().localised == reported
@@ -165,7 +165,7 @@ def test_a_scan_of_other_robots_only_does_not_delocalise() -> None:
     for _ in range(5):
         bench.tick()
     before = bench.localiser.estimate()
-    bench.localiser.leave_out(np.array([[*START.transform().translation()[:2], 30.0]]))
+    bench.localiser.exclude_robots(np.array([[*START.transform().translation()[:2], 30.0]]))
     for _ in range(30):
         bench.tick()
     after = bench.localiser.estimate()

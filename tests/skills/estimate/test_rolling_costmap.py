@@ -78,14 +78,14 @@ def test_the_window_follows_the_robot_and_keeps_its_cells():
 
 def test_only_new_obstacles_count_as_unexplained():
     bench = ticked(bench_of())
-    assert len(bench.costmap.unexplained()[1]) < 20
+    assert len(bench.costmap.unexplained_returns()[1]) < 20
     bench.robot.boxes.append(PERSON)
     ticked(bench, 2)
-    near = bench.costmap.unexplained()[1]
+    near = bench.costmap.unexplained_returns()[1]
     assert np.count_nonzero(np.hypot(near[:, 0] - 3.3, near[:, 1] - 5.4) < 0.5) > 20
 
 
 def test_the_costmap_can_be_cleared():
     bench = ticked(bench_of())
-    assert bench.costmap.forget_seen() > 100
+    assert bench.costmap.clear_obstacles() > 100
     assert bench.costmap.clearance_m(np.array([[3.5, 4.05]]))[0] > 0.3

@@ -3,7 +3,7 @@ import math
 import numpy as np
 
 from skills.estimate.matching import match
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.mapping.distributions import Distributions
 from skills.mapping.mapper import MapperOptions
 from skills.robot import Pose2D
@@ -52,4 +52,4 @@ def test_the_other_side_of_a_thin_wall_does_not_pull():
     made.add(np.column_stack([2.1 + rng.normal(0, 0.03, 300), y, far]), Pose2D(0.0, 0.0, 0.0))
     behind = np.column_stack([2.1 + rng.normal(0, 0.03, 300), y, far])
     found = match(made.linearise, behind, Pose2D(0.0, 0.0, 0.0), SPREAD, MATCHING)
-    assert abs(relative(Pose2D(0.0, 0.0, 0.0), found.pose).x_m) < 0.01
+    assert abs(relative_pose(Pose2D(0.0, 0.0, 0.0), found.pose).x_m) < 0.01

@@ -4,7 +4,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from skills.geometry import compose, relative
+from skills.geometry import compose, relative_pose
 from skills.mapping.pose_graph import Edge, PoseGraph
 from skills.robot import Pose2D
 
@@ -21,7 +21,7 @@ def ring(count: int = 40, radius_m: float = 5.0) -> list[Pose2D]:
 
 def drifting(true: list[Pose2D]) -> PoseGraph:
     """A chain whose every step turns by half a degree too much."""
-    steps = [relative(a, b) for a, b in pairwise(true)]
+    steps = [relative_pose(a, b) for a, b in pairwise(true)]
     wrong = [Pose2D(step.x_m, step.y_m, step.yaw_rad + math.radians(0.5)) for step in steps]
     poses = [true[0]]
     for step in wrong:
@@ -37,7 +37,7 @@ def test_a_loop_closure_takes_the_drift_out():
     true = ring()
     graph = drifting(true)
     before = worst_m(graph, true)
-    graph.edges.append(Edge(0, len(true) - 1, relative(true[0], true[-1]), SURE, closure=True))
+    graph.edges.append(Edge(0, len(true) - 1, relative_pose(true[0], true[-1]), SURE, closure=True))
     graph.optimise()
     assert before > 1.0 and worst_m(graph, true) < 0.4
 
@@ -45,17 +45,17 @@ def test_a_loop_closure_takes_the_drift_out():
 def test_the_first_pose_stays():
     true = ring()
     graph = drifting(true)
-    graph.edges.append(Edge(0, len(true) - 1, relative(true[0], true[-1]), SURE, closure=True))
+    graph.edges.append(Edge(0, len(true) - 1, relative_pose(true[0], true[-1]), SURE, closure=True))
     graph.optimise()
-    off = relative(true[0], graph.poses[0])
+    off = relative_pose(true[0], graph.poses[0])
     assert math.hypot(off.x_m, off.y_m) < 1e-3 and abs(off.yaw_rad) < 1e-3
 
 
 def test_a_false_closure_is_dropped_and_the_true_ones_stay():
     true = ring()
     graph = drifting(true)
-    right = [Edge(n, len(true) - 1 - n, relative(true[n], true[-1 - n]), SURE, closure=True) for n in range(3)]
-    wrong = Edge(0, 20, relative(true[0], true[-1]), SURE, closure=True)
+    right = [Edge(n, len(true) - 1 - n, relative_pose(true[n], true[-1 - n]), SURE, closure=True) for n in range(3)]
+    wrong = Edge(0, 20, relative_pose(true[0], true[-1]), SURE, closure=True)
     graph.edges.extend([*right, wrong])
     graph.optimise()
     assert graph.drop_outliers(5.0) == [wrong]

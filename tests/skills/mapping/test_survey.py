@@ -8,7 +8,7 @@ from planar_robot import TWO_ROOMS, Box, PlanarClock, PlanarRobot
 
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
-from skills.geometry import relative
+from skills.geometry import relative_pose
 from skills.mapping.map_folder import load_mapper, map_grids, save_graph, save_grids
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
@@ -54,7 +54,7 @@ class Trip:
             self.survey.tick(self.clock.now())
 
     def off(self) -> tuple[float, float]:
-        off = relative(self.robot.pose, self.mapper.pose)
+        off = relative_pose(self.robot.pose, self.mapper.pose)
         return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
 
 
@@ -72,7 +72,7 @@ def test_all_rooms_are_explored_without_a_touch_and_the_robot_comes_home(explore
     trip, folder = explored
     assert trip.survey.done and trip.survey.trouble is None
     assert trip.robot.least_clearance_m > 0.0
-    off = relative(START, trip.robot.pose)
+    off = relative_pose(START, trip.robot.pose)
     assert math.hypot(off.x_m, off.y_m) < 0.2
     made, true = load_grid_map(folder / "keepout.yaml"), grid_of(TWO_ROOMS, (0.05, 1.0))
     free = true.centres(np.argwhere(true.distance > 0.4))

@@ -121,7 +121,7 @@ def test_one_sentence_names_all_closed_doors():
 
 def test_clearing_within_discs_leaves_other_obstacles():
     bench, _ = watch(RIGHT_PANEL, Box(5.2, 5.2, 5.6, 5.6, 0.0, 1.7))
-    before = len(bench.costmap.seen_m())
-    forgotten = bench.costmap.forget_seen(np.array([[7.45, 4.05, 0.8]]))
+    before = len(bench.costmap.obstacle_cells())
+    forgotten = bench.costmap.clear_obstacles(np.array([[7.45, 4.05, 0.8]]))
     assert 0 < forgotten < before
-    assert len(bench.costmap.seen_m()) == before - forgotten
+    assert len(bench.costmap.obstacle_cells()) == before - forgotten

@@ -116,7 +116,7 @@ def test_a_person_out_of_view_is_remembered_while_an_obstacle_is_there(stays, re
     bench.robot.push(0.0, 0.0, math.pi)
     if not stays:
         bench.robot.boxes.remove(detector.people[0])
-        bench.costmap.forget_seen()
+        bench.costmap.clear_obstacles()
     look(bench, watch, remembered_s - 0.6)
     assert len(watch.people()) == 1
     look(bench, watch, 1.5)

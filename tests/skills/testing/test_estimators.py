@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skills.api import ForgettingCostmap, SearchingLocaliser
+from skills.api import ClearableCostmap, SearchingLocaliser
 from skills.robot import Pose2D
 from skills.testing.blocks import ROOM, Block, grid_of
 from skills.testing.clock import VirtualClock
@@ -36,7 +36,7 @@ def test_clearance_is_the_distance_to_the_nearest_block():
     costmap = BlockCostmap([Block(1.0, -0.5, 2.0, 0.5), Block(0.0, 0.0, 9.0, 9.0, 2.0, 2.5)])
     points = np.array([[0.0, 0.0], [1.5, 0.0], [2.0 + 3.0, 0.5 + 4.0]])
     assert costmap.clearance_m(points) == pytest.approx([1.0, -0.5, 5.0])
-    assert isinstance(costmap, ForgettingCostmap)
+    assert isinstance(costmap, ClearableCostmap)
 
 
 def test_clearance_without_blocks_is_large():

@@ -6,7 +6,7 @@ from pydrake.math import RigidTransform
 
 from plant.robots.fetch.kind import fetch_capabilities
 from skills.api import PlanningError
-from skills.manipulation.arm.looking_skill import head_angles, without_arm
+from skills.manipulation.arm.looking_skill import head_angles, mask_arm
 from skills.robot import FrameTree, Image, Intrinsics
 
 CAPABILITIES = fetch_capabilities()
@@ -33,4 +33,4 @@ def test_what_shows_the_arm_has_no_depth():
     frames = FrameTree({"body": ("odom", RigidTransform()), "camera": ("body", RigidTransform())})
     image = Image(0.0, "head", "camera", lens, lens, None, none, depth, frames)
     arm_B = [np.array([1.0, -0.5, 1.0]), np.array([1.0, 0.5, 1.0])]  # at the third pixel's point (1, 0, 1)
-    assert without_arm(image, arm_B).depth_m.tolist() == [[1.0, 1.0, 0.0]]
+    assert mask_arm(image, arm_B).depth_m.tolist() == [[1.0, 1.0, 0.0]]

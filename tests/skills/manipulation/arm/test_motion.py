@@ -90,7 +90,7 @@ def test_the_same_seed_plans_the_same_path(scene):
 def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
     scene.set_boxes([_wall_ahead()])
     path = PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3))
-    trajectory = PLANNER.timed(path, scene=scene)
+    trajectory = PLANNER.trajectory(path, scene=scene)
     times = np.arange(0.0, trajectory.times_s[-1], 0.08)
     q = np.stack([np.interp(times, trajectory.times_s, column) for column in trajectory.positions_rad.T], axis=1)
     speeds = np.diff(q, axis=0) / 0.08
@@ -101,7 +101,7 @@ def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
 
 
 def test_timing_a_motion_of_no_length_is_a_short_stay():
-    trajectory = PLANNER.timed(np.array([LEFT, LEFT]))
+    trajectory = PLANNER.trajectory(np.array([LEFT, LEFT]))
     assert np.allclose(trajectory.positions_rad[-1], LEFT)
 
 
@@ -131,7 +131,7 @@ def test_a_straight_line_into_a_box_is_refused(scene):
 
 @pytest.mark.parametrize("way_rad", [0.5, 0.05, 0.01, 0.001])
 def test_timing_takes_about_as_long_as_the_acceleration_needs(way_rad):
-    trajectory = PLANNER.timed(np.array([LEFT, LEFT + way_rad * np.eye(6)[1]]), speed_rad_s=10.0)
+    trajectory = PLANNER.trajectory(np.array([LEFT, LEFT + way_rad * np.eye(6)[1]]), speed_rad_s=10.0)
     shortest_s = 2.0 * np.sqrt(way_rad / 3.0)
     assert 0.8 * shortest_s < trajectory.times_s[-1] < 2.5 * shortest_s + 0.1
 

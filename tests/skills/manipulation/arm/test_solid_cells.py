@@ -7,12 +7,12 @@ from table_scene import CAMERA, TABLE, Can, scene
 from skills.manipulation.arm.solid_cells import (
     CELL_M,
     Outline,
-    boxes_of,
-    merged,
+    add_picture,
+    add_view,
+    boxes_around,
+    merge_cells,
     never_seen,
     solid_boxes,
-    with_picture,
-    with_view,
 )
 
 NOTHING = np.empty((0, 3), dtype=np.int64)
@@ -36,7 +36,7 @@ def inside(boxes, p_W):
 
 def test_what_is_seen_is_solid_and_what_is_behind_it_too():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 2.0, nothing_of)
+    boxes = solid_boxes(add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 2.0, nothing_of)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert inside(boxes, (1.15, 0.0, 0.9))
     assert not inside(boxes, (0.8, 0.0, 0.95))
@@ -44,15 +44,15 @@ def test_what_is_seen_is_solid_and_what_is_behind_it_too():
 
 def test_what_is_behind_it_ends_where_the_arm_does_not_reach():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    boxes = solid_boxes(with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 1.1, nothing_of)
+    boxes = solid_boxes(add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 1.1, nothing_of)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert not inside(boxes, (1.15, 0.0, 0.9))
 
 
 def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    cells = with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
-    cells = with_picture(cells, picture(), RigidTransform(), NOTHING_OWN)
+    cells = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
+    cells = add_picture(cells, picture(), RigidTransform(), NOTHING_OWN)
     assert not inside(solid_boxes(cells, BODY, 2.0, nothing_of), (0.97, 0.0, 0.95))
     assert inside(solid_boxes(cells, BODY, 2.0, nothing_of), (1.2, 0.2, TABLE.height_m - 0.005))
 
@@ -60,8 +60,8 @@ def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
 def test_what_lies_within_the_own_outline_is_not_solid():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     own = Outline(RigidTransform([0.9, 0.1, 0.5]), np.array([0.0, -0.2]), np.array([0.2, 0.0]))
-    everything = with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
-    rest = with_picture(NOTHING, picture(can), RigidTransform(), own)
+    everything = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
+    rest = add_picture(NOTHING, picture(can), RigidTransform(), own)
     middles = (everything + 0.5) * CELL_M
     assert own.holds(middles).any()
     kept = {tuple(cell) for cell in rest.tolist()}
@@ -71,7 +71,7 @@ def test_what_lies_within_the_own_outline_is_not_solid():
 
 def test_what_is_left_out_is_not_solid():
     boxes = solid_boxes(
-        with_picture(NOTHING, picture(), RigidTransform(), NOTHING_OWN), BODY, 2.0, lambda p: p[:, 2] < 0.8
+        add_picture(NOTHING, picture(), RigidTransform(), NOTHING_OWN), BODY, 2.0, lambda p: p[:, 2] < 0.8
     )
     assert boxes == []
 
@@ -81,7 +81,7 @@ def test_merged_boxes_cover_exactly_the_cells():
     cells = np.unique(rng.integers(-3, 4, (90, 3)), axis=0)
     covered = [
         (x, y, z)
-        for low, high in merged(cells)
+        for low, high in merge_cells(cells)
         for x in range(low[0], high[0])
         for y in range(low[1], high[1])
         for z in range(low[2], high[2])
@@ -91,12 +91,12 @@ def test_merged_boxes_cover_exactly_the_cells():
 
 def test_a_wall_is_one_box():
     wall = np.stack(np.meshgrid([4], np.arange(30), np.arange(20), indexing="ij"), axis=-1).reshape(-1, 3)
-    assert len(merged(wall)) == 1
+    assert len(merge_cells(wall)) == 1
     assert CELL_M < 0.05
 
 
 def test_what_is_above_every_picture_and_far_behind_what_it_shows_was_never_seen():
-    views = with_view((), picture(), RigidTransform())
+    views = add_view((), picture(), RigidTransform())
     on_the_table = np.array([1.05, 0.0, TABLE.height_m])
     over_the_camera, under_the_table = CAMERA + [0.0, 0.0, 0.5], CAMERA + 1.6 * (on_the_table - CAMERA)
     points = np.array([on_the_table + [0.0, 0.0, 0.1], over_the_camera, under_the_table])
@@ -107,13 +107,13 @@ def test_what_is_above_every_picture_and_far_behind_what_it_shows_was_never_seen
 def test_only_the_last_views_are_kept():
     views = ()
     for _ in range(40):
-        views = with_view(views, picture(), RigidTransform())
+        views = add_view(views, picture(), RigidTransform())
     assert len(views) == 32
 
 
 def test_boxes_of_chosen_cells_have_nothing_behind_them():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    cells = with_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
-    boxes = boxes_of(cells, BODY, lambda p: p[:, 2] > 0.85)
+    cells = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
+    boxes = boxes_around(cells, BODY, lambda p: p[:, 2] > 0.85)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert not inside(boxes, (1.15, 0.0, 0.9))

@@ -10,10 +10,10 @@ from scripted_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.manipulation.arm.collision import ArmScene, Box
-from skills.manipulation.arm.held_object import turned_in_hand
+from skills.manipulation.arm.held_object import square_hand_pose
 from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
-from skills.manipulation.grasp.reach import ReachCheck, body_heights_m, resting_on, space_about
+from skills.manipulation.grasp.reach import ReachCheck, body_heights_m, raise_onto_surface, space_about
 from skills.robot import Pose2D
 
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
@@ -78,7 +78,7 @@ def test_what_is_tall_has_its_own_space_up_to_its_top_and_not_beside_it():
 @pytest.mark.parametrize(("tilt_deg", "side", "turns"), [(10, 1.0, True), (10, -1.0, True), (45, 1.0, False)])
 def test_what_stands_is_taken_for_square_to_the_fingers_of_a_hand_that_tilts_little(tilt_deg, side, turns):
     X_BH, p_HT = RigidTransform(hand_rotation(np.radians(tilt_deg), 0.7, side), [0.7, 0.1, 0.2]), np.array([0.18, 0, 0])
-    now = turned_in_hand(X_BH, p_HT)
+    now = square_hand_pose(X_BH, p_HT)
     assert bool(abs(now.rotation().matrix()[2, 0]) < 1e-9) is turns
     assert np.allclose(now @ p_HT, X_BH @ p_HT)
 
@@ -106,8 +106,12 @@ def test_without_a_grasp_the_arm_goes_nowhere():
 def test_what_seems_to_be_sunk_into_its_surface_rests_on_it(seen_m, stands_m):
     table = Surface("table", ((0.7, -0.5), (1.3, -0.5), (1.3, 0.5), (0.7, 0.5)), 0.70)
     shelf = replace(table, name="shelf", height_m=1.5)
-    assert resting_on(replace(CAN, position_W=(0.9, 0.1, seen_m)), [table, shelf]).position_W == (0.9, 0.1, stands_m)
+    assert raise_onto_surface(replace(CAN, position_W=(0.9, 0.1, seen_m)), [table, shelf]).position_W == (
+        0.9,
+        0.1,
+        stands_m,
+    )
 
 
 def test_what_lies_on_no_surface_that_is_known_stays_where_it_was_seen():
-    assert resting_on(CAN, ()) == CAN
+    assert raise_onto_surface(CAN, ()) == CAN

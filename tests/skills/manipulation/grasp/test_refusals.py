@@ -9,9 +9,9 @@ from skills.api import Cause, ObjectKind, ObjectObservation
 from skills.manipulation.grasp.candidates import (
     Target,
     grasp_candidates,
-    known_too_heavy,
     least_mass_kg,
     why_no_candidates,
+    why_too_heavy,
 )
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 
@@ -37,12 +37,12 @@ def test_a_large_extinguisher_is_refused_before_the_arm_moves():
 
 
 def test_a_small_extinguisher_is_left_to_the_weighing():
-    assert known_too_heavy(seen("extinguisher", SMALL), 5.0) is None
+    assert why_too_heavy(seen("extinguisher", SMALL), 5.0) is None
 
 
 def test_a_class_is_refused_by_an_arm_that_carries_less_than_its_lightest():
     why = "the extinguisher weighs 2.3 kg at least, and the arm carries 1.0 kg at most"
-    assert known_too_heavy(seen("extinguisher", SMALL), 1.0) == why
+    assert why_too_heavy(seen("extinguisher", SMALL), 1.0) == why
 
 
 @pytest.mark.parametrize("name", ["thing", "cube", "unheard of"])

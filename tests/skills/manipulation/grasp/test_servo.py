@@ -10,7 +10,7 @@ from table_scene import GREEN, TABLE, Can, scene
 
 from skills.manipulation.arm.poses import camera_pose
 from skills.manipulation.grasp.candidates import Target
-from skills.manipulation.grasp.servo import seen_shift, shifted
+from skills.manipulation.grasp.servo import measure_shift, shift_trajectory
 from skills.robot import ArmTrajectory
 
 CAN = Can(1.0, 0.0, 0.033, 0.115, GREEN)
@@ -42,7 +42,7 @@ def target_of(can):
 )
 def test_a_can_that_was_pushed_is_seen_where_it_is(X_BC, moved_m, seen_m):
     now = replace(CAN, x=CAN.x + moved_m[0], y=CAN.y + moved_m[1])
-    found = seen_shift(target_of(CAN), scene([now], X_WC=X_BC), X_BC)
+    found = measure_shift(target_of(CAN), scene([now], X_WC=X_BC), X_BC)
     assert found.offset_B == pytest.approx([*seen_m, 0.0], abs=0.006)
     assert found.overlap > 0.7
 
@@ -51,32 +51,32 @@ def test_what_is_too_near_for_its_depth_is_seen_by_its_outline():
     now = replace(CAN, y=0.02)
     image = scene([now], X_WC=AHEAD)
     image = replace(image, depth_m=np.where(image.depth_m < 0.3, 0.0, image.depth_m).astype(np.float32))
-    found = seen_shift(target_of(CAN), image, AHEAD)
+    found = measure_shift(target_of(CAN), image, AHEAD)
     assert found.offset_B == pytest.approx([0.0, 0.02, 0.0], abs=0.006)
 
 
 @pytest.mark.parametrize("X_BC", [AHEAD, ABOVE])
 def test_of_a_can_that_is_gone_little_overlaps(X_BC):
-    assert seen_shift(target_of(CAN), scene([], X_WC=X_BC), X_BC).overlap < 0.2
+    assert measure_shift(target_of(CAN), scene([], X_WC=X_BC), X_BC).overlap < 0.2
 
 
 def test_a_picture_that_shows_nothing_tells_nothing():
     image = scene([CAN], X_WC=ABOVE)
     blind = replace(image, depth_m=np.zeros_like(image.depth_m))
     steep = camera_pose(MIDDLE + [0.0, 0.01, 0.12], MIDDLE)
-    assert seen_shift(target_of(CAN), blind, steep) is None
+    assert measure_shift(target_of(CAN), blind, steep) is None
 
 
 def test_a_neighbour_is_not_taken_for_the_object():
     beside = Can(1.0, 0.12, 0.033, 0.115, GREEN)
-    found = seen_shift(target_of(CAN), scene([CAN, beside], X_WC=AHEAD), AHEAD)
+    found = measure_shift(target_of(CAN), scene([CAN, beside], X_WC=AHEAD), AHEAD)
     assert found.offset_B == pytest.approx(np.zeros(3), abs=0.006)
 
 
 def test_a_shifted_trajectory_keeps_its_times_and_leads_the_hand_beside_where_it_was():
     q = MODEL.inverse(RigidTransform([0.75, 0.0, 0.2]))[0]
     trajectory = ArmTrajectory(np.array([0.0, 0.5, 1.0]), np.stack([q, q, q]))
-    beside = shifted(MODEL, trajectory, np.array([0.0, 0.02, 0.0]))
+    beside = shift_trajectory(MODEL, trajectory, np.array([0.0, 0.02, 0.0]))
     assert np.array_equal(beside.times_s, trajectory.times_s)
     for q_rad in beside.positions_rad:
         assert MODEL.X_BH(q_rad).translation() == pytest.approx([0.75, 0.02, 0.2], abs=1e-6)
@@ -84,4 +84,4 @@ def test_a_shifted_trajectory_keeps_its_times_and_leads_the_hand_beside_where_it
 
 def test_beyond_the_arms_reach_there_is_no_shifted_trajectory():
     q = MODEL.inverse(RigidTransform([0.75, 0.0, 0.2]))[0]
-    assert shifted(MODEL, ArmTrajectory(np.array([0.0]), q[None, :]), np.array([2.0, 0.0, 0.0])) is None
+    assert shift_trajectory(MODEL, ArmTrajectory(np.array([0.0]), q[None, :]), np.array([2.0, 0.0, 0.0])) is None

@@ -18,10 +18,10 @@ from skills.manipulation.hand_over.skill import HandOver, HandOverInputs
 from skills.manipulation.hand_over.verification import (
     Release,
     Seen,
+    judge_release,
     lies_at,
     names_in,
     release_of,
-    seen_given,
     stands_at,
 )
 from skills.perception.detection_3d import Detection3D
@@ -178,7 +178,7 @@ def _seen(thing, p_W):
 )
 def test_a_flat_object_is_known_by_its_class_and_place(thing, p_W, seen):
     image, found = _seen(thing, p_W)
-    assert seen_given(image, RigidTransform(), [found], ("wrench",), RELEASE).seen is seen
+    assert judge_release(image, RigidTransform(), [found], ("wrench",), RELEASE).seen is seen
 
 
 @pytest.mark.parametrize(

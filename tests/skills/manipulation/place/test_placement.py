@@ -11,7 +11,7 @@ from skills.api import Surface
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.motion import RrtConnect
-from skills.manipulation.place.placement import HeldObject, above_goal, clear_heights, with_held
+from skills.manipulation.place.placement import HeldObject, above_goal, clear_heights, hold_on_path
 
 MODEL = arm_model(spot_capabilities())
 LEVEL_FORWARD = RotationMatrix.MakeXRotation(np.pi / 2)
@@ -54,7 +54,7 @@ def test_what_is_held_keeps_clear_on_the_way_unless_it_touches_something_at_an_e
     above_B = RigidTransform(LEVEL_FORWARD, [0.8, 0.0, 0.25])
     (q_goal, *_) = MODEL.inverse(above_B)
     scene.set_boxes([Box(RigidTransform([1.0, 0.0, top_m - 0.05]), (0.3, 0.6, 0.1))])
-    with_held(lambda scene, q: q_goal, can)(scene, CARRYING)
+    hold_on_path(lambda scene, q: q_goal, can)(scene, CARRYING)
     lower = MODEL.inverse(RigidTransform(LEVEL_FORWARD, [0.8, 0.0, top_m + 0.1]))[0]
     assert scene.free(q_goal)
     assert scene.free(lower) is not held

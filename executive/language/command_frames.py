@@ -40,8 +40,7 @@ def command_frames(actions: Sequence[Action]) -> tuple[CommandFrame, ...]:
     The robot looks for the next action's object at the place where it was sent first; it does not fetch an object that
     it holds.
 
-    Raises:
-        RefusalError: the destination of an object is missing.
+    Raises RefusalError when the destination of an object is missing.
     """
     frames: list[CommandFrame] = []
     held: Phrase | None = None

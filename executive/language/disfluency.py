@@ -33,8 +33,7 @@ def repair_disfluencies(items: Iterable[Item]) -> tuple[Item, ...]:
 
     A correction or negation that fits nothing becomes an unknown word.
 
-    Raises:
-        RefusalError: the speaker forbids an action.
+    Raises RefusalError when the speaker forbids an action.
     """
     rest, done = list(items), list[Item]()
     while rest:

@@ -43,8 +43,7 @@ def ground(
     Also returns a note on each name that was taken for another one. Similarity of English words, which the parser
     knows, widens the meaning of unknown names.
 
-    Raises:
-        RefusalError: an object, place or person is unknown or ambiguous; with a question where that helps.
+    Raises RefusalError when an object, place or person is unknown or ambiguous; with a question where that helps.
     """
     grounder = _Grounder(knowledge, parser)
     commands = tuple(command for frame in grounder.needed_there(frames) for command in grounder.commands(frame))
@@ -181,10 +180,7 @@ class _Grounder:
         raise self._unknown(Slot.THING, (phrase.text, phrase.singular), known)
 
     def place(self, location: Location) -> str:
-        """Known place of a location.
-
-        The room around it decides among several surfaces with the same noun ("table").
-        """
+        """Known place of a location. The room around it decides among several surfaces with the same noun ("table")."""
         if location.phrase is None:
             raise RefusalError(f"which place is {location.preposition!r}?", [location.preposition], question=True)
         if location.phrase.said_count not in (None, 1) or location.every_room:

@@ -24,8 +24,7 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
     """Refuses invalid numbers, people as objects, all of a kind as recipients, abstract objects, and places out of
     reach.
 
-    Raises:
-        RefusalError: an action is out of reach; the error names all such actions.
+    Raises RefusalError when an action is out of reach; the error names all such actions.
     """
     counted = (phrase for one in actions for phrase in (one.target, one.time) if phrase is not None)
     odd = [number for phrase in counted if (number := phrase.odd_number)]

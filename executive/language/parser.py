@@ -130,8 +130,7 @@ class DependencyParser:
 def load_parser() -> DependencyParser:
     """Loads the parser of this process; its model is loaded when it is first needed.
 
-    Raises:
-        InputError: the model's package is not installed.
+    Raises InputError when the model's package is not installed.
     """
     spec = importlib.util.find_spec(_MODEL_PACKAGE)
     folders = [] if spec is None or spec.origin is None else sorted(Path(spec.origin).parent.glob("en_core_web_*"))

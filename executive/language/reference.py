@@ -45,8 +45,7 @@ class Resolution:
 def resolve(actions: Sequence[Action], memory: Memory) -> Resolution:
     """Replaces pronouns in actions, each then with one object at most; `memory` is that of earlier sentences.
 
-    Raises:
-        RefusalError: a pronoun stands for no earlier phrase.
+    Raises RefusalError when a pronoun stands for no earlier phrase.
     """
     resolved = Resolution(memory=memory)
     for action in actions:

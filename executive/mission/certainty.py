@@ -48,8 +48,7 @@ def refuse_certain_comparisons(expression: Expression, ranges: Ranges) -> None:
 def refuse_certain(condition: Condition, ranges: Ranges) -> None:
     """Refuses a condition whose parts contradict each other, or that cannot fail.
 
-    Raises:
-        ExpressionError: the condition cannot hold, or always holds.
+    Raises ExpressionError when the condition cannot hold, or always holds.
     """
     looks = any(not isinstance(part, ValueIs) for part in parts_of(condition))
     cases = _Cases(ranges, apart=looks)

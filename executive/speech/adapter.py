@@ -61,8 +61,7 @@ class Adapter:
     def add_to(self, weights: ModelFile) -> None:
         """Adds the changes to the weights, in place.
 
-        Raises:
-            InputError: a matrix is missing or of another shape; then no weight is changed.
+        Raises InputError when a matrix is missing or of another shape; then no weight is changed.
         """
         for name, low_rank in self.changes.items():
             if name not in weights:
@@ -83,8 +82,7 @@ class Adapter:
 def packaged_adapter(*, base: str) -> Adapter:
     """Reads the shipped adapter for the weights with the sha256 `base`.
 
-    Raises:
-        InputError: it is missing or damaged, or belongs to other weights.
+    Raises InputError when the adapter is missing or damaged, or belongs to other weights.
     """
     try:
         content = (resources.files(__package__) / _FILE).read_bytes()
@@ -96,8 +94,7 @@ def packaged_adapter(*, base: str) -> Adapter:
 def read_adapter(content: bytes, *, base: str) -> Adapter:
     """Reads an adapter from the content of a file.
 
-    Raises:
-        InputError: it is damaged, or belongs to other weights than those with the sha256 `base`.
+    Raises InputError when the adapter is damaged, or belongs to other weights than those with the sha256 `base`.
     """
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as parts:
@@ -155,8 +152,7 @@ class ModelFile:
 def read_model_file(content: Content) -> ModelFile:
     """Parses the variables of a `model.bin`.
 
-    Raises:
-        InputError: it is of another version, cut off, or has numbers of an unknown type.
+    Raises InputError when the file is of another version, cut off, or has numbers of an unknown type.
     """
     try:
         return ModelFile(content, _variables(_Reader(content)))

@@ -223,8 +223,7 @@ def follow(blocks: Iterable[Samples], listener: Listener, *, partial_every_s: fl
 def microphone_blocks(*, which: Callable[[str], str | None] = shutil.which) -> Generator[Samples, None, None]:
     """Records the default microphone in blocks of 0.1 s until it is closed, with ALSA's `arecord`.
 
-    Raises:
-        InputError: `arecord` is not installed, or there is no microphone.
+    Raises InputError when `arecord` is not installed, or there is no microphone.
     """
     program = which("arecord")
     if program is None:

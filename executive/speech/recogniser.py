@@ -102,8 +102,7 @@ def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
 def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
     """Reads the names in a text file, one on each line; empty lines are ignored.
 
-    Raises:
-        InputError: it cannot be read, is no text, or holds more than 5000 names or one of more than 80 letters.
+    Raises InputError when the file cannot be read, is no text, or holds more than 5000 names or one of more than 80 letters.
     """
     lines = [" ".join(line.split()) for line in read_text(file, hint="name a text file in UTF-8").splitlines()]
     for number, line in enumerate(lines, 1):
@@ -123,11 +122,7 @@ _HINT: Final = "install the extra that listens: pip install 'spot-errand[speech]
 
 
 def speech_module(name: str) -> ModuleType:
-    """Imports the module of that name.
-
-    Raises:
-        InputError: the extra `speech` is not installed.
-    """
+    """Imports the module of that name. Raises InputError when the extra `speech` is not installed."""
     try:
         return import_module(name)
     except ImportError as error:

@@ -48,8 +48,7 @@ _FRAMES_PER_S: Final = 100
 def load_whisper() -> WhisperRecogniser:
     """Loads the recogniser.
 
-    Raises:
-        InputError: the extra `speech` is not installed, or its weights have another checksum.
+    Raises InputError when the extra `speech` is not installed, or its weights have another checksum.
     """
     model, small = base_weights()
     packaged_adapter(base=BASE_SHA256).add_to(read_model_file(model.getbuffer()))
@@ -62,8 +61,7 @@ def load_whisper() -> WhisperRecogniser:
 def base_weights() -> tuple[io.BytesIO, dict[str, bytes]]:
     """Joins the `model.bin` of Whisper base as it was published; also returns the small files beside it by name.
 
-    Raises:
-        InputError: the extra `speech` is not installed, or the weights have another checksum.
+    Raises InputError when the extra `speech` is not installed, or the weights have another checksum.
     """
     first, second = (resources.files(speech_module(part)) / "data" for part in _PARTS)
     model = io.BytesIO()

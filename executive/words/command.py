@@ -50,9 +50,8 @@ class Command:
     `goal` is a place or a person ("start": the pose where the robot stood when the speaker addressed it), `goal_at` the
     place of a person, `verb` the spoken verb.
 
-    Raises:
-        ValueError: a name holds brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
-            `goal_at` stands without a goal.
+    Raises ValueError when a name holds brackets, quotes or stray blanks, a count is negative, Nothing is counted, or
+    `goal_at` stands without a goal.
     """
 
     item: ObjectKind | None = None
@@ -135,8 +134,7 @@ def parse_object(text: str) -> ObjectKind:
 def parse_command(text: str) -> Command:
     """Parses the text form of a command, which does not include its `verb`.
 
-    Raises:
-        ValueError: the text is no command.
+    Raises ValueError when the text is no command.
     """
     match = _FORM.fullmatch(text)
     if match is None:

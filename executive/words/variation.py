@@ -65,8 +65,7 @@ class Variation:
     mission does not ask for; `people` adds walking people; `friction` multiplies the friction of all loose objects and
     of the robots.
 
-    Raises:
-        InputError: a value is out of range, or the light is unknown.
+    Raises InputError when a value is out of range, or the light is unknown.
     """
 
     light: Annotated[

@@ -213,8 +213,10 @@ class Conversation(RunVisitor):
         when, refers = _When.FIRST, re.search(_PRONOUN, text, re.IGNORECASE)
         if re.match(_LATER, text, re.IGNORECASE):
             when = _When.AFTERWARDS
-        elif refers and self._can_be_changed(now_s) and self._same_thing(meant.commands):
-            when = _When.INSTEAD
+        elif refers and self._can_be_changed(now_s):
+            last = () if self._last is None else self._last.commands
+            before, now = ({each.object or each.item for each in commands} for commands in (last, meant.commands))
+            when = _When.INSTEAD if before & now - {None} else when
         return self._begin_meant(meant, when, now_s)
 
     def _not_ok(self, meant: Understanding, text: str, now_s: float) -> Reply:
@@ -324,10 +326,6 @@ class Conversation(RunVisitor):
         """Returns whether the last request is still running, waiting, or about to begin."""
         last, missions = self._remembered(now_s), self._control.state.missions.get(self._speech.robot_name, ())
         return last is not None and (last.mission in missions or last.mission not in self._seen)
-
-    def _same_thing(self, commands: Sequence[Command]) -> bool:
-        last = () if self._last is None else self._last.commands
-        return bool({c.object or c.item for c in commands} & {c.object or c.item for c in last} - {None})
 
     def _held(self) -> ObjectKind | None:
         """Object in the gripper, as far as the last request says."""

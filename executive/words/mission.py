@@ -72,17 +72,14 @@ class Parameter(Strict):
     description: Text | None = Field(default=None, description="Its purpose.")
 
 
-def _short_parameter(value: object) -> object:
-    """Expands a bare default to a parameter."""
-    return value if isinstance(value, dict | Parameter) else {"default": value}
-
-
+_SHORT: Final = BeforeValidator(
+    lambda value: value if isinstance(value, dict | Parameter) else {"default": value},
+    json_schema_input_type=Parameter | Scalar,
+)
 if TYPE_CHECKING:
     _Parameters = dict[str, Parameter]
 else:
-    _Parameters = dict[
-        str, Annotated[Parameter, BeforeValidator(_short_parameter, json_schema_input_type=Parameter | Scalar)]
-    ]
+    _Parameters = dict[str, Annotated[Parameter, _SHORT]]
 
 
 class _Whole(Placed):

@@ -102,7 +102,7 @@ def vocabulary_of_world(knowledge: Knowledge, *, called: bool) -> Vocabulary:
 def read_vocabulary(file: Path, robot_name: str | None) -> Vocabulary:
     """Reads the names in a text file, one on each line; empty lines are ignored.
 
-    Raises InputError when the file cannot be read, is no text, or holds more than 5000 names or a name of over 80 letters.
+    Raises InputError when the file is unreadable, is no text, or holds over 5000 names or a name of over 80 letters.
     """
     lines = [" ".join(line.split()) for line in read_text(file, hint="name a text file in UTF-8").splitlines()]
     for number, line in enumerate(lines, 1):

@@ -18,7 +18,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.context import Endings, RunContext
 from executive.tree.node import Change, NodeState, Snapshot, TreeObserver
 from executive.tree.node_view import node_view
-from executive.tree.nodes.decisions import Decide, buttons_of
+from executive.tree.nodes.decision_nodes import Decide, buttons_of
 from executive.tree.nodes.policies import Skip
 from executive.tree.nodes.search import Answer
 from executive.tree.nodes.skill_leaf import SkillLeaf

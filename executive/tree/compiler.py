@@ -16,7 +16,7 @@ from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decisions import buttons_of
+from executive.tree.nodes.decision_nodes import buttons_of
 from executive.tree.nodes.door_check import doorway
 from executive.tree.nodes.group import mission_plan
 from executive.tree.nodes.interrupts import watch_plan

@@ -13,7 +13,7 @@ from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
-from executive.tree.nodes.decisions import decide_plan
+from executive.tree.nodes.decision_nodes import decide_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import steps as model

@@ -12,7 +12,7 @@ from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import cause_of, message_of
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decisions import MustHold, MustNotBegin, instant_decision
+from executive.tree.nodes.decision_nodes import MustHold, MustNotBegin, instant_decision
 from executive.tree.nodes.interrupts import HANDLING
 from executive.tree.nodes.policies import under_policy
 from executive.tree.nodes.recovery import Afterwards

@@ -13,7 +13,7 @@ from executive.mission.gripper import held_after_either
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import MemoryComposite, cause_of, message_of
 from executive.tree.board import Board
-from executive.tree.nodes.decisions import Decide, decide_plan
+from executive.tree.nodes.decision_nodes import Decide, decide_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words import steps as model
 from executive.words.condition import READINGS, Condition, ValueIs, parts_of

@@ -14,7 +14,7 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.board import FromBoard
 from executive.tree.context import RunContext
-from executive.tree.nodes.decisions import Keys, View
+from executive.tree.nodes.decision_nodes import Keys, View
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import set_plan
 from executive.tree.plan import Assembled, PlanBuilder, StepPart

@@ -12,7 +12,7 @@ from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
 from executive.tree.behaviour import ExplainedLeaf
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decisions import Keys, View
+from executive.tree.nodes.decision_nodes import Keys, View
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
 from executive.words.expression import Expression, ExpressionError, Template

@@ -10,7 +10,7 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedDecorator, ExplainedLeaf
 from executive.tree.board import Board
 from executive.tree.context import RunContext
-from executive.tree.nodes.decisions import DAY_S, Decide, decide_plan
+from executive.tree.nodes.decision_nodes import DAY_S, Decide, decide_plan
 from executive.tree.plan import Assembled, PlanBuilder
 from executive.words import leaf_steps as model
 from skills.robot import Clock

@@ -12,7 +12,7 @@ from executive.cli.run_keys import HELP, SAY_HELP, Keys, Typing, prompt_lines, r
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.decisions import Decision
+from executive.tree.nodes.decision_nodes import Decision
 from executive.words.condition import AnyOf, ButtonPressed, Not
 from skills.api import Question
 from skills.testing.clock import VirtualClock

@@ -6,7 +6,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.tree.behaviour import suspend
-from executive.tree.nodes.decisions import Check, Decide, Decision, MustHold, MustNotBegin, View
+from executive.tree.nodes.decision_nodes import Check, Decide, Decision, MustHold, MustNotBegin, View
 from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.values import SetValues

@@ -40,8 +40,8 @@ class MemorySelector(MemoryComposite):
 
     The failure has the messages of all children that could begin, the decisive ones first. Its cause is ERROR if one
     child had that, else the first that is neither PRECONDITION nor POSTCONDITION, else `exhausted_cause` if given, else
-    that of the last child. With `one_goal` all children lead to the same goal: after a final failure of one, the others
-    are passed over.
+    that of the last child, or PRECONDITION if no child applied. With `one_goal` all children lead to the same goal:
+    after a final failure of one, the others are passed over.
     """
 
     kind = "selector"

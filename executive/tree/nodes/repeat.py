@@ -37,7 +37,8 @@ class Repeat(MemoryComposite):
     | - | FAILURE | FAILURE with its cause |
     | `until`: true after a round | SUCCESS | SUCCESS |
     | `until`: false after a round, `while` | SUCCESS | RUNNING until the next round |
-    | `until`, `while`: after `times` rounds | SUCCESS | FAILURE with POSTCONDITION |
+    | `until`: false after `times` rounds | SUCCESS | FAILURE with POSTCONDITION |
+    | `while`: true after `times` rounds | idle | FAILURE with POSTCONDITION |
     | none (mode `times`) | SUCCESS | RUNNING until the next round; SUCCESS after `times` rounds |
     | halted | halted | INVALID with CANCELLED |
 

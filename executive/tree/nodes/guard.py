@@ -242,7 +242,7 @@ class KnowsPlace(Condition):
 
 @dataclass
 class BatteryAtLeast(Condition):
-    """Condition that the battery's charge (0 to 1) is at least `charge`; accepts old readings, which change slowly."""
+    """Condition that the battery's charge (0 to 1) is at least `charge`; accepts old readings, as it changes slowly."""
 
     reading = "the battery"
     freshness = Freshness(10.0, StaleData.ACCEPT)

@@ -40,12 +40,13 @@ STOP: Final = "stop"
 class Timeout(ExplainedDecorator):
     """Decorator with a time limit on the robot's clock; suspended time does not count.
 
-    | child | in time | too late |
+    | child | time | status |
     |---|---|---|
-    | RUNNING | RUNNING | FAILURE with TIMEOUT; the child is halted |
-    | SUCCESS | SUCCESS | FAILURE with TIMEOUT |
-    | FAILURE | FAILURE with its cause | FAILURE with its cause |
-    | halted | INVALID with CANCELLED | INVALID with CANCELLED |
+    | RUNNING, SUCCESS | in time | as the child |
+    | RUNNING | over | FAILURE with TIMEOUT; the child is halted |
+    | SUCCESS | over | FAILURE with TIMEOUT |
+    | FAILURE | any | FAILURE with its cause |
+    | halted | any | INVALID with CANCELLED |
     """
 
     kind = "timeout"

@@ -5,7 +5,7 @@ from py_trees.common import Status
 
 from executive.run.outcome import Outcome
 from executive.tree import nodes
-from executive.tree.behaviour import ExplainedNode
+from executive.tree.behaviour import ExplainedDecorator, ExplainedNode, MemoryComposite
 from executive.tree.board import FromBoard
 from executive.tree.compiler import KINDS, build, compile_mission, writes
 from executive.tree.estimate import expected_children
@@ -378,6 +378,12 @@ def below(node):
 def test_each_kind_of_node_has_exactly_one_class():
     named = [node.kind for node in below(ExplainedNode) if node.__module__.startswith(nodes.__name__) and node.kind]
     assert sorted(named) == sorted(KINDS)
+
+
+@pytest.mark.parametrize("node", KINDS.values(), ids=KINDS)
+def test_each_node_with_children_documents_its_truth_table(node):
+    with_children = issubclass(node, ExplainedDecorator | MemoryComposite)
+    assert not with_children or "| status |" in node.__doc__ or "status as" in node.__doc__.lower()
 
 
 def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):

@@ -46,7 +46,7 @@ def fetch_capabilities() -> Capabilities:
     """Capabilities of Fetch."""
     facts = fetch_facts()
     body, arm, head = facts["capabilities"], facts["arm"], facts["head"]
-    arm_room = facts["arm_room"]
+    arm_space = facts["arm_space"]
     height_m, (down_m, up_m) = facts["lift"]["height"], facts["lift"]["range"]
     return Capabilities(
         footprint_m=_round(body["footprint_radius"]),
@@ -60,12 +60,12 @@ def fetch_capabilities() -> Capabilities:
             body["max_reach"],
             tuple(facts["stowed"][part["link"]] for part in arm),
             body["max_payload"],
-            standing_m=tuple(arm_room["standing"]),
-            nearer_m=tuple(arm_room["nearer"]),
-            carry_x_m=tuple(arm_room["carry_x"]),
-            carry_z_m=tuple(arm_room["carry_z"]),
-            carry_best_x_m=arm_room["carry_best_x"],
-            tuck_x_m=tuple(arm_room["tuck_x"]),
+            standing_m=tuple(arm_space["standing"]),
+            nearer_m=tuple(arm_space["nearer"]),
+            carry_x_m=tuple(arm_space["carry_x"]),
+            carry_z_m=tuple(arm_space["carry_z"]),
+            carry_best_x_m=arm_space["carry_best_x"],
+            tuck_x_m=tuple(arm_space["tuck_x"]),
         ),
         gripper=_gripper(),
         cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),

@@ -8,7 +8,7 @@ import pytest
 from executive.run.worker import WorkThread
 from executive.testing.small_room import write_small_room
 from plant.diagram import TIME_STEP_S
-from plant.pipeline import Pipeline
+from plant.pipelined_clock import Pipeline
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
 from skills.robot import ArmTrajectory, CommandState, Lease, LeaseError

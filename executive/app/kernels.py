@@ -111,8 +111,8 @@ def _survey() -> None:
     from executive.app.simulated import simulate
     from skills.estimate.grid_map import load_grid_map
     from skills.estimate.matching import score_poses
-    from skills.mapping.closures import Window
     from skills.mapping.mapper import Mapper
+    from skills.mapping.submap_matching import Window
     from skills.mapping.survey import Survey
 
     world, name = open_world(DEFAULT_WORLD), "Alice"

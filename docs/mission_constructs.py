@@ -1,4 +1,4 @@
-"""What the reference says of each construct of mission files: an example, and the rule that says what it returns."""
+"""Constructs of mission files for the reference: an example of each, and the rule of what it returns."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Construct:
-    """A construct: its heading, what it is, an example (steps, or a whole file), what it returns, and the node's kind.
+    """Construct: heading, description, an example (steps, or a whole file), the rule of its result, and its node.
 
     `kind` is the node in the compiled tree; empty where there is none of its own.
     """
@@ -23,58 +23,58 @@ class Construct:
 DECIDING = (
     Construct(
         "if, then, else",
-        "Steps that are done when a condition holds, and others when it does not. `else` may be missing.",
+        "Runs some steps when a condition holds, and others when it does not. `else` may be missing.",
         """- if: {object: beer, at: kitchen counter}
   then:
     - say: bring the beer from the kitchen counter to the coffee table
   else:
     - speak: There is no beer.
 """,
-        "As the steps that were chosen. SUCCESS when there are none. FAILURE with the cause of the look when the robot "
-        "cannot look.",
+        "The result of the chosen steps; SUCCESS when there are none. FAILURE with the cause of the look when the "
+        "robot cannot look.",
         "choose",
     ),
     Construct(
         "repeat",
-        "Rounds of `steps`: `times`, `until` a condition holds after a round, `while` one holds before a round. With "
-        '`every` (seconds, or "30 min") a round does not begin earlier than that after the one before began. `times` '
-        "beside a condition is the most rounds that are made.",
+        "Repeats `steps`: `times`, `until` a condition holds after a round, `while` one holds before a round. With "
+        '`every` (seconds, or "30 min") successive rounds begin at least that far apart. `times` '
+        "beside a condition is the largest number of rounds.",
         """- repeat: {until: {object: hammer, at: workbench}, times: 3, every: 60}
   steps:
     - to: workbench
 """,
         "FAILURE with the cause of a step as soon as one fails. SUCCESS when `until` holds, `while` does not hold, or "
-        "after `times` rounds without a condition. FAILURE with POSTCONDITION when a condition is still not as wanted "
-        "after `times` rounds. Rounds that nothing can end are refused before the mission starts.",
+        "after `times` rounds without a condition. FAILURE with POSTCONDITION when a condition still "
+        "keeps the rounds going after `times` of them. Endless rounds are refused before the mission starts.",
         "repeat",
     ),
     Construct(
         "repeat for_each",
-        "One round for each value of a list, or of `rooms`, `people`, `people in ROOM`, `surfaces` and `surfaces in "
-        "ROOM` of the world. The value stands in the steps as `${NAME}`, also in sentences.",
+        "Runs one round for each value of a list, or of `rooms`, `people`, `people in ROOM`, `surfaces` and `surfaces "
+        "in ROOM` of the world. The value stands in the steps as `${NAME}`, also in sentences.",
         """- repeat: {for_each: [kitchen, office], as: room}
   steps:
     - say: is there a hammer in the ${room}
       on_failure: skip
 """,
-        "SUCCESS after all rounds. FAILURE with the cause of a step as soon as one fails; later rounds are not made.",
+        "SUCCESS after all rounds. FAILURE with the cause of a step as soon as one fails; later rounds do not run.",
     ),
     Construct(
         "try, else",
-        "Steps, and others that are done in their place as soon as one of them fails.",
+        "Runs steps, and others in their place as soon as one of them fails.",
         """- try:
     - say: bring the coke from the kitchen table to the coffee table
       elsewhere: false
   else:
     - speak: I go on without the coke.
 """,
-        "SUCCESS when the steps of `try` succeed, else as the steps of `else`. A defect (ERROR) and a cancel are not "
-        "caught.",
+        "SUCCESS when the steps of `try` succeed, otherwise the result of `else`. A defect (ERROR) and a cancel are "
+        "not caught.",
         "try",
     ),
     Construct(
         "together, done_when",
-        "Steps that run side by side. Two that move the same part of the robot (base, arm, gripper) are refused. "
+        "Runs steps in parallel. Two that move the same part of the robot (base, arm, gripper) are refused. "
         "`done_when` is `all` (the default), `any`, or how many must succeed; the others are then stopped.",
         """- together:
     - to: kitchen
@@ -83,13 +83,13 @@ DECIDING = (
         - speak: Careful, a robot is coming.
   done_when: any
 """,
-        "SUCCESS when as many steps succeeded as are needed. FAILURE with the cause of the first failure when so many "
-        "cannot succeed any more.",
+        "SUCCESS when enough steps have succeeded. FAILURE with the cause of the first failure when too few can "
+        "still succeed.",
         "together",
     ),
     Construct(
         "group",
-        "Steps in a row that share a policy, a `while`, a `when` or an `always`.",
+        "Runs steps in order, with a common policy, `while`, `when` or `always`.",
         """- group:
     - to: office
     - to: bathroom
@@ -97,27 +97,28 @@ DECIDING = (
   timeout: 120
   on_failure: skip
 """,
-        "As its steps in a row: FAILURE with the cause of the first that fails.",
+        "SUCCESS when all steps succeed; FAILURE with the cause of the first that fails.",
         "sequence",
     ),
 )
 WATCHING = (
     Construct(
         "while",
-        "A condition that must hold as long as the steps of a group, or of the file, run. It takes no look.",
+        "Condition that must hold while the steps of a group, or of the file, run. It needs no look.",
         """name: watched
 while: {holds: battery > 0.2 and elapsed < 600}
 steps:
   - to: office
 """,
-        "FAILURE with PRECONDITION in the tick in which it does not hold; the steps are stopped. Else as the steps.",
+        "FAILURE with PRECONDITION in the tick in which it does not hold; the steps are stopped. Otherwise the "
+        "result of the steps.",
         "guard",
     ),
     Construct(
         "when",
-        "What interrupts the steps of a group, or of the file. When a condition begins to hold, the steps are "
-        "suspended, those of `do` are done, and the steps go on where they were. The first of several goes first. It "
-        "is called again only after the condition did not hold in between. It waits while the robot grasps, places "
+        "Conditions that interrupt the steps of a group, or of the file. When one begins to hold, the steps are "
+        "suspended, those of `do` run, and the steps go on where they were. The first of several goes first. It "
+        "runs again only after the condition did not hold in between. It waits while the robot grasps, places "
         "or hands over.",
         """name: interrupted
 when:
@@ -129,12 +130,12 @@ steps:
   - to: office
 """,
         "RUNNING while the steps of `do` run. FAILURE with their cause when they fail, and with EXECUTION when they "
-        "are called more than `times` times. Else as the steps.",
+        "run more than `times` times. Otherwise the result of the steps.",
         "interrupt",
     ),
     Construct(
         "always",
-        "Steps at the end of a group, or of the file, whatever happened: after success, failure and cancel. After a "
+        "Steps at the end of a group, or of the file, in any case: after success, failure and cancel. After a "
         "cancel they have two minutes.",
         """name: and back
 always:
@@ -142,7 +143,7 @@ always:
 steps:
   - to: office
 """,
-        "As the steps before. FAILURE with its own cause when those succeeded and `always` failed.",
+        "The result of the steps before. FAILURE with its own cause when those succeeded and `always` failed.",
         "always",
     ),
 )
@@ -150,12 +151,12 @@ SMALL = (
     Construct(
         "wait",
         'Waits `for` a condition, for `seconds` (a number, or "10 min"), or `until_clock` has come, a time of day '
-        'such as "14:30". A condition that takes a look is looked at `every` 15 s. `timeout` limits it.',
+        'such as "14:30". The robot looks for a condition `every` 15 s. `timeout` limits the wait.',
         """- wait: {for: {all: [{button: go}, battery > 0.5]}}
   timeout: 60
   on_failure: skip
 """,
-        "RUNNING until then, then SUCCESS. A time of day that passed in the last twelve hours has come already. "
+        "RUNNING until then, then SUCCESS. A time of day within the last twelve hours has come already. "
         "FAILURE with the cause of a look that fails, and with TIMEOUT after `timeout`.",
         "wait for",
     ),
@@ -166,7 +167,7 @@ SMALL = (
         """- check: {not: {person: anybody, at: office}}
   gives: {answer: empty}
 """,
-        "SUCCESS with yes or no: an honest no is no failure. FAILURE with the cause of a look that fails.",
+        "SUCCESS with yes or no: a true no is no failure. FAILURE with the cause of a look that fails.",
         "check",
     ),
     Construct(
@@ -174,7 +175,7 @@ SMALL = (
         "Goes to the dock and charges to `level` (0 to 1); by default as the knowledge file says.",
         """- dock: {level: 0.9}
 """,
-        "SUCCESS when the battery is charged so far. FAILURE with the cause of the drive, or when the charge does "
+        "SUCCESS when the battery has that charge. FAILURE with the cause of the drive, or when the charge does "
         "not rise.",
     ),
     Construct(
@@ -182,12 +183,12 @@ SMALL = (
         "Says a text to the people around. Expressions stand in braces; `{{` is a brace.",
         """- speak: The battery is at {round(battery * 100)} percent.
 """,
-        "RUNNING as long as saying it takes, then SUCCESS. FAILURE with PRECONDITION when a value is missing.",
+        "RUNNING while the robot speaks, then SUCCESS. FAILURE with PRECONDITION when a value is missing.",
     ),
     Construct(
         "ask",
-        "Puts a question, aloud, on the page and at the terminal. The answer is one of `choices`, whose steps are then "
-        "done, or what `match` says: a place, person or object of the world, a number or any text.",
+        "Asks aloud, on the page and at the terminal. The answer is one of `choices`, whose steps then "
+        "run, or of the type of `match`: a place, person or object of the world, a number or any text.",
         """- ask: Tea or coffee?
   choices:
     tea: null
@@ -197,9 +198,9 @@ SMALL = (
   default: tea
   gives: {answer: drink}
 """,
-        "RUNNING until it is answered; an answer that means nothing is asked for again. SUCCESS with the answer, "
-        "then as its steps. When nobody answers within `limit`: SUCCESS with `default`, or FAILURE with TIMEOUT "
-        "without one.",
+        "RUNNING until somebody answers; the robot asks again after an answer that it cannot use. SUCCESS with "
+        "the answer, then the result of its steps. When nobody answers within `limit`: SUCCESS with `default`, or "
+        "FAILURE with TIMEOUT without one.",
         "question",
     ),
     Construct(
@@ -215,34 +216,37 @@ CONDITIONS = (
     ("an expression", "`battery > 0.3 and not holding`", "at once"),
     ("`object`, perhaps `at`", "`{object: beer, at: kitchen}`", "goes there and looks; no only after all views"),
     ("`person`, perhaps `at`", "`{person: anybody, at: office}`", "goes there and looks around"),
-    ("`look`", "`{look: is there a hammer in the workshop}`", "what a question in English asks for"),
+    ("`look`", "`{look: is there a hammer in the workshop}`", "looks for the answer to a question in English"),
     ("`door`", "`{door: [hall, kitchen]}`", "goes there and looks whether it is open"),
     ("`button`", "`{button: go}`", "at once: pressed since a `wait` or `repeat` began, else since the mission began"),
-    ("`max_age_s`", "`{object: beer, at: kitchen, max_age_s: 60}`", "beside what looks: an answer so old counts still"),
-    ("`all`, `any`, `not`", "`{all: [count > 0, {button: go}]}`", "decided by as few looks as are needed"),
+    (
+        "`max_age_s`",
+        "`{object: beer, at: kitchen, max_age_s: 60}`",
+        "beside a look: age up to which an answer counts",
+    ),
+    ("`all`, `any`, `not`", "`{all: [count > 0, {button: go}]}`", "decided by as few looks as possible"),
 )
 VALUES = """\
-Each time that a condition is asked (in each round, at each `every` of a `wait`, in each attempt) the robot looks
+Each time that a condition is checked (in each round, at each `every` of a `wait`, in each attempt) the robot looks
 again, unless `max_age_s` (seconds, or a text such as `2 min`) lets an earlier answer count.
 
 A value has a name and a type: a number, a text, or true and false. It comes from `variables` (the file's values at
 the beginning), from `set`, and from `gives`: `{answer: NAME}` beside a question, a `check` or an `ask`, `{count:
 NAME}` beside a sentence that counts, and `{PORT: NAME}` beside a skill. A value of `variables` keeps its type. A
-value that not every way up to a step gives is unknown there, and using it is refused before the mission starts.
+value that is not set on every path to a step is unknown there, and its use is refused before the mission starts.
 
 An expression has numbers, texts in quotes, `true`, `false` and names; `+ - * / // %`; `== != < <= > >=`; `and`, `or`,
 `not`; `A if C else B`; brackets; and the functions `abs`, `min`, `max`, `round`, `length` and `lower`. Besides the
 mission's values it reads `battery` (0 to 1), `localised`, `holding`, `elapsed` (seconds since the mission began) and
-`clock` (the time of day, as `"08:30"`). Where a value is a text with braces, `{count + 1}` puts the expression's
-value in.
+`clock` (the time of day, as `"08:30"`). In a text with braces, `{count + 1}` inserts the expression's value.
 
-`${NAME}` is something else: a parameter, or the value of a `for_each`. It is put in when the file is read, so it may
+`${NAME}` is different: a parameter, or the value of a `for_each`. It is inserted when the file is read, so it may
 stand in sentences, places and conditions.
 """
 
 
 def constructs_text() -> str:
-    """The sections of the page on mission files."""
+    """Sections of the page on mission files."""
     return "".join(_sections())
 
 
@@ -250,12 +254,12 @@ def _sections() -> Iterator[str]:
     yield "## Steps that decide\n\n"
     yield "A step may hold steps. All take the keys of a [policy](#policy), such as `timeout` and `on_failure`.\n\n"
     yield from map(_section, DECIDING)
-    yield "## What is watched\n\n"
+    yield "## Watched conditions\n\n"
     yield from map(_section, WATCHING)
     yield "## Small steps\n\n"
     yield from map(_section, SMALL)
     yield "## Conditions and values\n\n"
-    yield "| condition | example | how it is decided |\n|---|---|---|\n"
+    yield "| condition | example | decision |\n|---|---|---|\n"
     yield from (f"| {what} | {example} | {how} |\n" for what, example, how in CONDITIONS)
     yield f"\n{VALUES}\n"
 
@@ -266,7 +270,7 @@ def _section(one: Construct) -> str:
 
 
 def file_of(one: Construct) -> str:
-    """The example as a whole mission file."""
+    """Makes a whole mission file of the example."""
     if one.example.startswith("name:"):
         return one.example
     steps = "".join(f"  {line}\n" for line in one.example.splitlines())

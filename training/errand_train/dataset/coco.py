@@ -46,9 +46,10 @@ def annotation(
 ) -> dict[str, Any] | None:
     """Makes one label without ids; None when almost nothing is visible.
 
-    `visibility` is the share seen of what the object alone would show in the picture, `truncation` the share of the
-    object beyond the picture's edge. Too little seen, too small, all over the picture, without an outline, or
-    `unseeable` for other reasons: `ignore` is 1, and `iscrowd`, by which COCO's tools pass over it.
+    `visibility` is the visible share of the pixels that the object alone would cover in the picture, `truncation` the
+    share of the object beyond the picture's edge. `ignore` is 1, and so is `iscrowd`, by which COCO's tools ignore a
+    label, for an object that is hardly visible, too small, all over the picture, without an outline, or `unseeable` for
+    other reasons.
     """
     area = int(mask.sum())
     if area < LEAST_NOTED_PX:

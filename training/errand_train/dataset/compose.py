@@ -49,7 +49,7 @@ class Held:
 class Scene:
     """A scene before light and cameras. `seats` are boxes under people who sit: (x, y, yaw, height).
 
-    `crowded` tells that there is more in it than in those for validation.
+    A `crowded` scene has more objects than those for validation.
     """
 
     room: Room
@@ -62,7 +62,8 @@ class Scene:
 def compose(rng: np.random.Generator, index: int, *, for_training: bool, others: Sequence[ObjectModel] = ()) -> Scene:
     """Composes the scene of a number. Every tenth holds distractors only; `others` replace some of them for training.
 
-    Many of those for training hold two to four times as much as those for validation, so that a picture teaches more.
+    Many scenes for training hold two to four times as many objects as those for validation, so that a picture teaches
+    more.
     """
     room = random_room(rng, for_training=for_training)
     bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1

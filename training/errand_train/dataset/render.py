@@ -90,9 +90,9 @@ def _views(rng: np.random.Generator, scene: Scene, count: int, others: Sequence[
     A quarter of the views show the `others` in the scene.
     """
     specs = camera_specs()
-    objects = [thing for thing in scene.objects if thing.model.class_id] or list(scene.objects)
-    turns = [thing for thing in objects for _ in range(2 if thing.model.category in SELDOM_BY_CHANCE else 1)]
-    strange = [thing for thing in scene.objects if thing.model in others]
+    objects = [item for item in scene.objects if item.model.class_id] or list(scene.objects)
+    turns = [item for item in objects for _ in range(2 if item.model.category in SELDOM_BY_CHANCE else 1)]
+    strange = [item for item in scene.objects if item.model in others]
     if strange and objects:
         turns += [strange[int(k)] for k in rng.integers(len(strange), size=len(turns) // 3)]
     order = [turns[k] for k in rng.permutation(len(turns))]
@@ -122,17 +122,17 @@ class Stage:
         self._add(
             self._world, _mesh_file(folder, "room", scene.room.mesh, scene.room, self._physical), RigidTransform()
         )
-        for thing in scene.objects:
-            self._add_thing(self._world, thing.model, thing.X_WO, in_hand=False)
+        for item in scene.objects:
+            self._add_object(self._world, item.model, item.X_WO, in_hand=False)
         self._add_seats(scene)
         opening = _jaw_for(scene.held) if scene.held else opening_rad
         self._add(self._hand, _mesh_file(folder, "hand", hand_mesh(opening), None, self._physical), RigidTransform())
         if scene.held:
-            self._add_thing(self._hand, scene.held.model, scene.held.X_HO, in_hand=True)
+            self._add_object(self._hand, scene.held.model, scene.held.X_HO, in_hand=True)
         self._context = self._graph.CreateDefaultContext()
         self._X_HC = camera_specs()["hand"].X_link_camera()
 
-    def _add_thing(self, frame: FrameId, model: ObjectModel, X_FO: RigidTransform, *, in_hand: bool) -> None:
+    def _add_object(self, frame: FrameId, model: ObjectModel, X_FO: RigidTransform, *, in_hand: bool) -> None:
         label = _BACKGROUND
         if model.class_id:
             label = len(self.labelled) + 1

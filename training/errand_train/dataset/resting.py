@@ -25,7 +25,7 @@ TOPPLED_SHARE: Final = 0.75
 class Resting:
     """Rotation that lays an object on a plane, height of its origin over the plane, and stability (0..1).
 
-    `upright` tells whether the model's own z axis points up.
+    `upright` says whether the model's own z axis points up.
     """
 
     R: FloatArray
@@ -95,7 +95,7 @@ def choose_pose(
 ) -> Resting:
     """Chooses a pose: upright as often as usual for such objects, else by stability.
 
-    `toppled`: what usually stands lies more often than that, but people, so that it is trained that way, too.
+    With `toppled`, objects except people lie more often than usual, so that training covers it.
     """
     standing = [pose for pose in poses if pose.upright]
     lying = [pose for pose in poses if not pose.upright]

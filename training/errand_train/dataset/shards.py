@@ -79,8 +79,9 @@ def render(
 ) -> Summary:
     """Renders the missing scenes of a data set and writes its COCO files. Raises DatasetError.
 
-    `progress` is told how many scenes are there, and how many there will be. `give_out` has the scenes made. `others`
-    is a folder of models of no class, each in a folder of its own, which replace some distractors for training.
+    `progress` gets the number of finished scenes and of all scenes. `give_out` distributes the rendering of scenes.
+    `others` is a folder of models without a class, each in a folder of its own, which replace some distractors for
+    training.
     """
     scenes = len(_taken(images))
     folders = _model_folders(others) if others is not None else ()

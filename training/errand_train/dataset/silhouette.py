@@ -39,7 +39,7 @@ def project(points_C: FloatArray, camera: Intrinsics) -> FloatArray:
 def silhouette(points_C: FloatArray, faces: NDArray[np.int64], camera: Intrinsics) -> Silhouette:
     """Counts the pixels that a mesh covers. Leaves out triangles that reach behind the camera.
 
-    The canvas reaches one picture beyond every edge; what lies still farther out does not count.
+    The canvas extends one picture beyond every edge; pixels still farther out do not count.
     """
     before = np.all(points_C[faces][..., 2] > NEAR_M, axis=1)
     pixels = project(points_C, camera)

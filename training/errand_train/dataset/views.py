@@ -50,12 +50,12 @@ def roll_deg(X_WC: RigidTransform) -> float:
     return float(np.degrees(np.arctan2(up_C[0], -up_C[1])))
 
 
-def view_of(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
+def view_of(rng: np.random.Generator, room: Room, item: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
     """Draws a view that has an object somewhere in the picture; None when none was found."""
     in_body = rng.random() < BODY_SHARE
     for _ in range(TRIES):
-        view = _body_view(rng, room, thing, specs) if in_body else _hand_view(rng, room, thing, specs["hand"])
-        if view is not None and _sees(view, room.obstacles, _aim(thing)):
+        view = _body_view(rng, room, item, specs) if in_body else _hand_view(rng, room, item, specs["hand"])
+        if view is not None and _sees(view, room.obstacles, _aim(item)):
             return view
     return None
 
@@ -71,18 +71,18 @@ def any_view(rng: np.random.Generator, room: Room, specs: Mapping[str, CameraSpe
     return View("hand", look_at(eye, target), _varied(rng, specs["hand"].intrinsics()), False, False)
 
 
-def _aim(thing: Placed) -> FloatArray:
+def _aim(item: Placed) -> FloatArray:
     """Target of the view: the middle of an object, or a point of a person's upper body."""
-    points = thing.model.surface.points
+    points = item.model.surface.points
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    if thing.model.category == "person":
+    if item.model.category == "person":
         middle = middle + np.array([0, 0, 0.2 * float(np.ptp(points[:, 2]))])
-    return np.asarray(thing.X_WO @ middle)
+    return np.asarray(item.X_WO @ middle)
 
 
-def distance_to(rng: np.random.Generator, thing: Placed, focal: float) -> float:
+def distance_to(rng: np.random.Generator, item: Placed, focal: float) -> float:
     """Draws a distance, log-uniform from where the object fills the picture to where it is some pixels long."""
-    size = float(max(thing.model.size_m))
+    size = float(max(item.model.size_m))
     near = max(NEAREST_M, 0.55 * size)
     far = min(FARTHEST_M, focal * size / LEAST_PIXELS)
     return float(np.exp(rng.uniform(np.log(near), np.log(max(far, near * 1.2)))))
@@ -94,17 +94,17 @@ def _varied(rng: np.random.Generator, camera: Intrinsics) -> Intrinsics:
     return Intrinsics(camera.width, camera.height, camera.fx * scale, camera.fy * scale, camera.cx + cx, camera.cy + cy)
 
 
-def eye_about(rng: np.random.Generator, thing: Placed, aim: FloatArray, focal: float) -> FloatArray:
+def eye_about(rng: np.random.Generator, item: Placed, aim: FloatArray, focal: float) -> FloatArray:
     """Draws a position (3,) of the hand camera to view `aim`: mostly from above, people from about level."""
-    distance, around = distance_to(rng, thing, focal), float(rng.uniform(0, 2 * np.pi))
-    above = float(np.radians(rng.uniform(-5, 75) if thing.model.category != "person" else rng.uniform(-25, 25)))
+    distance, around = distance_to(rng, item, focal), float(rng.uniform(0, 2 * np.pi))
+    above = float(np.radians(rng.uniform(-5, 75) if item.model.category != "person" else rng.uniform(-25, 25)))
     direction = np.array([np.cos(above) * np.cos(around), np.cos(above) * np.sin(around), np.sin(above)])
     return np.asarray(aim + distance * direction)
 
 
-def _hand_view(rng: np.random.Generator, room: Room, thing: Placed, spec: CameraSpec) -> View | None:
-    camera, aim = _varied(rng, spec.intrinsics()), _aim(thing)
-    eye = eye_about(rng, thing, aim, camera.fx)
+def _hand_view(rng: np.random.Generator, room: Room, item: Placed, spec: CameraSpec) -> View | None:
+    camera, aim = _varied(rng, spec.intrinsics()), _aim(item)
+    eye = eye_about(rng, item, aim, camera.fx)
     if not _free(eye, room) or not 0.12 < eye[2] < 1.8:
         return None
     roll = float(rng.normal(0, 0.05) if rng.random() < 0.8 else rng.normal(0, 0.7))
@@ -119,12 +119,12 @@ def off_centre(rng: np.random.Generator, X_WC: RigidTransform, camera: Intrinsic
     return RigidTransform(X_WC.rotation() @ turn, X_WC.translation())
 
 
-def _body_view(rng: np.random.Generator, room: Room, thing: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
+def _body_view(rng: np.random.Generator, room: Room, item: Placed, specs: Mapping[str, CameraSpec]) -> View | None:
     """The robot stands on the floor, turned so that one of its body cameras looks about towards the object."""
     spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
     shrink = 1 if rng.random() < FULL_SIZE_SHARE else spec.picture_shrink
     camera = _varied(rng, spec.model_copy(update={"picture_shrink": shrink}).intrinsics())
-    aim, distance, bearing = _aim(thing), distance_to(rng, thing, camera.fx) + 0.3, float(rng.uniform(0, 2 * np.pi))
+    aim, distance, bearing = _aim(item), distance_to(rng, item, camera.fx) + 0.3, float(rng.uniform(0, 2 * np.pi))
     x, y = aim[:2] + distance * np.array([np.cos(bearing), np.sin(bearing)])
     height = STANDING_HEIGHT_M + float(rng.normal(0, 0.04))
     if not (0.4 < x < room.size_m[0] - 0.4 and 0.4 < y < room.size_m[1] - 0.4):

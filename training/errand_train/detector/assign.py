@@ -1,7 +1,7 @@
 """Assignment of the network's cells to objects.
 
-Task-aligned assignment after Feng et al., "TOOD: Task-aligned One-stage Object Detection" (2021): of the cells whose
-middles lie in an object's box, those answer for it that score its class high and overlap its box well already.
+Task-aligned assignment after Feng et al., "TOOD: Task-aligned One-stage Object Detection" (2021): an object gets
+those of the cells with their middles in its box that already score its class high and overlap its box well.
 """
 
 from __future__ import annotations

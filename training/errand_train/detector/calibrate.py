@@ -22,7 +22,7 @@ def score_offsets(
 ) -> tuple[float, ...]:
     """Offset of each class's logit that makes 0.5 its best threshold; 0 where labels are few.
 
-    `found` are the detections of each picture, also those of low score.
+    `found` are the detections of each picture, low scores included.
     """
     evaluation = evaluate(pictures, found, class_names)
     return tuple(_offset(evaluation, name) for name in class_names)
@@ -42,7 +42,8 @@ def _offset(evaluation: Evaluation, name: str) -> float:
 def best_threshold(scores: Floats, right: NDArray[np.bool_], labels: int) -> float:
     """Threshold with the highest harmonic mean of precision and recall.
 
-    Halfway to the next lower score, so that small changes do not matter. 0.5 when nothing is right.
+    The threshold lies halfway to the next lower score, so that small changes do not matter; 0.5 when no detection is
+    right.
     """
     if not right.any():
         return 0.5

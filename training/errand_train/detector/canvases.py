@@ -30,9 +30,9 @@ _RIGHT_ANGLE: Final = np.pi / 2
 class CanvasOptions:
     """Size of a canvas in pixels, and options of its content.
 
-    `mosaic` is the share of canvases of four pictures, `focused` the share of windows about an object where there is
-    one. Scales are drawn evenly in their logarithm. `changed` is the share of canvases with other light and colours.
-    `whole` takes whole pictures, turned and scaled only a little.
+    `mosaic` is the share of mosaics of four pictures, `focused` the share of windows about an object where there is
+    one. Scales are drawn log-uniformly. `changed` is the share of canvases with changed light and colours. `whole` uses
+    whole pictures, rotated and scaled only a little.
     """
 
     width_px: int = 320
@@ -91,11 +91,11 @@ def _four(options: CanvasOptions, random: np.random.Generator) -> list[Cell]:
 def _window(labels: Labels, cell: Cell, options: CanvasOptions, random: np.random.Generator) -> Floats:
     """A window about an object, or anywhere, at a random scale at which the object mostly fits."""
     scale = float(np.exp(random.uniform(*np.log(options.scales))))
-    thing = _chosen(labels, options, random)
-    if thing is None:
+    item = _chosen(labels, options, random)
+    if item is None:
         focus = _somewhere(random)
     else:
-        low, high = thing.min(axis=0), thing.max(axis=0)
+        low, high = item.min(axis=0), item.max(axis=0)
         focus = (low + high) / 2
         if random.random() < 0.8:
             fitting = _FITS * min(cell.size) / float(max(high - low))

@@ -1,8 +1,8 @@
 """The classifier network: judges the refinement network's boxes in crops, with a backbone pretrained on ImageNet.
 
-It begins with the refinement network's opinion, to which it adds. In use it adds three quarters of what it would: it is
-surer of what it has trained on than of what is new. (As the mean of weights before and after learning, after Wortsman
-et al., "Robust fine-tuning of zero-shot models", 2022, but of the last layers alone.)
+It adds corrections to the refinement network's logits. In use it adds three quarters of them, since it is
+overconfident on new pictures. (The effect is that of averaging weights before and after training, after Wortsman et
+al., "Robust fine-tuning of zero-shot models", 2022, for the last layers alone.)
 """
 
 from __future__ import annotations

@@ -31,8 +31,8 @@ class CocoImage(_Entry):
 class CocoLabel(_Entry):
     """An object in a picture, its box (x, y, width, height) in pixels, and its mask.
 
-    `visibility` is the share of what is in the picture before which nothing stands, `truncation` the share of the
-    object that is beyond the picture's edge.
+    `visibility` is the unoccluded share of the object's pixels in the picture, `truncation` the share of the object
+    beyond the picture's edge.
     """
 
     image_id: int | str

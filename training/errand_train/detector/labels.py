@@ -33,8 +33,8 @@ class TrainingDataError(ValueError):
 class Labels:
     """Objects of one picture: convex outlines (K, 2) in pixels, class indices (N,), visibilities, and more.
 
-    `seen` (N,) is the share of the whole object that the picture shows; `ignored` (N,) marks what is neither to be
-    found nor to be left.
+    `seen` (N,) is the visible share of the whole object; `ignored` (N,) marks objects that are neither targets nor
+    background.
     """
 
     outlines: tuple[Floats, ...]

@@ -109,7 +109,7 @@ class Learner(Generic[Network]):
     def start_from(self, file: Path, batches: Iterable[Batch | CropBatch]) -> None:
         """Loads the weights of an ONNX file, with statistics of batches, or the averaged ones of a checkpoint.
 
-        All else starts again. Raises TrainingDataError.
+        Everything else starts at zero. Raises TrainingDataError.
         """
         if file.suffix == ONNX:
             take_over(self.network, file)
@@ -164,7 +164,7 @@ class ProposalLearner(Learner[DetectorNetwork]):
 class CropLearner(Learner[CropNetwork]):
     """State of the training of a network on crops.
 
-    `early` makes the features at stride 8 when they are no longer trained. It needs no normalisation.
+    `early` computes the features at stride 8 when they are frozen. It needs no normalisation.
     """
 
     early: EarlyLayers | None = None
@@ -178,8 +178,8 @@ class CropLearner(Learner[CropNetwork]):
     def begin(self, first: Path, batches: Iterable[CropBatch]) -> None:
         """Loads the initial weights; layers without any stay unchanged. Raises TrainingDataError.
 
-        The refinement network begins with the proposal network's ONNX file and statistics of batches, the classifier
-        with ImageNet's weights.
+        The refinement network starts from the proposal network's ONNX file and statistics of batches, the classifier
+        from ImageNet's weights.
         """
         if isinstance(self.network, ClassifierNetwork):
             self.network.backbone.begin_with_imagenet()

@@ -77,7 +77,8 @@ class _Halving(torch.autograd.Function):
 class PaddedConv(nn.Conv2d):
     """Convolution whose output has the size of its input, or half of it with stride 2.
 
-    With stride 2 there is one row more of padding below than above, and so at the sides, as ImageNet's weights want it.
+    With stride 2, padding has one row more below than above, and one column more at the right, as ImageNet's weights
+    require.
     """
 
     def __init__(self, inputs: int, outputs: int, kernel: int, stride: int, groups: int = 1) -> None:

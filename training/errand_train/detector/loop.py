@@ -32,7 +32,7 @@ class Stepped:
 class Loop:
     """Training loop of one network.
 
-    `step` trains on one batch, given the share of the time that is done. `written` writes the ONNX file and returns its
+    `step` trains on one batch, given the completed share of the time. `written` writes the ONNX file and returns its
     figures; its argument says whether this is the last time.
     """
 

@@ -1,7 +1,7 @@
 """Matching of detections and labels by COCO's own evaluation (pycocotools).
 
-Labels that do not count are passed over by COCO's range of areas: they get an area outside the range, and so do
-detections that are too small to count when they are on nothing.
+COCO's range of areas makes its tools ignore labels that do not count: they get an area outside the range, and so do
+unmatched detections that are too small to count.
 """
 
 from __future__ import annotations

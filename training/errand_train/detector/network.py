@@ -76,8 +76,8 @@ class CrossStage(nn.Module):
 class Residual(nn.Module):
     """Residual block of two 3x3 convolutions, whose untrained output is its input.
 
-    After He et al., "Deep Residual Learning" (2015); that the last normalisation begins at nought, after Goyal et al.,
-    "Accurate, Large Minibatch SGD" (2017).
+    After He et al., "Deep Residual Learning" (2015); the last normalisation starts at 0 after Goyal et al., "Accurate,
+    Large Minibatch SGD" (2017).
     """
 
     def __init__(self, channels: int) -> None:

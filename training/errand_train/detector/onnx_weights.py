@@ -27,8 +27,8 @@ _HINT = "start again without it"
 def take_over(network: CascadeNetwork, file: Path) -> None:
     """Loads the weights of an ONNX file into a network, whose output is then equal but for the score offsets.
 
-    Every normalisation passes on what it gets and adds the file's bias, until `settle`. A crop network's file may
-    belong to any network before it. Raises TrainingDataError.
+    Until `settle`, every normalisation passes its input on and adds the file's bias. A crop network's file may belong
+    to any network before it. Raises TrainingDataError.
     """
     try:
         source = load_network(file, network.kind)
@@ -79,7 +79,7 @@ def _pass_on(normalisation: nn.BatchNorm1d | nn.BatchNorm2d, bias: Tensor) -> No
 def settle(network: nn.Module, batches: Iterable[tuple[Tensor, ...]]) -> None:
     """Gives each normalisation the statistics of batches of inputs, and each filter the length 1.
 
-    To be done after `take_over`. What the network says stays the same. Without it, learning would begin by forgetting:
+    Follows `take_over`, and does not change the network's output. Without it, training would begin by forgetting, since
     it normalises by the batch.
     """
     units = [unit for _, unit in normalised_layers(network)]

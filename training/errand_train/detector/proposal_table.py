@@ -28,8 +28,8 @@ Floats = NDArray[np.float32]
 class ProposalTable:
     """Table of R proposals: picture number (R,), box (R, 4) in the letterbox, logits (R, K), and the true object.
 
-    `classes` (R,) are those of the objects with which regions share NEAR or more, or -1; `wanted` (R, 4) are their
-    boxes, and the region's own where there is no object.
+    `classes` (R,) are those of the objects that proposals overlap by NEAR or more, or -1; `wanted` (R, 4) are their
+    boxes, and the proposal's own box without an object.
     """
 
     pictures: NDArray[np.int64]

@@ -53,8 +53,8 @@ Given = Mapping[str, NDArray[Any]]
 def quantise_detector(file: Path, data: Path, out: Path) -> Path:
     """Quantises the networks of a detector into a folder; returns the proposal network's file.
 
-    Those that are quantised already stay as they are. Ranges are measured on pictures of the data set `data` that
-    were trained on. Raises TrainingDataError for files that cannot be used, or when there is nothing to do.
+    Quantised networks stay unchanged. Ranges are measured on training pictures of the data set `data`. Raises
+    TrainingDataError for unusable files, or when there is nothing to do.
     """
     try:
         model = load_model(file)
@@ -147,9 +147,8 @@ class _Given(CalibrationDataReader):
 def _between_convolutions(graph: onnx.GraphProto) -> list[str]:
     """Names of the nodes between convolutions.
 
-    Before them are those that open the network; of these there are several where the second convolution takes each
-    channel by itself: in 8 bits this is where the classifier network lost, presumably in channels much weaker than
-    others.
+    Nodes before the first convolution open the network; there are several where the second convolution is depthwise: in
+    8 bits the classifier network lost precision there, presumably in channels much weaker than others.
     """
     convolutions = [node for node in graph.node if node.op_type == "Conv"]
     separate = len(convolutions) > 2 and any(one.name == "group" and one.i > 1 for one in convolutions[1].attribute)

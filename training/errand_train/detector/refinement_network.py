@@ -1,9 +1,8 @@
 """The refinement network: class and exact box in a crop about a proposal.
 
-It is the proposal network once more, with weights of its own that begin with that one's, on a crop: of all its cells
-the one counts that is surest of a box about the place's. What all of its coarsest level knows is added, and the
-proposal network's opinion, so that it begins with both. On the coarser levels it has more layers than the first, which
-add nothing at the beginning: on a crop they cost little.
+It is a second proposal network with weights of its own, which start from the proposal network's, on a crop: the
+result is that of the cell with the best box about the proposal. Features of its coarsest level and the proposal's
+logits are added. On the coarser levels it has additional layers that start as identities: on a crop they cost little.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class RefinementNetwork(CropNetwork):
 def best_cell_about(boxes: Tensor, logits: Tensor, found: Tensor) -> tuple[Tensor, Tensor]:
     """Logits (N, K) and box (N, 4) of the cell with the highest product of score and overlap with a box (N, 4).
 
-    Of all cells' logits (N, A, K) and boxes `found` (N, A, 4).
+    Inputs are the logits (N, A, K) and boxes `found` (N, A, 4) of all cells.
     """
     with torch.no_grad():
         fit = logits.float().amax(dim=2).sigmoid() * overlap(boxes[:, None], found)

@@ -49,9 +49,8 @@ class Budget:
 class Schedule:
     """Learning rates and phases: a warm-up, then half a cosine from the highest rate to the last.
 
-    Crops that hold little but an object come first, since they show most objects in the same time; then wider windows;
-    whole pictures, as the detector will see them, last. What goes on from trained weights needs no crops:
-    see `refining`.
+    Crops of single objects come first, since they show most objects in the same time; then wider windows; whole
+    pictures, as the detector sees them, last. Trained weights need no crops: see `refining`.
     """
 
     highest_rate: float = HIGHEST_RATE
@@ -65,7 +64,7 @@ class Schedule:
     def refining(highest_rate: float = REFINING_RATE) -> Schedule:
         """Schedule for trained weights: the larger windows, then whole pictures.
 
-        In seven minutes at a rate of 2e-3 a quarter of the mean average precision was lost; at 8e-4 little of it.
+        A rate of 2e-3 lost a quarter of the mean average precision in seven minutes; 8e-4 lost little.
         """
         return Schedule(highest_rate, phases=(Phase(0.0, _LARGER, 8), Phase(0.6, _PICTURES, 4)))
 
@@ -84,8 +83,8 @@ class Schedule:
 class TrainOptions:
     """Options of a training: data, output folder and length.
 
-    `start` names a checkpoint or a detector's ONNX file of which the weights are taken over. With `resume`, training
-    goes on where `out` stands.
+    `start` names a checkpoint or a detector's ONNX file with the initial weights. With `resume`, training continues
+    from the checkpoint in `out`.
     """
 
     data: Path
@@ -102,7 +101,7 @@ class TrainOptions:
 class RefineOptions(TrainOptions):
     """Options of the refinement network after the proposal network of the file `model`, or of the `classifier` network.
 
-    `start` names a checkpoint of such a training, or such a network's ONNX file, of which the weights are taken over.
+    `start` names a checkpoint of such a training, or such a network's ONNX file, with the initial weights.
     """
 
     model: Path

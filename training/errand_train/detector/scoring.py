@@ -1,6 +1,6 @@
 """Evaluation of a detector: figures of labels and detections.
 
-Average precision as COCO computes it, precision and recall at a score, false detections in pictures that hold nothing,
+Average precision as COCO computes it, precision and recall at a score, false detections in pictures without objects,
 and recall by size, distance and visibility.
 """
 
@@ -55,9 +55,9 @@ class Bin:
 class Score:
     """All figures. Precision and recall are over the detections of all classes, at SURE_SCORE and overlap 0.5.
 
-    Only labels of at least 24 x 8 pixels of which 40 % are seen count; the rest is passed over, as are detections
-    below that size that are on nothing. Bins are of all labels that the file does not mark to be ignored: by size and
-    by distance those of which 40 % are seen, by visibility those that are large enough.
+    Only labels of at least 24 x 8 pixels with 40 % visible count; other labels, and unmatched detections below that
+    size, are ignored. Bins hold all labels that the file does not mark to be ignored: by size and by distance those
+    with 40 % visible, by visibility those that are large enough.
     """
 
     pictures: int
@@ -104,7 +104,7 @@ def by_camera(
 ) -> dict[str, tuple[list[LabelledPicture], list[Found]]]:
     """Splits pictures and detections as the robot uses them: all classes by the hand camera, people by the others.
 
-    Without an entry for a camera of which no picture tells.
+    A camera without pictures has no entry.
     """
     of: dict[str, tuple[list[LabelledPicture], list[Found]]] = {}
     for picture, ones in zip(pictures, found, strict=True):
@@ -124,7 +124,7 @@ def by_camera(
 class Judged:
     """Right and wrong detections of a picture from SURE_SCORE on, and missed labels.
 
-    What is passed over is in neither.
+    Ignored detections are in neither list.
     """
 
     right: tuple[Detection, ...]
@@ -149,7 +149,7 @@ def judge_picture(picture: LabelledPicture, found: Found, class_names: Sequence[
 def picture_errors(picture: LabelledPicture, found: Found, class_names: Sequence[str]) -> float:
     """Error in one picture: scores of wrong detections, and 1 - score of each label.
 
-    A label on which there is nothing adds 1.
+    A label without a detection adds 1.
     """
     evaluation = evaluate([picture], [found], class_names)
     matches = [one for name in class_names for one in evaluation.matches(name) if not one.passed]

@@ -20,9 +20,9 @@ Box = tuple[float, float, float, float]
 class Label:
     """An object in a picture: its class, and its box (u0, v0, u1, v1) in pixels.
 
-    `crowd` marks a region in which any number of detections of the class is passed over, `ignore` an object that need
-    not be found and may be. `visibility` is the share of the whole object that is seen (what lies beyond the picture's
-    edge is not), `distance_m` how far it is, where known.
+    `crowd` marks a region that absorbs any number of detections of the class, `ignore` an object whose detection does
+    not matter. `visibility` is the visible share of the whole object (parts beyond the picture's edge are hidden),
+    `distance_m` its distance, where known.
     """
 
     class_name: str
@@ -87,8 +87,8 @@ def large_enough(box: Box) -> bool:
 def pictures_of_coco(document: object, class_names: Sequence[str]) -> tuple[LabelledPicture, ...]:
     """Reads the pictures of a COCO file in the order of their ids, with the labels of the named classes.
 
-    Categories go by their names, in any case of letters; their ids may be any. Labels of other categories are left
-    out. Raises ValueError, naming the entry.
+    Categories match by name, in upper or lower case; their ids may be any. Leaves out labels of other categories.
+    Raises ValueError, naming the entry.
     """
     coco = coco_file(document)
     ours = {name.casefold(): name for name in class_names}

@@ -63,7 +63,8 @@ def run_loop(
 ) -> Path:
     """Trains until the time is over; returns the ONNX `file` of the averaged network, the last of `networks`.
 
-    `belongs` tells of the network before it. At the end scores are calibrated by pictures of the training split.
+    `belongs` is the metadata about the network before it. At the end, pictures of the training split calibrate the
+    scores.
     """
     first, names = options.out / MODEL, exam.class_names
     facts = {"seed": str(options.seed), "data": digest_of(options.data), **(belongs or {})}

@@ -34,7 +34,7 @@ class Examination:
 def examination(folder: Path, split: str, class_names: Sequence[str], most: int | None = None) -> Examination:
     """Reads the pictures of `train` or `val`, or about `most` of them, evenly chosen. Raises TrainingDataError.
 
-    Those of crowded scenes are left out, since in them more of what is seen is an object than elsewhere.
+    Leaves out crowded scenes, since there a detection is more often an object than elsewhere.
     """
     file = folder / f"{split}.json"
     try:

@@ -1,7 +1,7 @@
 """The loose objects: a can, a bottle, a hammer and a cube. The origin of each is the centre of its bounding box.
 
-A primitive that lies on a box has a single contact point in point contact and would wobble. So each thing carries
-small spheres at its rim or corners, which stand out by `PROUD_M` and bear it.
+A primitive on a box has a single contact point in point contact and would wobble. So each object rests on small
+spheres at its rim or corners, which protrude by `PROUD_M`.
 """
 
 from __future__ import annotations

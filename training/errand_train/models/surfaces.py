@@ -17,9 +17,8 @@ Radii = ArrayLike
 def add_grid(mesh: Mesh, material: str, points: ArrayLike, uvs: ArrayLike | None = None, *, ring: bool = False) -> None:
     """Adds a smooth surface through a grid of points (R, C, 3).
 
-    It looks to the side where rows x columns points: for rings from the bottom up, counter-clockwise seen from
-    above, that is outward. With `ring` the last column equals the first. Without `uvs` (R, C, 2) the texture is
-    stretched over the grid.
+    Its front is the side of rows x columns: outward for rings from the bottom up, counter-clockwise seen from above.
+    With `ring` the last column equals the first. Without `uvs` (R, C, 2) the texture is stretched over the grid.
     """
     grid = np.asarray(points, dtype=float)
     texture = _stretched(grid.shape) if uvs is None else np.asarray(uvs, dtype=float)

@@ -1,8 +1,8 @@
 """The tray on which a person receives an object. Its origin is the middle of the plate's upper side.
 
-The plate lies level, its handle is along -x. Its mass is that of the tray with the arms that bear it, which hardly give
-way to what is laid on it. Its collision shape reaches deeper than the plate that is seen: a thin one would let through
-what falls by a centimetre in one step of the plant. Upright in a person's torso it is out of sight.
+The plate is level, its handle is along -x. Its mass is that of the tray with the arms that hold it. Its collision
+shape is deeper than the visible plate: an object that falls a centimetre in one step of the plant would pass through
+a thin one. Upright in a person's torso the tray is invisible.
 """
 
 from __future__ import annotations

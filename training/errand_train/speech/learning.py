@@ -1,8 +1,8 @@
 """Learns an adapter: the recogniser writes noisy speech as it was said, and hears it as it would hear it without noise.
 
-Two losses are added: the cross entropy of the text, told the same before it as when the recogniser is at work, and the
-squared distance between what the encoder makes of the noisy sound and what it made, before it learned anything, of the
-same speech without noise. The latter also keeps it from forgetting.
+Two losses are added: the cross entropy of the text with the prompt of the recogniser in use, and the squared distance
+between the encoding of the noisy sound and the original network's encoding of the same speech without noise. The
+second loss also prevents forgetting.
 """
 
 from __future__ import annotations

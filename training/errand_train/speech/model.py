@@ -54,8 +54,8 @@ class AdaptedWhisper(nn.Module):
     def states(self, heard: Tensor, prompt: Tensor, lengths: Tensor, text: Tensor) -> Tensor:
         """States of the decoder after each token of a text: (batch, tokens, 512).
 
-        Before it stand the first `lengths` (batch,) tokens of `prompt` (batch, most). What the prompt does to the
-        decoder is taken as it is: nothing is learned through it, which halves the work.
+        The first `lengths` (batch,) tokens of `prompt` (batch, most) precede the text. The prompt has no gradients,
+        which halves the work.
         """
         with torch.no_grad():
             told = self._prompted(heard.detach(), prompt)

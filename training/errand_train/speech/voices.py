@@ -1,6 +1,6 @@
 """Synthetic voices of this machine that speak the training sentences: Debian's flite, espeak-ng and festival.
 
-The voices with which figures are taken (`tests/benchmarks/speech/voices.py`) are none of them.
+The voices of the benchmark (`tests/benchmarks/speech/voices.py`) are not among them.
 """
 
 from __future__ import annotations

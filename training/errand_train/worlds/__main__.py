@@ -22,7 +22,7 @@ from plant.worlds.world import PACKAGE_NAME, ROBOTS, TRUTH, WORLDS_FOLDER
 def build(plan: Plan, folder: Path, package: str, maps: str = TRUTH) -> None:
     """Writes meshes, models, directives and surveyed maps of a world. The same source gives the same bytes.
 
-    `package` is what its files call the folder, as in `errand/worlds/flat`; `maps` is the folder's of the grids.
+    `package` is the name of the folder in its files, as in `errand/worlds/flat`; `maps` is the folder of the grids.
     """
     palette = materials()
     shell = shell_mesh(plan, palette)

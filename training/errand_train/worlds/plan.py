@@ -29,7 +29,7 @@ class Room(NamedTuple):
 class Door(NamedTuple):
     """An opening without a leaf; (x, y) is its middle, in the middle of the wall.
 
-    A width of its own goes before the plan's. One that is open to the top of the wall has no frame.
+    A width of its own overrides the plan's. A door that is open to the top of the wall has no frame.
     """
 
     name: str

@@ -64,7 +64,7 @@ def sources_digest() -> str:
 def numbers(category: str, *, for_training: bool) -> list[int]:
     """Numbers of the instances of a category for training, or for validation.
 
-    Every fourth number is kept from training.
+    Every fourth number is held out from training.
     """
     if not for_training:
         below = VALIDATION_BELOW if category in CLASSES else DISTRACTOR_VALIDATION_BELOW
@@ -113,7 +113,7 @@ def make(category: str, seed: int) -> tuple[Finished, str, str]:
 def instance(category: str, seed: int) -> ObjectModel:
     """Makes the instance of a category by its number, or reads it from the cache. Raises KeyError, ValueError.
 
-    `ERRAND_MODEL_CACHE` names another place than the user's cache.
+    `ERRAND_MODEL_CACHE` names another folder than the user's cache.
     """
 
     def fill(folder: Path) -> None:

@@ -119,7 +119,7 @@ def printed_label(
 ) -> FloatArray:
     """Draws a label (256, 512): a name (one of `brands`, else invented), content, emblem, fine print, bar code.
 
-    All of it stands `repeats` times beside each other, over a band, a wave, or nothing.
+    The content repeats `repeats` times side by side, over a band, a wave, or nothing.
     """
     image = np.zeros((256, 512, 3)) + ground
     ink = np.array((0.95, 0.95, 0.93) if float(np.mean(ground)) < 0.55 else (0.1, 0.1, 0.12))

@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from skills.files.errors import InputError, did_you_mean
+from skills.files.errors import InputError, nearest_name
 from skills.files.outside import is_there
 from skills.files.yaml_source import yaml_of
 
@@ -35,7 +35,7 @@ def mission_file(named: Path) -> Path:
         return known[named.stem]
     if named.suffix:
         return named
-    near = did_you_mean(named.name, known)
+    near = nearest_name(named.name, known)
     hint = f"did you mean '{near}'?" if near else "`errand missions` lists the missions that come with Errand"
     raise InputError("there is no such mission", hint=hint, file=named)
 

@@ -17,7 +17,7 @@ import yaml
 
 from executive.words.expression import Value
 from executive.words.mission import Parameter
-from skills.files.errors import InputError, did_you_mean, listing, suggestion
+from skills.files.errors import InputError, listing, nearest_name, suggestion
 from skills.files.outside import json_object, plain_text
 from skills.files.yaml_source import KeyPath, YamlSource, scalar_of
 from skills.quantities import LARGEST, Number, QuantityError, display_text, number_of
@@ -210,8 +210,8 @@ def _text(text: str, values: Mapping[str, Any], source: YamlSource, path: KeyPat
 
 def _value(name: str, values: Mapping[str, Any], source: YamlSource, path: KeyPath) -> Any:
     if name not in values:
-        near = did_you_mean(name, values)
-        misspelled = None if DECLARED in source.data else did_you_mean(DECLARED, (str(key) for key in source.data))
+        near = nearest_name(name, values)
+        misspelled = None if DECLARED in source.data else nearest_name(DECLARED, (str(key) for key in source.data))
         known = f"declare it under '{DECLARED}' with its default"
         known = known if misspelled is None else f"did you mean '{DECLARED}' by '{misspelled}'?"
         known = f"declared are {listing(values)}" if values else known

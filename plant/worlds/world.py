@@ -15,7 +15,7 @@ from executive.words.knowledge import Knowledge, Pose
 from executive.words.mission import Route, Stop
 from plant.models.catalogue import ImportedObject, load_catalogue, read_imported
 from plant.worlds.geometry_files import check_directives, check_model
-from skills.files.errors import InputError, did_you_mean, suggestion
+from skills.files.errors import InputError, nearest_name, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
@@ -363,7 +363,7 @@ def _find_folder(name_or_path: str | Path) -> Path:
     for folder in (named, Path(name_or_path)):
         if is_file(folder / DIRECTIVES):
             return folder.resolve()
-    close = did_you_mean(str(name_or_path), known_worlds())
+    close = nearest_name(str(name_or_path), known_worlds())
     hint = f" Did you mean {close!r}?" if close else ""
     known = ", ".join(known_worlds())
     raise WorldError(

@@ -30,7 +30,7 @@ def describe(seen: ObjectObservation) -> str:
 
 
 def count_sentence(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:
-    """ "there are two wrenches on the bench"; each kind of object is count_sentence for itself."""
+    """Counts objects by kind: "there are two wrenches on the bench"."""
     kinds = list(dict.fromkeys(str(seen.kind) for seen in found))
     numbers = {kind: sum(str(seen.kind) == kind for seen in found) for kind in kinds}
     counts = " and ".join(count_of(count, kind) for kind, count in numbers.items())

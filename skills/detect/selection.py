@@ -111,7 +111,7 @@ def level_distance(p_W: Sequence[float] | FloatArray, q_W: Sequence[float] | Flo
 def unlabelled_clusters(clusters: Iterable[Cluster], tracks: Sequence[Track], classes: Sequence[str]) -> list[Cluster]:
     """Clusters about as large as objects of some classes that no track explains, each place once; largest first.
 
-    A track of another class explains none when its belief in one of the classes is high enough.
+    A track of another class explains no cluster when it may well have one of the classes.
     """
     named = [track.position_W for track in tracks if not _is_doubted(track, classes)]
     left: list[Cluster] = []

@@ -128,7 +128,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     def _look_closer(self, inputs: DetectInputs) -> Routine[None]:
         """Views the expected place from near, or unlabelled clusters that may be wanted.
 
-        The second view of a place from near is one from above.
+        The second near view of a place is from above.
         """
         if inputs.expected_W is not None:
             if not self._has_enough(inputs):
@@ -161,7 +161,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     def _look_from_above(self, inputs: DetectInputs, targets_W: Sequence[FloatArray]) -> Routine[None]:
         """Raises the body as high as it can, for a camera on a head, which sees tables at a flat angle.
 
-        The body stays there when it finds the objects, which may be hidden from lower down.
+        The body stays high when it finds the objects, which may be hidden from lower down.
         """
         capabilities = self.context.robot.capabilities()
         raised_m = capabilities.height_range_m[1] - capabilities.standing_height_m - _BELOW_TOP_M
@@ -271,7 +271,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     ) -> Routine[Look]:
         """Points the camera at p_BT from the first possible one of `viewpoints_B`, and updates the tracks.
 
-        A camera on a head views it from a body raised by raised_m.
+        With a camera on a head, the body rises by raised_m.
         """
         message = f"looking for {wanted_names(inputs.classes, inputs.attributes)}"
         yield from self.look_at(p_BT, viewpoints_B, message, raised_m=raised_m)

@@ -13,12 +13,12 @@ __all__ = [
     "Problems",
     "SourceLine",
     "count_text",
-    "did_you_mean",
     "disk_is_full",
-    "few",
     "known_names",
     "listing",
+    "nearest_name",
     "one_line",
+    "short_list",
     "suggestion",
 ]
 
@@ -128,7 +128,7 @@ class Problems:
             raise InputError(first.message, hint=first.hint, file=first.file, line=first.line, others=others)
 
 
-def did_you_mean(word: str, known: Iterable[str]) -> str | None:
+def nearest_name(word: str, known: Iterable[str]) -> str | None:
     """Returns the known word with the spelling nearest to `word`, or None when none is near."""
     from rapidfuzz import fuzz, process
 
@@ -143,7 +143,7 @@ def suggestion(word: str, known: Iterable[str], otherwise: str | None = None, *,
     `shown` are the names to list where `known` holds other spellings, too.
     """
     names = list(known)
-    near = did_you_mean(word, names)
+    near = nearest_name(word, names)
     return f"did you mean '{near}'?" if near else otherwise or known_names(word, list(shown) or names)
 
 
@@ -158,7 +158,7 @@ def known_names(word: str, known: Iterable[str]) -> str:
     return f"known are {', '.join(name for _, _, name in near)} and {len(names) - len(near)} more"
 
 
-def few(words: Iterable[str]) -> str:
+def short_list(words: Iterable[str]) -> str:
     """Lists the first words and counts the others: "a, b, c and 12 more (see docs/reference)"."""
     names = list(words)
     if len(names) <= MOST_LISTED:

@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 from pydantic_core import ErrorDetails
 from typing_extensions import TypeAliasType
 
-from skills.files.errors import MOST_LISTED, InputError, did_you_mean, few, listing, suggestion
+from skills.files.errors import MOST_LISTED, InputError, listing, nearest_name, short_list, suggestion
 from skills.files.yaml_source import KeyPath, YamlSource, quoted_key
 from skills.quantities import QuantityError, base_type, display_text
 
@@ -63,11 +63,11 @@ def validate(model: type[ModelT], source: YamlSource) -> ModelT:
         InputError: the first error with its line and what would fit; `others` has the rest.
     """
     if not isinstance(source.data, dict):
-        hint = f"begin with the keys {few(_field_names(model))}"
+        hint = f"begin with the keys {short_list(_field_names(model))}"
         raise InputError("the file holds no mapping of keys to values", hint=hint, file=source.path, line=1)
     known = _field_names(model)
-    if source.data and not any(key in known or did_you_mean(str(key)[:40], known) for key in source.data):
-        what, hint = "none of its keys is known here", f"begin with the keys {few(known)}"
+    if source.data and not any(key in known or nearest_name(str(key)[:40], known) for key in source.data):
+        what, hint = "none of its keys is known here", f"begin with the keys {short_list(known)}"
         raise InputError(what, hint=hint, file=source.path, line=1)
     try:
         return model.model_validate(source.data, by_alias=True, by_name=False)
@@ -126,7 +126,7 @@ def _input_error(model: type[BaseModel], source: YamlSource, errors: list[ErrorD
     where = ".".join(str(part) for part in path)
     known = _field_names(*_models_at(model, path[:-1]))
     if error["type"] == "extra_forbidden":
-        hint = suggestion(str(path[-1]), known, f"known keys are {few(known)}")
+        hint = suggestion(str(path[-1]), known, f"known keys are {short_list(known)}")
         return source.error(path, f"unknown {quoted_key(path[-1])}", hint)
     if error["type"] == "missing" and isinstance(path[-1], int):
         parts = ".".join(str(part) for part in path[:-1])
@@ -225,7 +225,7 @@ def _plain_hint(error: ErrorDetails, word: str | None = None) -> str:
         return f'put it in quotes: "{value if isinstance(value, float) else display_text(value)}"'
     if error["type"] == "invalid_key":
         return "put the key in quotes"
-    near = did_you_mean(str(value), _allowed(error))
+    near = nearest_name(str(value), _allowed(error))
     return f"it reads {display_text(value)} now" if near is None else f"did you mean '{near}'?"
 
 

@@ -58,7 +58,7 @@ class Doorway:
 
 @dataclass(frozen=True)
 class Opening:
-    """Width of a doorway that is open in one piece (m): what is seen to be free, and what would be if all unseen were.
+    """Open width of a doorway in one piece (m): `least_m` as seen, `most_m` if all unseen strips were free.
 
     `rays` is the number of rays that crossed the doorway.
     """

@@ -1,8 +1,8 @@
 """Segmentation of an object in its box: the points above its plane that fill the box best.
 
-Each level plane about the box is a hypothesis of the plane below the object, and so is none. The points above it are
-clustered; the hypothesis wins whose cluster fills the box best. Heights are along z of the level frame O of the
-picture's frame tree.
+Each level plane about the box is a hypothesis of the plane below the object; one more hypothesis has no plane. The
+points above the plane are clustered; the hypothesis with the cluster that fills the box best wins. Heights are along
+z of the level frame O of the picture's frame tree.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ def people_in_images(
 
 
 def _detected(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
-    """Detects people in the pictures, each with its picture."""
+    """Detects people in pictures; pairs each with its picture."""
     found = detect_class_in_grey(detector, images, PERSON)
     pairs = ((image, one) for image, ones in zip(images, found, strict=True) for one in ones)
     return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]

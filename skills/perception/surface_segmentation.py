@@ -99,7 +99,7 @@ def segment_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin
 def segment_surfaces(
     image: Image, X_WO: RigidTransform, surfaces: Sequence[Surface], margin_m: float = 0.03
 ) -> Iterator[SurfaceView | None]:
-    """Segments each surface in a picture; None for each of which too little is visible."""
+    """Segments each surface in a picture; None for a surface of which too little is visible."""
     levels_m = [surface.height_m for surface in surfaces]
     band_m = (min(levels_m, default=0.0) - _PLANE_BAND_M, max(levels_m, default=0.0) + _HIGHEST_M)
     cloud, p_WC = cloud_from_image(image, X_WO, heights_m=band_m), camera_pose_W(image, X_WO).translation()
@@ -182,7 +182,7 @@ def _apart(cluster: Cluster, detected: Detection3D) -> float:
 def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
     """Splits a detected object from a cluster that holds others as well, such as one that touches it.
 
-    The points right above or below the detected pixels stay with the object: its box has left them out.
+    A part right above or below the object is not split off, since its box has only left it out.
     """
     whole = matching_cluster(view.clusters, detected)
     if whole is None or len(detected.pixels) == 0:

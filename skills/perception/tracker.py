@@ -66,7 +66,7 @@ class Track:
 
     @property
     def class_belief(self) -> float:
-        """Probability of `class_name`; 1 for a `ANY_OBJECT`, which every object is."""
+        """Probability of `class_name`; 1 for `ANY_OBJECT`, which every object is."""
         return self.classes.get(self.class_name, 1.0)
 
     @property
@@ -103,7 +103,7 @@ class Tracker:
         return tuple(sorted(self._tracks.values(), key=lambda track: (-track.belief, track.number)))
 
     def update(self, seen: Sequence[Detection3D], in_plain_view: Callable[[Track], bool]) -> tuple[Track, ...]:
-        """Updates the tracks with the detections of a picture; `in_plain_view` tells whether it should show a track."""
+        """Updates the tracks with the detections of a picture; `in_plain_view` says whether it should show a track."""
         before, seen = tuple(self._tracks.values()), without_duplicates(seen)
         pairs = _matched_surest_first(before, seen)
         for track in before:

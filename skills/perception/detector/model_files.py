@@ -1,4 +1,4 @@
-"""The model files of the detector's cascade: found, checked, and loaded for ONNX Runtime.
+"""Model files of the detector's cascade: paths, checks, and loading for ONNX Runtime.
 
 The proposal network takes `images` uint8 (N, 480, 640, 3) RGB, and returns `boxes` float32 (N, A, 4), which are
 (u0, v0, u1, v1) in pixels of the letterbox, and `scores` float32 (N, A, K) from 0 to 1.
@@ -141,7 +141,7 @@ def classifier_file(file: Path) -> Path:
 
 
 def load_model(file: Path = MODEL_FILE, *, networks: int = 3) -> DetectorModel:
-    """Loads the proposal network and those beside it, at most so many `networks`. Raises ModelFileError."""
+    """Loads the proposal network and those beside it, at most `networks` in all. Raises ModelFileError."""
     proposal = load_network(file, PROPOSAL)
     beside, last = refinement_file(file), classifier_file(file)
     if networks < 2 or not beside.exists():

@@ -65,7 +65,7 @@ def verdict_of(
     said = dict.fromkeys(_speech(tree, result))
     if said:
         success = verdict.success is not False and all(holds for holds, _ in said)
-        verdict = replace(verdict, success=success, why=_joined(verdict.why, *(told for _, told in said)))
+        verdict = replace(verdict, success=success, why=_joined(verdict.why, *(sentence for _, sentence in said)))
     unseen = listing(_unseen(tree, result)) if _unseen(tree, result) else ""
     if verdict.success is None:
         nothing = f"No goal condition stands for {unseen}." if unseen else "There are no goal conditions."

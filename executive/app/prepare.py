@@ -98,7 +98,7 @@ class Setting:
 
     @property
     def require_wake(self) -> bool:
-        """Whether a sentence must call the robot by name; the request decides, else the world."""
+        """True if a sentence must call the robot by name, by the request or else by the world."""
         asked = self.request.require_wake
         return self.knowledge.robot.require_wake if asked is None else asked
 

@@ -1,4 +1,4 @@
-"""A request that was understood, ready to be checked, shown and run."""
+"""Prepared requests: understood, compiled, and ready to be checked and run."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Prepared:
 
     @property
     def several(self) -> bool:
-        """Whether the run has several robots."""
+        """True if the run has several robots."""
         return len(self.robots) > 1
 
 

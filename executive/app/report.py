@@ -78,17 +78,17 @@ class Ending:
 
     @property
     def claimed(self) -> bool:
-        """Whether the tree claims success."""
+        """True if the tree claims success."""
         return self.outcome == "success"
 
     @property
     def achieved(self) -> bool:
-        """Whether the tree claims success and no referee denies it."""
+        """True if the tree claims success and no referee denies it."""
         return self.claimed and self.seen.success is not False
 
     @property
     def false_claim(self) -> bool:
-        """Whether the tree claims success and the referee denies it."""
+        """True if the tree claims success and the referee denies it."""
         return self.claimed and self.seen.success is False
 
     @property

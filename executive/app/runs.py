@@ -73,7 +73,7 @@ class MissionResult:
 
     @property
     def hung_up(self) -> bool:
-        """Whether it ended because its terminal was closed."""
+        """True if it ended because its terminal was closed."""
         return self.message == HUNG_UP
 
     def to_json(self) -> dict[str, Any]:

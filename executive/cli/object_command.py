@@ -54,8 +54,8 @@ def import_command(
     wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
         wanted.check()
-    with _refused(mesh), new_folder(out) as draft:
-        made = import_object(mesh, wanted, draft)
+    with _refused(mesh), new_folder(out) as folder:
+        made = import_object(mesh, wanted, folder)
     if (doubt := _unlike_its_class(made)) is not None:
         typer.echo(f"errand: warning: {doubt}", err=True)
     if as_json:

@@ -73,7 +73,7 @@ class _Typed:
 
     @property
     def several(self) -> bool:
-        """Whether the option can be repeated."""
+        """True if the option can be repeated."""
         return get_origin(self.kind) is tuple
 
     @property

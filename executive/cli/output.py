@@ -113,9 +113,9 @@ def new_folder(out: Path) -> Iterator[Path]:
         if out.exists() and (not out.is_dir() or any(out.iterdir())):
             raise InputError("it exists already", hint="name a new folder by --out", file=out)
         out.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as draft:
-            yield Path(draft)
-            shutil.copytree(draft, out, dirs_exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=out.parent, prefix=f".{out.name}-") as folder:
+            yield Path(folder)
+            shutil.copytree(folder, out, dirs_exist_ok=True)
 
 
 def terminal_answerer() -> Answerer | None:

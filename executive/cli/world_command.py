@@ -123,8 +123,8 @@ def _cylinders(path: Path) -> _Cylinders:
 def _made(source: Path, out: Path, make: Callable[[Path], None]) -> None:
     """Builds a world, loads it again, and prints its facts. Raises InputError."""
     try:
-        with new_folder(out) as draft:
-            make(draft)
+        with new_folder(out) as folder:
+            make(folder)
     except WorldError as error:
         raise InputError(str(error), file=source) from error
     made = open_world(str(out))

@@ -143,8 +143,8 @@ class Feed:
             self._messages = [*older, *self._messages[cut:]]
             self._full = max(self._most, len(self._messages) + self._most // 2)
         needed, half = {each.picture for each in newest.values()}, self._most_pictures // 2
-        kept = {*needed, *range(self._shown - half, self._shown)}
-        self._pictures = {number: picture for number, picture in self._pictures.items() if number in kept}
+        stored = {*needed, *range(self._shown - half, self._shown)}
+        self._pictures = {number: picture for number, picture in self._pictures.items() if number in stored}
         self._full_pictures = len(self._pictures) + half
 
     def _call_listeners(self) -> None:

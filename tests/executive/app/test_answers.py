@@ -25,7 +25,7 @@ def test_an_answer_given_beforehand_leads_to_the_commands():
     assert goals(Request(TABLE, answers=("coffee",))) == ["workshop", "coffee table"]
 
 
-def test_what_is_kept_of_the_sentence_has_the_answer_in_its_place():
+def test_the_stored_sentence_has_the_answer_in_it():
     request = prepare(Request(TABLE, answers=("the second one",))).request
     assert request.sentence == "put the cube on the coffee table"
 
@@ -45,7 +45,7 @@ def test_an_answer_that_does_not_help_is_refused():
         prepare(Request(TABLE, answers=("the unicorn",)))
 
 
-def test_who_sits_at_the_terminal_is_asked(monkeypatch, capsys):
+def test_a_user_at_the_terminal_is_asked(monkeypatch, capsys):
     monkeypatch.setattr("sys.stdin", io.StringIO("2\n"))
     assert prepare(Request(TABLE), ask=ask_at_terminal).mission.commands[-1].goal == "coffee table"
     assert "[1] kitchen table  [2] coffee table" in capsys.readouterr().err

@@ -15,7 +15,7 @@ def answered(artifacts, answer):
     return artifacts.message("answer", {"node": "alice/q", "question": "q", "answer": answer, "message": "m"})
 
 
-def test_a_yes_shows_what_was_found_with_its_box(tmp_path):
+def test_a_positive_answer_shows_the_found_object_with_its_box(tmp_path):
     artifacts = Artifacts()
     artifacts.message("detections", looked())
     artifacts.message("detections", looked((10, 10, 40, 30)))
@@ -26,7 +26,7 @@ def test_a_yes_shows_what_was_found_with_its_box(tmp_path):
     assert draw_answer(artifacts, tmp_path).stat().st_size > 100
 
 
-def test_a_no_shows_all_that_was_looked_at():
+def test_a_negative_answer_shows_all_views():
     artifacts = Artifacts()
     for grey in (False, True, False, False, False):
         artifacts.message("detections", looked(grey=grey))
@@ -40,7 +40,7 @@ def test_without_a_question_there_is_no_picture(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_of_many_looks_without_an_answer_only_the_last_are_remembered():
+def test_only_the_last_views_before_an_answer_are_kept():
     artifacts = Artifacts()
     for _ in range(100):
         artifacts.message("detections", looked())

@@ -95,7 +95,7 @@ def test_a_mission_that_is_handed_back_comes_before_the_others():
     assert [(each.mission, each.robot) for each in dispatcher.assign(bid).begun] == [(1, "Bob")]
 
 
-def test_what_no_robot_can_do_is_refused_with_the_reason_of_each():
+def test_a_mission_that_no_robot_can_do_is_refused_with_each_reason():
     dispatcher = Auction([1], ["Alice", "Bob"])
     turn = dispatcher.assign(bid_of([10.0], {(1, "Alice"), (1, "Bob")}))
     assert turn.refused == {1: "no robot can do it: Alice: out of reach; Bob: out of reach"}

@@ -33,7 +33,7 @@ def test_a_run_without_a_referee_is_achieved_when_the_tree_says_so(prepared):
     assert (x_m, y_m) == (pytest.approx(1.0, abs=0.2), pytest.approx(0.5, abs=0.2))
 
 
-def test_its_report_says_that_nobody_else_saw_it(prepared):
+def test_the_report_of_a_run_without_a_referee_says_so(prepared):
     report = run_request(prepared, ScriptedBackend()).report
     told = json.loads(json.dumps(report.to_json()))
     assert told["referee"] is None

@@ -18,7 +18,7 @@ def lines(split):
     return [str(command) for command in split.first], [str(command) for command in split.second], split.table
 
 
-def test_what_is_held_is_put_on_a_table_and_taken_from_there():
+def test_a_split_puts_the_held_object_on_a_table_and_takes_it_from_there():
     (split,) = splits((TAKE, PUT), ["desk"])
     put = "Take [2 red cup] to [desk] and do [Nothing] to [Nothing]"
     take = "Take [Nothing] to [desk] and do [grasp] to [2 red cup]"
@@ -29,7 +29,7 @@ def test_between_commands_with_an_empty_gripper_nothing_is_handed_over():
     assert list(splits((GO, GO), ["desk"])) == [Split((GO,), (GO,))]
 
 
-def test_each_table_is_a_way():
+def test_each_table_gives_a_split():
     found = list(splits((TAKE, PUT, GO), ["desk", "shelf"]))
     assert [split.table for split in found] == ["desk", "shelf", None]
 

@@ -53,7 +53,7 @@ def test_a_fetch_gets_through_the_narrowest_door_of_a_world_wherever_it_begins(a
     assert 3.0 < route.length_m < 5.0
 
 
-def test_who_takes_things_and_what_covers_the_surfaces_are_those_of_the_world():
+def test_people_who_take_objects_and_full_surfaces_are_those_of_the_world():
     world = load_world("flat")
     able = abilities_in(world)
     assert able.takers == {person.name for person in world.seed_rules.people}
@@ -95,12 +95,12 @@ def test_each_route_is_planned_once_in_all_processes(tmp_path, broken):
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
-def test_where_nothing_can_be_kept_routes_are_planned_all_the_same(tmp_path):
+def test_routes_are_planned_without_a_writable_cache(tmp_path):
     tmp_path.chmod(0o500)
     assert RouteCache(tmp_path / "routes" / "a.json", Planner()).route(HERE, THERE) == Route(5.0, 5.25)
 
 
-def test_ways_are_planned_anew_when_a_file_that_they_depend_on_has_changed(tmp_path, monkeypatch):
+def test_routes_are_planned_again_when_a_file_that_they_depend_on_has_changed(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     robot, planner = tmp_path / "robot.yaml", Planner()
     for text, asked in (("a", 1), ("a", 1), ("b", 2)):

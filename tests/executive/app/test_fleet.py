@@ -56,7 +56,7 @@ def test_a_robot_that_can_do_it_offers_its_time_and_what_is_left_of_its_battery(
     assert 0.8 < bid.charge < 0.9
 
 
-def test_a_robot_does_not_offer_to_take_something_from_where_it_cannot_come(mission):
+def test_a_robot_does_not_bid_for_an_object_that_it_cannot_reach(mission):
     bid = bid_for(mission, robot("Alice", 0.9, Routes(closed=True)), 0.15)
     assert "no path leads to the kitchen table, where it must take the coke" in bid.problems
 
@@ -100,7 +100,7 @@ class EastOf:
 
 
 @pytest.mark.parametrize(("x_m", "reached"), [(9.5, True), (10.6, False)])
-def test_a_robot_takes_over_only_what_it_can_come_near_to(clock, x_m, reached):
+def test_a_robot_takes_over_only_a_reachable_object(clock, x_m, reached):
     bob = FleetRobot(SimpleNamespace(kind="spot"), Pose2D(11.0, 2.0, 0.0), planner=EastOf(x_m))
     offers = Offers({"Bob": bob}, BatteryFacts(), clock.now, Auction((), ["Bob"]))
     assert offers.takes_from("Bob", TABLE) is reached

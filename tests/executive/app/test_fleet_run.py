@@ -210,7 +210,7 @@ def _begins_first_command(event):
     return event.topic == "transitions" and event.data["node"].endswith("/1-kitchen") and event.data["to"] == "RUNNING"
 
 
-def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_again(fleet, script, registry):
+def test_an_object_in_a_dead_robots_gripper_is_named_and_not_fetched_again(fleet, script, registry):
     registry["grasp"].changes_world = True
     script.ends["grasp"] = fleet.hold
     script.ends["navigate"] = lambda skill: fleet.die_once_after("grasp", skill)
@@ -220,7 +220,7 @@ def test_what_is_in_the_gripper_of_a_robot_that_dies_is_told_and_not_fetched_aga
     assert fleet.message(1).endswith("; the coke is in Alice's gripper")
 
 
-def test_without_another_robot_the_mission_is_told_as_failed_and_what_had_not_begun_stays_queued(fleet):
+def test_without_another_robot_the_mission_fails_and_later_ones_stay_queued(fleet):
     for line in (KITCHEN, BEDROOM, KITCHEN):
         fleet.queue(line)
     fleet.faults = {"Alice": ["robot dies at 0.08 s"], "Bob": ["robot dies at 0.08 s"]}
@@ -250,7 +250,7 @@ def test_status_shows_what_runs_and_what_waits_while_it_does(fleet, script):
     assert states[1] == [("Alice", "success"), ("Bob", "success"), ("Alice", "running")]
 
 
-def test_whose_each_mission_is_stands_in_the_store(fleet):
+def test_the_store_has_the_robot_of_each_mission(fleet):
     fleet.queue(KITCHEN)
     fleet.run()
     given = GivenMissions(fleet.store).all()[1]
@@ -335,7 +335,7 @@ def chain(fleet, script, registry):
     return fleet
 
 
-def test_what_no_robot_can_do_alone_is_handed_over_by_a_table(chain, script):
+def test_a_mission_that_no_robot_can_do_alone_is_split_at_a_table(chain, script):
     assert chain.run() == [("Bob", "success", 0), ("Alice", "success", 0), ("Bob", "success", 0)]
     assert [(row["id"], row["part_of"], row["after"]) for row in chain.rows] == [
         (1, None, None),
@@ -361,7 +361,7 @@ def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(cha
     assert [robot.holder for robot in chain.robots.values()] == [None, None]
 
 
-def test_where_the_second_robot_does_not_reach_what_the_first_puts_down_nothing_is_handed_over(chain):
+def test_a_mission_is_not_split_at_a_table_that_the_second_robot_cannot_reach(chain):
     chain.tables = ()
     assert chain.run() == [(None, "failure", 0)]
 
@@ -389,18 +389,18 @@ def test_when_the_first_part_fails_the_second_is_not_begun(chain, script):
     assert chain.message(1).startswith("mission 2: ")
 
 
-def test_what_no_two_robots_can_do_either_ends_with_the_reason_of_each(chain):
+def test_a_mission_that_no_two_robots_can_do_ends_with_each_reason(chain):
     chain.cannot = lambda name, command: command.goal == "bedroom"
     assert chain.run() == [(None, "failure", 0)]
     assert chain.message(1) == "no robot can do it: Alice: out of reach; Bob: out of reach"
 
 
-def test_what_one_robot_can_do_alone_is_not_split(chain):
+def test_a_mission_for_one_robot_is_not_split(chain):
     chain.cannot = lambda name, command: name == "Alice" and command.goal == "bedroom"
     assert chain.run() == [("Bob", "success", 0)]
 
 
-def test_the_log_has_whose_each_mission_is_whenever_that_changes(fleet):
+def test_the_log_has_the_robot_of_each_mission_whenever_it_changes(fleet):
     fleet.queue(KITCHEN)
     fleet.faults["Alice"] = ["robot dies at 0.08 s"]
     fleet.run()
@@ -473,13 +473,13 @@ def sees_nothing(script, *names):
     return detect
 
 
-def test_what_one_robot_does_not_find_the_other_is_sent_for(fleet, script):
+def test_the_other_robot_searches_for_an_object_that_one_did_not_find(fleet, script):
     fleet.queue(TAKE)
     script.ends.update(detect=sees_nothing(script, "Alice"), grasp=fleet.hold)
     assert fleet.run() == [("Bob", "success", 1)]
 
 
-def test_what_fell_down_is_taken_by_the_other(fleet, script, registry):
+def test_a_dropped_object_is_taken_by_the_other_robot(fleet, script, registry):
     for name in ("grasp", "place"):
         registry[name].changes_world = True
     fleet.queue(TAKE, PUT)
@@ -494,7 +494,7 @@ def test_what_fell_down_is_taken_by_the_other(fleet, script, registry):
     assert fleet.robots["Alice"].holding is fleet.robots["Bob"].holding is False
 
 
-def test_what_the_first_still_holds_is_not_given_to_the_other(fleet, script, registry):
+def test_a_mission_stays_with_a_robot_that_holds_its_object(fleet, script, registry):
     for name in ("grasp", "place"):
         registry[name].changes_world = True
     fleet.queue(TAKE, PUT)
@@ -503,14 +503,14 @@ def test_what_the_first_still_holds_is_not_given_to_the_other(fleet, script, reg
     assert fleet.rows[0]["reassigned"] == 0
 
 
-def test_what_neither_robot_manages_ends_with_the_words_of_both(fleet, script):
+def test_a_mission_that_both_robots_fail_ends_with_both_reasons(fleet, script):
     fleet.queue(TAKE)
     script.ends["detect"] = sees_nothing(script, "Alice", "Bob")
     assert fleet.run() == [("Bob", "failure", 1)]
     assert "; Alice before: it tried: " in fleet.message(1)
 
 
-def test_what_the_other_cannot_do_stays_with_the_first(fleet, script):
+def test_a_mission_that_the_other_cannot_do_stays_with_the_first(fleet, script):
     fleet.queue(TAKE)
     fleet.unable = {"Bob"}
     script.ends["detect"] = sees_nothing(script, "Alice")

@@ -124,7 +124,7 @@ def test_a_drive_to_a_pose_asks_for_the_body_there(conditions_by):
     assert not condition.goal[0].contains((4.5, -1.0, 0.5))
 
 
-def test_a_thing_may_be_taken_from_where_else_it_was_looked_for(conditions_by):
+def test_an_object_may_be_taken_from_another_searched_place(conditions_by):
     (condition,) = conditions_by(step("Take [Nothing] to [bedroom] and do [grasp] to [coke]"))
     assert {region.name for region in condition.source} == {"bedside table", "counter", "shelf"}
 
@@ -163,7 +163,7 @@ VERDICTS = [
 
 
 @pytest.mark.parametrize(("steps", "holds", "success"), VERDICTS)
-def test_what_can_be_judged_decides_and_a_mission_of_nothing_else_is_not_judged(verdict_on, steps, holds, success):
+def test_only_steps_with_goal_conditions_are_judged(verdict_on, steps, holds, success):
     assert verdict_on(*steps, holds=holds).success is success
 
 
@@ -209,7 +209,7 @@ def spoken(knowledge, registry, run_tree):
 HELLO = CallSkill(skill="speak", values={"text": "Hello"})
 
 
-def test_what_is_said_does_not_keep_the_robot_from_staying_where_it_went(spoken):
+def test_speech_does_not_end_the_condition_on_the_robots_place(spoken):
     verdict, asked = spoken(HELLO, step(GO, Policy()), HELLO)
     assert verdict.success is True
     assert [(one.kind, one.when) for one in asked] == [(GoalKind.WENT, When.END_OF_MISSION)]

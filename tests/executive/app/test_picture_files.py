@@ -63,7 +63,7 @@ def test_a_picture_of_one_pixel_is_read(tmp_path):
 
 
 @pytest.mark.parametrize("ending", [".png", ".jpg", ".bmp", ".tiff", ".webp"])
-def test_what_is_cut_off_is_damaged(tmp_path, ending):
+def test_a_truncated_file_is_damaged(tmp_path, ending):
     file = written(tmp_path / f"a{ending}", noise(100, 100, 3))
     file.write_bytes(file.read_bytes()[: file.stat().st_size * 2 // 3])
     assert refused(file) == "the picture is damaged or cut off"
@@ -111,13 +111,13 @@ def test_a_long_picture_is_read(tmp_path):
     assert read_picture(written(tmp_path / "a.png", np.zeros((10, 20_000), np.uint8))).shape == (10, 20_000, 3)
 
 
-def test_what_is_written_is_read_again(tmp_path):
+def test_a_written_picture_is_read_again(tmp_path):
     picture = noise(20, 30, 3)
     write_picture(tmp_path / "new" / "a.png", picture)
     assert np.array_equal(read_picture(tmp_path / "new" / "a.png"), picture)
 
 
-def test_where_nothing_can_be_written_it_says_so(tmp_path):
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match=r"cannot write it .*; name a folder"):
         write_picture(tmp_path / "file" / "a.png", noise(2, 2, 3))

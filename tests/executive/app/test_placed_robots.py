@@ -70,7 +70,7 @@ def test_a_start_or_dock_that_cannot_be_is_refused(setups, words):
         placed_robots(WORLD, KNOWN, setups)
 
 
-def test_when_there_is_no_room_for_one_more_robot_that_is_said():
+def test_a_robot_without_a_free_place_is_refused():
     with pytest.raises(InputError, match="no free place"):
         placed_robots(WORLD, KNOWN, [RobotConfig(f"Robot {number}", "spot") for number in range(60)])
 

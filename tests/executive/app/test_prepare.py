@@ -58,7 +58,7 @@ def test_path_ids_carry_the_robots_name():
     assert ids == {"alice", "bob"}
 
 
-def test_what_is_for_nobody_goes_to_the_robot_that_is_there_first():
+def test_a_sentence_without_a_name_goes_to_the_fastest_robot():
     near_the_office = (TWO[0], RobotConfig("Bob", "spot", start=asked_pose()))
     assert asked("go to the office", near_the_office).mission.robot_name == "Bob"
 
@@ -69,7 +69,7 @@ def asked_pose():
     return Pose2D(pose.x, pose.y, pose.yaw)
 
 
-def test_one_who_needs_what_another_brings_begins_when_that_one_is_done():
+def test_a_robot_that_needs_what_another_brings_waits_for_it():
     prepared = asked("Alice, put the coke on the kitchen table, then let Bob bring it to Robin")
     waits = {each.mission.robot_name: each.after for each in prepared.all}
     assert waits == {"Alice": (), "Bob": ("Alice",)}
@@ -186,7 +186,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("said", "instead", "line", "words"), REFUSED)
-def test_what_is_wrong_with_the_robots_of_a_file_is_told_with_its_line(asked_file, said, instead, line, words):
+def test_errors_in_the_robots_of_a_file_name_their_line(asked_file, said, instead, line, words):
     assert said in PARTS
     with pytest.raises(InputError) as error:
         asked_file(PARTS.replace(said, instead))

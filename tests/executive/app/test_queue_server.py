@@ -117,7 +117,7 @@ def states(store):
     return [each.state.value for each in store.missions() if each.state is not MissionState.STANDING]
 
 
-def test_it_waits_until_something_is_due_and_runs_it(server, standing, world, lines):
+def test_the_server_waits_until_a_mission_is_due_and_runs_it(server, standing, world, lines):
     standing.add(REQUEST, trigger_of("every day 09:00"))
     standing.add(REQUEST, trigger_of("every 40m"))
     server.serve(end=START + 1.5 * HOUR)
@@ -130,7 +130,7 @@ def test_it_waits_until_something_is_due_and_runs_it(server, standing, world, li
     assert lines[0] == "Mission 3 is queued: go kitchen (every 40m, due 2026-11-24 08:40)"
 
 
-def test_it_runs_what_is_queued_already_and_what_comes_meanwhile(server, store, world):
+def test_the_server_runs_queued_missions_and_later_ones(server, store, world):
     store.add(REQUEST, queued=True)
     world.meanwhile = [lambda: store.add(REQUEST, queued=True), lambda: server.stop("enough")]
     assert [each.mission for each in server.serve()] == [1, 2]
@@ -151,7 +151,7 @@ def test_until_idle_it_ends_when_nothing_is_queued(server, store, standing, worl
         (Missed.ONCE, ["08:10", "08:35"]),
     ],
 )
-def test_what_is_due_while_a_mission_runs_is_missed(server, standing, world, missed, expected):
+def test_times_during_a_mission_count_as_missed(server, standing, world, missed, expected):
     """Missions take 25 minutes: 08:20 and 08:30 pass while that of 08:10 runs."""
     world.takes = timedelta(minutes=25)
     standing.add(REQUEST, trigger_of("every 10m"), missed)
@@ -160,7 +160,7 @@ def test_what_is_due_while_a_mission_runs_is_missed(server, standing, world, mis
 
 
 @pytest.mark.parametrize(("missed", "runs"), [(Missed.SKIP, 0), (Missed.ONCE, 1)])
-def test_what_was_due_before_it_was_started_again_is_missed(server, standing, world, missed, runs):
+def test_times_before_the_servers_start_count_as_missed(server, standing, world, missed, runs):
     standing.add(REQUEST, trigger_of("every 10m"), missed)
     world.now += 5 * HOUR
     server.serve(until_idle=True)
@@ -183,7 +183,7 @@ def test_a_server_that_is_killed_between_firing_and_running_runs_it_when_it_is_s
     assert world.runs == [("10:00", 2, "every day 09:00, due 2026-11-24 09:00")]
 
 
-def test_a_mission_that_was_broken_off_goes_on_first(server, store, world):
+def test_an_interrupted_mission_is_resumed_first(server, store, world):
     store.add(REQUEST, queued=True)
     store.begin(store.add(REQUEST, queued=True).id)
     server.serve(until_idle=True)
@@ -199,14 +199,14 @@ def test_a_mission_that_ends_the_process_each_time_is_set_aside_and_the_next_one
     assert store.mission(1).message == "it was started 3 times and interrupted"
 
 
-def test_a_run_that_was_broken_off_is_left_to_the_user(server, store, world):
+def test_an_interrupted_run_is_left_to_the_user(server, store, world):
     store.begin(store.add(REQUEST, queued=False).id)
     with pytest.raises(InputError, match=r"mission 1 \(go kitchen\) was interrupted; `errand resume`"):
         server.serve(until_idle=True)
     assert world.runs == []
 
 
-def test_when_it_is_stopped_the_mission_is_cancelled_and_the_queue_stays(server, store, world):
+def test_stopping_the_server_cancels_the_mission_and_keeps_the_queue(server, store, world):
     store.add(REQUEST, queued=True), store.add(REQUEST, queued=True)
     world.during = [lambda: server.stop("cancelled by SIGTERM")]
     assert len(server.serve()) == 1
@@ -245,7 +245,7 @@ def test_the_listeners_follow_the_standing_missions(server, standing, world, sto
     assert followed == [[OnCall("a")], [OnCall("a")], [OnCall("b")]]
 
 
-def test_what_cannot_be_listened_to_ends_it_at_the_beginning_and_is_told_once_later(
+def test_a_taken_port_ends_the_server_at_its_start_and_is_reported_once_later(
     store, standing, world, lines, monkeypatch
 ):
     refused = []
@@ -349,7 +349,7 @@ def test_a_plug_in_hears_the_topics_that_missions_wait_for(listeners, notes):
     assert notes == [("start", "a", "b"), ("stop",), ("start", "b"), ("stop",)]
 
 
-def test_what_a_plug_in_hears_is_that_of_its_kind(listeners, sources, lines):
+def test_a_plug_in_queues_only_missions_of_its_kind(listeners, sources, lines):
     listeners.follow([OnTopic("bell", "a")])
     sources[0].fire("a", b"")
     assert lines[0].startswith("topic bell:a: ")  # there is no store
@@ -394,7 +394,7 @@ def test_a_plug_in_that_hangs_at_its_start_is_named_and_not_asked_again(tmp_path
 
 
 @pytest.mark.parametrize("host", ["", "a b", "x" * 300, "[::1]", "h\u00f6st", "..", "-"])
-def test_what_is_no_host_is_refused_by_its_option(host, tmp_path, lines):
+def test_a_bad_host_is_refused_with_its_option(host, tmp_path, lines):
     with pytest.raises(InputError, match="--host"):
         Listeners(tmp_path / "m", CallAddress(host, 0, TOKEN), lines.append).follow([OnCall("beer")])
 
@@ -587,7 +587,7 @@ def test_a_message_that_cannot_be_used_is_told_and_raises_nothing(calls, stand, 
 
 
 @pytest.mark.mission
-def test_a_server_of_its_own_runs_what_is_called_and_ends_at_a_polite_kill(tmp_path):
+def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
     where = ["--out", str(tmp_path)]
     added = CliRunner().invoke(app, ["queue", "add", "go_to_pose", "--on", "call pose", "--no-record", *where])
     assert added.exit_code == 0, added.output

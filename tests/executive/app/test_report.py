@@ -14,5 +14,5 @@ from executive.words.goal import RefereeReport
         ((2, 0, 1, 1), "2 collisions (1 with people), 0 drops, 1 time somebody walked into the robot"),
     ],
 )
-def test_the_counts_are_told_in_words(counts, text):
+def test_the_counts_are_formatted_in_words(counts, text):
     assert counts_text(RefereeReport(True, "it is so", *counts)) == text

@@ -45,7 +45,7 @@ def talk(tmp_path, monkeypatch):
     return prepare(Request(file=path, out=tmp_path / "out", seed=4, record=False))
 
 
-def test_what_was_said_is_in_report_and_page(talk):
+def test_speech_is_in_report_and_page(talk):
     heard = []
     speech = OnMessage(lambda topic, message: heard.append(message["text"]) if topic == "speech" else None)
     report = run_request(talk, ScriptedBackend(), visitors=[speech]).report
@@ -85,7 +85,7 @@ def test_pictures_of_many_answers_are_kept_up_to_a_limit():
     assert artifacts.numbers["alice/q", 0.0] == 0
 
 
-def test_an_answer_for_which_nobody_looked_has_no_picture():
+def test_an_answer_without_a_view_has_no_picture():
     artifacts = Artifacts()
     artifacts.message("detections", {"detections": [], "image": np.zeros((48, 64, 3), np.uint8)})
     looked = {"node": "alice/q", "t": 1.0, "question": "q", "answer": False, "message": "m"}

@@ -99,7 +99,7 @@ def test_it_needs_no_script_and_nothing_from_elsewhere():
     assert not re.search(r'(src|href)="(?!data:)|url\(|@import', html)
 
 
-def test_what_there_is_nothing_of_has_no_heading():
+def test_an_empty_section_has_no_heading():
     text = Reader(page()).text
     assert not any(name in text for name in ("Answers", "Said", "Seen", "Pictures", "Behaviour tree"))
 

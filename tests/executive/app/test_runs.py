@@ -74,7 +74,7 @@ class TestMissionRuns:
         with pytest.raises(InputError, match="the disk is full"):
             runs(fill).run(mission)
 
-    def test_what_is_cancelled_before_it_begins_begins_cancelled(self, runs, mission):
+    def test_a_mission_cancelled_before_its_start_is_cancelled_at_once(self, runs, mission):
         begun = runs(cancelled_by_control)
         begun.cancel("cancelled by SIGTERM")
         assert begun.run(mission).message == "cancelled by SIGTERM"

@@ -46,7 +46,7 @@ def test_faults_and_how_many_the_seed_draws(read):
 
 
 @pytest.mark.parametrize("at", ["20", "20.0", "20 s", "20s"])
-def test_somebody_walks_to_a_place_at_a_time(read, at):
+def test_a_person_walks_to_a_place_at_a_time(read, at):
     scenario = read(event(f"{{person: the boss, at: {at}, to: kitchen}}"))
     route = {
         "start": 20.0,
@@ -58,7 +58,7 @@ def test_somebody_walks_to_a_place_at_a_time(read, at):
     assert scenario.people == {"Robin": route}
 
 
-def test_somebody_new_walks_from_a_place_along_several(read):
+def test_a_new_person_walks_along_several_places(read):
     scenario = read(event("{person: Sam, at: 2, from: hall, to: [kitchen, {at: [3, 2], pause: 4}], speed: 0.8}"))
     stops = [(stop["at"], stop["pause"]) for stop in scenario.people["Sam"]["waypoints"]]
     assert stops == [((5.0, 2.0), 0.0), ((1.0, 2.0), 0.0), ((3.0, 2.0), 4.0)]
@@ -132,7 +132,7 @@ def test_a_scenario_comes_back_from_the_json_of_its_request(read):
         (event("{object: cook, at: 3, to: table}"), "there is no 'cook' in the world; did you mean 'coke'"),
     ],
 )
-def test_what_is_wrong_is_refused_with_its_line(read, text, says):
+def test_errors_name_their_line(read, text, says):
     with pytest.raises(InputError, match=says):
         read(text)
 

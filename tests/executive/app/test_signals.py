@@ -69,7 +69,7 @@ def test_a_signal_cancels_and_the_handlers_are_put_back(number):
     assert signal.getsignal(number) == before
 
 
-def test_what_ends_by_a_signal_within_something_that_does_ends_both():
+def test_a_signal_ends_the_inner_and_the_outer_block():
     reasons, control = [], Control(pace=None)
     with ended_by_signals(reasons.append):
         with ended_by_signals(control.cancel):

@@ -127,7 +127,7 @@ def test_a_good_file_alone_is_ok():
         ("name: x\nworld: moon\nsteps:\n  - say: go to the kitchen\n", 2, "unknown world 'moon'"),
     ],
 )
-def test_what_the_robot_cannot_do_is_refused(write, text, line, says):
+def test_an_action_beyond_the_robot_is_refused(write, text, line, says):
     result = invoke(write(text), "--json")
     (error,) = json.loads(result.stdout)["errors"]
     assert (result.exit_code, error["line"], says in error["message"]) == (2, line, True), error

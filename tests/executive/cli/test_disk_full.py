@@ -47,7 +47,7 @@ def run_kept(prepared, store, backend, ending=None):
         ended(finished.report)
 
 
-def test_the_robot_stops_and_the_way_on_is_named(prepared, filling, tmp_path):
+def test_the_robot_stops_and_the_resume_command_is_named(prepared, filling, tmp_path):
     backend = ScriptedBackend()
     with MissionStore(tmp_path / "missions.sqlite") as store, pytest.raises(InputError) as left:
         run_kept(prepared, store, backend)

@@ -23,7 +23,7 @@ def store(tmp_path):
         yield opened
 
 
-def test_a_run_that_was_killed_goes_on_without_what_is_over_and_what_had_changed_something(store):
+def test_a_killed_run_continues_without_finished_and_half_done_missions(store):
     over, begun, stuck, waiting = (store.add(REQUEST, queued=True).id for _ in range(4))
     given = GivenMissions(store)
     for number in (over, begun, stuck):
@@ -37,7 +37,7 @@ def test_a_run_that_was_killed_goes_on_without_what_is_over_and_what_had_changed
     assert store.mission(stuck).message == "the run was interrupted, and Alice had begun it"
 
 
-def test_a_mission_that_another_command_was_broken_off_in_is_not_touched(store):
+def test_an_interrupted_mission_of_another_command_is_not_changed(store):
     store.begin(store.add(REQUEST, queued=True).id)
     with pytest.raises(InputError, match="was interrupted"):
         _to_do(store)
@@ -67,7 +67,7 @@ def test_a_chain_whose_run_was_killed_goes_on_with_its_parts(store):
     assert store.mission(whole).state is MissionState.RUNNING
 
 
-def test_a_chain_whose_first_part_was_broken_off_for_good_fails_as_a_whole(store):
+def test_a_split_mission_fails_if_its_interrupted_first_part_cannot_continue(store):
     whole, first, second = split_in_two(store)
     GivenMissions(store).progress(first, 0, "it was begun")
     with pytest.raises(InputError, match="no mission is queued"):

@@ -95,7 +95,7 @@ def test_any_of_several_robots_may_be_called(says, wav, heard, goals):
     assert found == goals
 
 
-def test_who_of_several_robots_does_what_is_shown(says, wav):
+def test_the_commands_of_each_robot_are_shown(says, wav):
     says("Hey Bob, go to the kitchen.")
     assert f"  Bob: {KITCHEN}" in _listen(wav, "--robots", "alice=spot,bob=fetch").stdout.splitlines()
 

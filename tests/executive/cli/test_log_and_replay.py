@@ -79,7 +79,7 @@ def test_log_shows_the_traceback_of_a_defect(tmp_path, compiled, run_tree, make,
 
 @pytest.mark.parametrize("verb", ["log", "replay", "tree"])
 @pytest.mark.parametrize(("name", "words"), [("absent.mcap", "no such file"), ("text.mcap", "no event log")])
-def test_what_is_no_log_is_refused_in_one_line(tmp_path, verb, name, words):
+def test_a_file_that_is_no_log_is_refused_in_one_line(tmp_path, verb, name, words):
     (tmp_path / "text.mcap").write_text("hello")
     result = invoke(verb, tmp_path / name)
     (line,) = result.stderr.splitlines()

@@ -99,7 +99,7 @@ def test_a_route_is_lines_or_a_list(tmp_path, text):
 
 
 @pytest.mark.parametrize("text", ["", "1 2 3\n", "here there\n", "[[1, .nan]]", "[[1, 2], 3]", "{x: 1}"])
-def test_what_is_no_route_is_refused(tmp_path, text):
+def test_a_file_that_is_no_route_is_refused(tmp_path, text):
     (tmp_path / "route").write_text(text)
     with pytest.raises(InputError, match="it is not a route"):
         _route_points(tmp_path / "route")

@@ -63,7 +63,7 @@ def test_a_size_that_its_class_never_has_is_warned_of(mesh, tmp_path):
     )
 
 
-def test_scripts_are_told_the_same_twice(mesh, tmp_path):
+def test_show_prints_the_same_json_as_import(mesh, tmp_path):
     first = json.loads(made(mesh, tmp_path / "drill", "--json").stdout)
     assert first == json.loads(invoke("object", "show", tmp_path / "drill", "--json").stdout)
     assert (first["class"], first["mass_kg"], first["size_m"]) == ("drill", 1.2, [0.2, 0.06, 0.04])
@@ -87,7 +87,7 @@ def test_scripts_are_told_the_same_twice(mesh, tmp_path):
         (("--out", "{tmp}/drill.stl"), "it exists already"),
     ],
 )
-def test_what_cannot_be_is_one_line_and_status_2(mesh, tmp_path, arguments, why):
+def test_bad_input_is_refused_in_one_line_with_status_2(mesh, tmp_path, arguments, why):
     given = [str(each).replace("{tmp}", str(tmp_path)) for each in arguments]
     result = made(mesh, tmp_path / "made", *given)
     assert result.exit_code == 2
@@ -153,7 +153,7 @@ def test_without_its_extra_it_says_what_to_install(tmp_path, monkeypatch, librar
     assert f"needs {library}, which is not installed; pip install 'spot-errand[objects]'" in result.stderr
 
 
-def test_what_is_no_model_is_not_shown(tmp_path):
+def test_a_folder_without_a_model_is_refused(tmp_path):
     result = invoke("object", "show", tmp_path)
     assert result.exit_code == 2
     assert f"{tmp_path}: there is no imported object (object.yaml is missing)" in result.stderr

@@ -17,7 +17,7 @@ def test_a_name_of_endless_length_is_refused_in_one_line(option):
     assert result.stderr.startswith("errand: ") and len(result.stderr) < 1500
 
 
-def test_what_is_no_fault_of_a_name_is_not_hidden():
+def test_an_error_that_is_no_fault_of_a_name_is_raised():
     with pytest.raises(OSError, match="wire"):
         refuse(OSError("the wire is cut"))
 

@@ -50,7 +50,7 @@ MISSION = [
 ]
 
 
-def test_what_decides_is_shown_as_yaml():
+def test_a_sentence_that_decides_is_shown_as_yaml():
     result = CliRunner().invoke(entry.app, ["parse", DECIDES, "--json"])
     values = json.loads(result.stdout.splitlines()[-1])
     assert values["mission"] == yaml.safe_load("\n".join(MISSION))

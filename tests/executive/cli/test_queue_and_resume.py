@@ -157,7 +157,7 @@ def test_a_mission_with_a_broken_stack_file_is_not_queued(errand, mission, tmp_p
     assert not (tmp_path / "out" / "missions.sqlite").exists()
 
 
-def test_one_that_fails_does_not_keep_the_next_from_being_run(errand, mission, plant, states):
+def test_a_failed_mission_does_not_keep_the_next_from_running(errand, mission, plant, states):
     plant.outcomes = ["failure"]
     errand("queue", "add", mission("first"))
     errand("queue", "add", mission("second"))
@@ -235,7 +235,7 @@ def test_a_killed_run_of_two_robots_is_resumed_with_each_where_it_was(errand, tw
     assert plant.commands == [[[GO % "kitchen"], [GO % "bedroom"]]] * 2
 
 
-def test_what_took_the_place_of_one_robots_part_is_resumed_beside_the_others(errand, two, plant, monkeypatch):
+def test_a_correction_of_one_robots_part_is_resumed_beside_the_others(errand, two, plant, monkeypatch):
     def corrected(prepared, *, durable, **_):
         prepared.request.out.mkdir(parents=True, exist_ok=True)
         durable.journals["Bob"].note(corrected_to("office", prepared, "Bob"))
@@ -290,7 +290,7 @@ def test_a_killed_run_is_resumed_with_its_own_seed_and_folder(errand, mission, p
 
 
 @pytest.mark.parametrize("ended", ["cancelled", "error"])
-def test_the_newest_mission_goes_on_where_it_was_cancelled(errand, mission, plant, states, ended):
+def test_resume_continues_the_newest_mission_if_it_was_cancelled(errand, mission, plant, states, ended):
     plant.outcomes = [ended]
     errand("run", mission("alone"), "--quiet", "--no-record")
     assert states() == [ended]
@@ -316,7 +316,7 @@ def test_a_mission_file_that_was_changed_is_taken_as_it_was(errand, mission, pla
     assert "[kitchen]" in plant.commands[1][0][0]
 
 
-def test_another_run_gives_up_what_was_broken_off(errand, mission, plant, states):
+def test_another_run_gives_up_an_interrupted_mission(errand, mission, plant, states):
     plant.outcomes = ["killed"]
     with pytest.raises(GoneError):
         errand("run", mission("alone"), "--quiet")
@@ -407,7 +407,7 @@ def test_a_trigger_that_cannot_be_is_refused_and_nothing_is_kept(errand, mission
     assert errand("queue", "list").exit_code == 2 or listed(errand) == []
 
 
-def test_what_has_passed_is_over(errand, mission, plant, tmp_path):
+def test_a_trigger_in_the_past_is_listed_as_over(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--at", "2999-01-01 09:00")
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
         store._connection.execute("UPDATE mission SET trigger = '2020-01-01 09:00'")
@@ -577,7 +577,7 @@ def test_a_name_of_300_letters_is_run_in_a_folder_with_a_short_name(errand, plan
         ("text", "name: alone\nsteps: [{skill: dance}]\n", "there is no skill 'dance'"),
     ],
 )
-def test_what_cannot_begin_is_set_aside_with_its_cause_and_the_next_one_runs(
+def test_a_mission_that_cannot_begin_is_set_aside_and_the_next_one_runs(
     errand, mission, plant, states, tmp_path, command, column, value, cause
 ):
     errand("queue", "add", mission("alone"))
@@ -606,7 +606,7 @@ def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(errand
     assert "raise ZeroDivisionError" in (tmp_path / "out" / "mission-1-traceback.txt").read_text()
 
 
-def test_what_was_set_aside_is_tried_again_by_its_number(errand, mission, plant, states, tmp_path):
+def test_a_mission_set_aside_is_resumed_by_its_number(errand, mission, plant, states, tmp_path):
     errand("queue", "add", mission("first"))
     with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
         change(store, world="nowhere")

@@ -79,7 +79,7 @@ def test_the_same_command_runs_only_what_is_missing(ran, tmp_path):
     assert first["standings"] == again["standings"]
 
 
-def test_what_cannot_be_done_counts_as_refused_with_its_words(ran, tmp_path, monkeypatch):
+def test_an_impossible_random_mission_counts_as_refused(ran, tmp_path, monkeypatch):
     def refuse(request, *, anyway):
         if not anyway:
             raise InputError("there is no way into the hall")
@@ -112,7 +112,7 @@ def test_the_report_shows_the_same_table(ran, tmp_path):
         (("--worlds", "falt"), "unknown world 'falt'"),
     ],
 )
-def test_what_is_wrong_is_refused_in_the_words_that_were_typed(options, says, tmp_path):
+def test_errors_name_the_words_that_were_typed(options, says, tmp_path):
     result = CliRunner().invoke(entry.app, [*ASKED, *options, "--out", str(tmp_path)])
     assert (result.exit_code, says in result.output) == (2, True), result.output
 

@@ -199,7 +199,7 @@ def impossible_file(tmp_path):
 
 
 @pytest.mark.parametrize("command", [("run",), ("queue", "add"), ("evaluate", "--seeds", "1-2")])
-def test_what_check_refuses_is_refused_before_anything_moves(no_plant, tmp_path, command):
+def test_errors_of_check_refuse_a_run_before_anything_moves(no_plant, tmp_path, command):
     result = invoke(*command, impossible_file(tmp_path), "--out", str(tmp_path / "out"))
     assert (result.exit_code, [line.split(":")[2] for line in result.stderr.splitlines()]) == (2, ["4", "5"])
     assert not (tmp_path / "out").exists()

@@ -28,7 +28,7 @@ class Heard:
 
 
 @pytest.mark.parametrize(("quiet", "shown"), [(False, "Alice: [bold]Hello\n"), (True, "")])
-def test_what_is_said_is_a_line_unless_quiet_and_is_said_by_the_voice(quiet, shown):
+def test_speech_is_printed_unless_quiet_and_said_by_the_voice(quiet, shown):
     told, voice = io.StringIO(), Heard()
     speech = SpeechOutput(Console(file=told, width=80), voice, quiet)
     speech.message("speech", {"robot": "Alice", "text": "[bold]Hello", "t": 1.0})
@@ -52,7 +52,7 @@ def tree_of(count, running):
 
 
 @pytest.mark.parametrize("running", [0, 1, 17, 38, 39])
-def test_what_runs_is_among_the_lines_that_fit(running):
+def test_the_running_node_is_among_the_lines_that_fit(running):
     shown = visible_rows(tree_of(40, running), 10).plain.splitlines()
     assert len(shown) == 10
     assert f"▶ node {running}" in shown

@@ -84,14 +84,14 @@ def test_if_is_asked_for_the_branch_that_was_taken(asked):
     assert asked(block(choose)) == [("kitchen", AT_END)]
 
 
-def test_each_look_of_a_condition_is_judged_at_its_time(ran):
+def test_each_check_of_a_condition_is_judged_at_its_time(ran):
     tree, result = ran(block(Repeat(loop=Loop(times=2), steps=(block(Choose(condition=LOOK, then=(go("hall"),))),))))
     looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.ANSWERED]
     assert [one.answer for one in looks] == [True, True]
     assert looks[0].answered_s < looks[1].answered_s
 
 
-def test_each_look_at_a_door_is_judged_at_its_time(ran, knowledge, registry, script, monkeypatch):
+def test_each_check_of_a_door_is_judged_at_its_time(ran, knowledge, registry, script, monkeypatch):
     doors = [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}]
     monkeypatch.setattr(knowledge, "__dict__", knowledge.model_validate({**KNOWLEDGE, "doors": doors}).__dict__)
     registry["check_door"] = scripted_skill(script, "check_door", CheckDoorInputs, {"open": bool})
@@ -117,13 +117,13 @@ def test_rounds_are_asked_for_though_the_last_decision_reset_them(asked):
     assert asked(block(Set(set={"n": "0"})), block(repeat)) == [("hall", AT_STEP), ("hall", AT_END)]
 
 
-def test_what_a_failed_branch_of_try_did_does_not_count(asked, script):
+def test_actions_of_a_failed_try_branch_do_not_count(asked, script):
     script.seen_on = ()
     tried = Try(steps=(go("hall"), GET), otherwise=(go("kitchen"),))
     assert asked(block(tried)) == [("kitchen", AT_END)]
 
 
-def test_what_together_stopped_does_not_count(asked):
+def test_a_step_that_together_stopped_does_not_count(asked):
     slow = Group(steps=(go("hall"), go("kitchen"), go("hall")))
     together = Together(steps=(block(slow), block(Wait(awaited=Awaited(seconds=0.2)))), done_when=1)
     assert asked(block(together), go("bedroom")) == [("bedroom", AT_END)]
@@ -181,7 +181,7 @@ def test_an_object_may_leave_the_place_where_a_later_step_takes_it(ran):
     assert [began for began, _ in put.taken_s] == [again.began_s]
 
 
-def test_what_a_failed_step_took_away_was_taken_by_the_mission(ran, script):
+def test_an_object_taken_by_a_failed_step_counts_as_taken_by_the_mission(ran, script):
     script.ends["relocalise"] = lambda skill: Failed(Cause.PLANNING, "stuck")
     taking = Try(steps=(GET, CallSkill(skill="relocalise")), otherwise=(block(Wait(awaited=Awaited(seconds=0.2))),))
     tree, result = ran(GET, PUT, block(taking))
@@ -189,7 +189,7 @@ def test_what_a_failed_step_took_away_was_taken_by_the_mission(ran, script):
     assert len(placed.taken_s) == 1
 
 
-def test_what_another_robot_of_the_run_takes_away_was_taken_by_the_mission(ran):
+def test_an_object_taken_by_another_robot_counts_as_taken_by_the_mission(ran):
     tree, result = ran(GET, PUT)
     (later,) = (one for one in result.executions if one.path_id.endswith("1-kitchen"))
     other = Share(tree, ran(GET)[1], 0)
@@ -198,7 +198,7 @@ def test_what_another_robot_of_the_run_takes_away_was_taken_by_the_mission(ran):
     assert later.done
 
 
-def test_what_is_held_while_holding_must_hold_always(ran):
+def test_a_condition_of_while_must_hold_always(ran):
     group = Group(steps=(go("hall"),), while_=While(holds=holds("holding")))
     tree, result = ran(GET, block(group))
     always = [one for one in conditions_of(tree, result) if one.when is When.ALWAYS]

@@ -59,7 +59,7 @@ def test_a_goal_is_reached_in_a_world_made_of_a_map(map_file, tmp_path):
         (("--out", "{tmp}"), "it exists already"),
     ],
 )
-def test_what_cannot_be_is_one_line_and_status_2(map_file, tmp_path, arguments, why):
+def test_bad_input_is_refused_in_one_line_with_status_2(map_file, tmp_path, arguments, why):
     given = [str(each).replace("{tmp}", str(tmp_path)) for each in arguments]
     result = invoke("world", "from-map", map_file, "--out", tmp_path / "hall", *given)
     assert result.exit_code == 2

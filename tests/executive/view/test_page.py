@@ -188,7 +188,7 @@ def test_states_causes_and_sentences_stand_on_the_nodes(page, live):
     assert "failure, PLANNING" in (page.locator(f'li[data-id="{second}"]').get_attribute("aria-label") or "")
 
 
-def test_what_a_running_node_says_meanwhile_stands_on_it_and_in_the_events(page, live):
+def test_the_message_of_a_running_node_is_on_the_node_and_in_the_events(page, live):
     feed, tree, url = live
     node = leaf_ids(tree)[0]
     page.goto(url)
@@ -309,7 +309,7 @@ def talking(compiled, make, control, knowledge):
     watch.close()
 
 
-def test_what_the_robot_asks_back_is_answered_by_buttons(page, talking):
+def test_a_question_of_the_robot_is_answered_by_buttons(page, talking):
     url, heard = talking
     page.goto(url)
     page.fill("#sentence", "bring me the can")
@@ -405,7 +405,7 @@ def test_the_state_of_the_robot_stands_above_all(page, live):
     playwright_api.expect(strip).to_contain_text("holdsnothing")
 
 
-def test_what_is_held_is_drawn_with_the_robot_on_the_map(page, live):
+def test_a_held_object_is_drawn_with_the_robot_on_the_map(page, live):
     feed, _, url = live
     page.goto(url)
     pose = {"position": {"x": 1.0, "y": 2.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
@@ -623,7 +623,7 @@ def test_a_browser_that_draws_on_the_processor_asks_for_fewer_pictures_of_the_sc
         assert eased.wait(5)
 
 
-def test_what_the_robot_says_is_announced_and_in_the_list(page, live):
+def test_speech_is_announced_and_in_the_list(page, live):
     feed, tree, url = live
     page.goto(url)
     row(page, leaf_ids(tree)[0]).wait_for(state="attached")
@@ -758,7 +758,7 @@ def test_the_missions_of_a_fleet_are_listed_with_the_robot_and_what_came_of_them
 
 
 @pytest.mark.nightly
-def test_how_several_robots_ended_is_told_for_each_and_for_all(page, two, control):
+def test_verdicts_are_shown_for_each_robot_and_for_all(page, two, control):
     feed, _, url = two
     page.goto(url)
     feed("outcome", 3.0, {"robot": "Alice", "outcome": "failure", "cause": "PLANNING", "message": "no way"})

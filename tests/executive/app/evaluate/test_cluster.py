@@ -58,7 +58,7 @@ def test_workers_of_another_version_are_refused_before_anything_runs(address, mo
         pass
 
 
-def test_what_a_run_raises_is_raised_here(address):
+def test_an_exception_of_the_function_is_raised_by_the_iterator(address):
     with scheduler_at(address) as workers, pytest.raises(ZeroDivisionError):
         list(workers.map_items(cheap_run.divide, [1, 0]))
 

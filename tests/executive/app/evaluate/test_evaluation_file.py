@@ -41,13 +41,13 @@ def test_an_id_is_that_of_the_content_wherever_the_files_lie(tmp_path):
         ("missions: [go on, go on]\nseeds: [1]\n", "1 of the runs stand in it twice"),
     ],
 )
-def test_what_is_wrong_is_refused_with_its_line(tmp_path, text, says):
+def test_errors_name_their_line(tmp_path, text, says):
     with pytest.raises(InputError) as raised:
         load(tmp_path, text)
     assert says in str(raised.value)
 
 
-def test_a_mission_file_is_no_scenario_for_evaluations(tmp_path):
+def test_a_mission_file_is_no_evaluation_file(tmp_path):
     file = tmp_path / "go.yaml"
     file.write_text("name: go\nsteps: [{to: hall}]\n")
     assert not is_evaluation(file)

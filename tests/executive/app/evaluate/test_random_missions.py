@@ -87,7 +87,7 @@ def test_in_a_world_without_objects_and_people_only_places_are_asked_for():
     assert not kinds & {"fetch", "bring to a person", "go to a person", "put on a surface", "instead"}
 
 
-def test_a_world_that_has_nothing_to_ask_for_still_has_a_battery():
+def test_an_empty_world_still_has_missions_on_the_battery():
     world = KnownWorld("empty", Knowledge.model_validate({**BARE, "places": {}}), frozenset())
     assert random_sentence(world, 3) == ("wait or charge", "go and recharge")
 

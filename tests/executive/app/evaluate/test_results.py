@@ -29,7 +29,7 @@ def test_results_are_kept_once_and_read_back(tmp_path):
         assert kept.evidence(RUNS[1].id) == case(RUNS[1]).evidence
 
 
-def test_results_of_another_scenario_or_version_are_refused(tmp_path):
+def test_results_of_another_evaluation_or_version_are_refused(tmp_path):
     with ResultsFile(tmp_path / "r.sqlite", create=True) as kept:
         kept.begin(EVALUATION, code="1")
         with pytest.raises(InputError, match="results of other runs"):
@@ -45,7 +45,7 @@ def test_only_one_process_writes(tmp_path):
         other.claim().__enter__()
 
 
-def test_what_is_no_results_file_is_refused(tmp_path):
+def test_a_file_that_is_no_results_file_is_refused(tmp_path):
     (tmp_path / "text").write_text("no database, " * 100)
     for name, says in (("text", "the results file is damaged"), ("none", "there is no results file")):
         with pytest.raises(InputError, match=says):

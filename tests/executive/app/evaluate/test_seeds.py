@@ -30,6 +30,6 @@ def test_too_few_seeds_are_refused():
 
 
 @pytest.mark.parametrize("text", ["-", "a-", "1-,4"])
-def test_what_is_no_range_of_seeds_is_refused(text):
+def test_a_bad_range_of_seeds_is_refused(text):
     with pytest.raises(InputError, match="is no range of seeds"):
         seed_range(text, 2)

@@ -71,7 +71,7 @@ def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
     assert rows[Standing.FULFILLED].rate.interval_text == "6.3% to 54.7%"
 
 
-def test_what_is_to_be_looked_at_begins_with_false_claims():
+def test_cases_to_inspect_begin_with_false_claims():
     assert [each.run.request.seed for each in cases_to_inspect(CASES)] == [3, 4, 5, 6, 7, 8, 9]
 
 
@@ -85,7 +85,7 @@ def test_runs_are_grouped_by_kind_and_by_world_with_the_counts_of_each_standing(
     assert [groups["world: flat"].standings[standing] for standing in Standing] == [1, 1, 1, 2, 1, 1, 1]
 
 
-def test_the_page_lists_each_run_to_look_at_with_its_sentence_and_the_commands(tmp_path):
+def test_the_page_lists_each_run_to_inspect_with_its_sentence_and_the_commands(tmp_path):
     log = tmp_path / CASES[2].run.id
     log.mkdir()
     found = Results(CASES, {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
@@ -100,7 +100,7 @@ def test_wilson_interval_of_81_of_263_is_that_of_newcombe_1998():
     assert Rate(81, 263).interval() == pytest.approx((0.2553, 0.3662), abs=5e-5)
 
 
-def test_all_of_ten_leaves_room_below():
+def test_the_interval_of_ten_successes_in_ten_runs_reaches_below_one():
     assert Rate(10, 10).interval() == pytest.approx((0.7225, 1.0), abs=5e-5)
 
 

@@ -21,7 +21,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_doubles_nothing(tmp_path):
     assert all(one.result == one.item[0] ** 2 for one in finished)
 
 
-def test_what_kills_each_worker_is_given_up_and_takes_nothing_along():
+def test_an_item_that_kills_each_worker_is_given_up_alone():
     finished = {one.item: one for one in LocalWorkers(2).map_items(cheap_run.always_die, range(6))}
     assert (finished[3].result, "3 worker processes have died" in finished[3].lost) == (None, True)
     assert [finished[number].result for number in (0, 1, 2, 4, 5)] == [0, 1, 2, 4, 5]

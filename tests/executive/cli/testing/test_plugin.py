@@ -65,7 +65,7 @@ def output(tmp_path_factory):
     return done.stdout
 
 
-def test_skill_tests_are_collected_by_name_and_fail_with_line_and_story(output):
+def test_skill_tests_are_collected_by_name_and_fail_with_line_and_messages(output):
     assert "stow.skilltest.yaml:5: skill 'stow'" in output
     assert "expected success, got failure EXECUTION" in output
     assert "Traceback" not in output

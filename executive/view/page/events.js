@@ -8,7 +8,7 @@
     run: (data) => ["run", `world ${data.world}, seed ${data.seed}: ${(data.commands || []).join(" · ")}`],
     object_to_detect: (data) => ["look for", data.class_name.join(", ")],
     object_destination: (data) => ["found", data.class_name],
-    missions: (data) => ["missions", data.missions.map((each) => `${each.id} ${each.robot || "nobody"}: ${each.outcome}`).join(", ")],
+    missions: (data) => ["missions", data.missions.map((each) => `${each.id} ${each.robot || "no robot"}: ${each.outcome}`).join(", ")],
     speech: (data) => [`${data.robot} says`, `“${data.text}”`],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
     control: (data) => [data.what || "control", data.message || ""],

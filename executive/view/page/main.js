@@ -54,13 +54,13 @@
 
   // The tree follows at once; what costs more is drawn a few times a second.
   function draw() {
-    const replaying = !timeline.following, view = replaying ? store.at(timeline.t) : store.now, told = store.live.control || null;
+    const replaying = !timeline.following, view = replaying ? store.at(timeline.t) : store.now, controlState = store.live.control || null;
     meet(store.robots);
     control.meet(store.robots);
     header.draw(store, view, replaying);
     teleop.draw(store.live.teleop, store.live.teleop_keys);
-    control.draw(told, !panels.size && store.now.outcomes.length > 0);
-    if (panels.size) all.draw(modeOfAll(replaying ? null : told, view, store.robots), true);
+    control.draw(controlState, !panels.size && store.now.outcomes.length > 0);
+    if (panels.size) all.draw(modeOfAll(replaying ? null : controlState, view, store.robots), true);
     for (const panel of shown()) panel.draw(store, view, replaying);
     measure();
     slowly(view);

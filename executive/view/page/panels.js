@@ -46,8 +46,8 @@
     if (!outcome || outcome.outcome === "success" || outcome.outcome === "cancelled") return null;
     const placeOf = (message) => (message ? (outcome.message || "").indexOf(message) : -1);
     const failed = [...view.failures].filter(([id]) => (store.known.get(id) || {}).leaf).map(([id, { message, t }]) => ({ id, t, place: placeOf(message) }));
-    const told = failed.filter((each) => each.place >= 0);
-    const [first] = (told.length ? told : failed).sort((one, other) => one.place - other.place || other.t - one.t);
+    const placed = failed.filter((each) => each.place >= 0);
+    const [first] = (placed.length ? placed : failed).sort((one, other) => one.place - other.place || other.t - one.t);
     return first ? first.id : null;
   }
 
@@ -191,8 +191,8 @@
   // True where the browser draws 3D on the processor: a scene then takes the time that the rest of the page needs.
   function drawsSlowly() {
     const brush = document.createElement("canvas").getContext("webgl");
-    const told = brush && brush.getExtension("WEBGL_debug_renderer_info");
-    const name = brush ? brush.getParameter(told ? told.UNMASKED_RENDERER_WEBGL : brush.RENDERER) : "none";
+    const info = brush && brush.getExtension("WEBGL_debug_renderer_info");
+    const name = brush ? brush.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : brush.RENDERER) : "none";
     return /swiftshader|llvmpipe|softpipe|software|none/i.test(name);
   }
 

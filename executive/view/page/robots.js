@@ -51,19 +51,19 @@
     }
 
     draw(store, whole, replaying) {
-      const view = (this.view = this.name === null ? whole : viewOf(whole, this.name)), told = store.live.control || null;
+      const view = (this.view = this.name === null ? whole : viewOf(whole, this.name)), controlState = store.live.control || null;
       const tree = view.trees[view.trees.length - 1], over = view.outcomes.length > 0, progress = replaying || over ? null : this.progress(store, tree);
-      const own = told && this.name !== null ? (told.robots || {})[this.name] || { mode: "ready" } : told;
+      const own = controlState && this.name !== null ? (controlState.robots || {})[this.name] || { mode: "ready" } : controlState;
       this.tree.progress = progress;
-      this.tree.breakpoints = told && told.mode !== "ended" && this.control.actions.has("break") ? new Set(told.breakpoints) : null;
-      this.tree.at = told ? told.at : null;
+      this.tree.breakpoints = controlState && controlState.mode !== "ended" && this.control.actions.has("break") ? new Set(controlState.breakpoints) : null;
+      this.tree.at = controlState ? controlState.at : null;
       this.tree.decisive = decisive(store, view);
       this.steps.draw(store, view, replaying ? view.t : store.end);
       this.state.draw(view);
       this.mode.draw(modeOf(replaying ? null : own, view), over, this.name || "");
       this.parts.doing.textContent = progress ? progress.message : "";
-      this.questions.draw(told ? this.asked(store, told) : [], store.end);
-      if (this.name !== null) this.drawOwn(told, own, tree, over);
+      this.questions.draw(controlState ? this.asked(store, controlState) : [], store.end);
+      if (this.name !== null) this.drawOwn(controlState, own, tree, over);
       this.tree.draw(view); // it scrolls, so all else has its place before
     }
 
@@ -73,17 +73,17 @@
     }
 
     // What the mission asks, and what the robot asks of a sentence, as long as it waits for the answer.
-    asked(store, told) {
+    asked(store, controlState) {
       const mine = (each) => this.name === null || each.robot === this.name;
       const back = Object.entries(store.live).filter(([about]) => about.split("/")[0] === "asked").map(([, { question }]) => question);
-      const waits = (each) => each && told.mode !== "ended" && this.control.actions.has("say") && each.until_s > store.end;
+      const waits = (each) => each && controlState.mode !== "ended" && this.control.actions.has("say") && each.until_s > store.end;
       const own = (each) => ({ ...each, id: null, default: null, options: each.options.length ? [...each.options, "never mind"] : [] });
-      return [...told.questions, ...back.filter(waits).map(own)].filter(mine);
+      return [...controlState.questions, ...back.filter(waits).map(own)].filter(mine);
     }
 
     // The mission's name, and the buttons; what holds all robots is let go of above.
-    drawOwn(told, own, tree, over) {
-      const { parts } = this, mode = (this.now = own || { mode: "ready" }).mode, all = told && ["paused", "stopped", "ended"].includes(told.mode);
+    drawOwn(controlState, own, tree, over) {
+      const { parts } = this, mode = (this.now = own || { mode: "ready" }).mode, all = controlState && ["paused", "stopped", "ended"].includes(controlState.mode);
       parts.mission.textContent = tree ? missionOf(tree.root).name : "nothing to do";
       parts.pause.querySelector("span").textContent = mode === "paused" ? "Go on" : "Pause";
       parts.pause.setAttribute("aria-pressed", mode === "paused");
@@ -91,7 +91,7 @@
       parts.stop.setAttribute("aria-pressed", mode === "stopped");
       for (const key of ["pause", "cancel", "stop"]) {
         parts[key].hidden = !this.control.actions.has(key);
-        parts[key].disabled = !told || told.mode === "ended" || (all && key !== "cancel") || (over && key !== "stop");
+        parts[key].disabled = !controlState || controlState.mode === "ended" || (all && key !== "cancel") || (over && key !== "stop");
       }
     }
   }
@@ -118,7 +118,7 @@
         swatch.style.background = `var(${colourOf(robots, robot)})`;
         whose.append(swatch, " ", robot);
       }
-      row.append(element("td", "t", id), element("td", "what", sentence), whose, state, element("td", "", reassigned ? `given anew ${reassigned} x` : ""));
+      row.append(element("td", "t", id), element("td", "what", sentence), whose, state, element("td", "", reassigned ? `reassigned ${reassigned} x` : ""));
       return row;
     }
   }

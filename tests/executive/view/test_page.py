@@ -754,7 +754,7 @@ def test_the_missions_of_a_fleet_are_listed_with_the_robot_and_what_came_of_them
     ]
     feed("missions", 2.0, {"missions": rows})
     lines = page.locator("#missions tr")
-    playwright_api.expect(lines).to_have_text(["1Go <b>there Bob✓ successgiven anew 1 x", "2Wait○ queued"])
+    playwright_api.expect(lines).to_have_text(["1Go <b>there Bob✓ successreassigned 1 x", "2Wait○ queued"])
 
 
 @pytest.mark.nightly

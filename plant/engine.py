@@ -156,7 +156,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
     def resume(self, state: State, world: Mapping[str, FloatArray]) -> None:
         """Restores a state, and powers the robots up in it. Raises ValueError when it is of another Diagram."""
         if set(world) != set(self.world_state()):
-            raise ValueError("the parts of the world are others")
+            raise ValueError("the world has other parts")
         self._sleepers.wake_all()
         self.restore(state)
         self.root_context.SetTime(self.now())

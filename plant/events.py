@@ -204,7 +204,7 @@ class Moves(Stateful, saved=("_done",)):
             return
         X_WO = self._goal(number, move, hands_W)
         if X_WO is None:
-            self._tell(f"nobody moves the {move.name}, since nothing is free on the {move.to}")
+            self._tell(f"nobody moves the {move.name}, because the {move.to} has no free spot")
             return
         self._plant.SetFreeBodyPose(self._context, body, X_WO)
         self._plant.SetFreeBodySpatialVelocity(

@@ -81,7 +81,7 @@ def encode(
 def decode(content: bytes) -> Snapshot:
     """Returns the snapshot in the content of a file. Raises ValueError when it is damaged or no snapshot."""
     if not content.startswith(MAGIC):
-        raise ValueError("it is no snapshot that this errand reads")
+        raise ValueError("it is no snapshot of this version of Errand")
     begin = len(MAGIC) + 12
     checksum, size = content[len(MAGIC) : len(MAGIC) + 4], int.from_bytes(content[len(MAGIC) + 4 : begin], "little")
     body = content[begin : begin + size]
@@ -244,7 +244,7 @@ def _try_read(path: Path, slot: str) -> Snapshot | str:
 def _rows(path: Path, stored: Rows) -> FloatArray:
     """Reads the rows of a snapshot. Raises ValueError when they are damaged, OSError when they cannot be read."""
     if stored.file not in _ROW_FILES:
-        raise ValueError("it is no snapshot that this errand reads")
+        raise ValueError("it is no snapshot of this version of Errand")
     size = stored.count * stored.width * 8
     with _beside(path, stored.file).open("rb") as file:
         content = file.read(size)

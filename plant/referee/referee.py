@@ -140,7 +140,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
     def resume(self, state: State, paths: Mapping[str, FloatArray]) -> None:
         """Restores a record with the paths of the robots, (N, 4) like `points`. Raises ValueError for other shapes."""
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
-            raise ValueError("paths without times")
+            raise ValueError("the paths have no times")
         self.restore(state)
         self._paths = {name: list(path) for name, path in paths.items()}
         self._person_paths = {name: [np.append(p_W, self._now_s)] for name, p_W in self._persons.items()}

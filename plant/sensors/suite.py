@@ -176,7 +176,7 @@ class SensorSuite(
         if source not in self._cameras:
             raise ValueError(f"{self._body.name} has no camera {source!r}; it has {', '.join(self._cameras)}")
         if self._scene is None:
-            raise LookupError("nothing is rendered: build the Diagram with render=True")
+            raise LookupError("there is no scene for cameras: build the Diagram with render=True")
         query = self._scene.query_at(self._whole)
         return self._cameras[source].take(query, self._now_s, self._frames(), visual=visual, depth=depth)
 

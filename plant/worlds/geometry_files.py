@@ -161,7 +161,7 @@ def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
 
     def begin(name: str, attributes: Mapping[str, str]) -> None:
         if len(open_elements) >= MOST_XML_DEPTH:
-            raise error(f"it is nested more than {MOST_XML_DEPTH} deep", "write it flatter")
+            raise error(f"it is nested more than {MOST_XML_DEPTH} deep", "nest it less deeply")
         open_elements.append(name)
         letters.clear()
         found.extend((parser.CurrentLineNumber, attributes[each]) for each in _ATTRIBUTES & attributes.keys())

@@ -114,7 +114,7 @@ def test_an_object_stays_when_the_goal_surface_has_no_free_spot():
     before_W = thing_W(simulation, "beer")
     simulation.clock.advance(1.0)
     assert thing_W(simulation, "beer") == pytest.approx(before_W, abs=0.01)
-    assert simulation.clock.events == [(0.5, "nobody moves the beer, since nothing is free on the stool")]
+    assert simulation.clock.events == [(0.5, "nobody moves the beer, because the stool has no free spot")]
 
 
 def test_doors_and_moves_go_on_after_a_restart(tmp_path):

@@ -86,7 +86,7 @@ def test_nothing_damaged_or_foreign_is_read(path):
         read_snapshot(path)
     for slot in ("a", "b"):
         path.with_name(f"kept.plant.{slot}").write_bytes(b"something else")
-    with pytest.raises(SnapshotError, match="no snapshot that this errand reads"):
+    with pytest.raises(SnapshotError, match="no snapshot of this version of Errand"):
         read_snapshot(path)
 
 

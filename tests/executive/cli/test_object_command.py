@@ -82,7 +82,7 @@ def test_show_prints_the_same_json_as_import(mesh, tmp_path):
         (("--name", "wrench"), "the name 'wrench' is taken by a class of objects"),
         (("--class", "drill"), "there is no class 'drill'; known are beer, coke"),
         (("--class", "person"), "there is no class 'person'"),
-        (("--up", "w"), "the axis 'w' is none; give x, y or z"),
+        (("--up", "w"), "there is no axis 'w'; give x, y or z"),
         (("--out", "{tmp}"), "it exists already; name a new folder by --out"),
         (("--out", "{tmp}/drill.stl"), "it exists already"),
     ],

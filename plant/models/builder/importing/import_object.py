@@ -82,7 +82,7 @@ class ImportOptions:
         if not (math.isfinite(self.scale) and self.scale > 0.0):
             raise ObjectImportError(f"the scale {self.scale:g} is not positive", "give metres per unit")
         if self.up is not None and self.up not in _UP:
-            raise ObjectImportError(f"the axis {self.up[:20]!r} is none", "give x, y or z")
+            raise ObjectImportError(f"there is no axis {self.up[:20]!r}", "give x, y or z")
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ def _refuse_impossible(mass: MassProperties) -> None:
     moments = np.linalg.eigvalsh(mass.inertia)
     if moments[0] <= 0.0 or moments[2] > (1.0 + 1e-6) * (moments[0] + moments[1]):
         hint = "unite its pieces to one body and let its normals be calculated again, or import its hull"
-        raise ObjectImportError("pieces of it are inside out, and no body has the inertia that it would have", hint)
+        raise ObjectImportError("some of its pieces are inside out, so its inertia is impossible", hint)
 
 
 def _at_rest(body: _Body) -> _Body:

@@ -82,7 +82,7 @@ def read_patches(path: Path) -> tuple[tuple[Patch, ...], str]:
     if len({patch.colour for patch in patches}) > MOST_COLOURS:
         patches = tuple(replace(patch, colour=_rounded(patch.colour)) for patch in patches)
     if not all(np.isfinite(patch.triangles).all() for patch in patches):
-        raise ObjectImportError("some of its points are no finite numbers", "export it once more")
+        raise ObjectImportError("some of its coordinates are not finite", "export it once more")
     return patches, up
 
 

@@ -142,7 +142,7 @@ def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid
     solid = Solid(points, _turned(faces, inward))
     box = float(np.prod(np.ptp(points, axis=0)))
     if abs(solid.volume_m3) <= _LEAST_VOLUME * box or box == 0.0:
-        raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet")
+        raise ObjectImportError("it encloses no volume", "give a body with a thickness instead of a sheet")
     changed = np.zeros(len(triangles), dtype=np.bool_)
     changed[kept] = turned ^ inward[: len(turned)]
     return solid, changed
@@ -250,7 +250,7 @@ def hull_of(points: FloatArray) -> ConvexHull:
     try:
         return ConvexHull(points)
     except QhullError as error:
-        raise ObjectImportError("it encloses no volume", "give a body with a thickness, no sheet") from error
+        raise ObjectImportError("it encloses no volume", "give a body with a thickness instead of a sheet") from error
 
 
 def _few_corners(corners: FloatArray) -> FloatArray:

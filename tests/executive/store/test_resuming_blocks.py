@@ -44,7 +44,7 @@ def done():
 
 @pytest.fixture
 def works(done):
-    """Skills a, b, c: two steps, the deed, and one more. After a restart one looks whether its deed is done."""
+    """Skills a, b, c: two steps, the work, and one more. After a restart one looks whether its work is done."""
 
     def work(skill_name, fails=False):
         class Work(Skill):

@@ -13,20 +13,20 @@ R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 class Leaf(Explained, Behaviour):
     """Goes through `script` ("RRS": running twice, then success), the last letter again and again.
 
-    S: success, F: failure with EXECUTION, E: with ERROR, C: with CANCELLED. With `anew` each start begins the script
+    S: success, F: failure with EXECUTION, E: with ERROR, C: with CANCELLED. With `restarts` each start begins it
     from its beginning, else it goes on. `log` gets "+name" when it begins and "-name" when it is stopped while running.
     """
 
-    def __init__(self, script, name="leaf", log=None, anew=False, put=None):
+    def __init__(self, script, name="leaf", log=None, restarts=False, put=None):
         super().__init__(name)
         self.path_id, self.cause, self.message = f"alice/{name}", None, ""
-        self.script, self.log, self.anew, self.put = script, [] if log is None else log, anew, put
+        self.script, self.log, self.restarts, self.put = script, [] if log is None else log, restarts, put
         self.place = self.ticks = self.suspended = 0
 
     def initialise(self):
         self.clear_explanation()
         self.log.append(f"+{self.name}")
-        self.place = 0 if self.anew else self.place
+        self.place = 0 if self.restarts else self.place
 
     def update(self):
         letter = self.script[min(self.place, len(self.script) - 1)]

@@ -39,7 +39,7 @@ def leaf_of(context):
     return make
 
 
-def test_the_sequence_keeps_its_place_and_the_running_skill_begins_anew(leaf_of):
+def test_the_sequence_keeps_its_place_and_the_running_skill_begins_again(leaf_of):
     log = []
     first, second = leaf_of("a", [Succeeded("")], log), leaf_of("b", [Running(""), Succeeded("")], log)
     root = MemorySequence(path_id="alice/all", name="all", children=[first, second])

@@ -50,7 +50,7 @@ class StraightRoutes:
 def check(knowledge, registry, tmp_path):
     """Check commands given as texts, or skill calls, each on a line of its own."""
 
-    def check_it(*steps, ways=None, abilities=ABLE):
+    def check_it(*steps, routes=None, abilities=ABLE):
         made = []
         for line, one in enumerate(steps, start=1):
             place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=line), ())
@@ -63,14 +63,14 @@ def check(knowledge, registry, tmp_path):
             knowledge=knowledge,
             start=START,
             abilities=abilities,
-            planner=ways or StraightRoutes(),
+            planner=routes or StraightRoutes(),
             estimates=load_estimates(),
         )
 
     return check_it
 
 
-def told(checked):
+def errors_in(checked):
     return [(error.line, error.message) for error in checked.errors]
 
 
@@ -98,12 +98,12 @@ def test_a_good_mission_has_no_errors_and_an_estimate(check, make):
 def test_a_step_that_empties_the_battery_is_warned_of_with_its_line(check, registry):
     there, back = GO.format("kitchen"), GO.format("start")
     far = StraightRoutes(far_m=1e9, stretched=300.0)
-    one_way = check(there, ways=far).estimate.charge
+    one_way = check(there, routes=far).estimate.charge
     assert 0.25 < one_way < 0.5
     trips = [there, back] * 2
     tired, rested = (
-        check(*trips, ways=far),
-        check(*trips[:2], CallSkill(skill="charge", values={"level": 0.8}), *trips[2:], ways=far),
+        check(*trips, routes=far),
+        check(*trips[:2], CallSkill(skill="charge", values={"level": 0.8}), *trips[2:], routes=far),
     )
     assert [warning.line for warning in tired.warnings] == [1 + int(1.0 / one_way)]
     assert (tired.errors, rested.warnings) == ((), ())
@@ -118,37 +118,37 @@ def test_time_and_charge_follow_from_the_route(check):
 
 
 def test_each_route_begins_where_the_last_one_ended(check):
-    ways = StraightRoutes()
+    routes = StraightRoutes()
     check(
         *(f"Take [Nothing] to [{room}] and do [Nothing] to [Nothing]" for room in ("kitchen", "bedroom", "start")),
-        ways=ways,
+        routes=routes,
     )
-    assert [(round(a.x_m), round(b.x_m)) for a, b in ways.asked] == [(0, 4), (4, -4), (-4, 0)]
+    assert [(round(a.x_m), round(b.x_m)) for a, b in routes.asked] == [(0, 4), (4, -4), (-4, 0)]
 
 
 def test_a_place_out_of_reach_is_refused_at_its_line(check):
-    checked = check(GO.format("bedroom"), GO.format("kitchen"), ways=StraightRoutes(far_m=1.0))
-    ((line, message),) = told(checked)
+    checked = check(GO.format("bedroom"), GO.format("kitchen"), routes=StraightRoutes(far_m=1.0))
+    ((line, message),) = errors_in(checked)
     assert (line, "no way to" in message) == (2, True)
     assert checked.errors[0].hint
 
 
 def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):
-    checked = check(GET.format("coke"), ways=StraightRoutes(far_m=4.6))
+    checked = check(GET.format("coke"), routes=StraightRoutes(far_m=4.6))
     assert checked.errors == ()
 
 
 def test_a_count_goes_to_all_surfaces_that_can_be_reached(check):
     asked = "Take [Nothing] to [kitchen] and do [find] to [{}coke]"
     near, every = StraightRoutes(far_m=4.6), StraightRoutes()
-    assert check(asked.format("some "), ways=near).errors == ()
-    assert check(asked.format("some "), ways=every).errors == check(asked.format(""), ways=StraightRoutes()).errors
+    assert check(asked.format("some "), routes=near).errors == ()
+    assert check(asked.format("some "), routes=every).errors == check(asked.format(""), routes=StraightRoutes()).errors
     assert len(every.asked) == 3
 
 
 def test_a_raw_pose_out_of_reach_is_refused(check):
     call = CallSkill(skill="navigate", values={"x": 50.0, "y": 0.0})
-    ((line, message),) = told(check(call, ways=StraightRoutes(far_m=9.0)))
+    ((line, message),) = errors_in(check(call, routes=StraightRoutes(far_m=9.0)))
     assert (line, "50.00" in message) == (1, True)
 
 
@@ -175,7 +175,7 @@ def test_a_raw_pose_out_of_reach_is_refused(check):
     ],
 )
 def test_an_object_that_cannot_be_recognised_or_lifted_is_refused(check, text, abilities, says):
-    ((line, message),) = told(check(text, abilities=replace(ABLE, **abilities)))
+    ((line, message),) = errors_in(check(text, abilities=replace(ABLE, **abilities)))
     assert (line, says in message) == (1, True), message
 
 
@@ -198,16 +198,16 @@ def walled():
 
 
 def test_routes_are_planned_on_the_map_for_the_whole_body(walled):
-    ways = PlannedRoutes(
+    routes = PlannedRoutes(
         walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]), LatticePlanner()
     )
     here = Pose2D(-1.0, -1.0, 0.0)
-    assert ways.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
+    assert routes.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
     for _ in range(2):
         with pytest.raises(ValueError, match="no path"):
-            ways.route(here, Pose2D(1.0, 1.0, 0.0))
+            routes.route(here, Pose2D(1.0, 1.0, 0.0))
     with pytest.raises(ValueError, match="blocked"):
-        ways.route(here, Pose2D(-1.9, 1.0, 0.0))
+        routes.route(here, Pose2D(-1.9, 1.0, 0.0))
 
 
 BRING = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
@@ -231,7 +231,7 @@ IN_GRIPPER = [
 
 @pytest.mark.parametrize(("steps", "lines"), IN_GRIPPER)
 def test_what_the_gripper_holds_is_followed_step_by_step(check, steps, lines):
-    assert [line for line, _ in told(check(*steps))] == lines
+    assert [line for line, _ in errors_in(check(*steps))] == lines
 
 
 PUT = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
@@ -249,16 +249,16 @@ PUT = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
     ],
 )
 def test_a_surface_that_is_too_high_or_too_low_for_the_arm_is_refused(check, commands, reaches_m, why):
-    messages = [message for _, message in told(check(*commands, abilities=replace(ABLE, reaches_m=reaches_m)))]
+    messages = [message for _, message in errors_in(check(*commands, abilities=replace(ABLE, reaches_m=reaches_m)))]
     wanted = [] if why is None else [f"the shelf is 1 m high, and the arm reaches {why}"]
     assert messages == wanted
 
 
 def test_an_object_wider_than_the_gripper_is_refused_unless_another_fits(check):
     narrow = replace(ABLE, widths_m={"coke": 0.05, "beer": 0.10}, opens_m=0.09)
-    (told_of_beer,) = told(check(GET.format("beer"), abilities=narrow))
-    assert told_of_beer == (1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m")
-    assert told(check(GET.format("drink"), abilities=narrow)) == []
+    (beer_error,) = errors_in(check(GET.format("beer"), abilities=narrow))
+    assert beer_error == (1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m")
+    assert errors_in(check(GET.format("drink"), abilities=narrow)) == []
 
 
 HAND_OVER = "Take [coke] to [start] and do [Nothing] to [Nothing]"
@@ -269,21 +269,21 @@ PUT_DOWN = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
 def test_a_hand_over_in_a_world_without_people_is_refused_with_its_line(check):
     nobody = replace(ABLE, takers=frozenset())
     checked = check(GET.format("coke"), HAND_OVER, abilities=nobody)
-    assert told(checked) == [(2, "nobody is in this world who could take the coke")]
+    assert errors_in(checked) == [(2, "nobody is in this world who could take the coke")]
     assert "surface" in checked.errors[0].hint
-    assert told(check(GET.format("coke"), PUT_DOWN, abilities=nobody)) == []
+    assert errors_in(check(GET.format("coke"), PUT_DOWN, abilities=nobody)) == []
 
 
 def test_a_person_who_is_not_in_the_world_is_refused_with_those_who_are(check):
     (error,) = check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Anna"}))).errors
     assert error.message.startswith("Robin is not in this world, or takes nothing")
     assert "name Anna" in error.hint
-    assert told(check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Robin"})))) == []
+    assert errors_in(check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Robin"})))) == []
 
 
 def test_a_robot_without_a_gripper_is_refused_for_each_step_that_needs_one(check):
     checked = check(GO.format("kitchen"), GET.format("coke"), abilities=replace(ABLE, gripper=False))
-    assert told(checked) == [(2, "this kind of robot has no gripper to take the coke with")]
+    assert errors_in(checked) == [(2, "this kind of robot has no gripper to take the coke with")]
 
 
 def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, knowledge):

@@ -98,7 +98,7 @@ def told(published):
     return [message["message"] for topic, message in published if topic == "transitions"]
 
 
-def test_what_is_in_the_way_is_put_elsewhere_on_its_surface_and_the_picking_up_starts_anew(
+def test_what_is_in_the_way_is_put_elsewhere_on_its_surface_and_the_picking_up_starts_again(
     play, table, script, published
 ):
     result = play(1)

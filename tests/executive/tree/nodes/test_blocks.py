@@ -89,7 +89,7 @@ def test_choose_cancelled(context, answers, leaf, log, ticks, stopped):
     assert (root.status, root.cause, log[-1]) == (N, Cause.CANCELLED, stopped)
 
 
-def test_choose_decides_anew_when_it_starts_anew(context, answers, leaf, log):
+def test_choose_decides_again_when_it_starts_again(context, answers, leaf, log):
     root = choose(context, answers("S", True, False), leaf("S", "then"), leaf("S", "else"))
     assert letters(root, 2) == "SS"
     assert log == ["+decide", "+then", "+decide", "+else"]
@@ -166,7 +166,7 @@ def test_repeat_fails_with_its_decision(context, answers, leaf, mode):
     assert root.cause is Cause.EXECUTION
 
 
-def test_repeat_counts_from_zero_when_it_starts_anew(context, leaf):
+def test_repeat_counts_from_zero_when_it_starts_again(context, leaf):
     root = repeat(context, "times", leaf("S", "body"), times=2)
     assert letters(root, 4) == "RSRS"
     assert context.board.get(COUNT) == 2
@@ -318,7 +318,7 @@ def test_together_does_not_tick_again_what_is_done(leaf):
     assert done.ticks == 1
 
 
-def test_together_begins_all_anew_when_it_starts_anew(leaf, log):
+def test_together_begins_all_again_when_it_starts_again(leaf, log):
     root = together(2, leaf("S", "a"), leaf("S", "b"))
     assert letters(root, 2) == "SS"
     assert log == ["+a", "+b", "+a", "+b"]

@@ -79,7 +79,7 @@ def test_what_slips_is_looked_for_where_it_is_set_down(leaf, clock, robot, conte
     assert [surface.name for surface in context.board.get("alice/around")] == ["floor", "bench"]
 
 
-def test_it_begins_anew_with_where_the_robot_is_then(leaf, clock, robot, context):
+def test_it_begins_again_with_where_the_robot_is_then(leaf, clock, robot, context):
     ended(leaf, clock)
     robot.standing = Pose2D(3.0, 0.0, 0.0)
     leaf.tick_once()

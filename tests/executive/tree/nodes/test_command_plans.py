@@ -1,4 +1,4 @@
-"""Several things by count: one trip for each."""
+"""Several objects by count: one trip for each."""
 
 import pytest
 

@@ -210,7 +210,7 @@ def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context):
     assert (log, root.children[0].status) == (["+one"], S)
 
 
-def test_decide_looks_anew_when_it_starts_anew(decide):
+def test_decide_looks_again_when_it_starts_again(decide):
     log = []
     root = decide(BOTH, log=log)
     assert letters(root, 2) == "SS"
@@ -260,7 +260,7 @@ def test_check(run_context, published, script, answer, expected):
     assert root.cause is (Cause.EXECUTION if expected == "F" else None)
 
 
-# Wait: for a decision, asked anew `every_s` after it was false.
+# Wait: for a decision, asked again `every_s` after it was false.
 
 
 @pytest.fixture

@@ -88,7 +88,7 @@ def test_wait_waits_and_goes_on_with_a_new_reading(readings, context, clock):
     assert condition.check(context) is None
 
 
-def test_wait_fails_when_the_patience_is_over_and_begins_anew_with_each_start(readings, context, clock):
+def test_wait_fails_when_the_patience_is_over_and_begins_again_with_each_start(readings, context, clock):
     condition = readings.fresh(StaleData.WAIT)
     clock.advance(2.0)
     assert isinstance(condition.check(context), Waiting)

@@ -195,7 +195,7 @@ def test_a_call_waits_for_the_handling_of_an_object_unless_it_is_urgent(context,
     assert bench.tick() == [(R, S, R, N, R)]
 
 
-def test_the_suspended_leaf_begins_anew(context, make, script, robot):
+def test_the_suspended_leaf_begins_again(context, make, script, robot):
     script.steps = 3
     bench = Bench(context, mission=skill_mission(context, make, script, "stow"))
     bench.tick(2)

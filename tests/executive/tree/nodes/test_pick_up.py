@@ -1,4 +1,4 @@
-"""Recovery in compiled trees, with scripted skills that fail as told: chosen by cause, bounded, nothing leaks."""
+"""Recovery in compiled trees with skills that fail by their scripts: chosen by cause, bounded, without leaks."""
 
 from pathlib import Path
 

@@ -64,7 +64,7 @@ def test_a_skip_turns_failure_into_success_and_keeps_the_reason():
     assert (root.skipped, root.cause, root.message) == ("slipped", None, "skipped: slipped")
 
 
-def test_a_skip_forgets_when_it_starts_anew():
+def test_a_skip_forgets_when_it_starts_again():
     root = skip(Queue(F, S))
     assert (tick(root, 2), root.skipped) == ([S, S], None)
 
@@ -75,7 +75,7 @@ def test_defects_and_cancels_are_not_skipped(cause):
     assert (tick(root, 1), root.cause, root.skipped) == ([F], cause, None)
 
 
-def test_the_answer_retry_starts_the_child_anew(ask):
+def test_the_answer_retry_starts_the_child_again(ask):
     # child   R   F       S
     # answer          R
     # ask     R   R   R   R   S
@@ -199,7 +199,7 @@ def test_timeout_lets_success_in_time_and_failure_pass(clock):
     assert root.cause is Cause.EXECUTION
 
 
-def test_timeout_starts_anew_after_an_end(clock):
+def test_timeout_starts_again_after_an_end(clock):
     root = timeout(Queue(R, R, R, R, S), clock)
     assert tick(root, 3, clock) == [R, R, F]
     assert tick(root, 2, clock) == [R, S]

@@ -55,7 +55,7 @@ def table(root, ticks):
     return rows
 
 
-def test_the_recovery_for_the_cause_is_chosen_and_the_attempt_starts_anew():
+def test_the_recovery_for_the_cause_is_chosen_and_the_attempt_starts_again():
     attempt, clear, back_off = Leaf("go", R, PLANNING, S), Leaf("clear", EXECUTION), Leaf("back", R, S)
     root = recover(attempt, recovery(clear, POST), recovery(back_off, PLANNING))
     # tick     root go clear back
@@ -175,7 +175,7 @@ def test_a_trigger_may_want_the_nodes_own_failure():
     assert table(root, 1) == [(F, F, N)]
 
 
-def test_interrupted_it_says_so_and_begins_anew_afterwards():
+def test_interrupted_it_says_so_and_begins_again_afterwards():
     attempt = Leaf("go", PLANNING, R)
     root = recover(attempt, recovery(Leaf("clear", R), PLANNING))
     table(root, 2)

@@ -156,7 +156,7 @@ def test_cancelled_it_takes_the_question_back(ask, control, run_context):
     assert KEY not in run_context.board
 
 
-def test_it_asks_anew_after_a_cancel(ask, answered, control):
+def test_it_asks_again_after_a_cancel(ask, answered, control):
     root = ask()
     root.tick_once()
     root.stop(N)

@@ -55,7 +55,7 @@ def test_a_duration_is_read(text: str, seconds: float) -> None:
         "9" * 70,
     ],
 )
-def test_what_is_no_duration_gives_none(text: str) -> None:
+def test_a_text_without_a_duration_gives_none(text: str) -> None:
     assert seconds_in(text) is None
 
 

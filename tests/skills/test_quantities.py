@@ -65,7 +65,7 @@ def test_a_number_in_its_range_is_taken(value: Any, hint: Any, number: float) ->
         ("soon", Duration, "a number, seconds, or as in", "it reads 'soon' now"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_the_range_and_the_likely_mistake(
+def test_a_wrong_value_is_refused_with_the_range_and_the_likely_mistake(
     value: Any, hint: Any, what: str, mistake: str
 ) -> None:
     with pytest.raises(QuantityError) as error:
@@ -106,7 +106,7 @@ def test_a_time_of_day_is_read(text: str, clock: str) -> None:
         ("noon", "as in"),
     ],
 )
-def test_what_is_no_time_of_day_is_refused_with_the_range(value: Any, says: str) -> None:
+def test_a_wrong_time_of_day_is_refused_with_the_range(value: Any, says: str) -> None:
     with pytest.raises(QuantityError, match=says):
         clock_text(value)
 

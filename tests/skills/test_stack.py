@@ -24,7 +24,7 @@ from skills.stack import (
 )
 
 
-def test_what_a_file_leaves_out_is_as_in_the_default():
+def test_missing_parts_of_a_file_come_from_the_default():
     assert stack_data(stack_of({})) == stack_data(default_stack())
     assert set(default_stack().names) == set(SLOTS)
 
@@ -70,7 +70,7 @@ def test_a_skill_takes_its_options_from_the_stack():
         ([], (), "localiser"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_its_place(data, path, hint):
+def test_a_wrong_value_is_refused_with_its_place(data, path, hint):
     with pytest.raises(StackError) as error:
         stack_of(data)
     assert error.value.path == path

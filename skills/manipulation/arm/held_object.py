@@ -41,7 +41,7 @@ _TOP_DEPTH_M = 0.06
 
 @dataclass(frozen=True)
 class HeldObject:
-    """What the hand holds: how the hand was turned when the object stood, and its corners (N, 3) in the hand frame."""
+    """Object in the hand: the hand's rotation when the object stood, and its corners (N, 3) in the hand frame."""
 
     R_BH: RotationMatrix
     corners_H: FloatArray
@@ -62,11 +62,11 @@ class HeldObject:
         return box_between(corners_B.min(axis=0) + [0.0, 0.0, OFF_SURFACE_M], corners_B.max(axis=0), _THINNEST_M)
 
     def drop_m(self, rotation: RotationMatrix) -> float:
-        """How far below the hand's origin the object reaches, with the hand turned so."""
+        """Distance (m) of the object's lowest point below the hand's origin, at a rotation of the hand."""
         return -float(np.min(self.corners_H @ rotation.matrix()[2]))
 
     def rotations(self, azimuth_rad: float) -> list[RotationMatrix]:
-        """How the hand may be turned for the object to stand as it stood.
+        """Returns rotations of the hand with which the object stands as it stood.
 
         Fingers that do not point down point towards an azimuth, or somewhat aside.
         """
@@ -82,16 +82,16 @@ class HeldObject:
         return [(ABOVE_M, 0.0), (LEAST_ABOVE_M, 0.0), *tilted]
 
     def _is_flat(self) -> bool:
-        """Returns whether the object is too low for its width to fall over when the gripper lets go of it tilted."""
+        """Returns whether the object is too low for its width to fall over when the gripper releases it tilted."""
         x, y, height = np.ptp(self.corners_H @ self.R_BH.matrix().T, axis=0)
         return bool(height < _FLAT * min(x, y))
 
     def above(
         self, p_BT: FloatArray, p_BS: FloatArray, above_m: float, tilt_rad: float = 0.0
     ) -> Iterator[RigidTransform]:
-        """Poses of the hand with the object so far over a point of a surface, as it stood; p_BS is the shoulder.
+        """Yields hand poses with the object, upright as before, at a height over a point p_BT of a surface.
 
-        Tilted, fingers that point down point away from the shoulder a little.
+        p_BS is the shoulder. Tilted fingers that point down point away from the shoulder a little.
         """
         azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
         ahead = RotationMatrix.MakeZRotation(azimuth)

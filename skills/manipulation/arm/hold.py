@@ -25,7 +25,7 @@ class Grip(enum.Enum):
     SLIPPING = "slipping"  # it has begun to slip: grip it again, more firmly
     SLIPS_ON = "slips on"  # it slips although it was gripped again
     LOST = "lost"  # it is out of the gripper, which did not open
-    RELEASED = "released"  # the gripper has opened: somebody let go of it
+    RELEASED = "released"  # the gripper has opened on purpose
 
 
 @dataclass

@@ -91,7 +91,7 @@ class RrtConnect:
         """
         q_goal_rad = scene.model.turned_near(q_goal_rad, q_start_rad)
         if not scene.free(q_goal_rad):
-            raise PlanningError(f"the arm's way ends in contact of {_pairs(scene, q_goal_rad)}")
+            raise PlanningError(f"the arm's path ends in contact of {_pairs(scene, q_goal_rad)}")
         if not scene.free(q_start_rad):
             q_freed_rad = self._freed(scene, q_start_rad, rng)
             return np.vstack([q_start_rad, self.path(scene, q_freed_rad, q_goal_rad, rng)])
@@ -112,7 +112,7 @@ class RrtConnect:
                 between = (q_rad + part * (q_freed_rad - q_rad) for part in _PARTS_OF_ESCAPE)
                 if scene.free(q_freed_rad) and all(set(scene.contacts(q)) <= touched for q in between):
                     return np.asarray(q_freed_rad)
-        raise PlanningError(f"the arm's way starts in contact of {_pairs(scene, q_rad)}")
+        raise PlanningError(f"the arm's path starts in contact of {_pairs(scene, q_rad)}")
 
     def line(
         self, model: ArmModel, q_start_rad: FloatArray, X_BH_to: RigidTransform, scene: ArmScene | None = None
@@ -192,7 +192,7 @@ class RrtConnect:
             setup.setPlanner(planner)
             setup.solve(base.PlannerTerminationCondition(_after(self.iterations)))
             if not setup.haveExactSolutionPath():
-                raise PlanningError("no free way was found for the arm")
+                raise PlanningError("no free path was found for the arm")
             setup.simplifySolution(base.PlannerTerminationCondition(_after(self.shortcuts)))
             states = setup.getSolutionPath().getStates()
             return np.array([q_start_rad, *([state[j] for j in joints] for state in states[1:-1]), q_goal_rad])

@@ -183,7 +183,7 @@ def _forward(pitches_rad: tuple[float, ...]) -> list[RotationMatrix]:
 
 
 def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationMatrix:
-    """R_BH of a hand whose fingers point tilt_rad below level towards azimuth_rad; side (1, -1) turns it over."""
+    """Returns R_BH of a hand whose fingers point tilt_rad below level to azimuth_rad; side (1, -1) turns it over."""
     c, s, ahead, down = np.cos(azimuth_rad), np.sin(azimuth_rad), np.cos(tilt_rad), np.sin(tilt_rad)
     x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
     y_axis = [-side * down * c, -side * down * s, -side * ahead]

@@ -137,8 +137,8 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         why = {
             Seen.IN_GRIPPER: f"the {name} is still in the gripper",
             Seen.FELL: f"the {name} fell to the floor before {person}",
-            Seen.NOT_SEEN: f"the {name} is not seen where it was let go of before {person}",
-            Seen.MOVES: f"the {name} still moves where it was let go of before {person}",
+            Seen.NOT_SEEN: f"the {name} is not seen where it was released before {person}",
+            Seen.MOVES: f"the {name} still moves where it was released before {person}",
         }
         if seen in why:
             raise SkillFailure(Cause.POSTCONDITION, why[seen])

@@ -81,7 +81,7 @@ _LEAST_KG = 0.06
 class Seen(enum.Enum):
     """Outcome of the check of a released object."""
 
-    GIVEN = "given"  # it is where it was let go of, or a little lower: somebody bears it
+    GIVEN = "given"  # it is at the release point or a little lower: somebody bears it
     FELL = "fell"  # it lies near the floor
     NOT_SEEN = "not seen"  # neither
     MOVES = "moves"  # somebody bears it, and it does not come to rest
@@ -297,4 +297,4 @@ class HandOverVerification(LookingSkill[InputsT]):
 
 
 def _unseen(name: str, failure: SkillFailure) -> SkillFailure:
-    return SkillFailure(Cause.POSTCONDITION, f"the {name} is let go of, but not seen: {failure.message}")
+    return SkillFailure(Cause.POSTCONDITION, f"the {name} was released, but is not seen: {failure.message}")

@@ -118,7 +118,7 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
         self._clear_of = inputs.clear_of
         if len(self._spots(surface)) == 0:
-            raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no room out of the way")
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no spot out of the way")
         carried = self._carried()
         held = held_object(self.context.payload, self.gripper, carried)
         yield from self._go_near(surface, held)

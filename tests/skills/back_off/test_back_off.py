@@ -37,7 +37,7 @@ def test_in_the_open_it_goes_straight_back():
     assert not bench.robot.driving
 
 
-def test_with_a_wall_behind_it_goes_another_way():
+def test_with_a_wall_behind_it_goes_in_another_direction():
     start = Pose2D(0.75, 5.5, 0.0)
     bench = Bench(start)
     assert isinstance(outcome(bench), Succeeded)
@@ -52,7 +52,7 @@ def test_a_base_that_cannot_go_sideways_goes_ahead_then():
     assert bench.robot.pose.x_m == pytest.approx(start.x_m + 0.4, abs=0.05)
 
 
-def test_what_is_seen_behind_counts_too():
+def test_an_obstacle_seen_behind_counts_too():
     bench = Bench(IN_THE_OPEN, unmapped=[Box(1.9, 5.2, 2.3, 5.8, 0.0, 1.5)])
     for _ in range(30):
         bench.tick()
@@ -91,7 +91,7 @@ def test_a_robot_that_does_not_move_is_given_up():
     assert (step.cause, "does not get on" in step.message) == (Cause.EXECUTION, True)
 
 
-def test_ended_on_the_way_it_stops():
+def test_it_stops_when_it_is_ended_while_it_drives():
     bench = Bench(IN_THE_OPEN)
     skill = BackOff(bench.context())
     for _ in range(4):

@@ -29,20 +29,20 @@ def seen_bench():
     return bench
 
 
-def test_what_stands_there_still_is_seen_again():
+def test_an_object_that_still_stands_there_is_seen_again():
     bench = seen_bench()
     assert isinstance(outcome(bench.context(), bench), Succeeded)
     assert len(bench.costmap.obstacle_cells()) > 0
 
 
-def test_what_is_gone_is_forgotten():
+def test_a_removed_obstacle_is_forgotten():
     bench = seen_bench()
     bench.robot.boxes.remove(CRATE)
     assert isinstance(outcome(bench.context(), bench), Succeeded)
     assert len(bench.costmap.obstacle_cells()) == 0
 
 
-def test_what_was_surveyed_stays():
+def test_the_surveyed_grid_stays():
     bench = seen_bench()
     near_wall = np.array([[0.5, 5.5]])
     before = bench.costmap.clearance_m(near_wall)

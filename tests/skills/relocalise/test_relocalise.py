@@ -84,7 +84,7 @@ def strange_bench():
     return bench
 
 
-def test_where_nothing_fits_it_turns_slowly_and_gives_up():
+def test_when_no_pose_fits_it_turns_slowly_and_gives_up():
     bench = strange_bench()
     step, said = outcome(bench, RelocaliseInputs(turns=3, drives=0))
     assert step == Failed(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
@@ -122,7 +122,7 @@ def test_after_a_round_of_turns_it_drives_elsewhere_and_keeps_clear():
     assert not bench.robot.driving
 
 
-def test_where_there_is_no_room_it_neither_turns_nor_drives():
+def test_without_space_it_neither_turns_nor_drives():
     bench = never_localised(Bench(Pose2D(0.0, 0.0, 0.0), surveyed=CLOSET))
     step, _ = outcome(bench, RelocaliseInputs(turns=3, drives=3))
     assert step.cause is Cause.POSTCONDITION
@@ -131,7 +131,7 @@ def test_where_there_is_no_room_it_neither_turns_nor_drives():
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_started_in_one_of_two_rooms_that_look_alike_it_finds_out_which(seed):
+def test_in_one_of_two_equal_rooms_it_finds_out_which(seed):
     component = MonteCarloOptions(particles=FilterOptions(seed=seed))
     bench = Bench(Pose2D(2.0, 1.5, 0.3), surveyed=TWIN_ROOMS, component=component, start_known=False)
     bench.tick()

@@ -20,7 +20,7 @@ def test_ahead_is_free_up_to_the_wall_less_the_body_and_the_margin():
     assert free_m(seen, math.pi, BODY, OPTIONS) == 5.0
 
 
-def test_only_what_is_in_the_bodys_way_counts():
+def test_only_obstacles_ahead_of_the_body_count():
     post = np.array([[2.0, 0.5]])
     assert free_m(post, 0.0, BODY, OPTIONS) == 5.0
     assert free_m(post, math.atan2(0.5, 2.0), BODY, OPTIONS) == pytest.approx(math.hypot(2.0, 0.5) - 0.85)
@@ -32,5 +32,5 @@ def test_the_floor_and_the_body_are_no_obstacles():
 
 
 @pytest.mark.parametrize(("x", "free"), [(0.7, True), (0.6, False)])
-def test_it_can_turn_where_the_corners_touch_nothing(x, free):
+def test_it_can_turn_where_its_corners_are_free(x, free):
     assert can_turn(np.array([[x, 0.0]]), BODY, OPTIONS) is free

@@ -55,7 +55,7 @@ def test_after_a_pause_it_is_not_said_again_and_after_a_restart_it_is(skill, sai
 
 
 @pytest.mark.parametrize(("text", "why"), [("", "nothing to say"), (" \n", "nothing"), ("x" * 501, "501 characters")])
-def test_what_cannot_be_said_is_refused(skill, said, text, why):
+def test_an_unspeakable_text_is_refused(skill, said, text, why):
     skill.begin(SpeakInputs(text))
     step = skill.step()
     assert step.cause is Cause.PRECONDITION

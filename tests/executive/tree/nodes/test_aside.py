@@ -55,7 +55,7 @@ class Table:
         self.placed.append(skill.inputs)
         cause = self.no_room.pop(0) if self.no_room else None
         if cause is not None:
-            return Failed(cause, "the counter has no room out of the way")
+            return Failed(cause, "the counter has no spot out of the way")
         skill.context.robot._robot.let_go()
         if skill.inputs.clear_of:
             self.blocking.pop(0)

@@ -45,7 +45,7 @@ def _poses(reach_cost=lambda pose: 0.0):
     return reachable_placements(free, reach_cost)
 
 
-def test_the_body_keeps_off_the_table_and_faces_the_thing():
+def test_the_body_keeps_off_the_table_and_faces_the_object():
     found = _poses()
     assert found
     for placement in found:
@@ -93,7 +93,7 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
-def test_a_hammer_lying_any_way_is_within_reach_from_some_place(yaw):
+def test_a_hammer_at_any_angle_is_within_reach_from_some_pose(yaw):
     hammer = ObjectObservation(0.0, ObjectKind("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
     found = _poses(lambda pose: _grasp_cost(pose.transform(0.52), hammer))
     assert found
@@ -124,5 +124,5 @@ def test_the_robot_goes_before_the_first_spot_that_it_can_reach_from_a_free_plac
     assert (spot[0], len(places)) == chosen
 
 
-def test_without_a_free_place_before_any_spot_there_is_none():
+def test_without_a_free_pose_before_any_spot_there_is_no_placement():
     assert first_reachable_spot([(np.zeros(2), [])], lambda spot: lambda pose: 0.0) is None

@@ -66,7 +66,7 @@ def _turned(rng: np.random.Generator) -> RotationMatrix:
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-def test_what_drake_finds_within_the_padding_touches(kind: Kind) -> None:
+def test_shapes_that_drake_finds_within_the_padding_touch(kind: Kind) -> None:
     # never looser than Drake; stricter in few cases, at rims and corners
     poses = random_poses(300)
     away = distances_m(kind, poses)

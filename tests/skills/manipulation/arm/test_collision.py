@@ -28,7 +28,7 @@ def test_boxes_in_another_frame_stand_where_that_frame_is(scene: ArmScene) -> No
     assert not scene.free(AHEAD)
 
 
-def test_what_is_touched_is_named(scene: ArmScene) -> None:
+def test_the_touched_links_are_named(scene: ArmScene) -> None:
     scene.set_boxes([AT_HAND])
     assert any(AROUND in pair for pair in scene.contacts(AHEAD))
 
@@ -50,7 +50,7 @@ def test_the_padding_counts_for_boxes_set_later(scene: ArmScene) -> None:
     assert scene.free(AHEAD)
 
 
-def test_a_thing_in_the_hand_stays_there_when_the_boxes_change(scene: ArmScene) -> None:
+def test_an_object_in_the_hand_stays_there_when_the_boxes_change(scene: ArmScene) -> None:
     far_ahead = Box(RigidTransform([1.4, 0.0, 0.2]), (0.1, 0.1, 0.1))
     scene.hold([Box(RigidTransform([0.5, 0.0, 0.0]), (0.5, 0.05, 0.05))])
     scene.set_boxes([far_ahead])
@@ -69,7 +69,7 @@ def test_checks_of_a_scene_do_not_depend_on_those_before(scene: ArmScene) -> Non
     assert [scene.free(q) for q in turns] == first
 
 
-def test_what_is_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
+def test_a_pose_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
     fetch = fetch_capabilities()
     raised_m = fetch.height_range_m[1] - fetch.standing_height_m
     usual_lift_m = fetch.standing_height_m - fetch.height_range_m[0]
@@ -87,7 +87,7 @@ def test_what_is_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
     assert usual.free_as_usual(ahead)
 
 
-def test_without_a_lift_free_as_usual_says_nothing_against_it(scene: ArmScene) -> None:
+def test_without_a_lift_every_pose_is_free_as_usual(scene: ArmScene) -> None:
     scene.set_boxes([AT_HAND])
     assert scene.free_as_usual(AHEAD)
 

@@ -21,11 +21,11 @@ def judged(*readings, watch=None, first=0):
 HELD, GONE = (0.5, 80.0, True), (0.02, 0.0, False)
 
 
-def test_nothing_held_from_the_first_is_empty():
+def test_a_gripper_without_an_object_from_the_start_is_empty():
     assert judged(GONE, GONE) == [Grip.EMPTY, Grip.EMPTY]
 
 
-def test_a_loss_is_told_at_the_second_reading_and_a_single_one_is_let_pass():
+def test_a_loss_is_reported_at_the_second_reading_and_not_at_the_first():
     assert judged(HELD, GONE, HELD, GONE, GONE) == [Grip.HELD] * 4 + [Grip.LOST]
 
 
@@ -64,7 +64,7 @@ def test_noise_of_the_readings_is_no_slip():
     assert set(judged(*noisy)) == {Grip.HELD}
 
 
-def test_it_is_gripped_half_as_firmly_again_within_what_the_gripper_can(spot):
+def test_the_second_grip_is_half_as_strong_again_within_the_limit(spot):
     assert (firmer_n(40.0, spot), firmer_n(100.0, spot)) == (60.0, 0.95 * spot.gripper.max_force_n)
 
 

@@ -26,7 +26,7 @@ def test_a_point_behind_is_refused():
         head_angles(HEAD, CAMERA, np.array([-1.0, 0.0, 0.5]))
 
 
-def test_what_shows_the_arm_has_no_depth():
+def test_pixels_of_the_arm_have_no_depth():
     lens = Intrinsics(3, 1, 1.0, 1.0, 1.0, 0.0)
     depth = np.array([[1.0, 1.0, 1.0]], dtype=np.float32)
     none = np.zeros((0, 0), np.uint8)

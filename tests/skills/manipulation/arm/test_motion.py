@@ -54,7 +54,7 @@ def test_an_arm_in_the_body_is_not_free(scene):
     assert not scene.free(np.array([0.0, 0.45, 2.2, 0.0, 0.0, 0.0]))
 
 
-def test_a_box_in_the_arms_place_is_named_as_what_stands_around(scene):
+def test_a_box_in_the_arms_space_is_named_as_an_obstacle(scene):
     scene.set_boxes([Box(RigidTransform(MODEL.X_BH(LEFT).translation()), (0.2, 0.2, 0.2))])
     with pytest.raises(PlanningError, match="what stands around"):
         PLANNER.path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))
@@ -105,7 +105,7 @@ def test_timing_a_motion_of_no_length_is_a_short_stay():
     assert np.allclose(trajectory.positions_rad[-1], LEFT)
 
 
-def test_a_straight_line_keeps_the_hands_orientation_and_its_way():
+def test_a_straight_line_keeps_the_hands_orientation_and_path():
     X_from = MODEL.X_BH(LEFT)
     X_to = RigidTransform(X_from.rotation(), X_from.translation() + [0.0, 0.0, 0.1])
     hands = [MODEL.X_BH(q) for q in PLANNER.line(MODEL, LEFT, X_to)]
@@ -147,7 +147,7 @@ def test_a_start_in_contact_is_left_without_touching_anything_else(scene):
     assert touched <= set(scene.contacts(LEFT))
 
 
-def test_a_hand_leaves_what_it_has_put_down_with_the_arm_stretched_out():
+def test_a_stretched_arm_leaves_the_object_that_it_has_put_down():
     # a Fetch put a screwdriver down on a workbench, the hand pointing down
     q = np.array([-0.191, -0.163, -5.484, 0.295, 5.498, 1.515, 1.754])
     model = arm_model(fetch_capabilities())

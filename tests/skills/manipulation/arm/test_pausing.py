@@ -99,7 +99,7 @@ def run(skill, bench, pauses=(), pause_s=0.5, between=lambda: None):
 
 
 @pytest.mark.parametrize("tick", range(1, 40, 2))
-def test_paused_at_any_moment_it_does_all_and_nothing_twice(bench, robot, tick):
+def test_paused_at_any_moment_it_does_everything_once(bench, robot, tick):
     skill = Works(bench.context())
     assert run(skill, bench, {tick}) == Succeeded("done")
     assert skill.story == ["stand", "reach", "open"]
@@ -113,19 +113,19 @@ def test_pauses_again_and_again_let_it_come_to_its_end(bench):
     assert skill.story == ["stand", "reach", "open"]
 
 
-def test_after_a_long_pause_it_looks_anew(bench):
+def test_after_a_long_pause_it_looks_again(bench):
     skill = Works(bench.context())
     assert run(skill, bench, {6}, pause_s=11.0) == Succeeded("done again")
 
 
-def test_when_the_robot_was_elsewhere_it_looks_anew(bench, robot):
+def test_when_the_robot_has_moved_it_looks_again(bench, robot):
     def carried_away():
         robot.odometry_pose = type(robot.odometry_pose)(2.0, 0.0, 0.0)
 
     assert run(Works(bench.context()), bench, {6}, between=carried_away) == Succeeded("done again")
 
 
-def test_when_the_thing_was_lost_it_looks_anew(bench, robot):
+def test_when_the_object_was_lost_it_looks_again(bench, robot):
     robot.in_gripper_rad = 0.3
     robot.opening, robot.clamp_force_n = 0.3, 20.0
 
@@ -157,7 +157,7 @@ def test_a_command_that_somebody_else_stops_again_and_again_is_a_failure(bench, 
     assert bench.clock.now() > PATIENCE_S
 
 
-def test_what_is_left_of_a_trajectory_begins_where_the_arm_is():
+def test_the_rest_of_a_trajectory_begins_where_the_arm_is():
     whole = ArmTrajectory(np.array([0.0, 1.0, 2.0]), np.array([[0.0], [1.0], [3.0]]))
     rest = rest_of(whole, 0.6, np.array([0.55]))
     assert rest.times_s == pytest.approx([0.0, 0.5625, 1.5625])

@@ -31,7 +31,7 @@ def test_places_beside_another_are_six_centimetres_from_it_across_the_view():
 
 # how the hand was tilted as it took what it carries (rad below level)
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.35])
-def test_what_sticks_out_ahead_is_drawn_in_beside_the_body_as_upright_as_it_was(tilt_rad):
+def test_an_object_that_sticks_out_is_drawn_in_beside_the_body_as_upright_as_before(tilt_rad):
     fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
     scene = ArmScene(fetch, model, {fetch.lift_joint: fetch.standing_height_m - fetch.height_range_m[0]})
     ahead = carry_configuration(scene, fetch.arm, hand_rotation(tilt_rad, 0.0, 1.0), model.stowed_rad)
@@ -54,7 +54,7 @@ def test_an_arm_that_carries_keeps_its_elbow_near_the_body(tilt_rad):
     assert scene.beyond_body_m(q)[1] < 0.04  # 0.14 where nothing is said about it
 
 
-def test_what_cannot_be_drawn_in_is_told():
+def test_an_object_that_cannot_be_drawn_in_is_refused():
     fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
     scene = ArmScene(fetch, model, {})
     scene.set_boxes([Box(RigidTransform([0.4, 0.0, 0.6]), (0.3, 1.5, 0.8))])

@@ -31,7 +31,7 @@ def test_nine_of_ten_reachable_poses_have_a_solution_and_all_have_one_near_their
     assert all(np.allclose(MODEL.nearest_inverse(MODEL.X_BH(q), q, 0.0), q, atol=1e-6) for q in qs)
 
 
-def test_what_has_solutions_is_reached_and_what_is_far_is_not():
+def test_a_pose_with_solutions_is_reached_and_a_far_one_is_not():
     X_BH = MODEL.X_BH(configurations(1)[0])
     assert MODEL.reaches(X_BH, 0.0) == bool(MODEL.inverse(X_BH, 0.0))
     assert not MODEL.reaches(RigidTransform([2.0, 0.0, 0.3]))

@@ -34,7 +34,7 @@ def inside(boxes, p_W):
     return any(np.all(np.abs(p) <= np.array(box.size_m) / 2 + 1e-9) for p, box in zip(local, boxes, strict=True))
 
 
-def test_what_is_seen_is_solid_and_what_is_behind_it_too():
+def test_a_seen_cell_and_the_cells_behind_it_are_solid():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     boxes = solid_boxes(add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 2.0, nothing_of)
     assert inside(boxes, (0.97, 0.0, 0.9))
@@ -42,14 +42,14 @@ def test_what_is_seen_is_solid_and_what_is_behind_it_too():
     assert not inside(boxes, (0.8, 0.0, 0.95))
 
 
-def test_what_is_behind_it_ends_where_the_arm_does_not_reach():
+def test_cells_behind_end_at_the_reach_of_the_arm():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     boxes = solid_boxes(add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN), BODY, 1.1, nothing_of)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert not inside(boxes, (1.15, 0.0, 0.9))
 
 
-def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
+def test_a_removed_object_is_forgotten_once_the_camera_sees_past_it():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     cells = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
     cells = add_picture(cells, picture(), RigidTransform(), NOTHING_OWN)
@@ -57,7 +57,7 @@ def test_what_was_taken_away_is_forgotten_once_it_is_seen_past():
     assert inside(solid_boxes(cells, BODY, 2.0, nothing_of), (1.2, 0.2, TABLE.height_m - 0.005))
 
 
-def test_what_lies_within_the_own_outline_is_not_solid():
+def test_points_within_the_robots_outline_are_not_solid():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     own = Outline(RigidTransform([0.9, 0.1, 0.5]), np.array([0.0, -0.2]), np.array([0.2, 0.0]))
     everything = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
@@ -69,7 +69,7 @@ def test_what_lies_within_the_own_outline_is_not_solid():
     assert not inside(solid_boxes(rest, BODY, 2.0, nothing_of), (0.97, 0.0, 0.9))
 
 
-def test_what_is_left_out_is_not_solid():
+def test_excluded_cells_are_not_solid():
     boxes = solid_boxes(
         add_picture(NOTHING, picture(), RigidTransform(), NOTHING_OWN), BODY, 2.0, lambda p: p[:, 2] < 0.8
     )
@@ -95,7 +95,7 @@ def test_a_wall_is_one_box():
     assert CELL_M < 0.05
 
 
-def test_what_is_above_every_picture_and_far_behind_what_it_shows_was_never_seen():
+def test_points_outside_all_pictures_or_far_behind_their_depth_were_never_seen():
     views = add_view((), picture(), RigidTransform())
     on_the_table = np.array([1.05, 0.0, TABLE.height_m])
     over_the_camera, under_the_table = CAMERA + [0.0, 0.0, 0.5], CAMERA + 1.6 * (on_the_table - CAMERA)
@@ -104,7 +104,7 @@ def test_what_is_above_every_picture_and_far_behind_what_it_shows_was_never_seen
     assert never_seen(points, ()).all()
 
 
-def test_only_the_last_views_are_kept():
+def test_only_the_last_views_are_stored():
     views = ()
     for _ in range(40):
         views = add_view(views, picture(), RigidTransform())

@@ -27,7 +27,7 @@ def test_the_mass_follows_from_the_extra_efforts(mass_kg, q):
     assert held_mass_kg(MODEL, q, GRIP, _efforts_of(mass_kg, q)) == pytest.approx(mass_kg, abs=1e-3)
 
 
-def test_a_twist_about_the_vertical_weighs_nothing():
+def test_a_moment_about_the_vertical_gives_no_mass():
     assert held_mass_kg(MODEL, AHEAD, GRIP, np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0])) == pytest.approx(0.0, abs=1e-6)
 
 

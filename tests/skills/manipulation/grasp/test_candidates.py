@@ -60,7 +60,7 @@ def test_the_can_lies_between_palm_and_fingertips_and_clear_of_the_fixed_gripper
 
 # height -> the fingers can take it from above, too, with the palm over its top and the tips clear of the surface
 @pytest.mark.parametrize("height_m", [0.08, 0.115, 0.24])
-def test_what_stands_can_be_taken_from_above(height_m):
+def test_an_upright_object_can_be_taken_from_above(height_m):
     found = grasp_candidates(_target(0.066, 0.066, height_m, is_round=True), MODEL.p_BS, GRIPPER)
     above = [each for each in found if each.X_BH.rotation().matrix()[2, 0] < -0.999]
     assert above
@@ -99,7 +99,7 @@ def test_fingertips_keep_off_the_surface(target, beside_m, least_m):
         assert min(_tips_m(candidate, target.base_m, beside_m)) > least_m - 1e-6
 
 
-def test_what_is_thin_is_held_by_fingers_that_end_level():
+def test_a_thin_object_is_held_by_fingers_that_end_level():
     # 9.6 mm: straight from above the fixed finger, 11 mm shorter than the other can be, would pass over it
     found = grasp_candidates(_wrench(0.3), MODEL.p_BS, GRIPPER)
     assert found
@@ -125,11 +125,11 @@ def test_fingers_do_not_close_beyond_the_end_of_a_hammers_head(head_m):
 
 # length of a cube, m -> it is taken although it is shorter than the fingers are broad
 @pytest.mark.parametrize("length_m", [0.022, 0.03, 0.05])
-def test_what_is_shorter_than_the_fingers_are_broad_is_taken(length_m):
+def test_an_object_shorter_than_the_fingers_are_broad_is_taken(length_m):
     assert _found(_target(length_m, length_m, length_m))
 
 
-def test_a_thing_wider_than_the_gripper_has_no_candidates():
+def test_an_object_wider_than_the_gripper_has_no_candidates():
     assert grasp_candidates(_target(0.25, 0.2, 0.05), MODEL.p_BS, GRIPPER) == []
 
 
@@ -159,7 +159,7 @@ def test_two_fingers_close_about_the_middle_of_a_can():
 
 # object -> both fingertips end as high over the surface, under the object's top
 @pytest.mark.parametrize("target", [_wrench(0.3), _hammer(0.6), _target(0.05, 0.05, 0.05)])
-def test_two_fingers_straight_from_above_end_level_at_what_lies(target):
+def test_two_fingers_straight_from_above_end_level_at_a_lying_object(target):
     straight = [each for each in _by_two_fingers(target) if each.X_BH.rotation().matrix()[2, 0] < -0.999]
     assert straight
     for each in straight:
@@ -169,5 +169,5 @@ def test_two_fingers_straight_from_above_end_level_at_what_lies(target):
         assert 0.0 < one < target.height_m
 
 
-def test_what_is_as_wide_as_two_fingers_open_is_not_taken():
+def test_an_object_as_wide_as_the_open_fingers_is_not_taken():
     assert _by_two_fingers(_target(0.12, TWO_FINGERS.max_grasp_m + 0.01, 0.12)) == []

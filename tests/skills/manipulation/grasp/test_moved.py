@@ -69,14 +69,14 @@ def test_a_can_that_is_pushed_far_is_looked_at_again_and_taken():
     assert sum("looking closely" in message for _, message in run.messages) == 2
 
 
-def test_a_can_that_is_taken_away_is_gone_and_the_hand_closes_on_nothing():
+def test_a_can_that_was_removed_is_gone_and_the_hand_does_not_close():
     run, _ = ran(None)
     assert (run.outcome, run.cause) == ("failure", Cause.PRECONDITION)
     assert "no longer where it was seen" in run.message
     assert not any("closing on" in message for _, message in run.messages)
 
 
-def test_a_can_that_is_pushed_again_and_again_is_left_alone():
+def test_a_can_that_moves_at_every_attempt_is_a_failed_precondition():
     run, _ = ran((0.0, 0.1), (0.0, -0.1))
     assert (run.outcome, run.cause) == ("failure", Cause.PRECONDITION)
     assert "moves while the hand reaches for it" in run.message

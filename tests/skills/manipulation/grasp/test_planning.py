@@ -51,26 +51,26 @@ def test_of_two_others_the_one_that_stands_before_it_is_named():
     )
 
 
-def test_the_refusal_tells_what_is_in_the_way_as_it_was_seen():
+def test_the_refusal_returns_the_objects_in_the_way_as_they_were_seen():
     coke, cube = _obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.85, 0.6)
     assert _refused((cube, coke)).outputs == {"in_the_way": (coke.seen,)}
 
 
-def test_of_two_that_are_in_the_way_together_the_nearest_comes_first():
+def test_of_two_objects_in_the_way_the_nearest_comes_first():
     near, far = _obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.66, 0.0, width=0.5)
     assert _refused((far, near)).outputs == {"in_the_way": (near.seen, far.seen)}
 
 
-def test_without_another_object_in_the_way_nothing_is_told():
+def test_without_an_object_in_the_way_none_is_returned():
     assert _refused(x=1.9).outputs == {}
 
 
-def test_what_stands_close_behind_it_is_too_near():
+def test_a_close_object_behind_is_too_near():
     wall = _obstacle("box", 0.87, 0.0, width=0.5)
     assert _why((wall,)) == "the beer is too near the box"
 
 
-def test_what_is_no_object_is_not_named_as_one():
+def test_an_obstacle_that_is_no_object_is_not_named():
     wall = _obstacle("wall", 0.74, 0.0, width=0.5)
     assert "would touch something" in _why((_obstacle("cube", 0.85, 0.6),), boxes=wall.boxes)
 
@@ -103,7 +103,7 @@ def test_why_there_is_no_grasp_is_asked_of_a_bounded_number_of_candidates():
         ((0.87, 0.0, 0.27), (0.05, 0.2, 0.03), True),  # a part of it that was seen as an object of its own
     ],
 )
-def test_an_object_rises_where_nothing_is_over_it(place, size_m, rises):
+def test_an_object_can_be_lifted_where_nothing_is_above_it(place, size_m, rises):
     can = Box(RigidTransform([0.85, 0.0, 0.26]), (0.07, 0.07, 0.12))
     around = Surroundings([Box(RigidTransform(place), size_m)], can, UP)
     assert around.lets_rise(np.array([0.0, 0.0, 0.12])) == rises

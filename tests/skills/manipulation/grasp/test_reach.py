@@ -24,7 +24,7 @@ LOW_M, USUAL_M, HIGH_M = 0.425, 0.52, 0.575
 
 # height of the surface (m) -> the body height that is tried first
 @pytest.mark.parametrize(("base_m", "first_m"), [(0.0, LOW_M), (0.45, USUAL_M), (0.9, HIGH_M)])
-def test_the_body_crouches_for_the_floor_and_stands_up_for_what_is_high(base_m, first_m):
+def test_the_body_crouches_for_the_floor_and_stands_up_for_high_objects(base_m, first_m):
     heights_m = body_heights_m(base_m, CAPABILITIES)
     low, high = CAPABILITIES.height_range_m
     assert heights_m[0] == pytest.approx(first_m, abs=0.006)
@@ -67,7 +67,7 @@ def test_the_space_about_an_object_holds_it_and_a_band_of_its_surface():
     assert np.all(high > [1.0, 2.0, 0.82])
 
 
-def test_what_is_tall_has_its_own_space_up_to_its_top_and_not_beside_it():
+def test_a_tall_object_has_its_own_space_up_to_its_top_and_not_beside_it():
     seen = ObjectObservation(0.0, ObjectKind("extinguisher"), (1.0, 2.0, 0.9), (0.09, 0.09, 0.4), 0.0, 1.0)
     about, own = space_about(seen)
     assert about[1][2] < 1.1 < own[1][2] < 1.16
@@ -76,7 +76,7 @@ def test_what_is_tall_has_its_own_space_up_to_its_top_and_not_beside_it():
 
 # tilt of the hand (degrees), which way it is turned over -> whether what stands turns square to the fingers
 @pytest.mark.parametrize(("tilt_deg", "side", "turns"), [(10, 1.0, True), (10, -1.0, True), (45, 1.0, False)])
-def test_what_stands_is_taken_for_square_to_the_fingers_of_a_hand_that_tilts_little(tilt_deg, side, turns):
+def test_an_upright_object_counts_as_square_to_the_fingers_of_a_slightly_tilted_hand(tilt_deg, side, turns):
     X_BH, p_HT = RigidTransform(hand_rotation(np.radians(tilt_deg), 0.7, side), [0.7, 0.1, 0.2]), np.array([0.18, 0, 0])
     now = square_hand_pose(X_BH, p_HT)
     assert bool(abs(now.rotation().matrix()[2, 0]) < 1e-9) is turns
@@ -103,7 +103,7 @@ def test_without_a_grasp_the_arm_goes_nowhere():
 
 # where a can of 0.115 m on a table of 0.70 m seems to stand -> where it does
 @pytest.mark.parametrize(("seen_m", "stands_m"), [(0.745, 0.7575), (0.7575, 0.7575), (0.78, 0.78)])
-def test_what_seems_to_be_sunk_into_its_surface_rests_on_it(seen_m, stands_m):
+def test_an_object_that_seems_sunk_into_its_surface_is_raised_onto_it(seen_m, stands_m):
     table = Surface("table", ((0.7, -0.5), (1.3, -0.5), (1.3, 0.5), (0.7, 0.5)), 0.70)
     shelf = replace(table, name="shelf", height_m=1.5)
     assert raise_onto_surface(replace(CAN, position_W=(0.9, 0.1, seen_m)), [table, shelf]).position_W == (
@@ -113,5 +113,5 @@ def test_what_seems_to_be_sunk_into_its_surface_rests_on_it(seen_m, stands_m):
     )
 
 
-def test_what_lies_on_no_surface_that_is_known_stays_where_it_was_seen():
+def test_an_object_on_no_known_surface_stays_where_it_was_seen():
     assert raise_onto_surface(CAN, ()) == CAN

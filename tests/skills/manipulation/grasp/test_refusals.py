@@ -46,7 +46,7 @@ def test_a_class_is_refused_by_an_arm_that_carries_less_than_its_lightest():
 
 
 @pytest.mark.parametrize("name", ["thing", "cube", "unheard of"])
-def test_nothing_is_known_of_the_mass_of_what_has_no_class_knowledge(name):
+def test_the_mass_of_an_unknown_class_is_unknown(name):
     assert least_mass_kg(seen(name, LARGE)) == 0.0
 
 
@@ -58,6 +58,6 @@ def test_nothing_is_known_of_the_mass_of_what_has_no_class_knowledge(name):
         (_target(0.25, 0.02, 0.002), "too flat for the gripper: 2 mm high, and the fingers need"),
     ],
 )
-def test_what_has_no_grasp_says_which_measure_is_at_fault(target, why):
+def test_the_refusal_names_the_measure_that_prevents_a_grasp(target, why):
     assert grasp_candidates(target, MODEL.p_BS, GRIPPER) == []
     assert why in why_no_candidates(target, MODEL.p_BS, GRIPPER, "plank")

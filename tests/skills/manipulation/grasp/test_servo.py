@@ -47,7 +47,7 @@ def test_a_can_that_was_pushed_is_seen_where_it_is(X_BC, moved_m, seen_m):
     assert found.overlap > 0.7
 
 
-def test_what_is_too_near_for_its_depth_is_seen_by_its_outline():
+def test_an_object_too_near_for_depth_is_seen_by_its_outline():
     now = replace(CAN, y=0.02)
     image = scene([now], X_WC=AHEAD)
     image = replace(image, depth_m=np.where(image.depth_m < 0.3, 0.0, image.depth_m).astype(np.float32))
@@ -56,11 +56,11 @@ def test_what_is_too_near_for_its_depth_is_seen_by_its_outline():
 
 
 @pytest.mark.parametrize("X_BC", [AHEAD, ABOVE])
-def test_of_a_can_that_is_gone_little_overlaps(X_BC):
+def test_the_outline_of_a_missing_can_hardly_overlaps(X_BC):
     assert measure_shift(target_of(CAN), scene([], X_WC=X_BC), X_BC).overlap < 0.2
 
 
-def test_a_picture_that_shows_nothing_tells_nothing():
+def test_an_empty_picture_gives_no_shift():
     image = scene([CAN], X_WC=ABOVE)
     blind = replace(image, depth_m=np.zeros_like(image.depth_m))
     steep = camera_pose(MIDDLE + [0.0, 0.01, 0.12], MIDDLE)

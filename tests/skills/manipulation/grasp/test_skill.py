@@ -19,7 +19,7 @@ def test_a_full_gripper_is_a_failed_precondition():
     assert robot.arm_commands == []
 
 
-def test_a_thing_that_is_gone_is_a_failed_precondition_and_the_arm_is_stowed():
+def test_a_missing_object_is_a_failed_precondition_and_the_arm_is_stowed():
     robot = ScriptedRobot()
     failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "no longer where it was seen")
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
@@ -32,7 +32,7 @@ def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
     failed(Grasp(context_of(robot)), SEEN, Cause.EXECUTION, "the arm is out of order")
 
 
-def test_a_second_attempt_starts_anew():
+def test_a_second_attempt_starts_again():
     robot = ScriptedRobot(holding=True, opening=0.3)
     skill = Grasp(context_of(robot))
     failed(skill, SEEN, Cause.PRECONDITION, "holds something already")
@@ -63,7 +63,7 @@ class Heavy(Grasp):
         return Succeeded("lifted")
 
 
-def test_what_weighs_more_than_the_arm_carries_is_set_down_and_refused_with_its_mass():
+def test_an_object_that_is_too_heavy_is_set_down_and_refused_with_its_mass():
     robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening=0.3)
     before = MODEL.X_BH(robot.q).translation()
     why = "the coke weighs 5.6 kg, and the arm carries 5.0 kg at most"
@@ -71,7 +71,7 @@ def test_what_weighs_more_than_the_arm_carries_is_set_down_and_refused_with_its_
     assert (MODEL.X_BH(robot.q).translation() - before)[2] < -0.09
 
 
-def test_what_the_arm_carries_is_not_set_down():
+def test_an_object_that_the_arm_can_carry_is_not_set_down():
     robot = ScriptedRobot(holding=True, opening=0.3)
     skill = Heavy(context_of(robot), 4.9)
     skill.begin(SEEN)
@@ -88,7 +88,7 @@ def resumed(skill, inputs):
     return step
 
 
-def test_a_thing_that_is_held_after_a_restart_is_not_taken_again():
+def test_an_object_held_after_a_restart_is_not_taken_again():
     robot = ScriptedRobot(holding=True, opening=0.3, gripper_stops_rad=0.3)
     step = resumed(Grasp(context_of(robot)), SEEN)
     assert isinstance(step, Succeeded), step
@@ -103,7 +103,7 @@ def test_after_a_restart_with_an_empty_gripper_the_robot_looks_before_it_takes()
     assert "no longer where it was seen" in step.message
 
 
-def test_what_the_gripper_has_lost_is_undone():
+def test_a_lost_object_undoes_the_grasp():
     robot = ScriptedRobot()
     skill = Grasp(context_of(robot))
     assert skill.undone(SEEN) == "the coke is not in the gripper"
@@ -121,11 +121,11 @@ class Behind(Grasp):
         return (yield from self.compute(plan, latency_s=0.1, name="plan grasp", message="planning"))
 
 
-def test_a_failure_to_plan_tells_what_is_in_the_way():
+def test_a_failure_to_plan_returns_the_objects_in_the_way():
     step = outcome(Behind(context_of(ScriptedRobot())), SEEN)
     assert (step.cause, step.message) == (Cause.PLANNING, "the coke is behind the beer")
     assert step.outputs == {"tried": (), "in_the_way": (BEER,)}
 
 
-def test_another_failure_tells_that_nothing_is_in_the_way():
+def test_another_failure_returns_that_no_object_is_in_the_way():
     assert outcome(Grasp(context_of(ScriptedRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}

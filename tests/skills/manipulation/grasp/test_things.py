@@ -18,7 +18,7 @@ def examined(things, at, p_WB=(0.0, 0.0, 0.0)):
 
 
 @pytest.mark.parametrize("at", [ONE, OTHER])
-def test_of_two_that_touch_the_one_that_was_seen_is_taken_and_the_other_is_in_the_way(at):
+def test_of_two_touching_objects_the_seen_one_is_the_target_and_the_other_an_obstacle(at):
     view = examined([ONE, OTHER], at)
     assert view.target.centre_B == pytest.approx((at.x, at.y), abs=0.012)
     assert view.target.width_m == pytest.approx(0.066, abs=0.012)
@@ -27,7 +27,7 @@ def test_of_two_that_touch_the_one_that_was_seen_is_taken_and_the_other_is_in_th
     assert (str(other.seen.kind), other.seen.surface, len(other.boxes)) == ("thing", "table", 1)
 
 
-def test_what_stands_beside_is_known_by_its_place_in_the_world_and_its_size():
+def test_a_neighbour_is_reported_with_its_position_and_size():
     p_WB = (0.2, 0.1, 0.3)
     (other,) = examined([ONE, OTHER], ONE, p_WB).others
     x, y, z = other.seen.position_W
@@ -37,5 +37,5 @@ def test_what_stands_beside_is_known_by_its_place_in_the_world_and_its_size():
     assert p_WB + other.centre_B == pytest.approx(other.seen.position_W, abs=0.02)
 
 
-def test_a_thing_that_is_gone_is_not_seen():
+def test_a_missing_object_is_not_seen():
     assert examined([], ONE) is None

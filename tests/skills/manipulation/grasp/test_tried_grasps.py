@@ -30,7 +30,7 @@ def test_the_best_grasp_falls_behind_all_that_are_unlike_it():
     assert ordered.index(found[0]) > len(found) // 2 or len(found) < 4
 
 
-def test_nothing_tried_changes_nothing():
+def test_without_tried_grasps_the_order_stays():
     found = candidates()
     assert others_first(found, (), CENTRE, RigidTransform()) == found
 
@@ -51,7 +51,7 @@ def test_a_grasp_is_known_again_from_where_the_body_stands_later():
     assert same_grasp(tried_grasp(first, CENTRE, X_WB), tried_grasp(moved, (float(centre[0]), float(centre[1])), X_WC))
 
 
-def test_a_gripper_that_is_turned_over_takes_the_same_grasp():
+def test_a_gripper_turned_over_makes_the_same_grasp():
     found = candidates()[0]
     over = dataclasses.replace(found, X_BH=found.X_BH @ RigidTransform(RollPitchYaw(np.pi, 0.0, 0.0), np.zeros(3)))
     assert same_grasp(tried_grasp(found, CENTRE, RigidTransform()), tried_grasp(over, CENTRE, RigidTransform()))
@@ -81,7 +81,7 @@ class Slippery(Grasp):
         raise SkillFailure(Cause.POSTCONDITION, "it slipped")
 
 
-def test_a_failed_grasp_tells_what_it_tried_and_the_next_one_tries_another():
+def test_a_failed_grasp_returns_its_try_and_the_next_attempt_takes_another():
     seen = ObjectObservation(0.0, ObjectKind("hammer"), (0.85, 0.0, 0.215), (0.2, 0.03, 0.03), 0.0, 1.0, "table")
     avoid = ()
     for count in (1, 2):

@@ -39,11 +39,11 @@ def test_space_above_an_object_that_no_picture_shows_is_looked_into_once():
 
 # where the arm would be -> nothing is to be seen there, or nothing of it from here
 @pytest.mark.parametrize("arm_W", [ABOVE_IT[:1], ABOVE_IT + [0.0, 1.0, 0.0], np.empty((0, 3))])
-def test_where_the_arm_does_not_come_near_the_object_nothing_is_looked_at(arm_W):
+def test_the_camera_does_not_look_where_the_arm_stays_away_from_the_object(arm_W):
     assert _looked(arm_W) == [False]
 
 
-def test_the_camera_looks_from_about_the_height_of_what_it_looks_at():
+def test_the_camera_looks_from_about_the_height_of_the_space():
     p_BT = np.array([0.9, 0.1, 0.5])
     places = level_viewpoints(MODEL, p_BT)
     assert places

@@ -84,7 +84,7 @@ def test_nobody_in_sight_is_a_failed_precondition():
 
 
 @pytest.mark.parametrize("y", [-0.4, 0.0, 0.4])
-def test_the_thing_is_held_out_near_the_person_but_does_not_touch(y):
+def test_the_object_is_held_out_near_the_person_without_contact(y):
     robot = _holding(scan_now=scan_of([(1.4, y, 0.2)]))
     skill = HandOver(context_of(robot))
     skill.begin(BEER)
@@ -116,7 +116,7 @@ class _Rolling(_Person):
 
 
 @pytest.mark.parametrize("rests_s", [15.0, math.inf])
-def test_nothing_is_given_as_long_as_it_moves(rests_s):
+def test_an_object_that_still_moves_is_not_given(rests_s):
     robot = _Rolling(q=CARRYING.copy(), holding=True, opening=0.3, scan_now=scan_of([(1.4, 0.0, 0.2)]))
     robot.rests_s = rests_s
     step = outcome(HandOver(context_of(robot)), BEER)
@@ -126,13 +126,13 @@ def test_nothing_is_given_as_long_as_it_moves(rests_s):
     else:
         assert (step.cause, step.message) == (
             Cause.POSTCONDITION,
-            "the beer still moves where it was let go of before Robin",
+            "the beer still moves where it was released before Robin",
         )
 
 
 def test_the_hand_camera_looks_whether_the_person_has_it():
     robot = _before_robin(things=())
-    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was let go of")
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was released")
     assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
 
 
@@ -166,10 +166,10 @@ def test_an_object_pulled_out_of_the_closed_gripper_is_given_when_seen_with_the_
 
 def test_an_object_lost_while_held_out_and_not_seen_is_not_given():
     robot = _before_robin(things=(), pull_n=0.0, lost_s=PULL_S)
-    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was let go of")
+    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was released")
 
 
-def test_what_stays_in_the_open_gripper_is_told():
+def test_an_object_that_stays_in_the_open_gripper_is_reported():
     robot = _before_robin()
     robot.gripper = lambda: Gripper(robot.now_s, robot.opening, 5.0, True)
     failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "still in the open gripper")
@@ -199,7 +199,7 @@ TICKS = pytest.mark.parametrize("every", [13, pytest.param(3, marks=pytest.mark.
 
 
 @TICKS
-def test_cancelled_at_any_tick_nothing_is_under_way(every):
+def test_cancelled_at_any_tick_no_command_still_runs(every):
     whole = _before_robin()
     count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
     for end in range(1, count + 1, every):
@@ -232,7 +232,7 @@ def test_paused_at_any_tick_it_goes_on_and_gives_it(every):
         assert not robot.holding
 
 
-def test_after_a_restart_what_was_let_go_is_given():
+def test_after_a_restart_a_released_object_is_given():
     robot = _before_robin(holding=False)
     skill = HandOver(context_of(robot))
     skill.checkpoint = {"lets_go": True, "release": asdict(Release(0.85, 0.0, 0.94, 1.05))}

@@ -59,11 +59,11 @@ def _at_release(colour, base_m=LEVEL_M - 0.06):
     return Can(AHEAD_M, 0.0, 0.033, 0.115, colour, base=base_m)
 
 
-def test_what_is_seen_where_it_was_let_go_of_is_given():
+def test_an_object_seen_at_its_release_point_is_given():
     assert outcome(HandOver(context_of(_robot(_at_release(RED)))), COKE) == Succeeded("gave the coke to Robin")
 
 
-def test_two_fingers_are_drawn_straight_back_from_what_they_let_go_of():
+def test_two_fingers_are_drawn_straight_back_from_a_released_object():
     robot = _robot(_at_release(RED))
     skill = HandOver(context_of(robot))
     skill.begin(COKE)
@@ -77,7 +77,7 @@ def test_two_fingers_are_drawn_straight_back_from_what_they_let_go_of():
     assert way_H == pytest.approx([-0.16, 0.0, 0.0], abs=0.003)  # not aside first: both fingers are off it
 
 
-def test_the_arm_is_stowed_around_what_bears_the_object_now():
+def test_the_arm_is_stowed_around_the_hands_that_bear_the_object():
     robot = _robot(_at_release(RED))
     context = context_of(robot)
     around_m = ((-0.033, 0.033), (-0.06, 0.055), (-0.033, 0.033))  # the can, gripped in its middle; y of the hand is up
@@ -92,21 +92,21 @@ def test_the_arm_is_stowed_around_what_bears_the_object_now():
     assert robot.q == pytest.approx(HEAD_MODEL.stowed_rad, abs=0.06)
 
 
-def test_what_is_seen_nowhere_is_not_given():
-    failed(HandOver(context_of(_robot())), COKE, Cause.POSTCONDITION, "not seen where it was let go of before Robin")
+def test_an_object_seen_nowhere_is_not_given():
+    failed(HandOver(context_of(_robot())), COKE, Cause.POSTCONDITION, "not seen where it was released before Robin")
 
 
-def test_what_lies_on_the_floor_fell():
+def test_an_object_on_the_floor_fell():
     robot = _robot(_at_release(RED, base_m=0.0))
     failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke fell to the floor before Robin")
 
 
 def test_something_else_that_is_not_as_high_is_not_the_object():
     robot = _robot(_at_release(BLUE, base_m=0.80))
-    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "not seen where it was let go of")
+    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "not seen where it was released")
 
 
-def test_what_the_closing_gripper_feels_again_is_still_in_it():
+def test_an_object_that_the_closing_gripper_feels_is_still_in_it():
     robot = _robot(_at_release(RED))
     opened = []
 
@@ -137,13 +137,13 @@ class _LetsGo:
         pass
 
 
-def test_a_head_that_does_not_turn_is_told_in_one_sentence():
+def test_a_head_that_does_not_turn_is_reported_in_one_sentence():
     robot = _robot(_at_release(RED), head_refuses=True)
-    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke is let go of, but not seen: the head")
+    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke was released, but is not seen: the head")
 
 
 @pytest.mark.parametrize(("things", "given"), [((_at_release(RED),), True), ((), False)])
-def test_after_a_restart_it_looks_where_it_let_go(things, given):
+def test_after_a_restart_it_looks_at_the_release_point(things, given):
     robot = _robot(*things)
     robot.holding = False
     skill = HandOver(context_of(robot))
@@ -204,12 +204,12 @@ def test_depth_shows_a_flat_object_on_a_level_plate(things, lies):
     assert lies_at(scene((plate, *things)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97)) is lies
 
 
-def test_depth_does_not_tell_a_flat_object_from_what_bears_it():
+def test_depth_cannot_separate_a_flat_object_from_its_support():
     tray = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.945)
     assert not stands_at(scene((tray,)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97))
 
 
-def test_where_it_is_let_go_of_is_told_by_its_box_in_the_hand():
+def test_the_release_point_follows_from_the_box_in_the_hand():
     corners_H = np.array([[x, y, z] for x in (0.13, 0.20) for y in (-0.05, 0.06) for z in (-0.03, 0.03)])
     X_WH = RigidTransform(RotationMatrix.MakeXRotation(np.pi / 2), [2.0, 1.0, 1.1])  # y of the hand is up
     release = release_of(X_WH, P_HT, corners_H)

@@ -44,7 +44,7 @@ def test_spots_keep_off_the_edges():
     assert found[:, 0].max() <= 1.6 - EDGE_M + 1e-9
 
 
-def test_spots_within_a_circle_that_is_kept_clear_are_none():
+def test_spots_within_a_forbidden_circle_are_left_out():
     found = clear_spots(spots(TABLE), [(1.3, 0.0, 0.25), (1.1, -0.4, 0.1)])
     assert 0 < len(found) < len(spots(TABLE))
     assert np.linalg.norm(found - [1.3, 0.0], axis=1).min() > 0.25
@@ -56,13 +56,13 @@ def test_a_small_surface_has_its_middle_as_spot():
     assert spots(small) == pytest.approx(np.array([[0.06, 0.06]]))
 
 
-def test_spots_near_a_thing_are_not_free():
+def test_spots_near_an_object_are_not_free():
     free = free_spots(_view(things=((1.3, 0.0),)), spots(TABLE))
     assert len(free) > 0
     assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M
 
 
-def test_what_is_not_seen_is_not_free():
+def test_an_unseen_spot_is_not_free():
     free = free_spots(_view(seen_y=(0.0, 0.5)), spots(TABLE))
     assert free[:, 1].min() > -0.04
 
@@ -72,7 +72,7 @@ def test_a_full_table_has_no_free_spot():
     assert len(free_spots(_view(things=things), spots(TABLE))) == 0
 
 
-def test_the_spot_with_the_most_room_comes_first_and_none_near_where_the_robot_was_before():
+def test_the_spot_with_the_most_clearance_comes_first_and_none_near_an_earlier_one():
     free = np.array([[1.2, -0.4], [1.2, 0.0], [1.2, 0.4]])
     view = _view(things=[(1.4, -0.4)])
     assert clearest_first(free, view, [])[-1] == pytest.approx(free[0])
@@ -80,7 +80,7 @@ def test_the_spot_with_the_most_room_comes_first_and_none_near_where_the_robot_w
     assert len(clearest_first(free[:1], view, [free[0]])) == 0
 
 
-def test_a_surface_that_is_hidden_is_free_but_for_what_is_known_to_stand_there():
+def test_a_hidden_surface_is_free_except_near_known_objects():
     standing = np.array([[1.3, 0.0, 0.78]])
     free = free_spots(unseen_view(TABLE, standing), spots(TABLE))
     assert 0 < len(free) < len(spots(TABLE))

@@ -28,7 +28,7 @@ def test_a_held_object_reaches_below_the_hand_as_far_as_its_lowest_corner():
     assert held.p_HO == pytest.approx([0.185, -0.03, 0.0])
 
 
-def test_what_was_taken_from_above_is_put_down_with_the_fingers_down_whatever_way_they_are_turned():
+def test_an_object_taken_from_above_is_placed_with_the_fingers_down_at_any_turn():
     down = RotationMatrix.MakeYRotation(np.pi / 2)
     turned = HeldObject(down, np.zeros((2, 3))).rotations(0.3)
     assert len(turned) == 8
@@ -37,7 +37,7 @@ def test_what_was_taken_from_above_is_put_down_with_the_fingers_down_whatever_wa
 
 # What stands beside the first of two spots (m to its side) -> the spot that is taken
 @pytest.mark.parametrize(("beside_m", "taken"), [(None, 0), (0.35, 0), (0.12, 1), (-0.12, 1)])
-def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_it(beside_m, taken):
+def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_neighbour(beside_m, taken):
     spots_B = [np.array([0.85, y, 0.02]) for y in (0.0, -0.5)]
     beside = [] if beside_m is None else [Box(RigidTransform([0.8, beside_m, 0.2]), (0.1, 0.1, 0.3))]
     scene = ArmScene(spot_capabilities(), MODEL, {})
@@ -49,7 +49,7 @@ def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_thing_beside_
 
 # How high (m) a surface below the hand at its goal is -> whether the path is planned with the object in the hand
 @pytest.mark.parametrize(("top_m", "held"), [(-0.3, True), (0.1, False)])
-def test_what_is_held_keeps_clear_on_the_way_unless_it_touches_something_at_an_end(top_m, held):
+def test_the_held_object_is_checked_on_the_path_unless_it_touches_at_an_end(top_m, held):
     scene, can = ArmScene(spot_capabilities(), MODEL, {}), Box(RigidTransform([0.2, -0.08, 0.0]), (0.06, 0.16, 0.06))
     above_B = RigidTransform(LEVEL_FORWARD, [0.8, 0.0, 0.25])
     (q_goal, *_) = MODEL.inverse(above_B)
@@ -93,6 +93,6 @@ def test_a_far_spot_is_reached_from_lower_and_then_tilted(ahead_m, way):
         (0.9, 0.5, (0.76, 0.6, 0.5, 0.4)),  # under it
     ],
 )
-def test_a_body_is_not_lowered_so_far_that_what_it_holds_is_pressed_on_the_surface(x_m, low_m, tried_m):
+def test_the_body_is_not_lowered_until_the_held_object_presses_on_the_surface(x_m, low_m, tried_m):
     corners_W = np.array([[x_m, y, z] for y in (-0.03, 0.03) for z in (low_m, low_m + 0.1)])
     assert tuple(clear_heights((0.76, 0.6, 0.5, 0.4), 0.76, corners_W, TABLE)) == tried_m

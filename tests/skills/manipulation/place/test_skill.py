@@ -27,17 +27,17 @@ def test_an_empty_gripper_is_a_failed_precondition():
     failed(Place(context_of(ScriptedRobot())), PlaceInputs(TABLE), Cause.PRECONDITION, "nothing in the gripper")
 
 
-def test_a_surface_that_is_not_seen_is_a_failed_planning_and_the_thing_is_kept():
+def test_an_unseen_surface_is_a_failed_planning_and_the_object_stays_in_the_hand():
     robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
     failed(Place(context_of(robot)), PlaceInputs(TABLE), Cause.PLANNING, "the kitchen table is not seen from here")
     assert robot.holding
     assert robot.opening == 0.3
 
 
-def test_a_surface_without_a_spot_out_of_the_way_is_a_failed_planning_before_anything_moves():
+def test_a_surface_without_an_allowed_spot_is_a_failed_planning_before_anything_moves():
     robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
     inputs = PlaceInputs(TABLE, clear_of=((1.0, 0.0, 2.0),))
-    failed(Place(context_of(robot)), inputs, Cause.PLANNING, "the kitchen table has no room out of the way")
+    failed(Place(context_of(robot)), inputs, Cause.PLANNING, "the kitchen table has no spot out of the way")
     assert (robot.arm_commands, robot.holding) == ([], True)
 
 
@@ -58,7 +58,7 @@ def test_after_a_restart_an_empty_gripper_that_was_not_yet_over_the_spot_is_a_fa
     assert (step.cause, "not yet over its place" in step.message) == (Cause.PRECONDITION, True)
 
 
-def test_after_a_restart_an_empty_gripper_makes_the_robot_look_whether_the_thing_stands_there():
+def test_after_a_restart_a_robot_with_an_empty_gripper_looks_for_the_object_on_its_spot():
     robot = ScriptedRobot()
     step = resumed(robot, {"spot_W": [0.9, 0.0]})
     assert isinstance(step, Failed)  # the scripted camera is dark
@@ -78,7 +78,7 @@ class _Rolling(ScriptedRobot):
 
 
 @pytest.mark.parametrize(("rests_s", "why"), [(0.0, None), (3.0, None), (math.inf, "the object still moves on the")])
-def test_what_was_put_down_is_to_be_at_rest(rests_s, why):
+def test_a_placed_object_must_be_at_rest(rests_s, why):
     robot = _Rolling()
     robot.rests_s = rests_s
     step = resumed(robot, {"spot_W": [0.95, 0.0]}, TOP)
@@ -87,14 +87,14 @@ def test_what_was_put_down_is_to_be_at_rest(rests_s, why):
     assert why is None or (step.cause is Cause.POSTCONDITION and why in step.message)
 
 
-def test_a_thing_still_held_after_a_restart_is_put_down_as_it_was_brought():
+def test_an_object_held_after_a_restart_is_put_down_as_it_was_brought():
     robot = ScriptedRobot(q=CARRYING.copy(), holding=True, opening=0.3)
     skill = Place(context_of(robot))
     skill.checkpoint = {"carried": np.eye(3).tolist()}
     assert np.array_equal(skill._carried().matrix(), np.eye(3))
 
 
-def test_what_is_still_in_the_gripper_is_not_put_down():
+def test_an_object_still_in_the_gripper_is_a_failed_postcondition():
     robot = ScriptedRobot(holding=True)
     assert Place(context_of(robot)).undone(PlaceInputs(TABLE)) is not None
 
@@ -109,7 +109,7 @@ FROM_THE_SIDE = HeldObject(LEVEL_FORWARD, np.array([[0.15, -0.05, -0.03], [0.22,
     ("held", "off_m", "reached"),
     [(FROM_ABOVE, 0.85, True), (FROM_ABOVE, 1.0, False), (FROM_THE_SIDE, 1.0, True), (FROM_THE_SIDE, 1.4, False)],
 )
-def test_what_is_held_from_above_is_put_down_nearer(held, off_m, reached):
+def test_the_robot_stands_nearer_to_place_an_object_held_from_above(held, off_m, reached):
     skill = Place(context_of(ScriptedRobot(holding=True)))
     cost = skill._reach_cost(BENCH, held, np.array([0.1, 0.0]))
     assert (cost(Pose2D(0.1 - off_m, 0.0, 0.0)) is not None) is reached

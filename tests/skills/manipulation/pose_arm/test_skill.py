@@ -23,7 +23,7 @@ def test_an_arm_in_the_pose_is_not_moved():
     assert not robot.arm_commands
 
 
-def test_what_is_held_stays_held():
+def test_a_held_object_stays_held():
     robot = ScriptedRobot(holding=True, opening=0.3)
     outcome(PoseArm(context_of(robot)), PoseArmInputs(POSE, 1.0))
     assert robot.opening == 0.3

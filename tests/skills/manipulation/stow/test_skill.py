@@ -19,7 +19,7 @@ def test_a_stowed_arm_is_left_alone():
     assert robot.arm_commands == []
 
 
-def test_an_arm_that_is_out_is_stowed():
+def test_a_stretched_arm_is_stowed():
     robot = ScriptedRobot(q=OUT.copy())
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
     assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
@@ -31,7 +31,7 @@ def test_an_open_empty_gripper_is_closed_first():
     assert robot.opening == 0.0
 
 
-def test_a_held_thing_is_drawn_in_and_kept():
+def test_a_held_object_is_drawn_in_and_stays_held():
     robot = ScriptedRobot(q=OUT.copy(), holding=True, opening=0.3)
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
     hand = MODEL.X_BH(robot.q).translation()

@@ -1,4 +1,4 @@
-"""Quantities: what a number in a file or an option may be, and what is said where it may not."""
+"""Tests of quantities: ranges of numbers in files and options, and their messages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Routines: what end stops, how failures come out."""
+"""Tests of routines: commands that end stops, and failures."""
 
 import numpy as np
 import pytest

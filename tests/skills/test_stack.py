@@ -1,4 +1,4 @@
-"""The stack: what a file chooses, what it may set, and what is refused."""
+"""Tests of stack files: choices, options, refusals."""
 
 import dataclasses
 from typing import get_args, get_type_hints

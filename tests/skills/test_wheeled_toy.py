@@ -1,4 +1,4 @@
-"""Every skill runs on a robot that is no Spot, with its suite."""
+"""Every skill runs, with its suite, on a robot that is not Spot."""
 
 import functools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Backing off among boxes: where to, how far, and when not."""
+"""Tests of the direction and the distance of backing off among boxes."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Charging: until the level is reached, and only where the charge rises."""
+"""Tests of charging: it ends at the level and fails where the charge does not rise."""
 
 from types import SimpleNamespace
 

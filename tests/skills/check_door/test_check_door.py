@@ -1,4 +1,4 @@
-"""The check_door skill waits for somebody who stands in the doorway to go on."""
+"""The check_door skill waits until a person has left the doorway."""
 
 import pytest
 

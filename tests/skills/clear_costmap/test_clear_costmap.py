@@ -1,4 +1,4 @@
-"""Clearing the seen layer: what is gone is forgotten, what stands there is seen anew."""
+"""Tests of clearing the obstacle layer: the sensors fill it again."""
 
 import dataclasses
 

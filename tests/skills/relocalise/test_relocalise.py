@@ -1,4 +1,4 @@
-"""Finding the place again after the robot was carried off."""
+"""Tests of finding the pose again after the robot was carried away."""
 
 import dataclasses
 import math

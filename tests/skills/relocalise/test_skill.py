@@ -1,4 +1,4 @@
-"""Room to drive, by a scan alone."""
+"""Tests of the free space of a drive, by a scan alone."""
 
 import math
 

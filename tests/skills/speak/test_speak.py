@@ -1,4 +1,4 @@
-"""Saying something: once, for as long as it takes, and nothing that cannot be said."""
+"""Tests of speech: said once, for as long as it takes, or refused."""
 
 from types import SimpleNamespace
 

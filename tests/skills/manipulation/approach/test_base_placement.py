@@ -1,4 +1,4 @@
-"""Where to stand for a thing on a surface."""
+"""Tests of base placements before an object on a surface."""
 
 import math
 from functools import partial

@@ -1,4 +1,4 @@
-"""The collision scene: boxes in any frame, those of before found again, a thing in the hand, its own padding."""
+"""Tests of the collision scene: boxes in any frame, a held object, padding."""
 
 import numpy as np
 import pytest

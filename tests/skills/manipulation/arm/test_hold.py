@@ -1,4 +1,4 @@
-"""What becomes of the object in the gripper, told from readings."""
+"""Tests of the watch over the object in the gripper."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Where a head turns to look at a point."""
+"""Tests of the angles of a head that looks at a point, and of pictures without the arm."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A routine that is paused: it goes on where it was when all is as it was, and else looks anew what is done."""
+"""Tests of a paused routine: it continues when nothing has changed, and else checks again."""
 
 from typing import ClassVar
 

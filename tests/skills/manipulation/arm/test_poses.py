@@ -1,4 +1,4 @@
-"""Places to look from."""
+"""Tests of viewpoints and carrying poses."""
 
 import numpy as np
 import pytest

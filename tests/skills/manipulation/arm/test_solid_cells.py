@@ -1,4 +1,4 @@
-"""Solid cells from depth pictures: what is seen is solid, what is seen past is not, boxes cover exactly the cells."""
+"""Tests of solid cells from depth pictures, and of the boxes that cover them."""
 
 import numpy as np
 from pydrake.math import RigidTransform

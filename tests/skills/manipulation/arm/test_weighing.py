@@ -1,4 +1,4 @@
-"""What the hand holds is weighed by the arm's efforts."""
+"""Tests of weighing a held object by the arm's efforts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A can that is moved after the close look, before the hand gets to it."""
+"""Tests of a can that moves between the close view and the grasp."""
 
 from dataclasses import replace
 from functools import partial

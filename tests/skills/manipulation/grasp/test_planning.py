@@ -1,4 +1,4 @@
-"""Why none of the grasps of an object can be carried out."""
+"""Tests of the reasons why no grasp of an object is feasible."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""From which body height an object is taken, and which grasps count as reached."""
+"""Tests of body heights and of grasps within reach."""
 
 from dataclasses import replace
 from functools import partial

@@ -1,4 +1,4 @@
-"""Why an object is not grasped."""
+"""Tests of the reasons for refusing an object."""
 
 import numpy as np
 import pytest

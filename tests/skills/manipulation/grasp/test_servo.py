@@ -1,4 +1,4 @@
-"""Where an object is seen to be from just before the grasp, and trajectories shifted to there."""
+"""Tests of the measured shift of an object just before the grasp, and of shifted trajectories."""
 
 from dataclasses import replace
 

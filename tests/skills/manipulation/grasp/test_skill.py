@@ -1,4 +1,4 @@
-"""What the grasp skill does when things go wrong."""
+"""Tests of failures of the grasp skill."""
 
 import numpy as np
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome

@@ -1,4 +1,4 @@
-"""Another grasp after one that failed."""
+"""Tests of choosing another grasp after a failed one."""
 
 import dataclasses
 

@@ -1,4 +1,4 @@
-"""A look where the arm would go and no picture has looked, and none elsewhere."""
+"""Tests of the look into space that no picture has shown."""
 
 import numpy as np
 import pytest

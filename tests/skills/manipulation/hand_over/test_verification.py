@@ -1,4 +1,4 @@
-"""Whether what was let go of is seen with the person: by a robot whose camera is on its head."""
+"""Tests of the check that a person has the released object, with a head camera."""
 
 import itertools
 from dataclasses import asdict, replace

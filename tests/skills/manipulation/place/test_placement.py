@@ -1,4 +1,4 @@
-"""Poses of the hand at which what it holds comes to stand on a surface."""
+"""Tests of hand poses that put an object down on a surface."""
 
 import math
 

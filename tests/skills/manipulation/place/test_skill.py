@@ -1,4 +1,4 @@
-"""What the place skill does when it cannot put the thing down."""
+"""Tests of failures of the place skill."""
 
 import math
 

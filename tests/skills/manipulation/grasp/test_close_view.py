@@ -1,4 +1,4 @@
-"""An object without a class, seen closely: its points alone say where it is."""
+"""Tests of the close view of an object without a class."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Free spots on a surface that is seen."""
+"""Tests of free spots on a seen surface."""
 
 import numpy as np
 import pytest

@@ -298,7 +298,7 @@ def to_page(
         "evaluation.html",
         title=Path(about["scenario"]).stem.replace("_", " "),
         facts=(
-            ("scenario", about["scenario"]),
+            ("evaluation", about["scenario"]),
             ("runs with a result", f"{len(cases)} of {about['runs']}" if "runs" in about else str(len(cases))),
             ("version", about["code"]),
             ("missions per hour", about.get("missions_per_hour", "?")),

@@ -101,7 +101,7 @@ def test_it_needs_no_script_and_nothing_from_elsewhere():
 
 def test_an_empty_section_has_no_heading():
     text = Reader(page()).text
-    assert not any(name in text for name in ("Answers", "Said", "Seen", "Pictures", "Behaviour tree"))
+    assert not any(name in text for name in ("Answers", "Speech", "Seen objects", "Pictures", "Behaviour tree"))
 
 
 def test_a_step_tells_status_cause_and_time():

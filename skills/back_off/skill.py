@@ -36,7 +36,7 @@ class BackOffOptions:
 
 
 class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
-    """The skill that `BackOffPorts` declares."""
+    """Implementation of `BackOffPorts`."""
 
     Options: ClassVar[type] = BackOffOptions
     options: BackOffOptions

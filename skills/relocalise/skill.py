@@ -85,7 +85,7 @@ class RelocaliseOptions:
 
 
 class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
-    """The skill that `RelocalisePorts` declares."""
+    """Implementation of `RelocalisePorts`."""
 
     Options: ClassVar[type] = RelocaliseOptions
     options: RelocaliseOptions

@@ -49,7 +49,7 @@ class ApproachOptions:
 
 
 class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
-    """The skill that `ApproachPorts` declares."""
+    """Implementation of `ApproachPorts`."""
 
     Options: ClassVar[type] = ApproachOptions
     options: ApproachOptions

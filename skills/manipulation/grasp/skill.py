@@ -98,7 +98,7 @@ class GraspOptions:
 
 
 class Grasp(GraspPorts, LookingSkill[GraspInputs]):
-    """The skill that `GraspPorts` declares."""
+    """Implementation of `GraspPorts`."""
 
     Options: ClassVar[type] = GraspOptions
     options: GraspOptions

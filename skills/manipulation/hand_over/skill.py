@@ -73,7 +73,7 @@ class HandOverOptions:
 
 
 class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
-    """The skill that `HandOverPorts` declares."""
+    """Implementation of `HandOverPorts`."""
 
     Options: ClassVar[type] = HandOverOptions
     options: HandOverOptions

@@ -102,7 +102,7 @@ class PlaceOptions:
 
 
 class Place(PlacePorts, LookingSkill[PlaceInputs]):
-    """The skill that `PlacePorts` declares."""
+    """Implementation of `PlacePorts`."""
 
     Options: ClassVar[type] = PlaceOptions
     options: PlaceOptions

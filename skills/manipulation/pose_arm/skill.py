@@ -14,7 +14,7 @@ _THERE_RAD = 0.05
 
 
 class PoseArm(PoseArmPorts, ArmSkill[PoseArmInputs]):
-    """The skill that `PoseArmPorts` declares."""
+    """Implementation of `PoseArmPorts`."""
 
     def run(self, inputs: PoseArmInputs) -> Routine[Succeeded]:
         """Moves the arm, then the gripper."""

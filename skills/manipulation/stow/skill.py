@@ -18,7 +18,7 @@ _RAISED_M = 0.05
 
 
 class Stow(StowPorts, ArmSkill[StowInputs]):
-    """The skill that `StowPorts` declares."""
+    """Implementation of `StowPorts`."""
 
     def run(self, inputs: StowInputs) -> Routine[Succeeded]:
         """Stows or carries.

@@ -44,7 +44,7 @@ def test_a_noun_without_vector_is_of_no_kind(kinds):
     assert kinds.kind(("zzyxqv",), lemma="zzyxqv") is None
 
 
-def test_nouns_left_out_of_the_examples_are_mostly_told_apart(vector_of):
+def test_nouns_outside_the_examples_are_mostly_classified_right(vector_of):
     """Ten-fold cross-validation over all examples: a tenth is judged by what the others teach."""
     rows = sorted(noun_examples().items())
     wrong = {True: 0, False: 0}

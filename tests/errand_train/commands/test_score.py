@@ -71,7 +71,7 @@ def told(result):
     return json.loads(result.stdout.splitlines()[-1])
 
 
-def test_all_figures_are_told(score, data):
+def test_all_figures_are_reported(score, data):
     figures = told(score("--data", data, "--json"))
     assert (figures["pictures"], figures["distractor_pictures"]) == (3, 1)
     # hammer: two of two; beer: one of two, so 51 of 101 recalls at 1; coke: nothing to find
@@ -101,7 +101,7 @@ def test_without_pycocotools_the_command_says_what_to_install(score, data, monke
     assert "scoring needs pycocotools; run `make train`" in result.stderr
 
 
-def test_figures_are_told_by_camera(score, data):
+def test_figures_are_reported_by_camera(score, data):
     document = json.loads(data.read_text())
     for image, camera in zip(document["images"], ("hand", "left", "left"), strict=True):
         image["camera"] = camera
@@ -189,7 +189,7 @@ def test_pictures_may_lie_elsewhere(score, data, tmp_path):
         ('{"images": [], "annotations": [], "categories": [{"id": 1, "name": "beer"}]}', "it names no pictures"),
     ],
 )
-def test_what_is_no_coco_file_is_refused(score, tmp_path, content, part):
+def test_anything_but_a_coco_file_is_refused(score, tmp_path, content, part):
     file = tmp_path / "data.json"
     file.write_text(content)
     result = score("--data", file)

@@ -73,7 +73,7 @@ def test_visibility_and_truncation(
     assert found["area"] == seen
 
 
-def test_what_is_too_small_to_be_judged_is_ignored_and_a_few_pixels_are_no_label() -> None:
+def test_small_objects_are_ignored_and_a_few_pixels_have_no_label() -> None:
     small = label(9, 9, 9, side=3)
     assert small is not None
     assert small["ignore"] == 1
@@ -82,7 +82,7 @@ def test_what_is_too_small_to_be_judged_is_ignored_and_a_few_pixels_are_no_label
 
 # share of the rows of the picture -> ignored
 @pytest.mark.parametrize(("rows", "ignored"), [(90, 0), (95, 0), (96, 1), (100, 1)])
-def test_what_fills_the_picture_is_ignored(rows: int, ignored: int) -> None:
+def test_an_object_that_fills_the_picture_is_ignored(rows: int, ignored: int) -> None:
     mask = np.zeros((100, 100), dtype=bool)
     mask[:rows] = True
     entry = annotation(mask=mask, alone=Silhouette(rows * 100, 10_000), class_id=4, instance="x", distance_m=0.1)
@@ -115,7 +115,7 @@ def test_a_document_numbers_pictures_and_labels_and_joins_them() -> None:
 
 # mean and spread of the thing's pixels -> whether it is lost
 @pytest.mark.parametrize(("mean", "spread", "lost"), [(5, 2, True), (60, 2, False), (10, 25, False)])
-def test_a_thing_that_is_all_black_is_lost_in_the_dark(mean: float, spread: float, lost: bool) -> None:
+def test_an_all_black_object_is_recognised(mean: float, spread: float, lost: bool) -> None:
     noise = np.random.default_rng(1).normal(mean, spread, (20, 20, 3))
     picture = np.clip(noise, 0, 255).astype(np.uint8)
     assert is_black(picture, np.ones((20, 20), dtype=bool)) is lost

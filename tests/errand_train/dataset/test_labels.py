@@ -68,9 +68,7 @@ def test_boxes_agree_with_the_projection_of_all_corners(
     assert found["instance"] == "cube_000"
 
 
-def test_what_stands_before_a_thing_takes_from_its_visibility(
-    cubes: tuple[ObjectModel, ObjectModel], tmp_path: Path
-) -> None:
+def test_an_occluding_object_reduces_visibility(cubes: tuple[ObjectModel, ObjectModel], tmp_path: Path) -> None:
     cube, cylinder = cubes
     behind = Placed(cube, RigidTransform([0.0, 0.3, cube.size_m[2] / 2]))
     before = Placed(cylinder, RigidTransform([cube.size_m[0] / 4, 0.3 - cube.size_m[1], cylinder.size_m[2] / 2]))
@@ -81,7 +79,7 @@ def test_what_stands_before_a_thing_takes_from_its_visibility(
 
 # how far the middle of the cube is from the camera, in sides of it -> ignored
 @pytest.mark.parametrize(("sides", "ignored"), [(0.25, 1), (0.45, 1), (1.5, 0)])
-def test_a_thing_that_the_camera_is_in_is_to_be_ignored(
+def test_an_object_around_the_camera_is_ignored(
     cubes: tuple[ObjectModel, ObjectModel], sides: float, ignored: int, tmp_path: Path
 ) -> None:
     cube = cubes[0]
@@ -91,7 +89,7 @@ def test_a_thing_that_the_camera_is_in_is_to_be_ignored(
 
 # how far the camera is before the cube's side, which it shows from 0.05 m on -> ignored
 @pytest.mark.parametrize(("before_m", "ignored"), [(0.02, 1), (0.04, 1), (0.1, 0)])
-def test_a_thing_that_is_too_near_to_be_shown_whole_is_to_be_ignored(
+def test_an_object_within_the_near_plane_is_ignored(
     cubes: tuple[ObjectModel, ObjectModel], before_m: float, ignored: int, tmp_path: Path
 ) -> None:
     # ahead and to the left of the camera, so that the right half of the picture is free

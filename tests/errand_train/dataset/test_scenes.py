@@ -35,7 +35,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
 
 
 @pytest.mark.parametrize("category", ["hammer", "screwdriver", "wrench", "beer", "cube", "extinguisher", "kettle"])
-def test_a_thing_rests_on_three_points_under_its_centre_of_mass(category: str) -> None:
+def test_an_object_rests_on_three_points_under_its_centre_of_mass(category: str) -> None:
     model = instance(category, 1)
     for pose in resting_poses(model):
         points = model.surface.points @ pose.R.T
@@ -63,7 +63,7 @@ def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not() -
 
 
 @pytest.mark.parametrize("category", ["cube", "cylinder", "coke"])
-def test_drake_leaves_a_standing_thing_where_it_was_put(category: str) -> None:
+def test_an_object_in_a_stable_pose_stays_there_in_drake(category: str) -> None:
     model = instance(category, 1)
     pose = resting_poses(model)[0]
     builder = DiagramBuilder()
@@ -136,7 +136,7 @@ def test_degrading_is_the_same_for_the_same_seed() -> None:
     assert np.array_equal(first, second)
 
 
-def test_a_scene_for_validation_holds_held_out_instances_only_and_nothing_overlaps() -> None:
+def test_a_validation_scene_has_only_held_out_instances_without_overlap() -> None:
     scene = compose(np.random.default_rng(3), 5, for_training=False)
     assert any(thing.model.class_id for thing in scene.objects)
     assert all(thing.model.held_out for thing in scene.objects)

@@ -192,13 +192,13 @@ def test_a_damaged_scene_is_named_with_the_mend(tmp_path: Path) -> None:
     assert sum(run(tmp_path / "set", images=48).images.values()) == 48
 
 
-def test_a_file_in_the_place_of_the_folder_is_told(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "set").write_text("a file")
     with pytest.raises(DatasetError, match="cannot be written"):
         run(tmp_path / "set", images=8)
 
 
-def test_a_full_disk_is_told_and_leaves_whole_scenes_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_and_leaves_only_whole_scenes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run(tmp_path / "set", images=24)
 
     def full(*_: object) -> None:
@@ -210,7 +210,7 @@ def test_a_full_disk_is_told_and_leaves_whole_scenes_only(tmp_path: Path, monkey
     assert [path.name for path in (tmp_path / "set" / "scenes").iterdir()] == ["000000"]
 
 
-def test_a_scene_that_nobody_has_rendered_is_told_and_the_others_stay(tmp_path: Path) -> None:
+def test_a_lost_scene_is_reported_and_the_others_stay(tmp_path: Path) -> None:
     def lose_the_second(function: Callable[[int], Mapping[str, bytes]], numbers: list[int]) -> Iterator[Any]:
         return ((number, None if number == 1 else function(number)) for number in numbers)
 

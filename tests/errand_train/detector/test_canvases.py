@@ -48,7 +48,7 @@ def alone(boxes: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("whole", [False, True])
 @pytest.mark.parametrize("mosaic", [0.0, 1.0])
-def test_boxes_stay_about_the_things(
+def test_boxes_stay_about_the_objects(
     maker: CanvasMaker, monkeypatch: pytest.MonkeyPatch, mosaic: float, whole: bool
 ) -> None:
     plain(monkeypatch)
@@ -81,7 +81,7 @@ def test_the_same_random_source_gives_the_same_canvas(maker: CanvasMaker) -> Non
     assert np.array_equal(first.targets.boxes, second.targets.boxes)
 
 
-def test_windows_mostly_show_a_thing(maker: CanvasMaker) -> None:
+def test_windows_mostly_show_an_object(maker: CanvasMaker) -> None:
     options = CanvasOptions(mosaic=0.0, focused=1.0)
     made = [maker.make(0, options, np.random.default_rng(seed)) for seed in SEEDS]
     assert all(len(canvas.targets.boxes) for canvas in made)

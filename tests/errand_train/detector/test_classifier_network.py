@@ -69,7 +69,7 @@ def test_a_fresh_network_says_what_the_refinement_network_said() -> None:
     assert torch.allclose(found_boxes, boxes)
 
 
-def test_it_begins_with_imagenets_weights_and_learns_all_but_the_early_layers() -> None:
+def test_classifier_starts_from_imagenets_weights_and_trains_all_but_the_early_layers() -> None:
     learner = new_learner(1)
     learner.begin(Path("none"), [])
     learner.keep_early()
@@ -163,7 +163,7 @@ def test_normalisation_becomes_part_of_the_layers() -> None:
 
 
 # first: a box at (100, 100, 200, 200); the second makes it a tenth smaller, and sees the red there as a beer
-def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_path: Path) -> None:
+def test_training_crops_are_the_refinement_networks_proposals(tmp_path: Path) -> None:
     picture = picture_of(("hammer", 0.2, (100, 100, 200, 200)))
     picture[50:250, 50:250, 0] = 255
     look = partial(refined_proposals, load_model(write_pair(tmp_path / "m.onnx")))
@@ -172,7 +172,7 @@ def test_what_is_learnt_from_is_where_the_refinement_network_sees_something(tmp_
     assert found.logits.argmax(axis=1).tolist() == [CLASSES.index("beer")]
 
 
-def test_without_a_refinement_network_there_is_nothing_to_learn_from(tmp_path: Path) -> None:
+def test_classifier_training_needs_a_refinement_network(tmp_path: Path) -> None:
     pair = load_model(write_pair(tmp_path / "m.onnx"), networks=1)
     with pytest.raises(ValueError, match="no refinement network"):
         refined_proposals(pair, Scales(picture_of(), halve(picture_of())))

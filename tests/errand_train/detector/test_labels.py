@@ -47,7 +47,7 @@ def test_outlines_are_in_pixels_of_the_letterbox(tmp_path: Path) -> None:
     assert picture.file == tmp_path / "scenes/000000/0.jpg"
 
 
-def test_what_is_seen_is_the_share_not_hidden_and_within_the_picture(tmp_path: Path) -> None:
+def test_seen_is_the_unoccluded_share_within_the_picture(tmp_path: Path) -> None:
     (picture,) = read_split(write(tmp_path, visibility=0.5, truncation=0.2, ignore=1), "train")
     assert picture.labels.seen.tolist() == pytest.approx([0.4])
     assert picture.labels.ignored.tolist() == [True]

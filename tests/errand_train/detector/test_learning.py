@@ -62,7 +62,7 @@ def test_cells_come_in_the_networks_order() -> None:
     assert ((boxes[0, :, :2] < middles) & (middles < boxes[0, :, 2:])).all()
 
 
-def test_cells_that_fit_a_thing_best_answer_for_it() -> None:
+def test_the_best_fitting_cells_are_assigned_to_an_object() -> None:
     middles, boxes = at_every_cell(16.0)
     scores = torch.full((1, len(middles), 2), 0.5)
     found = assigned(scores, boxes, middles, targets((20, 20, 36, 36), classes=(1,)))
@@ -74,7 +74,7 @@ def test_cells_that_fit_a_thing_best_answer_for_it() -> None:
     assert (found.quality[0][found.objects[0] < 0] == 0).all()
 
 
-def test_a_cell_in_two_things_answers_for_the_one_it_fits_better() -> None:
+def test_a_cell_in_two_objects_is_assigned_to_the_better_fit() -> None:
     middles, boxes = at_every_cell(16.0)
     scores = torch.full((1, len(middles), 2), 0.5)
     found = assigned(scores, boxes, middles, targets((0, 0, 64, 64), (20, 20, 36, 36)))
@@ -83,7 +83,7 @@ def test_a_cell_in_two_things_answers_for_the_one_it_fits_better() -> None:
     assert found.objects[0, at_28].tolist() == [1]
 
 
-def test_a_thing_smaller_than_a_cell_still_gets_one() -> None:
+def test_an_object_smaller_than_a_cell_gets_one() -> None:
     middles, boxes = at_every_cell(8.0)
     scores = torch.full((1, len(middles), 1), 0.5)
     found = assigned(scores, boxes, middles, targets((15, 15, 17, 17)))

@@ -36,7 +36,7 @@ def test_a_network_says_what_the_one_in_the_file_said(written: tuple[DetectorNet
             assert torch.allclose(mine, theirs, atol=1e-3)
 
 
-def test_what_reckons_with_8_bits_gives_the_weights_that_it_was_made_of(
+def test_quantised_weights_dequantise_to_the_original_ones(
     written: tuple[DetectorNetwork, Path], tmp_path: Path
 ) -> None:
     network, file = written

@@ -20,7 +20,7 @@ def still() -> np.ndarray:
     return similarity_map(np.zeros(2, np.float32), np.zeros(2, np.float32), angle_rad=0.0, scale=1.0, flipped=False)
 
 
-def test_what_is_inside_keeps_its_box() -> None:
+def test_an_object_inside_the_cell_keeps_its_box() -> None:
     found = place_labels(labels(square(10, 20, 30)), still(), CELL)
     assert found.boxes.tolist() == [[10, 20, 40, 50]]
     assert not found.ignored.any()
@@ -41,7 +41,7 @@ def test_a_turned_disc_keeps_its_box_where_a_turned_box_would_grow() -> None:
     assert place_labels(labels(disc), affine, CELL).boxes[0].tolist() == pytest.approx([30, 20, 70, 60], abs=0.5)
 
 
-def test_mirroring_brings_the_focus_where_it_is_told_and_swaps_sides() -> None:
+def test_mirroring_moves_the_focus_to_its_target_and_swaps_sides() -> None:
     affine = similarity_map(
         np.array([10, 10], np.float32), np.array([50, 40], np.float32), angle_rad=0.0, scale=2.0, flipped=True
     )
@@ -53,27 +53,27 @@ def test_mirroring_brings_the_focus_where_it_is_told_and_swaps_sides() -> None:
     ("seen", "x", "expected"),
     [(1.0, 80, False), (1.0, 95, True), (0.4, 70, False), (0.4, 80, True), (0.2, 10, True)],
 )
-def test_what_is_hardly_seen_any_more_is_ignored(seen: float, x: float, expected: bool) -> None:
+def test_hardly_visible_objects_are_ignored(seen: float, x: float, expected: bool) -> None:
     found = place_labels(labels(square(x, 10, 40), seen=seen), still(), CELL)
     assert found.ignored.tolist() == [expected]
     assert found.boxes[0, 2] <= 100
 
 
-def test_what_is_outside_is_left_out() -> None:
+def test_objects_outside_the_cell_are_left_out() -> None:
     found = place_labels(labels(square(10, 10, 20), square(200, 10, 20)), still(), CELL)
     assert found.classes.tolist() == [0]
 
 
-def test_what_has_become_small_is_ignored() -> None:
+def test_objects_that_became_small_are_ignored() -> None:
     affine = similarity_map(np.zeros(2, np.float32), np.zeros(2, np.float32), angle_rad=0.0, scale=0.2, flipped=False)
     assert place_labels(labels(square(10, 10, 40)), affine, CELL).ignored.tolist() == [True]
 
 
-def test_what_was_ignored_stays_so() -> None:
+def test_ignored_objects_stay_ignored() -> None:
     assert place_labels(labels(square(10, 10, 40), ignored=True), still(), CELL).ignored.tolist() == [True]
 
 
-def test_a_picture_without_things_gives_no_targets() -> None:
+def test_a_picture_without_objects_gives_no_targets() -> None:
     found = place_labels(labels(), still(), CELL)
     assert found.boxes.shape == (0, 4)
     assert join_targets([found, found]).boxes.shape == (0, 4)

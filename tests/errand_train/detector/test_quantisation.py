@@ -111,7 +111,7 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
-def test_it_says_nearly_what_the_one_with_floats_said(plain: "onnx.ModelProto", made: "onnx.ModelProto") -> None:
+def test_a_quantised_network_has_nearly_the_same_output(plain: "onnx.ModelProto", made: "onnx.ModelProto") -> None:
     given = {"images": noise(99)[None]}
     said, expected = (InferenceSession(one.SerializeToString()).run(None, given) for one in (made, plain))
     for mine, theirs in zip(said, expected, strict=True):
@@ -131,9 +131,7 @@ def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too() -> N
     assert kept == {"network.second.weight_quantized"}
 
 
-def test_weights_are_told_as_they_were_but_for_half_a_step_of_8_bits(
-    plain: "onnx.ModelProto", made: "onnx.ModelProto"
-) -> None:
+def test_quantised_weights_are_within_half_a_step_of_8_bits(plain: "onnx.ModelProto", made: "onnx.ModelProto") -> None:
     before, after = trained_weights(plain), trained_weights(made)
     assert set(before) == set(after)
     for name, values in before.items():
@@ -173,7 +171,7 @@ def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path: Path, data: Path,
     assert twice.read_bytes() == once.read_bytes()
 
 
-def test_what_is_in_8_bits_already_is_refused(tmp_path: Path, data: Path) -> None:
+def test_an_already_quantised_network_is_refused(tmp_path: Path, data: Path) -> None:
     told = {"format": "errand-detector-1", "class_names": json.dumps(list(CLASSES)), "eight_bits": "yes"}
     file = write_model(tmp_path / "detector.onnx", metadata=told)
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*is quantised already"):
@@ -181,7 +179,7 @@ def test_what_is_in_8_bits_already_is_refused(tmp_path: Path, data: Path) -> Non
     assert not (tmp_path / "out").exists()
 
 
-def test_nothing_is_written_over(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
+def test_no_file_is_overwritten(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
     file = tmp_path / "detector.onnx"
     file.write_bytes(plain.SerializeToString())
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*written over"):

@@ -90,7 +90,7 @@ def test_without_a_refinement_network_there_is_no_classifier_network(options: Re
         refine(replace(options, classifier=True), lambda _: None)
 
 
-def test_it_goes_on_where_it_stood(options: RefineOptions) -> None:
+def test_a_training_resumes_from_its_checkpoint(options: RefineOptions) -> None:
     refine(options, lambda _: None)
     told = list[Report]()
     refine(replace(options, budget=Budget(pictures=16), resume=True), told.append)
@@ -125,7 +125,7 @@ def test_a_network_of_other_classes_is_refused(options: RefineOptions) -> None:
         refine(options, lambda _: None)
 
 
-def test_a_network_that_finds_nothing_is_refused(options: RefineOptions, tmp_path: Path) -> None:
+def test_a_network_without_proposals_is_refused(options: RefineOptions, tmp_path: Path) -> None:
     blind = write_model(tmp_path / "blind.onnx")
     for file in options.data.glob("*.png"):
         cv2.imwrite(str(file), picture_of())

@@ -47,7 +47,7 @@ def table(file: Path, picture: TrainingPicture, *things: tuple[str, float, tuple
     return build_table(look, [(Scales(seen, halve(seen)), picture.labels)])
 
 
-def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path: Path) -> None:
+def test_a_proposal_on_an_object_has_its_class_and_box_as_target(tmp_path: Path) -> None:
     found = table(tmp_path / "m.onnx", labelled(THING), ("coke", 0.6, (110, 100, 200, 200)), ("coke", 0.5, FAR))
     assert found.classes.tolist() == [0, -1]
     assert found.wanted.tolist() == [list(THING), list(FAR)]
@@ -57,12 +57,12 @@ def test_a_place_on_a_thing_wants_its_class_and_box_and_another_nothing(tmp_path
 
 # share of the thing's box that the place takes   0.36 of 100 x 100 -> near, 0.25 -> not near
 @pytest.mark.parametrize(("side", "near"), [(60, True), (50, False)])
-def test_a_place_is_on_a_thing_from_three_tenths_of_it_on(tmp_path: Path, side: int, near: bool) -> None:
+def test_a_proposal_is_on_an_object_from_an_overlap_of_0_3_on(tmp_path: Path, side: int, near: bool) -> None:
     found = table(tmp_path / "m.onnx", labelled(THING), ("beer", 0.6, (100, 100, 100 + side, 100 + side)))
     assert (found.classes.tolist() == [0]) is near
 
 
-def test_what_is_to_be_ignored_teaches_nothing(tmp_path: Path) -> None:
+def test_proposals_on_ignored_labels_are_left_out(tmp_path: Path) -> None:
     part = ("beer", 0.5, (120, 120, 150, 150))
     found = table(tmp_path / "m.onnx", labelled(THING, ignored=True), ("beer", 0.6, THING), part, ("coke", 0.4, FAR))
     assert found.boxes.tolist() == [list(FAR)]
@@ -91,13 +91,13 @@ def feed() -> CropFeed:
     return CropFeed(told, store, 5)
 
 
-def test_half_of_a_batch_is_about_things(feed: CropFeed) -> None:
+def test_half_of_a_batch_shows_objects(feed: CropFeed) -> None:
     batch = feed.batch(0, 8)
     assert (batch.classes >= 0).sum() == 4
     assert batch.crops.shape == (8, 3, CROP_PX, CROP_PX)
 
 
-def test_the_boxes_of_a_crop_are_where_the_thing_is_however_it_was_turned(feed: CropFeed) -> None:
+def test_the_boxes_of_a_rotated_crop_are_on_the_object(feed: CropFeed) -> None:
     for start in range(0, 64, 8):
         batch = feed.batch(start, 8)
         for crop, box in zip(batch.crops[:4], batch.wanted[:4], strict=True):
@@ -127,7 +127,7 @@ def test_a_fresh_network_says_the_mean_of_what_the_proposal_network_said_and_see
     assert torch.allclose(found, (boxes + seen_boxes) / 2, atol=1e-3)
 
 
-def test_a_residual_block_says_nothing_until_it_has_learnt() -> None:
+def test_an_untrained_residual_block_is_the_identity() -> None:
     block, given = Residual(4).train(), torch.rand(2, 4, 8, 8)
     assert torch.equal(block(given), given)
     block(given).square().sum().backward()
@@ -168,7 +168,7 @@ def test_scores_want_to_be_as_high_as_the_box_is_good() -> None:
     assert told[0.0].boxes > crop_losses(torch.tensor([[-9.0, 0.0]]), wanted, wanted, classes).boxes
 
 
-def test_nothing_at_a_place_wants_low_scores_and_no_box() -> None:
+def test_a_background_crop_wants_low_scores_and_no_box() -> None:
     box, none = torch.tensor([[0.0, 0.0, 10.0, 10.0]]), torch.tensor([-1])
     low, high = (crop_losses(torch.full((1, 2), score), box, box + 5, none) for score in (-5.0, 5.0))
     assert low.scores < high.scores

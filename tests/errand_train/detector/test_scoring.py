@@ -21,7 +21,7 @@ def scored(labels, found, names=("hammer",)):
     return score(pictures, [tuple(ones) for ones in found], names)
 
 
-def test_all_found_and_nothing_else():
+def test_figures_of_perfect_detections():
     result = scored([[thing(0), thing(100)]], [[seen(0, 0.9), seen(100, 0.6)]])
     assert (result.map50, result.map50_95, result.precision, result.recall) == (
         pytest.approx(1.0),
@@ -76,7 +76,7 @@ def test_each_class_has_its_own_figures():
     ids=["small", "hidden", "ignore", "crowd"],
 )
 @pytest.mark.parametrize("found", [True, False])
-def test_what_does_not_count_counts_neither_found_nor_missed(label, found):
+def test_ignored_labels_count_neither_as_found_nor_as_missed(label, found):
     size = round(label.box[2])
     ones = [seen(0, 0.9, width=size, height=size)] if found else []
     result = scored([[label, thing(100)]], [[*ones, seen(100, 0.8)]])
@@ -84,7 +84,7 @@ def test_what_does_not_count_counts_neither_found_nor_missed(label, found):
     assert result.map50 == pytest.approx(1.0)
 
 
-def test_small_detections_on_nothing_are_passed_over_and_larger_ones_are_not():
+def test_small_unmatched_detections_are_ignored_and_larger_ones_are_not():
     small, large = seen(300, 0.9, width=20, height=20), seen(400, 0.9, width=30, height=30)
     assert scored([[thing(0)]], [[seen(0, 0.8), small]]).precision == 1.0
     assert scored([[thing(0)]], [[seen(0, 0.8), large]]).precision == 0.5
@@ -95,7 +95,7 @@ def test_no_more_than_a_hundred_detections_of_a_class_in_a_picture_are_taken():
     assert scored([[thing(0)]], [[*crowd_of_wrong, seen(0, 0.8)]]).recall == 0.0
 
 
-def test_false_detections_are_counted_in_pictures_that_hold_nothing():
+def test_false_detections_are_counted_in_pictures_without_labels():
     labels = [[], [], [thing(0, crowd=True)], [thing(0)]]
     found = [[seen(0, 0.9), seen(0, 0.5, width=10)], [seen(0, 0.4)], [seen(200, 0.9)], []]
     result = scored(labels, found)
@@ -154,12 +154,12 @@ def test_pictures_and_detections_are_of_one_number():
         ([seen(100, 0.9)], 1.0),
     ],
 )
-def test_how_wrong_a_picture_is(found, expected):
+def test_error_of_a_picture(found, expected):
     picture = LabelledPicture("a.png", (thing(0), thing(100, ignore=True)))
     assert picture_errors(picture, tuple(found), ("hammer", "wrench")) == pytest.approx(expected)
 
 
-def test_what_is_right_wrong_and_missed_in_a_picture():
+def test_right_wrong_and_missed_in_a_picture():
     labels = (thing(0), thing(100), thing(200, ignore=True), thing(300, "wrench"))
     found = (seen(500, 0.6), seen(0, 0.9), seen(200, 0.9), seen(300, 0.8, "wrench"), seen(100, 0.4))
     told = judge_picture(LabelledPicture("a.png", labels), found, ("hammer", "wrench"))

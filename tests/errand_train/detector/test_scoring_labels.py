@@ -44,7 +44,7 @@ def test_categories_go_by_name_and_pictures_by_their_ids():
         (100, 100, 1.0, False, True, False),
     ],
 )
-def test_what_counts(width, height, visibility, crowd, ignore, counts):
+def test_labels_that_count(width, height, visibility, crowd, ignore, counts):
     label = Label("hammer", (5.0, 5.0, 5.0 + width, 5.0 + height), crowd, ignore, visibility)
     assert label.counts == counts
 
@@ -59,7 +59,7 @@ def test_what_counts(width, height, visibility, crowd, ignore, counts):
         ({}, None),
     ],
 )
-def test_what_lies_beyond_the_edge_is_not_seen(told, share):
+def test_parts_beyond_the_edge_are_hidden(told, share):
     entry = {"id": 1, "image_id": 3, "category_id": 90, "bbox": [10, 20, 30, 40], **told}
     first, _ = pictures_of_coco(coco(annotations=[entry]), CLASSES)
     assert first.labels[0].visibility == (None if share is None else pytest.approx(share))
@@ -84,12 +84,12 @@ def test_what_lies_beyond_the_edge_is_not_seen(told, share):
         ({"annotations": [{"image_id": 7, "category_id": 90, "bbox": "abcd"}]}, r"annotations\[0\]\.bbox"),
     ],
 )
-def test_what_is_no_coco_file_is_refused_with_the_place(changes, place):
+def test_anything_but_a_coco_file_is_refused_with_the_wrong_entry(changes, place):
     with pytest.raises(ValueError, match=f"^{place}"):
         pictures_of_coco(coco(**changes), CLASSES)
 
 
 @pytest.mark.parametrize("document", [[], "coco", None, 3])
-def test_what_is_no_object_is_refused(document):
+def test_anything_but_a_json_object_is_refused(document):
     with pytest.raises(ValueError, match="the file"):
         pictures_of_coco(document, CLASSES)

@@ -22,7 +22,7 @@ def test_pictures_are_kept_at_the_networks_size_and_at_half(tmp_path: Path) -> N
     assert store.full[:, 0, 0, 0].tolist() == store.half[:, 0, 0, 0].tolist() == [10, 200]
 
 
-def test_other_pictures_fill_the_store_anew_and_the_same_do_not(tmp_path: Path) -> None:
+def test_other_pictures_fill_the_store_again_and_the_same_do_not(tmp_path: Path) -> None:
     first, second = picture(tmp_path / "a.png", 10), picture(tmp_path / "b.png", 200)
     open_store(tmp_path / "kept", [first])
     first.file.unlink()

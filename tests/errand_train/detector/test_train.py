@@ -63,7 +63,7 @@ def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> No
     assert told[-1].steps == 6
 
 
-def test_a_training_that_is_over_writes_its_file_anew(options: TrainOptions) -> None:
+def test_a_finished_training_writes_its_file_again(options: TrainOptions) -> None:
     file = train(options, lambda _report: None)
     content = file.read_bytes()
     file.unlink()

@@ -24,7 +24,7 @@ def spoken(monkeypatch):
     return texts
 
 
-def test_they_are_spoken_once(spoken, tmp_path):
+def test_sentences_are_synthesised_once(spoken, tmp_path):
     first = spoken_sentences(tmp_path, 5, seed=1)
     count = len(spoken)
     again = spoken_sentences(tmp_path, 5, seed=1)
@@ -40,7 +40,7 @@ def test_another_seed_and_those_for_validation_are_others(spoken, tmp_path):
     assert len(set(texts)) == len(texts) == 9
 
 
-def test_a_damaged_file_is_told(spoken, tmp_path):
+def test_a_damaged_file_is_refused(spoken, tmp_path):
     spoken_sentences(tmp_path, 2, 1)
     (file,) = tmp_path.iterdir()
     file.write_bytes(file.read_bytes()[:50])

@@ -38,12 +38,12 @@ def test_sentences_are_written_as_the_recogniser_writes_them(sentences):
         assert "  " not in sentence.text and not re.search(r"\ba [aeiou]", sentence.text)
 
 
-def test_they_differ_widely(sentences):
+def test_sentences_differ_widely(sentences):
     assert len({sentence.text for sentence in sentences}) > 1900
     assert len({word for sentence in sentences for word in sentence.text.lower().split()}) > 1200
 
 
-def test_most_are_told_before_and_some_are_not(sentences):
+def test_most_names_are_in_the_prompt_and_some_are_not(sentences):
     told = [any(name in one.text for name in one.vocabulary.names if name[0].islower()) for one in sentences]
     assert 0.5 < sum(told) / len(told) < 0.95
     assert 0.02 < sum(not one.vocabulary.names for one in sentences) / len(sentences) < 0.2

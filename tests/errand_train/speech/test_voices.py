@@ -12,7 +12,7 @@ from skills.files.errors import InputError
 HELD_OUT = ("scotland", "rp", "+f3", "awb", "slt", "ked")
 
 
-def test_without_any_the_hint_is_told(monkeypatch):
+def test_a_machine_without_voices_gets_a_hint(monkeypatch):
     monkeypatch.setattr(voices.shutil, "which", lambda name: None)
     with pytest.raises(InputError, match="no synthetic voice") as refused:
         speakers()
@@ -35,7 +35,7 @@ def test_each_that_is_installed_speaks():
         assert 0.3 * RATE_HZ < len(speak(speaker, "Bring the cup.", random.Random(1))) < 5 * RATE_HZ
 
 
-def test_those_left_out_are_never_drawn():
+def test_excluded_voices_are_never_drawn():
     try:
         found = speakers(left_out=("espeak",))
     except InputError:

@@ -60,7 +60,7 @@ def test_the_same_number_gives_the_same_files(category: str, tmp_path: Path, mon
     assert files(again.folder) == first
 
 
-def test_another_number_gives_another_thing() -> None:
+def test_another_number_gives_another_instance() -> None:
     forms = {tuple(np.round(make("wrench", seed)[0].size_m, 4)) for seed in range(8)}
     assert len(forms) == 8
 
@@ -87,7 +87,7 @@ def test_validation_sees_the_same_instances_however_many_there_are() -> None:
     assert {category: numbers(category, for_training=False) for category in expected} == expected
 
 
-def test_validation_sees_no_untextured_ones_and_nothing_repainted() -> None:
+def test_validation_has_no_untextured_or_repainted_instances() -> None:
     assert not any(
         is_untextured(category, n) or is_repainted(category, n)
         for category in (*CLASSES, *DISTRACTORS)
@@ -103,7 +103,7 @@ def test_two_fifths_of_the_later_instances_are_untextured_and_so_are_all_later_p
 
 @pytest.mark.parametrize("count", [4, pytest.param(12, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("category", CLASSES)
-def test_an_untextured_model_has_plain_colours_alone_and_the_size_of_the_real_thing(category: str, count: int) -> None:
+def test_an_untextured_model_has_only_plain_colours_and_a_real_size(category: str, count: int) -> None:
     masses, sides = RANGES[category]
     for seed in [number for number in range(48, 120) if is_untextured(category, number)][:count]:
         made, kind, _ = make(category, seed)
@@ -120,7 +120,7 @@ def test_an_untextured_distractor_keeps_its_form_and_loses_its_pictures() -> Non
 
 
 @pytest.mark.parametrize("category", ["extinguisher", "hammer", "screwdriver", "wrench"])
-def test_a_repainted_thing_keeps_its_form_and_loses_its_pictures(category: str) -> None:
+def test_a_repainted_object_keeps_its_form_and_loses_its_pictures(category: str) -> None:
     seeds = [number for number in range(48, 80) if is_repainted(category, number)][:4]
     for seed in seeds:
         made, kind, _ = make(category, seed)
@@ -138,7 +138,7 @@ def test_some_repainted_tools_are_of_one_colour_and_no_extinguisher_is() -> None
     assert min(colours("extinguisher")) > 1
 
 
-def test_what_would_pass_for_a_class_without_its_picture_keeps_it() -> None:
+def test_a_distractor_that_would_look_like_a_class_keeps_its_pictures() -> None:
     assert not any(is_untextured(category, 10) for category in ("food_can", "wine_bottle", "tissue_box"))
 
 
@@ -151,7 +151,7 @@ def test_there_are_nine_classes_with_thirty_instances_and_forty_distractors() ->
 
 @pytest.mark.parametrize("count", [4, pytest.param(16, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("category", SMALL)
-def test_sizes_and_masses_are_those_of_real_things(category: str, count: int) -> None:
+def test_sizes_and_masses_are_those_of_real_objects(category: str, count: int) -> None:
     masses, sides = RANGES[category]
     for seed in range(count):
         made, _, _ = make(category, seed)

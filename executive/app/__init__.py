@@ -1,4 +1,4 @@
-"""The application: requests become prepared missions, robots and runs; reports and evaluation. It prints nothing.
+"""Application behind the commands: prepares requests, runs them, and writes reports; prints nothing.
 
-It puts executive, skills and plant together; only the command line stands above it.
+It combines executive, skills and plant; only the command line imports it.
 """

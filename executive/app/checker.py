@@ -36,7 +36,7 @@ class Checked:
 
     @property
     def ok(self) -> bool:
-        """True without errors."""
+        """True if the mission has no errors."""
         return not self.errors
 
 

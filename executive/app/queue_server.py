@@ -46,7 +46,7 @@ class Waiting(Protocol):
         """Blocks until `wake` is called, or until a time."""
 
     def wake(self) -> None:
-        """Ends the wait, from any thread or signal handler."""
+        """Ends the wait. Any thread or signal handler may call it."""
 
 
 class QueueServer:

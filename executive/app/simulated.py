@@ -37,7 +37,7 @@ _LOG: Final = logging.getLogger(__name__)
 
 
 class SimulatedBackend:
-    """Robots in the plant of a world (`executive.app.backend.Backend`)."""
+    """Backend with robots in the plant of a world."""
 
     def __init__(
         self,

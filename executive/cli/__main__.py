@@ -1,4 +1,4 @@
-"""`python -m executive.cli` is `errand`."""
+"""Runs `errand` as `python -m executive.cli`."""
 
 from executive.cli.entry import main
 

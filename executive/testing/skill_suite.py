@@ -46,7 +46,7 @@ class SuiteCase:
 
     @property
     def limit_s(self) -> float:
-        """Time limit of a run with a fault (s): 1.5 times the nominal run, and 5 s."""
+        """Time limit of a run with a fault (s): 1.5 times the nominal run plus 5 s."""
         return 1.5 * self.nominal[0].time_s + 5.0
 
     @cached_property
@@ -186,15 +186,15 @@ class SkillSuite:
         return scripted_bench(capabilities)
 
     def test_it_can_be_cancelled_at_every_tick(self, robot_capabilities: Capabilities) -> None:
-        """Motion ends within 0.2 s and nothing raises."""
+        """Checks that motion ends within 0.2 s and that nothing raises."""
         _raise_findings(cancelled_at_every_tick(self._case(robot_capabilities)))
 
     def test_an_exception_in_any_verb_is_a_failure_with_cause_error(self, robot_capabilities: Capabilities) -> None:
-        """The skill fails with ERROR, and the robot is still afterwards."""
+        """Checks that the skill fails with ERROR and that the robot is still afterwards."""
         _raise_findings(exception_in_every_verb(self._case(robot_capabilities)))
 
     def test_no_success_is_claimed_on_stale_data(self, robot_capabilities: Capabilities) -> None:
-        """No success on data older than the skill declares."""
+        """Checks that the skill claims no success on data older than it declares."""
         _raise_findings(stale_sensors(self._case(robot_capabilities)))
 
     def _case(self, capabilities: Capabilities) -> SuiteCase:

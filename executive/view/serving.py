@@ -36,7 +36,7 @@ class Server:
         self._ready.wait(START_LIMIT_S)
 
     def call_soon(self, callback: Callable[[], None]) -> None:
-        """Calls `callback` in the serving thread; from any thread. Does nothing after the end."""
+        """Schedules `callback` in the serving thread. Any thread may call it; after the end it does nothing."""
         if self._loop is not None and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(callback)
 

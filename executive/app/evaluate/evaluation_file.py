@@ -324,7 +324,7 @@ Robots = Annotated[dict[Name, Name], _SOME]
 
 
 class EvaluationFile(_Strict):
-    """Missions, worlds, robots, seeds and variations, whose product is the set of runs."""
+    """Evaluation file: missions, worlds, robots, seeds and variations, of which all combinations are run."""
 
     missions: Annotated[tuple[Text | MissionEntry, ...], _SOME] = Field(
         description="Sentences, names of `errand missions`, and mission files, as seen from this file."

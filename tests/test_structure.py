@@ -32,6 +32,8 @@ LINES = {
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 448, 72, 7
 """All modules; those that one other imports; file names that stand more than once."""
+LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
+"""Lines."""
 
 
 def modules() -> Mapping[str, Path]:
@@ -87,3 +89,19 @@ def test_few_file_names_stand_more_than_once() -> None:
     names = Counter(path.name for path in modules().values() if path.name != "__init__.py")
     twice = [name for name, count in names.items() if count > 1]
     assert 0 < len(twice) <= SAME_NAME
+
+
+def test_no_module_is_too_long() -> None:
+    lines = {name: len(path.read_text().splitlines()) for name, path in modules().items()}
+    assert {name: count for name, count in lines.items() if count > LONGEST_MODULE} == {}
+
+
+def test_no_function_is_too_long() -> None:
+    functions = {
+        f"{name}.{node.name}": (node.end_lineno or node.lineno) - node.lineno + 1
+        for name, path in modules().items()
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert len(functions) > 1000
+    assert {name: count for name, count in functions.items() if count > LONGEST_FUNCTION} == {}

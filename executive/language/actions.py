@@ -288,9 +288,9 @@ def _carrying(blank: Action, roles: Roles) -> Iterator[Action]:
     goal = next(iter(goals), HERE if blank.verb in lexicon().hands and not sources else None)
     each = len(roles.objects) == 1 and roles.objects[0].indefinite and not roles.objects[0].pronoun
     shared = roles.joined_goals if goal is not None and each else []
-    rivals = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
-    if len(rivals) > 1:
-        blank = replace(blank, choices=(*blank.choices, tuple(rivals)))
+    candidates = [place.phrase for place in ([] if shared else [goal, *roles.joined_goals]) if place and place.phrase]
+    if len(candidates) > 1:
+        blank = replace(blank, choices=(*blank.choices, tuple(candidates)))
     extra = [place.text for place in (*sources[1:], *(place for place in goals[1:] if place is not HERE))]
     extra += [roles.searched.text] if roles.searched is not None else []
     source = next(iter(sources), None)

@@ -1,4 +1,4 @@
-"""The skill that clears the seen layer of the costmap and lets the sensors fill it anew."""
+"""The skill that clears the obstacle layer of the costmap, which the sensors then fill again."""
 
 from __future__ import annotations
 

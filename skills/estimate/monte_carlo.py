@@ -119,8 +119,8 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             found = [best]
         if best is None or best.inlier_share < self._options.found_share:
             return None
-        rivals = (each for each in found if each.inlier_share > best.inlier_share - self._own.alike_share)
-        if not all(_same_place(each.pose, best.pose) for each in rivals):
+        competing = (each for each in found if each.inlier_share > best.inlier_share - self._own.alike_share)
+        if not all(_same_place(each.pose, best.pose) for each in competing):
             return None
         X_WO: RigidTransform = compose(best.pose, inverse(X_OB)).transform()
         return LocalisationEstimate(scan.stamp_s, X_WO, best.covariance, True, best.inlier_share)

@@ -134,7 +134,7 @@ def test_stopping_one_command_leaves_the_others(engine):
 def test_events_of_the_step_under_way_appear_at_the_next_tick(engine):
     pipeline = Pipeline(engine)
     pipeline.advance(TICK_S)
-    engine.note("the lamp falls over")  # the engine is a tick ahead by now
+    engine.record_event("the lamp falls over")  # the engine is a tick ahead by now
     assert list(pipeline.events) == []
     pipeline.advance(TICK_S)
     assert list(pipeline.events) == [(2 * TICK_S, "the lamp falls over")]

@@ -9,9 +9,9 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
 from plant.robots.spot.description import CAMERAS
-from plant.sensors.camera import Camera
 from plant.sensors.camera_spec import load_cameras
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
+from plant.sensors.suite import Camera
 from skills.files.errors import InputError
 from skills.robot import FrameTree, Intrinsics
 

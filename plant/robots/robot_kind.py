@@ -128,8 +128,8 @@ class RobotBody(ABC):
         self.plant.SetPositions(context, q)
 
     @abstractmethod
-    def place(self, context: Context) -> None:
-        """Sets the robot standing at its start with its arm stowed."""
+    def place(self, context: Context, pose: Pose2D | None = None) -> None:
+        """Sets the robot standing with its arm stowed: at a pose, else at its start."""
 
     @abstractmethod
     def opening(self, context: Context) -> float:

@@ -61,7 +61,7 @@ def report(count: int) -> None:
                 kept.add(made_case(run))
         began = time.perf_counter()
         with ResultsFile(path) as kept:
-            made = kept.evaluated()
+            made = kept.results()
             html = Path(folder) / "report.html"
             html.write_text(to_page(made, kept.evidence, command_of, against=made.cases, other="itself"))
         failed = sum(not case.report.achieved for case in made.cases)
@@ -81,14 +81,15 @@ def kill(count: int) -> None:
         runs = runs_of(count)
         with ResultsFile(Path(folder) / "r.sqlite", create=True) as kept:
             kept.begin(Evaluation("made.yaml", runs), code="1")
-            for finished in workers.give_out(cheap, runs):
+            for finished in workers.map_items(cheap, runs):
                 assert finished.result is not None
                 found[finished.item.id] += 1
                 landed[finished.item.id] += kept.add(finished.result)
                 if found.total() in (count // 4, count // 2):
                     killed.append(finished.result.worker)
                     os.kill(int(finished.result.worker), signal.SIGKILL)
-            lost, doubled = count - len(kept.done()), sum(number > 1 for number in (*found.values(), *landed.values()))
+            lost = count - len(kept.done_ids())
+            doubled = sum(number > 1 for number in (*found.values(), *landed.values()))
     print(f"{count} runs, workers killed {len(killed)}: lost {lost}, doubled {doubled}")
 
 
@@ -97,9 +98,9 @@ def cluster(count: int) -> None:
     walls, digests = {}, {}
     for number in (1, 2):
         with local_cluster(number) as workers:
-            list(workers.give_out(run_one, runs_of(2 * number)))
+            list(workers.map_items(run_one, runs_of(2 * number)))
             began = time.perf_counter()
-            cases = [one.result for one in workers.give_out(run_one, runs_of(count)) if one.result is not None]
+            cases = [one.result for one in workers.map_items(run_one, runs_of(count)) if one.result is not None]
             walls[number] = time.perf_counter() - began
             digests[number] = {case.run.id: case.digest for case in cases}
             spent = sum(case.spent_s for case in cases)

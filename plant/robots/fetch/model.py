@@ -20,6 +20,7 @@ from plant.robots.fetch.description import (
 from plant.robots.fetch.wheels import WheelLimits
 from plant.robots.robot_kind import PlacedRobot, RobotBody
 from plant.robots.servos import ActuatedJoints
+from skills.robot import Pose2D
 
 FINGER_GAIN_N_M = 2e4
 _GAINS = {
@@ -54,11 +55,11 @@ class FetchModel(RobotBody):
         joints = (self.plant.GetJointByName(finger, self.instance) for finger in FINGERS)
         return sum(float(positions[joint.position_start()]) for joint in joints)
 
-    def place(self, context: Context) -> None:
-        """Sets the robot on its wheels at its start, the torso at its height for travelling and the arm stowed."""
+    def place(self, context: Context, pose: Pose2D | None = None) -> None:
+        """Sets the robot on its wheels, the torso at its height for travelling and the arm stowed."""
         facts = fetch_facts()
         self.set_joints(context, {**facts["stowed"], LIFT_JOINT: facts["capabilities"]["travelling_lift"]})
-        self.plant.SetFreeBodyPose(context, self.base, self.robot.start.transform())
+        self.plant.SetFreeBodyPose(context, self.base, (pose or self.robot.start).transform())
 
 
 class JointIndex(ActuatedJoints):

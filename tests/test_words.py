@@ -20,7 +20,7 @@ METAPHORS = {
     r"happenings?": "events",
     r"deeds?": "action",
     r"sightings?": "detection in 3D",
-    r"rivals": "competing hypotheses",
+    r"rivals?": "competing hypotheses",
     r"held clear": "clearance",
 }
 
@@ -68,6 +68,13 @@ def test_public_docstrings_begin_with_a_verb_or_a_noun(package: str) -> None:
 )
 def test_the_check_finds_clauses(line: str, expected: bool) -> None:
     assert begins_with_a_clause(line) is expected
+
+
+def test_names_of_tests_begin_with_what_acts() -> None:
+    found = re.compile(r"def (test_(?:what|where|who|whoever|why|how|which)_\w*)")
+    sources = [path.read_text() for path in (ROOT / "tests").rglob("test_*.py")]
+    assert len(sources) > 100
+    assert [name for source in sources for name in found.findall(source)] == []
 
 
 @pytest.mark.parametrize("word", METAPHORS)

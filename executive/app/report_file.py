@@ -34,10 +34,10 @@ from skills.files.errors import InputError
 REPORT: Final = "report.html"
 TREE: Final = "tree"
 _CAPTIONS: Final = {
-    "detection": "What was detected first",
+    "detection": "The first detection",
     "grasp": "The grasp",
     "place": "Putting it down",
-    "hand_over": "Handing it over",
+    "hand_over": "The hand-over",
 }
 _MAP: Final = "The map, with the path of the robot"
 _MAPS: Final = "The map, with the path of each robot"

@@ -76,7 +76,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
             self._filter.place(initial, self._covariance)
         self._lost_covariance = self._filter.covariance
         self._weighed_at: Pose2D | None = None
-        self._scans = self._at_rest = self._rival_updates = 0
+        self._scans = self._at_rest = self._contrary_updates = 0
         self._agreeing = 0 if initial is None else self._own.sure_updates
         self._mass = 0.0 if initial is None else 1.0
         self._expected = initial is not None
@@ -182,11 +182,11 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         found = match(self._surfaces, points_F, mode.mean, mode.covariance + _SPREAD, self._options.matching)
         fits = mode.mass > self._mass and found.inlier_share >= self._options.lost_share
         better = fits and found.inlier_share > self._inlier_share + self._own.better_share
-        self._rival_updates = self._rival_updates + 1 if better else 0
-        doubted = self._inlier_share < self._options.found_share or self._rival_updates >= self._own.better_updates
+        self._contrary_updates = self._contrary_updates + 1 if better else 0
+        doubted = self._inlier_share < self._options.found_share or self._contrary_updates >= self._own.better_updates
         if fits and (not self._localised or (better and doubted)):
             self._believe(found)
-            self._placed, self._localised, self._rival_updates = True, False, 0
+            self._placed, self._localised, self._contrary_updates = True, False, 0
             self._expected = False
             self._mass, self._inlier_share = mode.mass, found.inlier_share
 

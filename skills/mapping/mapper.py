@@ -64,7 +64,7 @@ class MapperOptions:
     widest: Window = field(default_factory=lambda: Window(4.0, 0.35))
     closure_score: float = 0.55
     closure_share: float = 0.6
-    rival_share: float = 0.9
+    competing_share: float = 0.9
     agree_m: float = 0.10
     agree_rad: float = 0.02
     agree_within_m: float = 8.0
@@ -347,7 +347,7 @@ class Mapper:
         grid = _hit_grid(points_A)
         few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // _SEARCH_POINTS)])
         coarse = find_pose(grid, few, guess, window, least=options.closure_score)
-        if coarse is None or coarse.rival_score > options.rival_share * coarse.score:
+        if coarse is None or coarse.competing_score > options.competing_share * coarse.score:
             return None
         wide = np.diag([0.2**2, 0.2**2, 0.05**2])
         found = match(distributions.linearise, points_F, coarse.pose, wide, options.matching)

@@ -131,7 +131,7 @@ class SubmapMatch:
 
     pose: Pose2D
     score: float
-    rival_score: float
+    competing_score: float
 
 
 def find_pose(
@@ -142,11 +142,11 @@ def find_pose(
     *,
     least: float = 0.4,
     reach_m: float = 0.25,
-    rival_m: float = 0.5,
+    apart_m: float = 0.5,
 ) -> SubmapMatch | None:
     """The pose about a guess where points (N, 2 or more columns) fit a grid best, None when not better than `least`.
 
-    A rival lies farther than rival_m away.
+    A competing pose lies farther than `apart_m` away.
     """
     distance, frame = grid.distance, (grid.resolution_m, *grid.origin_m)
     turns = max(1, math.ceil(window.yaw_rad / math.radians(1.5)))
@@ -157,8 +157,8 @@ def find_pose(
     if best[0] <= least:
         return None
     place, bar = (float(best[1]), float(best[2])), 0.8 * float(best[0])
-    rival = _branch_and_bound(distance, frame, points_F, yaws, centre, window.place_m, bar, reach_m, place, rival_m)
-    return SubmapMatch(Pose2D(place[0], place[1], float(best[3])), float(best[0]), float(rival[0]))
+    competing = _branch_and_bound(distance, frame, points_F, yaws, centre, window.place_m, bar, reach_m, place, apart_m)
+    return SubmapMatch(Pose2D(place[0], place[1], float(best[3])), float(best[0]), float(competing[0]))
 
 
 @compiled

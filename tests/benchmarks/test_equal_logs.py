@@ -29,7 +29,7 @@ def test_each_difference_is_told_with_its_place():
         assert found.startswith(told), found
 
 
-def test_what_differs_between_equal_runs_is_left_out():
+def test_differences_between_equal_runs_are_left_out():
     result = {"outcome": "success", "wall_time_s": 9.1, "robots": [{"real_time_factor": 4.0, "ticks": 3}]}
     assert steady(result) == {"outcome": "success", "robots": [{"ticks": 3}]}
 

@@ -12,7 +12,7 @@ def test_the_slope_of_the_memory_is_that_of_the_second_half(tmp_path):
     assert (told["memory_mb_per_hour"], told["log_mb"], told["recording_mb"]) == (6.0, 0.2, None)
 
 
-def test_what_this_process_writes_and_holds_is_measured(tmp_path):
+def test_memory_and_written_bytes_of_this_process_are_measured(tmp_path):
     before = written_bytes()
     (tmp_path / "file").write_bytes(b"x" * 100_000)
     assert written_bytes() - before >= 100_000

@@ -37,12 +37,12 @@ def test_triangles_are_read_as_they_are_told() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"solid thing", stl(PYRAMID)[:-1], stl(PYRAMID)[:84]])
-def test_what_is_no_whole_binary_file_is_refused(data: bytes) -> None:
+def test_an_incomplete_binary_file_is_refused(data: bytes) -> None:
     with pytest.raises(ValueError, match="not a binary STL file"):
         read_stl(data)
 
 
-def test_where_faces_meet_the_normal_is_their_mean() -> None:
+def test_a_vertex_normal_is_the_mean_of_its_faces() -> None:
     normals = smooth_normals(PYRAMID)
     np.testing.assert_allclose(normals[:, 2], np.tile([0.0, 0.0, 1.0], (4, 1)), atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=2), 1.0)

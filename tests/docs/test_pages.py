@@ -77,7 +77,7 @@ def test_all_fourteen_points_have_a_test():
     assert [number for number, text in zip(parts[1::2], parts[2::2], strict=True) if not _TEST.search(text)] == []
 
 
-def test_what_is_not_there_is_noticed():
+def test_a_missing_target_is_noticed():
     assert list(missing_tests("`tests/docs/test_pages.py::test_no_such`")) == ["tests/docs/test_pages.py::test_no_such"]
     assert unknown_command("errand fly") == "no command fly"
     assert unknown_command("errand check --fast file.yaml") == "check has no --fast"

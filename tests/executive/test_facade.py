@@ -60,7 +60,7 @@ def test_a_world_has_a_name_and_an_unknown_one_is_refused():
         executive.load_world("nowhere")
 
 
-def test_what_cannot_be_done_is_not_run(tmp_path):
+def test_an_impossible_request_is_not_run(tmp_path):
     with pytest.raises(InputError, match="moon"):
         executive.run_mission(executive.Request("go to the moon", out=tmp_path))
 

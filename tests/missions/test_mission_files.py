@@ -59,7 +59,7 @@ KEPT = "patrol_and_report"
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[NIGHTLY] * (name != KEPT)) for name in DECIDING])
-def test_what_it_decides_is_right_and_it_says_so(name, tmp_path):
+def test_a_mission_decides_right_and_says_so(name, tmp_path):
     seed, said = DECIDING[name]
     file = MISSIONS / f"{name}.yaml"
     request = Request(file=file, seed=seed, out=tmp_path, record=False, time_of_day="08:29")

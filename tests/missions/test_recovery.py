@@ -166,7 +166,7 @@ class LosesHalfway:
 
 
 @pytest.mark.nightly
-def test_what_falls_on_the_way_is_noticed_at_once_picked_up_from_the_floor_and_brought():
+def test_an_object_that_falls_on_the_way_is_picked_up_and_brought():
     mission = FlatMission(BEER)
     robot = LosesHalfway(mission, "beer")
     result, verdict = mission.run(robot, observer=robot.observe)

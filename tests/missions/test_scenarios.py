@@ -25,7 +25,7 @@ def told(out):
     return [event.data["message"] for event in events if event.topic == "control"]
 
 
-def test_where_a_door_closes_the_robot_takes_another(tmp_path):
+def test_a_robot_takes_another_door_when_one_closes(tmp_path):
     file = tmp_path / "door.yaml"
     file.write_text("events:\n  - {door: [kitchen, living room], closes: 1 s}\n", encoding="utf-8")
     out = tmp_path / "out"

@@ -25,7 +25,7 @@ def well(name):
 
 
 @pytest.mark.parametrize("name", sorted(SKILLS))
-def test_what_goes_well_with_spot_goes_well_with_the_toy(name):
+def test_skill_tests_that_pass_with_spot_pass_with_the_toy(name):
     assert differences(name, TOY) == []
 
 

@@ -172,7 +172,7 @@ def test_a_step_without_condition_is_named(verdict_on):
     assert "Not judged: stow." in verdict_on(step(GO, Policy()), STOW).why
 
 
-def test_where_the_robot_went_must_hold_until_it_drives_again(conditions_by):
+def test_a_reached_place_must_hold_until_the_robot_drives_again(conditions_by):
     assert [one.when for one in conditions_by(step(GO), step(GO))] == [When.END_OF_STEP, When.END_OF_MISSION]
 
 

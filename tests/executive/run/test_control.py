@@ -423,7 +423,7 @@ def test_a_control_controls_one_run_only(compiled, run_tree, make, control):
         run_tree(compiled(GO), control=control)
 
 
-def test_what_was_done_by_hand_is_logged(compiled, run_tree, make, control, notes):
+def test_manual_actions_are_logged(compiled, run_tree, make, control, notes):
     actions = {2: control.toggle_pause, 4: control.toggle_pause, 5: lambda: control.cancel("enough")}
     run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
     assert notes() == [

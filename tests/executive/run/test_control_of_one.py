@@ -148,7 +148,7 @@ def test_a_question_says_whose_it_is(control, clock):
     assert [each.robot for each in control.state.questions] == ["Bob"]
 
 
-def test_what_holds_all_robots_holds_each(control, compiled):
+def test_a_hold_of_all_robots_holds_each(control, compiled):
     control.begin({"Alice": compiled(GO)})
     control.pause(robot="Alice")
     control.stop_button("fire")

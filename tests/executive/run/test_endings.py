@@ -183,7 +183,7 @@ def test_a_cancel_runs_always_of_a_preempting_and_of_the_suspended_mission(go, c
     assert begun == ["relocalise", "stow"]
 
 
-def test_where_a_command_is_cancelled_the_end_begins_at_once(go, control):
+def test_a_cancelled_command_begins_the_end_at_once(go, control):
     drive = Do.from_command(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
     _, begun = go(group(drive, always=[skill("relocalise")]), act=cancels(control, 2))
     assert begun == ["navigate", "relocalise"]

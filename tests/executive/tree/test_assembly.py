@@ -233,7 +233,7 @@ def test_an_object_that_a_branch_may_have_grasped_is_not_certain(compiled_steps,
     assert any(node.kind == "only if holding" and "in-gripper" in node.path_id for node in tree.root.walk()) is counts
 
 
-def test_what_is_taken_before_a_block_is_held_in_its_branches(compiled_steps):
+def test_an_object_taken_before_a_block_is_held_in_its_branches(compiled_steps):
     tree = compiled_steps(go(TAKE), block(Choose(condition=HOLDING, then=(go(BRING),), otherwise=(to("bathroom"),))))
     assert [held(tree, n)[0] for n in (-2, -1)] == [(True, "coke")] * 2
 

@@ -230,7 +230,7 @@ IN_GRIPPER = [
 
 
 @pytest.mark.parametrize(("steps", "lines"), IN_GRIPPER)
-def test_what_the_gripper_holds_is_followed_step_by_step(check, steps, lines):
+def test_the_held_object_is_followed_step_by_step(check, steps, lines):
     assert [line for line, _ in errors_in(check(*steps))] == lines
 
 

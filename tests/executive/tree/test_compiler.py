@@ -268,7 +268,7 @@ def test_objects_are_counted_on_all_surfaces_of_a_place(compiled, run_tree, scri
         ("Take [Nothing] to [kitchen] and do [grasp] to [some coke]", "cannot be carried in one go|is no"),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_a_reason(compiled, text, words):
+def test_an_impossible_command_is_refused_with_a_reason(compiled, text, words):
     with pytest.raises((InputError, ValueError), match=words):
         compiled(text)
 
@@ -397,6 +397,6 @@ def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):
     assert (root.status, root.children[0].status) == (Status.FAILURE, Status.INVALID)
 
 
-def test_what_a_node_writes_follows_from_its_options():
+def test_outputs_of_a_node_follow_from_its_options():
     assert writes(NodeSpec("remember", "alice/r", "r", {"key": "alice/pose"})) == {"alice/pose": Pose2D}
     assert writes(LIMIT) == {}

@@ -83,7 +83,7 @@ def test_a_name_that_leads_elsewhere_is_refused_in_its_line(home: Path, name: st
 
 
 @pytest.mark.parametrize("name", ["http://x/walls.obj", "../walls.obj", "none.obj", "model://nobody/x.obj"])
-def test_what_a_model_names_is_refused_in_its_line(home: Path, name: str) -> None:
+def test_a_bad_file_name_in_a_model_is_refused_in_its_line(home: Path, name: str) -> None:
     (home / "walls.sdf").write_text(MODEL.replace("walls.obj", name))
     error = refusal(home)
     assert (error.file, error.line) == (home / "walls.sdf", 2)

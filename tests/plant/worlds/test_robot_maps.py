@@ -49,7 +49,7 @@ def test_walls_are_where_they_are(world: World, band: str) -> None:
     assert np.mean(true.distance_m(walls) <= FLOORS_M[world.name]) > 0.97
 
 
-def test_what_the_body_could_touch_is_on_the_map(world: World) -> None:
+def test_the_map_shows_all_that_the_body_could_touch(world: World) -> None:
     made, true = grids(world, "keepout")
     rows, columns = true.cells(made.centres(np.argwhere(made.occupied))).T
     inside = (rows >= 0) & (columns >= 0) & (rows < true.occupied.shape[0]) & (columns < true.occupied.shape[1])

@@ -83,7 +83,7 @@ def test_a_pipe_is_refused_at_once(copy: Path) -> None:
 @pytest.mark.parametrize(
     "text", [b"\xff", b"a: !!python/object:x.y {}", b"x: 0x" + b"f" * 10_000, b"[" * 3000, b"x: " + b"9" * 5000]
 )
-def test_what_is_no_yaml_is_told_with_its_file(copy: Path, text: bytes) -> None:
+def test_an_invalid_yaml_file_is_named(copy: Path, text: bytes) -> None:
     (copy / "objects.yaml").write_bytes(text)
     with pytest.raises(InputError, match=r"objects\.yaml:[12]: ") as error:
         load_world(copy)

@@ -53,7 +53,7 @@ def test_a_full_battery_needs_no_waiting():
 
 
 @pytest.mark.parametrize("rate", [0.0, -0.0002])
-def test_where_the_charge_does_not_rise_it_gives_up(rate):
+def test_charging_gives_up_when_the_charge_does_not_rise(rate):
     dock = Dock(0.2, rate)
     step, _ = outcome(dock, 0.8)
     assert step.cause is Cause.POSTCONDITION

@@ -34,7 +34,7 @@ def test_a_person_who_walks_away_is_forgotten_at_once():
     assert bench.costmap.clearance_m(AT_PERSON)[0] > 0.5
 
 
-def test_what_is_below_the_beams_stays_remembered_and_then_decays():
+def test_obstacles_below_the_beams_stay_remembered_and_then_decay():
     crate = Box(2.6, 5.2, 3.0, 5.6, 0.0, 0.3)
     bench = ticked(Bench(START, unmapped=[crate], cameras=False))
     ahead = np.array([[2.7, 5.4]])

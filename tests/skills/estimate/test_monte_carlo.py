@@ -169,7 +169,7 @@ def test_particles_gather_at_an_accepted_estimate():
     assert bench.localiser.particles.mass_near(bench.robot.pose) > 0.95
 
 
-def test_where_nothing_fits_it_is_not_localised():
+def test_a_robot_whose_scan_fits_nowhere_is_not_localised():
     spots = np.random.default_rng(5).uniform(20.0, 26.0, (60, 2))
     pillars = [Box(x, y, x + 0.15, y + 0.15) for x, y in spots if math.hypot(x - 23, y - 23) > 1]
     bench = bench_at(Pose2D(23.0, 23.0, 0.3), surveyed=TWO_ROOMS, unmapped=pillars, start_known=False)

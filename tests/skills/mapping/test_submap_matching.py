@@ -85,7 +85,7 @@ def test_finds_the_pose_in_a_wide_window(true):
     assert found is not None
     assert math.hypot(found.pose.x_m - true.x_m, found.pose.y_m - true.y_m) < 0.1
     assert abs(found.pose.yaw_rad - true.yaw_rad) < math.radians(2.0)
-    assert found.rival_score < 0.9 * found.score
+    assert found.competing_score < 0.9 * found.score
 
 
 def test_equals_the_best_of_an_exhaustive_search():
@@ -106,12 +106,12 @@ def test_equals_the_best_of_an_exhaustive_search():
     assert found.score >= max(scores) - 1e-6
 
 
-def test_a_corridor_has_rivals():
+def test_a_corridor_has_competing_poses():
     grid = field((1.0, 3.0, 11.0, 3.1), (1.0, 5.0, 11.0, 5.1))
     x = np.arange(-2.0, 2.0, 0.05)
     points = np.vstack([np.column_stack([x, np.full(len(x), side)]) for side in (-1.0, 1.0)])
     found = find_pose(grid, points, Pose2D(6.0, 4.05, 0.0), Window(2.0, 0.05))
-    assert found is not None and found.rival_score > 0.9 * found.score
+    assert found is not None and found.competing_score > 0.9 * found.score
 
 
 def test_nothing_is_found_where_nothing_fits():

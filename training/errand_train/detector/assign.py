@@ -54,8 +54,8 @@ def assign(
     metric = asked.pow(_SCORE_POWER) * (overlaps + 1e-4).pow(_OVERLAP_POWER)
     metric = metric * (inside & ~truth.ignored[..., None])
     chosen = _best(metric, most_cells) & (metric > 0)
-    rival = torch.where(chosen, overlaps + _TINY, overlaps.new_tensor(-1.0))
-    best, objects = rival.max(dim=1)
+    candidates = torch.where(chosen, overlaps + _TINY, overlaps.new_tensor(-1.0))
+    best, objects = candidates.max(dim=1)
     mine = chosen & (objects[:, None, :] == torch.arange(truth.boxes.shape[1])[None, :, None].to(objects.device))
     quality = _quality(metric * mine, overlaps * mine)
     taken = best >= 0

@@ -98,9 +98,7 @@ def told(published):
     return [message["message"] for topic, message in published if topic == "transitions"]
 
 
-def test_what_is_in_the_way_is_put_elsewhere_on_its_surface_and_the_picking_up_starts_again(
-    play, table, script, published
-):
+def test_a_blocking_object_is_moved_on_its_surface_and_picking_up_starts_again(play, table, script, published):
     result = play(1)
     assert result.outcome is Outcome.SUCCESS, result.message
     assert script.begun == ["navigate", *ROUND, *MOVED, *ROUND, "stow"]
@@ -132,7 +130,7 @@ def test_the_robot_goes_back_to_where_it_stood_since_a_grasp_was_found_from_ther
     assert goals[1:] == [Pose2D(0.3, 0.0, 0.0)]
 
 
-def test_where_the_way_back_is_blocked_it_goes_on_from_where_it_stands(play, script, table):
+def test_a_robot_whose_way_back_is_blocked_goes_on_from_where_it_stands(play, script, table):
     script.ends["navigate"] = lambda skill: (
         Failed(Cause.PLANNING, "blocked") if "place" in script.begun else Succeeded("gone")
     )
@@ -148,7 +146,7 @@ def test_whether_it_is_allowed_is_the_steps_to_say_or_the_missions(
     assert (result.outcome is Outcome.SUCCESS) == bool(moved)
 
 
-def test_where_it_is_not_allowed_the_failure_is_as_before(play, table, script):
+def test_the_failure_stays_when_moving_objects_is_not_allowed(play, table, script):
     result = play()
     assert (result.cause, result.message) == (Cause.PLANNING, "the beer is behind the coke (after 3 attempts)")
     assert script.begun == ["navigate", *ROUND, *ROUND, "back_off", *ROUND, "stow"]
@@ -167,7 +165,7 @@ def test_two_are_moved_one_after_the_other(play, table):
     assert len(table.placed) == 2
 
 
-def test_what_cannot_be_moved_is_left_and_the_end_says_both(play, table, script):
+def test_an_object_that_cannot_be_moved_is_left_and_the_end_says_both(play, table, script):
     table.no_grasp = [Cause.PLANNING]
     result = play(1)
     assert result.cause is Cause.PLANNING
@@ -175,13 +173,13 @@ def test_what_cannot_be_moved_is_left_and_the_end_says_both(play, table, script)
     assert script.begun == ["navigate", *ROUND, *MOVED[:2], "stow"]
 
 
-def test_what_slips_when_it_is_taken_is_taken_once_more(play, table, script):
+def test_an_object_that_slips_from_the_grasp_is_taken_once_more(play, table, script):
     table.no_grasp = [Cause.POSTCONDITION]
     assert play(1).outcome is Outcome.SUCCESS
     assert script.begun == ["navigate", *ROUND, *MOVED[:2], *MOVED, *ROUND, "stow"]
 
 
-def test_what_cannot_be_approached_is_taken_from_where_the_robot_stands(play, table, script):
+def test_an_object_without_approach_is_taken_from_where_the_robot_stands(play, table, script):
     usual = script.ends["approach"]
 
     def not_the_coke(skill):
@@ -193,7 +191,7 @@ def test_what_cannot_be_approached_is_taken_from_where_the_robot_stands(play, ta
     assert script.begun == ["navigate", *ROUND, *MOVED, *ROUND, "stow"]
 
 
-def test_where_there_is_no_room_it_is_set_down_again_and_the_end_says_so(play, table, robot):
+def test_an_object_without_a_free_spot_is_set_down_again_and_the_end_says_so(play, table, robot):
     table.no_room = [Cause.PLANNING]
     result = play(1)
     assert result.message.startswith("the beer is behind the coke; move it aside: the counter has")
@@ -208,7 +206,7 @@ def test_on_the_floor_it_is_put_on_the_floor_about_it(play, table):
     assert sorted(corner[0] for corner in surface.polygon_W) == pytest.approx([-0.3, -0.3, 2.1, 2.1])
 
 
-def test_what_stands_on_nothing_known_is_left(play, table):
+def test_an_object_on_no_known_surface_is_left(play, table):
     table.blocking = [replace(COKE, surface=None)]
     assert play(1).message.endswith("move it aside: it is not known what the coke stands on")
     assert not table.placed

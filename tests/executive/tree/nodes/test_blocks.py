@@ -575,7 +575,7 @@ def test_always_beside_another_that_ends_it(always, run, run_context, leaf, log)
     assert log == ["+first", "+other", "-first", "+last"]
 
 
-def test_what_was_cancelled_and_is_done_in_the_end_is_not_done_twice(always, run, run_context, leaf, log):
+def test_a_cancelled_step_that_is_done_in_the_end_is_not_done_twice(always, run, run_context, leaf, log):
     inner = always(leaf("RR", "first"), leaf("RS", "last"))
     root = Skip(path_id="alice/skip", name="skip", child=inner, step="it")
     run(root)

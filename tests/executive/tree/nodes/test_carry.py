@@ -38,7 +38,7 @@ def test_it_says_what_happened(leaf, clock):
     assert ended(leaf, clock).message == "the hammer fell on the way to the kitchen; it is picked up again"
 
 
-def test_what_is_felt_after_all_has_slipped(leaf, clock, robot):
+def test_an_object_that_is_felt_after_all_has_slipped(leaf, clock, robot):
     leaf.tick_once()
     robot.holding = True
     told = "the hammer slips in the gripper on the way to the kitchen; it is set down and gripped again"
@@ -66,7 +66,7 @@ def test_it_is_set_down_before_where_the_robot_has_come_to_rest(leaf, clock, rob
     assert (min(xs), max(xs)) == pytest.approx((1.35, 1.95))
 
 
-def test_what_slips_is_looked_for_where_it_is_set_down(leaf, clock, robot, context):
+def test_a_slipped_object_is_looked_for_where_it_is_set_down(leaf, clock, robot, context):
     robot.holding = True
     leaf.context = replace(context, costmap=BlockCostmap([Block(0.75, -0.4, 1.55, 0.4, z1=1.0)]))
     ended(leaf, clock)

@@ -70,7 +70,7 @@ def test_an_empty_surface_is_cleared_already(compiled, run_tree, script, table):
     assert "grasp" not in script.begun
 
 
-def test_what_cannot_be_taken_is_left_for_last_and_then_fails(compiled, run_tree, script, table):
+def test_an_object_that_cannot_be_taken_comes_last_and_then_fails(compiled, run_tree, script, table):
     wide, hold = table[0], script.ends["grasp"]
 
     def try_to_hold(skill):
@@ -131,7 +131,7 @@ def test_the_conditions_are_that_nothing_is_left_and_all_of_it_is_there(compiled
         ((GET, BRING.replace("bedside table", "hall")), "no surface"),
     ],
 )
-def test_what_cannot_be_cleared_is_refused(compiled, texts, says):
+def test_a_place_that_cannot_be_cleared_is_refused(compiled, texts, says):
     with pytest.raises(InputError, match=says) as error:
         compiled(*texts)
     assert error.value.hint

@@ -22,7 +22,7 @@ def test_two_things_are_two_trips(compiled):
     assert not any("/trip-3" in path_id for path_id in ids)
 
 
-def test_what_was_brought_is_not_looked_for_again(compiled):
+def test_a_brought_object_is_not_looked_for_again(compiled):
     finds = [node for node in compiled(*TWO).root.walk() if node.kind == "skill" and "/get/find/" in node.path_id]
     bound = [node.options["inputs"]["surfaces"] for node in finds if node.name == "detect"]
     named = {surface.name for binding in bound if isinstance(binding, Constant) for surface in binding.value}
@@ -63,7 +63,7 @@ def test_the_condition_is_one_of_two_things(compiled, run_tree, knowledge, scrip
         ("Take [Nothing] to [kitchen] and do [grasp] to [some drink]", "Take [some drink] to [bedroom]", "open number"),
     ],
 )
-def test_what_no_trips_can_be_made_of_is_refused(compiled, get, bring, says):
+def test_a_command_without_trips_is_refused(compiled, get, bring, says):
     with pytest.raises(InputError, match=says) as error:
         compiled(get, f"{bring} and do [Nothing] to [Nothing]")
     assert error.value.hint
@@ -76,12 +76,12 @@ PUT = (
 )
 
 
-def test_what_an_earlier_step_grasped_is_not_looked_for(compiled, run_tree, script):
+def test_an_object_grasped_by_an_earlier_step_is_not_looked_for(compiled, run_tree, script):
     assert run_tree(compiled(GET, *PUT)).outcome is Outcome.SUCCESS
     assert script.begun.count("grasp") == 1
 
 
-def test_what_is_no_longer_in_the_gripper_is_looked_for_again(compiled, run_tree, script, robot):
+def test_an_object_that_left_the_gripper_is_looked_for_again(compiled, run_tree, script, robot):
     def drop(skill):
         skill.context.robot._robot.holding = False
         return Succeeded("there")

@@ -61,7 +61,7 @@ def test_the_skill_learns_where_the_door_is_and_answers_under_the_key():
         assert leaf.options["outputs"] == {"open": "alice/m/1-check/answer"}
 
 
-def test_where_the_way_is_barred_it_looks_from_where_it_is():
+def test_a_robot_with_a_barred_path_looks_from_where_it_stands():
     near = plan(world()).children[0].children[0].children[0]
     assert [near.kind, *(child.kind for child in near.children)] == ["selector", "recover", "pause"]
 
@@ -92,7 +92,7 @@ def test_in_a_corridor_the_robot_stands_along_the_wall():
     assert abs(math.sin(view.yaw_rad)) < 1e-3
 
 
-def test_where_furniture_stands_before_the_door_it_looks_from_aside():
+def test_a_robot_looks_from_aside_when_furniture_stands_before_the_door():
     table = {"place": "kitchen", "height": 0.7, "polygon": [[2.6, 0.6], [3.6, 0.6], [3.6, 3.2], [2.6, 3.2]]}
     table["viewpoints"] = [{"x": 1, "y": 1}]
     knowledge = world(surfaces={"table": table})
@@ -106,7 +106,7 @@ def test_a_room_too_small_to_stand_in_is_left_out():
     assert [port(leaf, "goal").y_m for leaf in leaves(looks, "navigate")] == [5.55]
 
 
-def test_where_no_place_is_better_it_looks_from_where_it_stands_in_the_rooms():
+def test_a_robot_looks_from_where_it_stands_when_no_place_is_better():
     small = [[2.5, 3.5], [3.5, 3.5], [3.5, 4], [2.5, 4]]
     looks = plan(world(south=small, north=[[2.5, 4.1], [3.5, 4.1], [3.5, 4.6], [2.5, 4.6]]))
     assert [port(leaf, "goal").y_m for leaf in leaves(looks, "navigate")] == [4.5, 5.1]

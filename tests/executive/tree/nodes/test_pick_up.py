@@ -84,7 +84,7 @@ def test_going_is_given_up_after_all_poses_nearby(compiled, run_tree, script, fa
     assert script.begun.count("clear_costmap") == script.begun.count("back_off") == 4
 
 
-def test_where_all_poses_are_out_of_reach_nothing_else_is_tried(compiled, run_tree, script):
+def test_nothing_else_is_tried_when_all_poses_are_out_of_reach(compiled, run_tree, script):
     script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "the door is closed", final=True)
     worst = run_tree(compiled(GO)).worst
     assert (worst.cause, worst.message) == (Cause.PLANNING, "the door is closed")
@@ -455,7 +455,7 @@ def test_the_mission_continues_where_it_was(compiled, run_tree, script, robot, m
     assert script.begun == [*before, *interrupt, "approach", "grasp", "stow", "navigate", "hand_over"]
 
 
-def test_where_it_does_not_charge_it_backs_off_and_docks_again_three_times_at_most(compiled, run_tree, script, robot):
+def test_a_robot_that_does_not_charge_docks_again_three_times_at_most(compiled, run_tree, script, robot):
     script.ends["charge"] = lambda skill: Failed(Cause.POSTCONDITION, "it does not charge here")
     robot.charge = 0.1
     worst = run_tree(compiled(GO)).worst

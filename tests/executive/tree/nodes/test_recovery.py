@@ -150,7 +150,7 @@ def test_a_new_start_counts_recoveries_from_zero_and_forgets_what_attempts_share
         root.stop(N)
 
 
-def test_what_attempts_write_stays_from_one_to_the_next():
+def test_values_stay_from_one_attempt_to_the_next():
     board = Board("alice")
     root = recover(Leaf("go", PLANNING, S), recovery(Leaf("clear", S), PLANNING), forgets=("alice/tried",), board=board)
     root.tick_once()

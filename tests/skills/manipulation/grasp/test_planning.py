@@ -75,7 +75,7 @@ def test_an_obstacle_that_is_no_object_is_not_named():
     assert "would touch something" in _why((_obstacle("cube", 0.85, 0.6),), boxes=wall.boxes)
 
 
-def test_why_there_is_no_grasp_is_asked_of_a_bounded_number_of_candidates():
+def test_the_cause_of_no_grasp_is_sought_among_a_bounded_number_of_candidates():
     asked = []
 
     class Counted(GeometricGraspPlanner):

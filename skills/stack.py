@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from skills.estimate.grid_map import GridMap
     from skills.manipulation.arm.collision import ArmScene
     from skills.manipulation.arm.motion import ArmPlanner
-    from skills.manipulation.grasp.candidates import GraspCandidate, Target
+    from skills.manipulation.grasp.candidates import GraspCandidate
+    from skills.manipulation.grasp.placements import Target
     from skills.manipulation.grasp.planning import GraspPlan, Surroundings
     from skills.navigate.follower import Drive
     from skills.navigate.footprint import Footprint

@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7419,
     "executive/cli": 3815,
-    "skills": 25176,
+    "skills": 25362,
     "plant": 11609,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 446, 70, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 447, 70, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

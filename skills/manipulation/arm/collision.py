@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -102,7 +103,10 @@ class ArmScene:
 
     def set_boxes(self, boxes: Sequence[Box], X_BF: RigidTransform | None = None) -> None:
         """Replaces the boxes around the robot, given in frame F; without X_BF, in the body frame."""
-        self._boxes, self._X_BF = tuple(boxes), RigidTransform() if X_BF is None else X_BF
+        X_BF, same = RigidTransform() if X_BF is None else X_BF, len(boxes) == len(self._boxes)
+        if same and all(map(operator.is_, boxes, self._boxes)) and X_BF.IsExactlyEqualTo(self._X_BF):
+            return
+        self._boxes, self._X_BF = tuple(boxes), X_BF
         self._obstacles = None
 
     @contextmanager
@@ -131,8 +135,8 @@ class ArmScene:
 
     def set_opening(self, opening: float) -> None:
         """Sets the gripper's opening for later checks, 0 closed."""
+        self._obstacles = self._obstacles if opening == self._opening else None
         self._opening = opening
-        self._obstacles = None
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
         """Sets the robot's other joints for later checks: legs, lift, head."""
@@ -146,8 +150,8 @@ class ArmScene:
 
     def set_padding(self, padding_m: float) -> None:
         """Sets the distance (m) that the robot keeps from boxes in later checks."""
+        self._obstacles = self._obstacles if padding_m == self._padding_m else None
         self._padding_m = padding_m
-        self._obstacles = None
 
     def free(self, q_rad: FloatArray) -> bool:
         """Returns whether arm angles q_rad (J,) collide with nothing."""

@@ -100,19 +100,19 @@ class LookingSkill(ArmSkill[InputsT]):
         opens = not gripper.holding and gripper.opening < _OPEN_ENOUGH * widest
         yield from self.move_to(goal, message, speed_rad_s, opening=_OPEN_WIDE * widest if opens else None)
 
-    def picture(self, message: str, settle_s: float = SETTLE_S) -> Routine[Image]:
+    def picture(self, message: str, settle_s: float = SETTLE_S, *, near: bool = False) -> Routine[Image]:
         """Takes a picture with the object camera at rest; a head camera's picture has no depth on the robot's own arm.
 
         Asks again for a while when the picture is missing, old, dark or without depth; one attempt of a skill waits
-        `PATIENCE_S` in all for light and depth. Raises SkillFailure with cause EXECUTION when the camera gives no
-        picture or an old one.
+        `PATIENCE_S` in all for light and depth. A camera that may be too `near` for depth is asked once. Raises
+        SkillFailure with cause EXECUTION when the camera gives no picture or an old one.
         """
         yield from self.pause(settle_s, message)
         robot, camera = self.context.robot, self.object_camera
         while True:
             begun_s = self.context.clock.now()
             image = yield from self._picture_now(camera, message)
-            if self._doubted_s > PATIENCE_S or not (is_dark(image) or lacks_depth(image)):
+            if near or self._doubted_s > PATIENCE_S or not (is_dark(image) or lacks_depth(image)):
                 break
             yield from self.pause(_ASK_AGAIN_S, f"the {camera.mount.value} camera shows nothing; {message}")
             self._doubted_s += self.context.clock.now() - begun_s

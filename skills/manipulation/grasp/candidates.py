@@ -1,29 +1,27 @@
 """Grasp candidates from the shape of a seen object, and the reasons why there are none.
 
 The gripper closes along the hand's z axis, which is kept level: from the side with the wrist rolled for upright
-objects, from above for low ones. Along a long object the local width counts, so that a hammer is taken by its handle.
+objects, from above for low ones and for the tops of upright ones.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
-from skills.geometry import wrap
 from skills.manipulation.arm.poses import hand_rotation
+from skills.manipulation.grasp.placements import Placement, Target, placements
 from skills.perception.class_forms import class_forms
 from skills.robot import FloatArray, GripperCapabilities, GripperKind
 from skills.world_model import ObjectObservation
 
 THIN_M = 0.020
 """Objects lower than this count as thin."""
-_UPRIGHT_M = 0.075
-"""An object higher than this is grasped from the side."""
 _ABOVE_SURFACE_M = 0.004
 """Usual distance of the fingertips from the surface."""
 _LEAST_ABOVE_SURFACE_M = 0.003
@@ -34,12 +32,12 @@ _LEAST_GRIP_M = 0.008
 """Least height that the fingers must cover of a low object."""
 _LEAST_OF_THIN = 0.35
 """The same for a thin object, as a part of its height."""
-_BIN_M = 0.01
-"""Length of the slices of an outline."""
-_BREADTH_M = 0.036
-"""Half the length of an outline within which its local width is measured."""
 _LEAST_BEYOND = 0.25
 """Part of a flat object's height by which the fingers may end above its middle."""
+_WELL_BEYOND_M = 0.008
+"""Depth by which the fingers should end below an object's middle: rounded tips above it press a round handle out."""
+_PER_HIGH_M = 40.0
+"""Cost of fingers that end higher, per metre."""
 _BESIDE_THIN_M = 0.012
 """Gap between the fixed finger and a thin object."""
 _ENDING_LEVEL_M = 0.017
@@ -48,41 +46,16 @@ _BEVEL_M = 0.003
 """Distance by which the back of a fingertip ends behind its tip."""
 _SHORTER_CLOSED_M = 0.004
 """Length by which the moving finger reaches less far when closed than half open."""
-_YIELD_M = 0.006
-"""Depth by which a finger yields to an outline that it touches."""
-_LEAST_TOUCHING = 0.55
-"""Least part of a finger's breadth that must touch the outline."""
-_LOOSE_COST = 1.5
-"""Cost of a finger that touches the outline nowhere."""
-_FROM_ABOVE_RAD = np.radians(50.0)
-"""Fingers that are tilted more grasp an upright object from above."""
 _HIGHEST_FLAT_MM = 40
 """Height up to which an object may be refused as too flat."""
 _BELOW_PALM_M = 0.05
 """Distance of the grip from the palm when an upright object is grasped from above."""
 _OVER_TOP_M = 0.01
 """Distance of the palm over the top of an upright object that is grasped from above."""
+_AHEAD_OF_PALM_M = 0.008
+"""Gap between the palm and an upright object that is grasped from the side."""
 _TIPS_UP_M = 0.012
 """Least height of the fingertips over the surface when an upright object is grasped from above."""
-
-
-@dataclass(frozen=True)
-class Target:
-    """Object to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
-
-    points_B: FloatArray
-    centre_B: tuple[float, float]
-    yaw_rad: float
-    length_m: float
-    width_m: float
-    height_m: float
-    base_m: float
-    round: bool
-
-    @property
-    def upright(self) -> bool:
-        """Returns whether the object is high enough to be grasped from the side."""
-        return self.height_m > _UPRIGHT_M
 
 
 @dataclass(frozen=True)
@@ -103,18 +76,6 @@ class GraspCandidate:
         return self.X_BH @ RigidTransform([-distance_m, 0.0, 0.0])
 
 
-@dataclass(frozen=True)
-class _Placement:
-    """Position of a grasp along an object: point (x, y), azimuth of the approach, local width and depth (m), cost."""
-
-    xy: FloatArray
-    azimuth_rad: float
-    width_m: float
-    half_depth_m: float
-    cost: float
-    lever_m: float = 0.0
-
-
 def grasp_candidates(
     target: Target, p_BS: FloatArray, gripper: GripperCapabilities, beside_m: tuple[float, float] = (0.010, 0.017)
 ) -> list[GraspCandidate]:
@@ -122,12 +83,12 @@ def grasp_candidates(
 
     `beside_m` are the gaps beside the fixed finger, for an upright object and for a low one.
     """
-    ahead, placements = _placements(target, p_BS)
+    ahead = _ahead_rad(target, p_BS)
     tried = [
         _candidate(target, placement, attitude, side, gripper, beside_m[0 if target.upright else 1])
-        for placement in placements
+        for placement in placements(target, p_BS, ahead)
         if placement.width_m < gripper.max_grasp_m
-        for attitude, side in itertools.product(_attitudes(target, placement.width_m, gripper), (1.0, -1.0))
+        for attitude, side in itertools.product(_attitudes(target, placement, gripper), (1.0, -1.0))
     ]
     found = [candidate for candidate in tried if candidate is not None]
     if not target.upright:
@@ -138,7 +99,12 @@ def grasp_candidates(
 
 def _narrowest_m(target: Target, p_BS: FloatArray) -> float | None:
     """Least width (m) over which fingers could close on an object; None when its outline has no place for them."""
-    return min((placement.width_m for placement in _placements(target, p_BS)[1]), default=None)
+    return min((each.width_m for each in placements(target, p_BS, _ahead_rad(target, p_BS))), default=None)
+
+
+def _ahead_rad(target: Target, p_BS: FloatArray) -> float:
+    """Direction of an object from the shoulder."""
+    return float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
 
 
 def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabilities) -> float | None:
@@ -149,86 +115,24 @@ def _least_height_m(target: Target, p_BS: FloatArray, gripper: GripperCapabiliti
     return None
 
 
-def _placements(target: Target, p_BS: FloatArray) -> tuple[float, list[_Placement]]:
-    """Returns the direction from the shoulder (rad), and the positions of grasps along an object."""
-    ahead = float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
-    return ahead, _round_placements(target, ahead) if target.round else list(_long_placements(target, ahead))
-
-
-def _attitudes(target: Target, width_m: float, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
+def _attitudes(target: Target, placement: Placement, gripper: GripperCapabilities) -> Sequence[tuple[float, float]]:
     """Tilts of the fingers below level and, for grasps from above, leans about the object's long axis (rad).
 
     With the first lean, fingers of different length end level on both sides of an object of that width.
     """
     if target.upright:
-        return [(float(np.radians(tilt)), 0.0) for tilt in (0.0, 10.0, 20.0, 32.0, 45.0, 60.0, 75.0, 90.0)]
+        tilts = (60.0, 75.0, 90.0) if placement.below_top_m else (0.0, 10.0, 20.0, 32.0, 45.0)
+        return [(float(np.radians(tilt)), 0.0) for tilt in tilts]
     down = [(90.0, 0.0), (78.0, 0.0), (66.0, 0.0), (54.0, 0.0), (44.0, 0.0)]
-    ending_level = np.degrees(np.arctan2(_closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m + _ENDING_LEVEL_M))
+    uneven_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m
+    ending_level = np.degrees(np.arctan2(uneven_m, placement.width_m + _ENDING_LEVEL_M))
     leaning = [(90.0, lean) for lean in (ending_level, -ending_level, 22.0, -22.0, 32.0, -32.0, 44.0, -44.0)]
     return [(float(np.radians(tilt)), float(np.radians(lean))) for tilt, lean in (*down, *leaning)]
 
 
-def _round_placements(target: Target, ahead_rad: float) -> list[_Placement]:
-    """Approaches of a round object from several sides, the shoulder's side the cheapest."""
-    centre = np.array(target.centre_B)
-    return [
-        _Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, 0.5 * abs(turn))
-        for turn in (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
-    ]
-
-
-def _long_placements(target: Target, ahead_rad: float) -> Iterator[_Placement]:
-    """Yields positions along a box's axes with the local width there; both axes of a box that is nearly square."""
-    square = target.length_m < 1.4 * target.width_m
-    for turn in (0.0, 0.5 * np.pi) if square else (0.0,):
-        yaw = target.yaw_rad + turn
-        along, across = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
-        offsets = target.points_B[:, :2] - np.array(target.centre_B)
-        s, t = offsets @ along, offsets @ across
-        middle = _balance(s, t)
-        for shift in (0.0,) if square else (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09):
-            local = np.abs(s - middle - shift) < _BREADTH_M
-            if np.count_nonzero(local) < 8:
-                continue
-            low, high = np.percentile(t[local], [1, 99])
-            sides = ((-t[local], -low), (t[local], high))
-            touching = min(_touching(s[local], side, edge_m, float(np.ptp(s))) for side, edge_m in sides)
-            if touching < _LEAST_TOUCHING:
-                continue
-            xy = np.array(target.centre_B) + (0.0 if square else middle + shift) * along + 0.5 * (low + high) * across
-            half_depth = 0.5 * (target.length_m if turn == 0.0 else target.width_m) if target.upright else 0.02
-            for azimuth in (yaw, yaw + np.pi):
-                off = abs(wrap(azimuth - ahead_rad))
-                cost = 4.0 * abs(shift) + 2.0 * (high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
-                yield _Placement(xy, azimuth, float(high - low), half_depth, cost, abs(shift))
-
-
-def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> float:
-    """Part of a finger's breadth that touches an outline (s along, t across, m) when it closes at edge_m.
-
-    A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it; so
-    does a finger half beyond the end of a handle. For an object shorter (length_m) than the finger's breadth, the
-    object's length counts.
-    """
-    bins = np.round(s / _BIN_M).astype(int)
-    touched = [np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]
-    return float(sum(touched) / max(len(touched), min(2.0 * _BREADTH_M, length_m) // _BIN_M))
-
-
-def _balance(s: FloatArray, t: FloatArray) -> float:
-    """Position along a long object (s along, t across, m) of its centre of mass, taken as a solid of revolution.
-
-    A hammer is heavy at its head: held by the far end of its handle it would turn in the gripper.
-    """
-    bins = np.round(s / _BIN_M).astype(int)
-    found = [(k * _BIN_M, np.ptp(np.percentile(t[bins == k], [2, 98]))) for k in np.unique(bins)]
-    places, widths = np.array(found).T
-    return float(np.average(places, weights=np.maximum(widths, 1e-3) ** 2))
-
-
 def _candidate(
     target: Target,
-    placement: _Placement,
+    placement: Placement,
     attitude: tuple[float, float],
     side: float,
     gripper: GripperCapabilities,
@@ -238,12 +142,12 @@ def _candidate(
     cost = placement.cost + 0.4 * tilt
     ahead = np.array([np.cos(placement.azimuth_rad), np.sin(placement.azimuth_rad), 0.0])
     R_BH = RotationMatrix(AngleAxis(lean, ahead)) @ hand_rotation(tilt, placement.azimuth_rad, side)
-    if target.upright and tilt > _FROM_ABOVE_RAD:
-        below_top, depth = _top_grip(placement.half_depth_m, tilt, gripper)
+    if placement.below_top_m:
+        below_top, depth = _top_grip(placement, tilt, gripper)
         height = max(target.height_m - below_top, (gripper.tip_x_m - depth) * np.sin(tilt) + _TIPS_UP_M)
     elif target.upright:
-        height = max(float(np.clip(0.56 * target.height_m, 0.05, 0.095)), 0.45 * target.height_m)
-        depth = gripper.palm_x_m + placement.half_depth_m + 0.008
+        height = placement.height_m
+        depth = gripper.palm_x_m + placement.half_depth_m + _AHEAD_OF_PALM_M
     else:
         beside_m = min(beside_m, _BESIDE_THIN_M) if target.height_m < THIN_M else beside_m
         low = _low_grip(R_BH, target.height_m, placement.width_m, gripper, beside_m)
@@ -251,7 +155,8 @@ def _candidate(
             return None
         depth, beyond = low
         height = 0.5 * target.height_m
-        cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean) + 15.0 * max(0.0, 0.008 - beyond)
+        cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean)
+        cost += _PER_HIGH_M * max(0.0, _WELL_BEYOND_M - beyond)
     across_m = gripper.fixed_z_m + beside_m + 0.5 * placement.width_m if _hinged(gripper) else 0.0
     p_HT = np.array([depth, 0.0, across_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
@@ -259,10 +164,11 @@ def _candidate(
     return GraspCandidate(X_BH, placement.width_m, float(cost), tilt, placement.lever_m)
 
 
-def _top_grip(half_depth_m: float, tilt_rad: float, gripper: GripperCapabilities) -> tuple[float, float]:
+def _top_grip(placement: Placement, tilt_rad: float, gripper: GripperCapabilities) -> tuple[float, float]:
     """Depths of a grasp from above (m): of the grip below the top, and of the object's centre ahead of the hand."""
-    ahead_m = _BELOW_PALM_M + half_depth_m * np.cos(tilt_rad)
-    return ahead_m * float(np.sin(tilt_rad)) - _OVER_TOP_M, gripper.palm_x_m + ahead_m
+    ahead_m = _BELOW_PALM_M + placement.half_depth_m * np.cos(tilt_rad)
+    over_top_m = max(_OVER_TOP_M, gripper.tip_x_m - gripper.palm_x_m - placement.below_top_m)
+    return ahead_m * float(np.sin(tilt_rad)) - over_top_m, gripper.palm_x_m + ahead_m
 
 
 def _low_grip(

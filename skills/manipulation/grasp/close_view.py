@@ -12,7 +12,7 @@ from pydrake.math import RigidTransform
 from skills.api import LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.detect.viewpoints import cluster_box, cluster_boxes, surface_boxes
 from skills.manipulation.arm.collision import Box
-from skills.manipulation.grasp.candidates import Target
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import Obstacle
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D

@@ -12,7 +12,8 @@ from skills.manipulation.arm.collision import ArmScene, Box, gaps_m
 from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.arm.motion import ArmPlanner
 from skills.manipulation.arm.poses import towards_shoulder
-from skills.manipulation.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.manipulation.grasp.candidates import GraspCandidate, grasp_candidates
+from skills.manipulation.grasp.placements import Target
 from skills.quantities import Margin, TurnRate
 from skills.robot import ArmTrajectory, FloatArray, GripperCapabilities
 from skills.world_model import IN_THE_WAY, ObjectObservation, PlanningError

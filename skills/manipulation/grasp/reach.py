@@ -23,7 +23,8 @@ from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import ArmModel
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.solid_cells import boxes_around, never_seen
-from skills.manipulation.grasp.candidates import GraspCandidate, Target
+from skills.manipulation.grasp.candidates import GraspCandidate
+from skills.manipulation.grasp.placements import UPRIGHT_M, Target
 from skills.manipulation.grasp.planning import PREGRASPS_M, lifts, within_reach
 from skills.robot import Capabilities, FloatArray, GripperCapabilities, GripperKind
 from skills.routine import Routine, planning_failure
@@ -72,6 +73,8 @@ _GAP_BESIDE_M = 0.045
 """Space left beside an object by a gripper that opens only as far as needed."""
 _LESS_OPEN_RAD = 0.2
 """A narrower opening must differ at least by this from the wide one."""
+_GRASPABLE_M = 0.09
+"""Largest side of an upright object as seen from afar."""
 _UNSEEN_NEAR_M = 0.3
 """Distance from an object within which unseen space matters."""
 _UNSEEN_FURTHEST_M = 1.6
@@ -227,8 +230,13 @@ def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ..
 
 
 def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
-    """Returns an observation as a grasp target: its box filled with points."""
+    """Returns an observation as a grasp target: its box filled with points.
+
+    A wide upright object counts as graspable: a close view may show a neck or a handle.
+    """
     length, width, height = seen.size_m
+    if height > UPRIGHT_M:
+        length, width = min(length, _GRASPABLE_M), min(width, _GRASPABLE_M)
     X_BW = X_WB.inverse()
     base_m = float((X_BW @ np.array(seen.position_W))[2]) - 0.5 * height
     turn = RigidTransform(X_BW.rotation())
@@ -239,7 +247,7 @@ def observed_target(seen: ObjectObservation, X_WB: RigidTransform) -> Target:
     centre = (X_BW @ np.array(seen.position_W))[:2]
     xy = centre + (grid * [length, min(width, 0.06)]) @ along
     points = np.column_stack([xy, np.full(len(xy), base_m + height)])
-    is_round = height > 0.075 and length < 1.2 * width
+    is_round = height > UPRIGHT_M and length < 1.2 * width
     return Target(points, (float(centre[0]), float(centre[1])), yaw, length, width, height, base_m, is_round)
 
 

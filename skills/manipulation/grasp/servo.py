@@ -18,7 +18,7 @@ from pydrake.math import RigidTransform
 
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import ArmModel
-from skills.manipulation.grasp.candidates import Target
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import GraspPlan
 from skills.robot import ArmTrajectory, FloatArray, Image, Intrinsics
 

@@ -208,7 +208,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         message = f"reaching for the {name}"
         if not self.object_camera.on_hand:
             return view, plan
-        image = yield from self.picture(message, settle_s=0.0)
+        image = yield from self.picture(message, settle_s=0.0, near=True)
         X_BC = image.frames.pose("body").inverse() @ image.frames.pose(image.camera_frame)
         scene_now = self.scene_now([*view.boxes, *self.seen_boxes()])
 

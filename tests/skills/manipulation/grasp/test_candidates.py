@@ -6,7 +6,8 @@ import pytest
 from plant.robots.fetch.kind import fetch_capabilities
 from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.grasp.candidates import GraspCandidate, Target, grasp_candidates
+from skills.manipulation.grasp.candidates import GraspCandidate, grasp_candidates
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import within_reach
 
 MODEL, GRIPPER = arm_model(spot_capabilities()), spot_capabilities().gripper
@@ -105,6 +106,13 @@ def test_a_thin_object_is_held_by_fingers_that_end_level():
     assert found
     for candidate in found:
         assert max(_tips_m(candidate, _wrench(0.3).base_m, 0.012)) < 0.0096 - 0.003
+
+
+@pytest.mark.parametrize("height_m", [0.018, 0.024, 0.032])
+def test_both_fingers_end_well_below_the_middle_of_a_round_handle(height_m):
+    handle = _target(0.25, height_m, height_m, yaw=0.3)
+    beside_m = 0.012 if height_m < 0.02 else 0.017
+    assert max(_tips_m(_found(handle)[0], handle.base_m, beside_m)) < 0.5 * height_m - 0.0035
 
 
 def test_nobody_takes_a_sheet_of_paper():

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 
 from executive.testing.bench import SkillBench
@@ -16,6 +17,7 @@ from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
 
+NO_DEPTH = "no depth"
 HERE = Pose2D(0.45, 0.0, 0.0)
 AT = (0.5 * (TABLE_CAN.x0 + TABLE_CAN.x1), 0.5 * (TABLE_CAN.y0 + TABLE_CAN.y1), TABLE_CAN.z0)
 SEEN = Inputs(
@@ -34,12 +36,26 @@ class Disturbed(Grasp):
         return (yield from super()._aimed(view, plan, thing))
 
 
+def _without_depth(robot):
+    """The next picture has no depth, as that of a camera just above a table."""
+    image_of = robot.image
+
+    def image(source):
+        robot.image = image_of
+        seen = image_of(source)
+        return replace(seen, depth_m=np.zeros_like(seen.depth_m))
+
+    robot.image = image
+
+
 def ran(*moves):
     """The skill's run when the can is moved by (x, y) m at the first, second, ... pre-grasp; None takes it away."""
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=(*ROOM, TABLE_CAN), start=Start(HERE))
 
     def move(by):
+        if by == NO_DEPTH:
+            return _without_depth(robot)
         (can,) = (block for block in robot.blocks if block.loose)
         robot.blocks.remove(can)
         if by is not None:
@@ -80,3 +96,9 @@ def test_a_can_that_moves_at_every_attempt_is_a_failed_precondition():
     run, _ = ran((0.0, 0.1), (0.0, -0.1))
     assert (run.outcome, run.cause) == ("failure", Cause.PRECONDITION)
     assert "moves while the hand reaches for it" in run.message
+
+
+def test_the_hand_does_not_wait_for_depth_that_its_camera_is_too_near_to_see():
+    run, robot = ran(NO_DEPTH)
+    assert (run.outcome, robot.held is not None) == ("success", True)
+    assert not any("shows nothing" in message for _, message in run.messages)

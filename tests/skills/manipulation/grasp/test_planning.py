@@ -9,7 +9,7 @@ from skills.api import ObjectKind, ObjectObservation, PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.motion import RrtConnect
-from skills.manipulation.grasp.candidates import Target
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import GeometricGraspPlanner, Obstacle, Surroundings
 
 CAPABILITIES = spot_capabilities()

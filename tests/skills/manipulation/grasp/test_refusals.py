@@ -6,13 +6,8 @@ from scripted_robot import MODEL, ScriptedRobot, context_of, failed
 
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, ObjectKind, ObjectObservation
-from skills.manipulation.grasp.candidates import (
-    Target,
-    grasp_candidates,
-    least_mass_kg,
-    why_no_candidates,
-    why_too_heavy,
-)
+from skills.manipulation.grasp.candidates import grasp_candidates, least_mass_kg, why_no_candidates, why_too_heavy
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 
 SMALL, LARGE = (0.11, 0.11, 0.38), (0.18, 0.16, 0.52)

@@ -9,7 +9,7 @@ from scripted_robot import MODEL
 from table_scene import GREEN, TABLE, Can, scene
 
 from skills.manipulation.arm.poses import camera_pose
-from skills.manipulation.grasp.candidates import Target
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.servo import measure_shift, shift_trajectory
 from skills.robot import ArmTrajectory
 

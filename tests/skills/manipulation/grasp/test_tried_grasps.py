@@ -7,7 +7,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from scripted_robot import GRIPPER, MODEL, ScriptedRobot, context_of, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation
-from skills.manipulation.grasp.candidates import Target, grasp_candidates
+from skills.manipulation.grasp.candidates import grasp_candidates
+from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.manipulation.grasp.tried_grasps import others_first, same_grasp, tried_grasp
 from skills.routine import SkillFailure

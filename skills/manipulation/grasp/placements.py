@@ -1,0 +1,266 @@
+"""Placements of grasps on an object: points over its outline at which the fingers close, the local width, and a cost.
+
+Along a long object the local width counts, so that a hammer is taken by its handle, and over the height of an upright
+one, so that a bottle that is too wide for the gripper is taken by its neck.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from skills.geometry import wrap
+from skills.perception.fitting import fit_circle, fit_rectangle, without_strays
+from skills.robot import FloatArray
+
+UPRIGHT_M: Final = 0.075
+"""An object higher than this is grasped from the side."""
+_BIN_M = 0.01
+"""Length of the slices of an outline."""
+_BREADTH_M = 0.036
+"""Half the length of an outline within which its local width is measured."""
+_YIELD_M = 0.006
+"""Depth by which a finger yields to an outline that it touches."""
+_LEAST_TOUCHING = 0.55
+"""Least part of a finger's breadth that must touch the outline."""
+_LOOSE_COST = 1.5
+"""Cost of a finger that touches the outline nowhere."""
+_PER_LEVER_M = 4.0
+"""Cost of a level distance from the centre of mass, per metre."""
+_PER_WIDTH_M = 2.0
+"""Cost of the local width, per metre."""
+_WIDE_M = 0.095
+"""Local width from which on the fingers have little space on both sides."""
+_PER_WIDE_M = 20.0
+"""Additional cost of the local width beyond that."""
+_SLICE_M = 0.03
+"""Half the height of a slice of an upright object, and the distance between slices."""
+_FEWEST_POINTS = 25
+"""A slice with fewer points has no outline."""
+_MOST_POINTS = 4000
+"""Number of points that are enough to slice an upright object."""
+_NARROWER_M = 0.015
+"""Another slice than the usual one is considered when it is narrower by this."""
+_PER_OFF_USUAL_M = 3.0
+"""Cost of the distance of a grip from the usual height, per metre."""
+_FINGERS_M = 0.1
+"""Length of the fingers ahead of the palm."""
+_LEAST_REACH_M = 0.03
+"""Least length of the fingers on a slice whose wider neighbour stops the palm."""
+_HAND_HALF_M = 0.06
+"""Half the breadth of the hand, within which a wider part of an upright object stops the palm."""
+_MOST_ASIDE_RAD = 1.7
+"""Largest angle between the approach to a box's side and the direction from the shoulder."""
+_BESIDE_RAD = 1.0
+"""Angle from which on the far side of a box is hidden from the shoulder."""
+_TOP_DEPTHS_M = (0.098, 0.045)
+"""Depths below its top to which fingers reach that grasp an upright object from above."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Object to grasp, in the body frame: its points (N, 3), outline box, and the height of its surface (m)."""
+
+    points_B: FloatArray
+    centre_B: tuple[float, float]
+    yaw_rad: float
+    length_m: float
+    width_m: float
+    height_m: float
+    base_m: float
+    round: bool
+
+    @property
+    def upright(self) -> bool:
+        """Returns whether the object is high enough to be grasped from the side."""
+        return self.height_m > UPRIGHT_M
+
+    def slice(self, p_BS: FloatArray, low_m: float, high_m: float = np.inf) -> Target:
+        """Returns the part between two heights over the surface, as seen from p_BS; all of it where few points are."""
+        above = self.points_B[:, 2] - self.base_m
+        points_B = self.points_B[(above > low_m) & (above < high_m)]
+        if not _FEWEST_POINTS < len(points_B) < len(above):
+            return self
+        circle = fit_circle(points_B[:, :2], p_BS)
+        if circle is None:
+            (x, y), length, width, yaw = fit_rectangle(without_strays(points_B[:, :2]))
+        else:
+            (x, y), length, width, yaw = circle[:2], 2.0 * circle[2], 2.0 * circle[2], 0.0
+        centre_B, is_round = (float(x), float(y)), circle is not None
+        return Target(points_B, centre_B, yaw, length, width, self.height_m, self.base_m, is_round)
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Position of a grasp: point (x, y), azimuth of the approach, local width and depth (m), cost.
+
+    `lever_m` is the estimated level distance of the centre of mass. For an upright object, the point is `height_m` over
+    the surface, or the fingers reach `below_top_m` below its top from above.
+    """
+
+    xy: FloatArray
+    azimuth_rad: float
+    width_m: float
+    half_depth_m: float
+    cost: float
+    lever_m: float = 0.0
+    height_m: float = 0.0
+    below_top_m: float = 0.0
+
+
+def placements(target: Target, p_BS: FloatArray, ahead_rad: float) -> list[Placement]:
+    """Returns the positions of grasps on an object that lies at ahead_rad from the shoulder at p_BS."""
+    if not target.upright:
+        return _round(target, ahead_rad) if target.round else list(_along(target, ahead_rad))
+    target = replace(target, points_B=target.points_B[:: 1 + len(target.points_B) // _MOST_POINTS])
+    heights_m = np.arange(_SLICE_M, target.height_m - 0.5 * _SLICE_M, _SLICE_M)
+    slices = [(float(each), target.slice(p_BS, each - _SLICE_M, each + _SLICE_M)) for each in heights_m]
+    areas = [part.length_m * part.width_m + 1e-9 for _, part in slices]
+    middle = np.average([part.centre_B for _, part in slices], axis=0, weights=areas)
+    usual_m = max(float(np.clip(0.56 * target.height_m, 0.05, 0.095)), 0.45 * target.height_m)
+    usual = target.slice(p_BS, usual_m - _SLICE_M, usual_m + _SLICE_M)
+    better = [each for each in slices if _is_better(each[1], usual)]
+    aside = [_aside(target, part, each_m, ahead_rad) for each_m, part in [(usual_m, usual), *better]]
+    above = _above(target, p_BS, ahead_rad, middle)
+    return [_with_lever(each, middle, usual_m) for each in itertools.chain(*aside, above)]
+
+
+def _is_better(part: Target, usual: Target) -> bool:
+    """Returns whether a slice may be held better than the usual one: it is narrower, or nothing sticks out of it."""
+    return part.width_m < usual.width_m - _NARROWER_M or (part.round and not usual.round)
+
+
+def _with_lever(placement: Placement, middle: FloatArray, usual_m: float) -> Placement:
+    """Returns the placement with its lever, the cost of that, and the cost of an unusual height."""
+    lever_m = float(np.linalg.norm(placement.xy - middle))
+    off_m = 0.0 if placement.below_top_m else abs(placement.height_m - usual_m)
+    cost = placement.cost + _PER_LEVER_M * lever_m + _PER_OFF_USUAL_M * off_m
+    return replace(placement, lever_m=lever_m, cost=cost)
+
+
+def _aside(target: Target, part: Target, height_m: float, ahead_rad: float) -> Iterator[Placement]:
+    """Yields positions of grasps of a slice from the side. A wider part below or above it keeps the palm off."""
+    beside = target.points_B[np.abs(target.points_B[:, 2] - target.base_m - height_m) < _HAND_HALF_M, :2]
+    higher_B = target.points_B[target.points_B[:, 2] - target.base_m > height_m - _SLICE_M]
+    for each in _round(part, ahead_rad) if part.round else _from_sides(part, higher_B, ahead_rad):
+        s, t = _turned(each.azimuth_rad) @ (beside - each.xy).T
+        half_depth_m = max(each.half_depth_m, -float(np.min(s[np.abs(t) < _HAND_HALF_M], initial=0.0)))
+        reach_m = _FINGERS_M - half_depth_m + (0.0 if part.round else each.half_depth_m)
+        if reach_m > _LEAST_REACH_M:
+            yield replace(each, half_depth_m=half_depth_m, height_m=height_m)
+
+
+def _above(target: Target, p_BS: FloatArray, ahead_rad: float, middle: FloatArray) -> Iterator[Placement]:
+    """Yields positions of grasps of an upright object from above, about its top, such as a handle or a neck."""
+    widest_m = np.inf
+    for depth_m in _TOP_DEPTHS_M:
+        part = target.slice(p_BS, target.height_m - depth_m)
+        if part.width_m < widest_m - _NARROWER_M:
+            widest_m = part.width_m
+            for each in _round(part, ahead_rad) if part.round else _along(part, ahead_rad, middle):
+                yield replace(each, below_top_m=depth_m)
+
+
+def _round(target: Target, ahead_rad: float) -> list[Placement]:
+    """Approaches of a round object from several sides, the shoulder's side the cheapest."""
+    centre, z = np.array(target.centre_B), target.points_B[:, 2]
+    off = np.linalg.norm(target.points_B[:, :2] - centre, axis=1)
+    touching = _touching(z, off, 0.5 * target.width_m, float(np.ptp(z))) if target.upright else 1.0
+    cost = _width_cost(target.width_m) + _LOOSE_COST * (1.0 - touching)
+    return [
+        Placement(centre, ahead_rad + turn, target.width_m, 0.5 * target.width_m, cost + 0.5 * abs(turn))
+        for turn in (0.0, 0.3, -0.3, 0.6, -0.6, 0.9, -0.9)
+    ]
+
+
+def _from_sides(target: Target, higher_B: FloatArray, ahead_rad: float) -> Iterator[Placement]:
+    """Yields positions of grasps of an upright box from its sides, with its width as far as the fingers reach in.
+
+    Its back is hidden: how wide it is from beside is seen at its top, among the points `higher_B`.
+    """
+    centre = np.array(target.centre_B)
+    for azimuth in (wrap(target.yaw_rad + turn) for turn in (0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi)):
+        off = abs(wrap(azimuth - ahead_rad))
+        if off > _MOST_ASIDE_RAD:
+            continue
+        directions = _turned(azimuth)
+        points_B = target.points_B if off < _BESIDE_RAD else higher_B
+        s, t = directions @ (points_B[:, :2] - centre).T
+        near = float(np.percentile(s, 1))
+        reached = s < near + _FINGERS_M
+        s, t, z = s[reached], t[reached], points_B[reached, 2]
+        low, high = np.percentile(t, [1, 99])
+        touching = _touching_both(z, t, low, high)
+        if touching > _LEAST_TOUCHING:
+            half_depth = 0.5 * (float(s.max()) - near)
+            xy = centre + np.array([near + half_depth, 0.5 * (low + high)]) @ directions
+            cost = _width_cost(high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
+            yield Placement(xy, azimuth, float(high - low), half_depth, cost)
+
+
+def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None) -> Iterator[Placement]:
+    """Yields positions along a box's axes with the local width there; both axes of a box that is nearly square.
+
+    The best is at the centre of mass `middle_B` (x, y), or at the one that the outline suggests.
+    """
+    square, centre = target.length_m < 1.4 * target.width_m, np.array(target.centre_B)
+    for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if square else (target.yaw_rad,):
+        directions = _turned(yaw)
+        s, t = directions @ (target.points_B[:, :2] - centre).T
+        middle = _balance(s, t) if middle_B is None else float(directions[0] @ (middle_B - centre))
+        for shift in (0.0,) if square else (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09):
+            local = np.abs(s - middle - shift) < _BREADTH_M
+            if np.count_nonzero(local) < 8:
+                continue
+            low, high = np.percentile(t[local], [1, 99])
+            touching = _touching_both(s[local], t[local], low, high, float(np.ptp(s)))
+            if touching < _LEAST_TOUCHING:
+                continue
+            xy = centre + np.array([0.0 if square else middle + shift, 0.5 * (low + high)]) @ directions
+            for azimuth in (yaw, yaw + np.pi):
+                off = abs(wrap(azimuth - ahead_rad))
+                cost = 4.0 * abs(shift) + _width_cost(high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
+                yield Placement(xy, azimuth, float(high - low), 0.02, cost, abs(shift))
+
+
+def _turned(azimuth_rad: float) -> FloatArray:
+    """Level unit vectors along an azimuth and to the left of it, as rows (2, 2)."""
+    c, s = np.cos(azimuth_rad), np.sin(azimuth_rad)
+    return np.array([[c, s], [-s, c]])
+
+
+def _width_cost(width_m: float) -> float:
+    return _PER_WIDTH_M * width_m + _PER_WIDE_M * max(0.0, width_m - _WIDE_M)
+
+
+def _touching_both(s: FloatArray, t: FloatArray, low_m: float, high_m: float, length_m: float | None = None) -> float:
+    """The lesser part of their breadth by which two fingers touch that close at low_m and high_m (see `_touching`)."""
+    length_m = float(np.ptp(s)) if length_m is None else length_m
+    return min(_touching(s, -t, -low_m, length_m), _touching(s, t, high_m, length_m))
+
+
+def _touching(s: FloatArray, t: FloatArray, edge_m: float, length_m: float) -> float:
+    """Part of a finger's breadth that touches an outline (s along, t across, m) when it closes at edge_m.
+
+    A finger at the cheek of a hammer's head touches at one end of its breadth only, and the hammer turns out of it; so
+    does a finger half beyond the end of a handle. For an object shorter (length_m) than the finger's breadth, the
+    object's length counts.
+    """
+    bins = np.round(s / _BIN_M).astype(int)
+    touched = [np.percentile(t[bins == k], 98) > edge_m - _YIELD_M for k in np.unique(bins)]
+    return float(sum(touched) / max(len(touched), min(2.0 * _BREADTH_M, length_m) // _BIN_M))
+
+
+def _balance(s: FloatArray, t: FloatArray) -> float:
+    """Position along a long object (s along, t across, m) of its centre of mass, taken as a solid of revolution.
+
+    A hammer is heavy at its head: held by the far end of its handle it would turn in the gripper.
+    """
+    bins = np.round(s / _BIN_M).astype(int)
+    found = [(k * _BIN_M, np.ptp(np.percentile(t[bins == k], [2, 98]))) for k in np.unique(bins)]
+    places, widths = np.array(found).T
+    return float(np.average(places, weights=np.maximum(widths, 1e-3) ** 2))

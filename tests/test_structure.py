@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7419,
     "executive/cli": 3815,
-    "skills": 25362,
+    "skills": 25441,
     "plant": 11609,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 447, 70, 7

@@ -1,9 +1,10 @@
 """Segmentation of a surface in a depth image: its plane, and the clusters of points of the objects on it.
 
 Objects that touch are split by their outline from above, at a narrow neck between two parts that bulge: the outline is
-eroded until it falls into cores, and each cell goes to its nearest core. The parts count as objects only when each is
-nearly convex and the whole is not: a wrench has a neck, too, but its halves are not convex. Boxes flush side by side
-have no neck and stay one.
+eroded until it falls into cores, and each cell goes to its nearest core. The parts count as objects when each is nearly
+convex and the whole is not, or when the neck is short and their heights or colours differ beside it: a wrench has a
+neck, too, but a long one, and a hammer's peen has the height and colour of its head. Boxes flush side by side have no
+neck and stay one.
 """
 
 from __future__ import annotations
@@ -34,7 +35,11 @@ from skills.perception.point_cloud import (
 )
 from skills.robot import FloatArray, Image
 
-_CELL_M = 0.008
+_CELL_M = 0.005
+_CELL_PX = 4.0
+"""Least side of a cell of the grid, in pixels of the depth picture."""
+_LOW_M = 0.025
+"""Height up to which an object counts as low."""
 _LOWEST_M = 0.008
 _HIGHEST_M = 0.4
 _FEWEST_POINTS = 40
@@ -50,13 +55,24 @@ _UNDER_HANGING_M = 0.12
 _LOWEST_HIDDEN_M = 0.28
 _COLUMN_STRIDES = np.array([1 << 20, 1])
 
-_OUTLINE_CELL_M: Final = 0.004
+_OUTLINE_CELL_M: Final = 0.003
 _BORDER_CELLS: Final = 4
 _MOST_ERODED_M: Final = 0.03
-_LEAST_CORE_M2: Final = 0.00008
+_LEAST_CORE_M2: Final = 0.00005
 _LEAST_PART_M2: Final = 0.0003
 _CONVEX: Final = 0.87
 _MORE_CONVEX: Final = 0.03
+_NECK_SHARE: Final = 0.6
+"""Largest half width of a neck, as a part of the narrower object's."""
+_LEAST_NECK_M2: Final = 0.0001
+"""Area that a short neck may always have."""
+_BESIDE_NECK_M: Final = 0.015
+"""Distance from the other part within which heights and colours are compared."""
+_FEWEST_BESIDE: Final = 4
+"""Number of cells from which on they are compared."""
+_OTHER_HEIGHT_M: Final = 0.012
+_OTHER_COLOUR: Final = 25.0
+"""Difference of colours in CIELAB from which on they are different."""
 
 _SEGMENT_SCORE = 0.7
 """Probability that a segment is an object: one picture may show noise, or a part of one."""
@@ -103,10 +119,13 @@ def segment_surfaces(
     levels_m = [surface.height_m for surface in surfaces]
     band_m = (min(levels_m, default=0.0) - _PLANE_BAND_M, max(levels_m, default=0.0) + _HIGHEST_M)
     cloud, p_WC = cloud_from_image(image, X_WO, heights_m=band_m), camera_pose_W(image, X_WO).translation()
-    return (_segment(cloud, p_WC, surface, margin_m) for surface in surfaces)
+    pixel_rad = 1.0 / image.depth_intrinsics.fx
+    return (_segment(cloud, p_WC, surface, margin_m, pixel_rad) for surface in surfaces)
 
 
-def _segment(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float) -> SurfaceView | None:
+def _segment(
+    cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float, pixel_rad: float
+) -> SurfaceView | None:
     above = cloud.p_W[:, 2] - surface.height_m
     over = (above > -_PLANE_BAND_M) & (above < _HIGHEST_M)
     over[over] = inside_polygon(cloud.p_W[over, :2], surface.polygon_W, margin_m)
@@ -117,7 +136,7 @@ def _segment(cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: fl
     height = cloud.p_W[:, 2] - plane.z(cloud.p_W[:, :2])
     standing = height > max(_LOWEST_M, 3.0 * plane.noise_m)
     standing[standing] = may_rest(cloud.p_W[standing, :2], height[standing])
-    groups = _split_on_grid(cloud.where(standing))
+    groups = _split_on_grid(cloud.where(standing), height[standing], p_WC, pixel_rad)
     clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in groups)
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
 
@@ -152,12 +171,23 @@ def _fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:
     return LevelPlane.fit(near, level, noise_m=0.004, band_m=0.006, sigmas=2.5, steps=4)
 
 
-def _split_on_grid(points: PointCloud) -> list[PointCloud]:
-    """Clusters points by neighbourhood on a grid seen from above."""
+def _split_on_grid(points: PointCloud, height_m: FloatArray, p_WC: FloatArray, pixel_rad: float) -> list[PointCloud]:
+    """Clusters points by neighbourhood on a grid seen from above.
+
+    Gaps of a cell or two do not divide low objects, since the noise of the surface hides parts of them.
+    """
     if len(points) < _FEWEST_POINTS:
         return []
-    labels, count = grid_labels(points.p_W[:, :2], _CELL_M, fewest=2, dilated=True)
-    groups = [points.where(labels == k) for k in range(1, count)]
+    cell_m = max(_CELL_M, _CELL_PX * pixel_rad * float(np.median(np.linalg.norm(points.p_W - p_WC, axis=1))))
+    labels, count = grid_labels(points.p_W[:, :2], cell_m, fewest=2)
+    highest_m = np.zeros(count)
+    np.maximum.at(highest_m, labels, height_m)
+    low = highest_m[labels] < _LOW_M
+    labels[low] = 0
+    if np.any(low):
+        found, _ = grid_labels(points.p_W[low, :2], cell_m, fewest=2, dilated=True)
+        labels[low] = np.where(found > 0, found + count, 0)
+    groups = [points.where(labels == k) for k in np.unique(labels[labels > 0])]
     return [group for group in groups if len(group) >= _FEWEST_POINTS]
 
 
@@ -209,37 +239,73 @@ def split_touching(view: SurfaceView, p_WC: FloatArray) -> SurfaceView:
     """Splits the clusters of a view from p_WC into the objects that touch, of any class."""
     clusters: list[Cluster] = []
     for each in view.clusters:
-        labels, count = touching_parts(each.points.p_W[:, :2])
+        labels, count = touching_parts(each.points.p_W, each.points.colours)
         parts = [each.points.where(labels == k) for k in range(count)]
         clusters += [each] if count == 1 else [_cluster(one, each.surface, each.plane, p_WC) for one in parts]
     return SurfaceView(view.plane, view.plane_points, tuple(clusters))
 
 
-def touching_parts(xy: FloatArray) -> tuple[NDArray[np.int64], int]:
-    """Labels the objects among connected points (N, 2) seen from above: the label of each, and their number."""
-    cells = np.floor((xy - xy.min(axis=0)) / _OUTLINE_CELL_M).astype(np.int64) + _BORDER_CELLS
-    outline = np.zeros(cells.max(axis=0) + _BORDER_CELLS + 1, dtype=np.uint8)
-    outline[cells[:, 0], cells[:, 1]] = 1
-    parts, count = _parts(_filled(outline))
+def touching_parts(p_W: FloatArray, colours: NDArray[np.uint8]) -> tuple[NDArray[np.int64], int]:
+    """Labels the objects among connected points (N, 3) of some colours (N, 3): the label of each, and their number."""
+    cells = np.floor((p_W[:, :2] - p_W[:, :2].min(axis=0)) / _OUTLINE_CELL_M).astype(np.int64) + _BORDER_CELLS
+    seen = _SeenCells.of(cells, p_W[:, 2], colours)
+    parts, count = _parts(_filled((seen.points > 0).astype(np.uint8)), seen)
     labels = parts[cells[:, 0], cells[:, 1]].astype(np.int64) - 1
     few = count > 1 and int(np.bincount(labels, minlength=count).min()) < _FEWEST_POINTS
-    return (np.zeros(len(xy), dtype=np.int64), 1) if few else (labels, count)
+    return (np.zeros(len(p_W), dtype=np.int64), 1) if few else (labels, count)
 
 
-def _parts(outline: NDArray[np.uint8]) -> tuple[NDArray[np.int32], int]:
+@dataclass(frozen=True)
+class _SeenCells:
+    """Cells (X, Y) seen from above: number of points, height of the highest (m), mean colour (X, Y, 3) in CIELAB."""
+
+    points: FloatArray
+    top_m: FloatArray
+    colour: FloatArray
+
+    @classmethod
+    def of(cls, cells: NDArray[np.int64], z_m: FloatArray, colours: NDArray[np.uint8]) -> _SeenCells:
+        """The cells (N, 2) of points at heights (N,), of colours (N, 3)."""
+        shape, at = tuple(cells.max(axis=0) + _BORDER_CELLS + 1), (cells[:, 0], cells[:, 1])
+        points, top_m, colour = np.zeros(shape), np.full(shape, -np.inf), np.zeros((*shape, 3))
+        np.add.at(points, at, 1.0)
+        np.maximum.at(top_m, at, z_m)
+        np.add.at(colour, at, cv2.cvtColor(colours[None], cv2.COLOR_RGB2LAB)[0].astype(np.float64))
+        return cls(points, top_m, colour / np.maximum(points, 1.0)[..., None])
+
+    def differ(self, part: Mask, rest: Mask) -> bool:
+        """Returns whether two parts of an outline have other heights, or other colours, where they are near."""
+        sides = [
+            one & (_distance_m(other) < _BESIDE_NECK_M) & (self.points > 0)
+            for one, other in ((part, rest), (rest, part))
+        ]
+        if min(map(np.count_nonzero, sides)) < _FEWEST_BESIDE:
+            return False
+        (top, colour), (other_top, other_colour) = (
+            (np.percentile(self.top_m[side], 80), np.median(self.colour[side], axis=0)) for side in sides
+        )
+        return bool(abs(top - other_top) > _OTHER_HEIGHT_M or np.linalg.norm(colour - other_colour) > _OTHER_COLOUR)
+
+
+def _distance_m(mask: Mask) -> FloatArray:
+    """Distance of each cell from a mask of cells (m)."""
+    return np.asarray(cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 5) * _OUTLINE_CELL_M)
+
+
+def _parts(outline: NDArray[np.uint8], seen: _SeenCells) -> tuple[NDArray[np.int32], int]:
     """Labels the parts of an outline from 1 on, 0 outside, and counts them; splits parts further."""
-    halves = _halves(outline)
+    halves = _halves(outline, seen)
     if not halves:
         return outline.astype(np.int32), 1
     labels, count = np.zeros(outline.shape, dtype=np.int32), 0
     for half in halves:
-        own, number = _parts(half)
+        own, number = _parts(half, seen)
         labels[own > 0] = own[own > 0] + count
         count += number
     return labels, count
 
 
-def _halves(outline: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
+def _halves(outline: NDArray[np.uint8], seen: _SeenCells) -> list[NDArray[np.uint8]]:
     """Parts into which the least erosion splits an outline; empty when it is one object."""
     whole = _convexity(outline)
     inside_m = cv2.distanceTransform(outline, cv2.DIST_L2, 5) * _OUTLINE_CELL_M
@@ -249,16 +315,21 @@ def _halves(outline: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
         cores = [k for k in range(1, count) if areas_m2[k] >= _LEAST_CORE_M2]
         if len(cores) < 2:
             continue
-        off = np.stack([cv2.distanceTransform((labels != k).astype(np.uint8), cv2.DIST_L2, 5) for k in cores])
-        nearest = np.argmin(off, axis=0)
-        parts = [((nearest == n) & (outline > 0)).astype(np.uint8) for n in range(len(cores))]
-        if all(_is_object(part, max(_CONVEX, whole + _MORE_CONVEX)) for part in parts):
-            return parts
+        off_m = np.stack([_distance_m(labels == k) for k in cores])
+        nearest = np.argmin(off_m, axis=0)
+        parts = [(nearest == n) & (outline > 0) for n in range(len(cores))]
+        if min(map(np.count_nonzero, parts)) * _OUTLINE_CELL_M**2 < _LEAST_PART_M2:
+            continue
+        eroded_m2 = (
+            np.count_nonzero((outline > 0) & (off_m.min(axis=0) > eroded_m + 1.5 * _OUTLINE_CELL_M))
+            * _OUTLINE_CELL_M**2
+        )
+        short = eroded_m2 < max(_LEAST_NECK_M2, 8.0 * eroded_m**2)
+        narrow = eroded_m < _NECK_SHARE * min(float(inside_m[part].max()) for part in parts)
+        convex = all(_convexity(part) > max(_CONVEX, whole + _MORE_CONVEX) for part in parts)
+        if convex or (short and narrow and all(seen.differ(part, (outline > 0) & ~part) for part in parts)):
+            return [part.astype(np.uint8) for part in parts]
     return []
-
-
-def _is_object(part: NDArray[np.uint8], convex: float) -> bool:
-    return int(part.sum()) * _OUTLINE_CELL_M**2 >= _LEAST_PART_M2 and _convexity(part) > convex
 
 
 def _filled(seen: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -268,7 +339,7 @@ def _filled(seen: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.asarray(cv2.drawContours(np.zeros_like(closed), borders, -1, 1, thickness=cv2.FILLED))
 
 
-def _convexity(part: NDArray[np.uint8]) -> float:
+def _convexity(part: NDArray[np.uint8] | Mask) -> float:
     """Share of its convex hull that an outline fills."""
     hull = cv2.convexHull(np.argwhere(part).astype(np.float32))
     # the hull passes through the middles of the cells: half a cell is missing all around

@@ -179,3 +179,9 @@ def test_many_results_are_reported():
 def test_a_table_of_sentences_is_scored(measure):
     score = measure.measured(measure.TABLES[-1])
     assert (score.right > 0.9 * score.sentences, score.wrongly_accepted) == (True, ()), str(score)
+
+
+@pytest.mark.nightly
+def test_objects_close_together_are_told_apart():
+    result = result_of("touching", "--scenes", 2, "--seed", 4800)
+    assert result["all"]["objects"] > 4 and result["all"]["found"] > 0.5, result

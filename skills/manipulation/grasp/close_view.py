@@ -77,8 +77,8 @@ def examine(
         return None
     own = [each for each in found if seen.kind.name in (ANY_OBJECT, each.detection.class_name)]
     view = reduce(split_detected, own, view)
-    if seen.kind.name == ANY_OBJECT:
-        view, own = split_touching(view, camera_pose_W(image, place.X_WO).translation()), []
+    own = [] if seen.kind.name == ANY_OBJECT else own
+    view = _split_others(view, own, camera_pose_W(image, place.X_WO).translation())
     cluster = _same_object(view, seen, own, within_m)
     if cluster is None:
         return None
@@ -91,6 +91,14 @@ def examine(
     surfaces = surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB)
     boxes = (*surfaces, *(box for other in others for box in other.boxes))
     return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, others)
+
+
+def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArray) -> SurfaceView:
+    """Splits the clusters of objects that touch, except those of the object's own detections, which are split."""
+    kept = [each for one in own if (each := matching_cluster(view.clusters, one)) is not None]
+    rest = tuple(each for each in view.clusters if not any(each is one for one in kept))
+    split = split_touching(replace(view, clusters=rest), p_WC)
+    return replace(view, clusters=(*{id(each): each for each in kept}.values(), *split.clusters))
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from table_scene import BLUE, CAMERA, COKE, RED, TABLE, Can, scene, seen_as
+from table_scene import BLUE, CAMERA, COKE, GREEN, GREY, RED, TABLE, Can, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.perception.detection_3d import detections_3d
@@ -147,15 +147,25 @@ def test_neighbouring_columns_are_judged_alone():
 RNG_SEED = 4
 
 
-def box(x, y, length, width):
+def box(x, y, length, width, height=0.03):
     points = np.random.default_rng(RNG_SEED).uniform(-0.5, 0.5, (6000, 2))
-    return points * [length, width] + [x, y]
+    return np.column_stack([points * [length, width] + [x, y], np.full(len(points), height)])
 
 
-def disc(x, y, radius):
+def disc(x, y, radius, height=0.03):
     rng = np.random.default_rng(RNG_SEED)
     turn, off = rng.uniform(0.0, 2.0 * np.pi, 6000), radius * np.sqrt(rng.uniform(0.0, 1.0, 6000))
-    return np.column_stack([x + off * np.cos(turn), y + off * np.sin(turn)])
+    return np.column_stack([x + off * np.cos(turn), y + off * np.sin(turn), np.full(6000, height)])
+
+
+HAMMER = (box(0.0, 0.0, 0.26, 0.026), box(0.13, 0.0, 0.03, 0.12))
+
+
+def parts_of(objects, colours=None):
+    """Labels and number of the objects that touch; each is grey unless its colour is given."""
+    colours = colours or [GREY] * len(objects)
+    painted = [np.tile(np.uint8(colour), (len(points), 1)) for points, colour in zip(objects, colours, strict=True)]
+    return touching_parts(np.concatenate(objects), np.concatenate(painted))
 
 
 @pytest.mark.parametrize(
@@ -165,28 +175,46 @@ def disc(x, y, radius):
         ((disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033)), 2),
         ((disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033), disc(0.132, 0.0, 0.033)), 3),
         ((box(0.0, 0.0, 0.05, 0.05), box(0.03, 0.05, 0.05, 0.05)), 2),
+        ((*HAMMER, disc(0.17, 0.095, 0.04, height=0.12)), 2),
     ],
 )
 def test_objects_that_touch_are_counted(objects, count):
-    labels, found = touching_parts(np.concatenate(objects))
+    labels, found = parts_of(objects)
     assert found == count
     assert sorted(np.unique(labels)) == list(range(count))
 
 
+def test_another_colour_divides_a_hammer_from_a_low_object_that_it_touches():
+    objects = (*HAMMER, disc(0.17, 0.095, 0.04))
+    assert parts_of(objects)[1] == 1
+    assert parts_of(objects, [GREY, GREY, RED])[1] == 2
+
+
 def test_each_point_gets_the_label_of_its_object():
-    labels, _ = touching_parts(np.concatenate([disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033)]))
+    labels, _ = parts_of([disc(0.0, 0.0, 0.033), disc(0.066, 0.0, 0.033)])
     halves = labels.reshape(2, -1)
     assert all(np.mean(half == np.bincount(half).argmax()) > 0.95 for half in halves)
 
 
 @pytest.mark.parametrize(
-    "parts",
+    ("parts", "colours"),
     [
-        (box(0.0, 0.0, 0.26, 0.026), box(0.13, 0.0, 0.03, 0.12)),  # a hammer
-        (box(0.0, 0.0, 0.2, 0.02), box(0.1, 0.0, 0.05, 0.05), box(-0.1, 0.0, 0.05, 0.05)),  # a wrench
-        (box(0.0, 0.0, 0.1, 0.036), box(0.1, 0.0, 0.12, 0.007)),  # a screwdriver
-        (box(0.0, 0.0, 0.05, 0.05), box(0.05, 0.0, 0.05, 0.05)),  # flush boxes, as was said
+        (HAMMER, (RED, GREY)),
+        ((box(0.0, 0.0, 0.2, 0.02), box(0.1, 0.0, 0.05, 0.05), box(-0.1, 0.0, 0.05, 0.05)), None),  # a wrench
+        ((box(0.0, 0.0, 0.1, 0.036), box(0.1, 0.0, 0.12, 0.007)), (RED, GREY)),  # a screwdriver
+        ((box(0.0, 0.0, 0.05, 0.05), box(0.05, 0.0, 0.05, 0.05)), (RED, BLUE)),  # flush boxes, as was said
     ],
 )
-def test_one_object_of_several_parts_stays_one(parts):
-    assert touching_parts(np.concatenate(parts))[1] == 1
+def test_one_object_of_several_parts_stays_one(parts, colours):
+    assert parts_of(parts, colours)[1] == 1
+
+
+# the cans are seen from 0.8 m with half of the hand camera's pixels
+def test_a_gap_of_two_centimetres_divides_two_cans():
+    beside = Can(COKE.x, COKE.y + 0.086, 0.033, 0.115, BLUE)
+    assert len(viewed(scene([COKE, beside])).clusters) == 2
+
+
+def test_a_low_bar_stays_whole_where_the_noise_of_the_surface_hides_a_part_of_it():
+    halves = [Can(1.0, y, 0.012, 0.014, GREEN) for y in np.arange(-0.1, 0.1, 0.012) if abs(y) > 0.01]
+    assert len(viewed(scene(halves)).clusters) == 1

@@ -31,10 +31,11 @@ def spot_facts() -> Mapping[str, Any]:
     return facts
 
 
-def spot_urdf(*, visuals: bool = False) -> str:
+def spot_urdf(*, visuals: bool = False, pads: bool = True) -> str:
     """URDF text of Spot with arm and LiDAR; root link `body`, free.
 
-    With `visuals` its appearance is meshes under `package://spot_visuals/`, else the collision shapes.
+    With `visuals` its appearance is meshes under `package://spot_visuals/`, else the collision shapes. Motions are
+    planned without the rubber `pads`, which stand a few millimetres proud of the jaws.
     """
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="spot")
@@ -44,7 +45,8 @@ def spot_urdf(*, visuals: bool = False) -> str:
         _add_leg(robot, leg, facts["legs"], visuals=visuals)
     parent = "body"
     for part in facts["arm"]:
-        _add_link(robot, part["link"], part, visuals=visuals)
+        bare = {key: value for key, value in part.items() if pads or key != "pads"}
+        _add_link(robot, part["link"], bare, visuals=visuals)
         urdf.add_joint(robot, part["link"], parent, part["link"], part)
         parent = part["link"]
     _add_lidar(robot, facts["lidar"])

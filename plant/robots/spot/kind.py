@@ -54,7 +54,7 @@ def spot_capabilities() -> Capabilities:
             CameraCapabilities(name, spec.X_link_camera(), Mount.BODY if spec.link == "body" else Mount.HAND)
             for name, spec in load_cameras(CAMERAS).items()
         ),
-        description=spot_urdf(),
+        description=spot_urdf(pads=False),
         lidar_height_m=body["standing_height"] + facts["lidar"]["xyz"][2],
     )
 

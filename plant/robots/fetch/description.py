@@ -57,10 +57,10 @@ def head_camera() -> CameraSpec:
     )
 
 
-def fetch_urdf(*, root: str = BASE_LINK) -> str:
+def fetch_urdf(*, root: str = BASE_LINK, pads: bool = True) -> str:
     """URDF text of Fetch with the free root link `base_link`, or `body`, below which the base then hangs.
 
-    The lift's joint reads the same either way: 0 with the torso down.
+    The lift's joint reads the same either way: 0 with the torso down. Motions are planned without the rubber `pads`.
     """
     facts = fetch_facts()
     robot = ElementTree.Element("robot", name="fetch")
@@ -79,7 +79,7 @@ def fetch_urdf(*, root: str = BASE_LINK) -> str:
             urdf.add_joint(robot, part["link"], parent, part["link"], part, kind)
             parent = part["link"]
     for name, side in zip(FINGERS, (1, -1), strict=True):
-        _add_finger(robot, name, side, facts["finger"])
+        _add_finger(robot, name, side, facts["finger"], pads=pads)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 
@@ -157,15 +157,15 @@ def _add_lift(robot: ElementTree.Element, lift: Mapping[str, Any], root: str) ->
     urdf.add_joint(robot, lift["joint"], parent, child, part, "prismatic")
 
 
-def _add_finger(robot: ElementTree.Element, name: str, side: int, finger: Mapping[str, Any]) -> None:
+def _add_finger(robot: ElementTree.Element, name: str, side: int, finger: Mapping[str, Any], *, pads: bool) -> None:
     """Adds a finger; the finger of side -1 is mirrored along z, the direction of closing."""
-    pads = finger["pads"]
+    rubber = finger["pads"]
     part = {
-        **finger,
+        **{key: value for key, value in finger.items() if key != "pads"},
         "com": _mirrored(finger["com"], side),
         "shapes": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["shapes"]],
         "visuals": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["visuals"]],
-        "pads": {**pads, "xz": [[x, side * z] for x, z in pads["xz"]]},
+        **({"pads": {**rubber, "xz": [[x, side * z] for x, z in rubber["xz"]]}} if pads else {}),
         "axis": (0, 0, side),
         "range": (0.0, finger["travel"]),
     }

@@ -69,7 +69,7 @@ def fetch_capabilities() -> Capabilities:
         ),
         gripper=_gripper(),
         cameras=(CameraCapabilities(HEAD_CAMERA, head_camera().X_link_camera(), Mount.HEAD),),
-        description=fetch_urdf(root="body"),
+        description=fetch_urdf(root="body", pads=False),
         base_kind=BaseKind.DIFFERENTIAL,
         lift_joint=LIFT_JOINT,
         lidar_height_m=facts["lidar"]["xyz"][2],

@@ -44,6 +44,7 @@ from skills.world_model import PlanningError as PlanningError
 from skills.world_model import ReturnsView as ReturnsView
 from skills.world_model import SearchingLocaliser as SearchingLocaliser
 from skills.world_model import Surface as Surface
+from skills.world_model import Tag as Tag
 from skills.world_model import WorkCounter as WorkCounter
 
 if TYPE_CHECKING:
@@ -233,7 +234,7 @@ class _LastPose:
 class SkillContext:
     """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
-    `doors` are those on the robot's map.
+    `doors` are those on the robot's map, `tags` the AprilTags that it knows.
     """
 
     robot: Robot
@@ -252,6 +253,7 @@ class SkillContext:
     solid: SeenSolid = field(default_factory=SeenSolid)
     traffic: Traffic = NO_TRAFFIC
     doors: tuple[Doorway, ...] = ()
+    tags: tuple[Tag, ...] = ()
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
 
     def X_WB(self) -> RigidTransform:

@@ -5,6 +5,7 @@ Skills of others import these names from `skills.api`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share
+from skills.quantities import Angle, Coordinate, Delay, Height, Length, Margin, Share
 from skills.robot import Robot, Scan
 
 if TYPE_CHECKING:
@@ -45,6 +46,29 @@ class Surface:
     name: str
     polygon_W: tuple[tuple[Coordinate, Coordinate], ...]
     height_m: Height
+
+
+@dataclass(frozen=True)
+class Tag:
+    """AprilTag that the robot knows: its number, the side of its black square, and what carries it.
+
+    An object's tag is `on` its class. Any other one stands upright with its middle at `p_W`, and its face looks in the
+    direction `yaw_rad`: at a dock (`on` it), or on a wall.
+    """
+
+    id: int
+    size_m: Length
+    on: str | None = None
+    p_W: tuple[Coordinate, Coordinate, Height] | None = None
+    yaw_rad: Angle = 0.0
+
+    def X_WT(self) -> RigidTransform:
+        """Pose of a tag with a place: x to the right and y up on its face, z out of it."""
+        from pydrake.math import RigidTransform, RotationMatrix
+
+        assert self.p_W is not None
+        c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
+        return RigidTransform(RotationMatrix(np.array([[-s, 0.0, c], [c, 0.0, s], [0.0, 1.0, 0.0]])), self.p_W)
 
 
 FLOOR: Final = "floor"

@@ -77,6 +77,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     """
     world, robot = prepared.world, prepared.robot
     abilities = abilities_in(world, robot.kind)
+    tagged = frozenset(tag.on for tag in prepared.tree.tags if tag.on is not None)
     stack = None if robot.stack_file is None else robot_stack(robot)
     if stack is not None and stack.detector != default_component("detector"):
         seen = abilities.classes & frozenset(shared_detector(stack).class_names)
@@ -85,7 +86,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
         prepared.tree,
         knowledge=prepared.knowledge,
         start=world.start,
-        abilities=abilities,
+        abilities=replace(abilities, classes=abilities.classes | tagged),
         planner=planner or route_planner_of(world, robot),
         estimates=load_estimates(),
     )

@@ -19,7 +19,7 @@ from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from skills.api import ObjectKind, Publish
 from skills.estimate.grid_map import GridMap
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import class_form
 from skills.robot import Clock
 
 PACKAGES: Final = ("spot-errand", "drake", "py-trees", "numpy")
@@ -64,9 +64,7 @@ def _task_message(command: Command, knowledge: Knowledge) -> Mapping[str, Any]:
         """Returns the numbers of an object's classes."""
         if item is None:
             return (_NOTHING_ID,)
-        return tuple(
-            class_forms()[name].id for name in knowledge.classes(knowledge.object_name(item.name) or item.name)
-        )
+        return tuple(class_form(name).id for name in knowledge.classes(knowledge.object_name(item.name) or item.name))
 
     items, objects = ids(command.item), ids(command.object)
     goal_x, goal_y = goal_position(knowledge, command)

@@ -22,6 +22,7 @@ from executive.tree.board import Board
 from executive.tree.context import RunContext
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from executive.words.slug import slug
+from skills.detection import Detector
 from skills.navigate.footprint import Footprint
 from skills.robot import (
     Battery,
@@ -153,6 +154,15 @@ class GuardedRobot:
         return call() if verb == "image" else call_aside(call, verb, limit_s)
 
 
+def _with_tags(entry: RunEntry) -> Detector:
+    """Returns the detector of a robot, which recognises objects by their tags, too, where there are any."""
+    if not entry.tree.tags:
+        return entry.detector
+    from skills.perception.tagged_objects import with_tags
+
+    return with_tags(entry.detector, entry.tree.tags)
+
+
 class RunRobot:
     """Robot of a run, with or without a mission.
 
@@ -188,10 +198,11 @@ class RunRobot:
             stop_pressed=lambda: control.stop_pressed(name),
             presses=lambda: control.presses,
             day_began_s=shared.day_began_s,
-            detector=CountedDetector(entry.detector, shared.work),
+            detector=CountedDetector(_with_tags(entry), shared.work),
             work=shared.work,
             stack=entry.stack,
             doors=entry.tree.doors,
+            tags=entry.tree.tags,
             traffic=shared.traffic.view_of(name),
         )
 

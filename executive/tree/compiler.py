@@ -30,6 +30,7 @@ from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
+from skills.api import Tag
 from skills.files.errors import InputError, suggestion
 from skills.perception.doorway import Doorway
 
@@ -40,8 +41,9 @@ __all__ = ["CompiledTree", "StepPart", "compile_mission"]
 class CompiledTree:
     """Tree of a mission for one robot, as data.
 
-    `parts` are its parts with goal conditions in order, `steps` the compiled steps, and `doors` the doors of the
-    knowledge file. Its root has monitors and interrupts above the mission: see `executive.tree.nodes.interrupts`.
+    `parts` are its parts with goal conditions in order, `steps` the compiled steps, `doors` and `tags` the doors and
+    the AprilTags of the knowledge file. Its root has monitors and interrupts above the mission: see
+    `executive.tree.nodes.interrupts`.
     """
 
     robot_name: str
@@ -51,6 +53,7 @@ class CompiledTree:
     parts: tuple[StepPart, ...] = ()
     steps: tuple[Step, ...] = ()
     doors: tuple[Doorway, ...] = ()
+    tags: tuple[Tag, ...] = ()
 
     @property
     def mission(self) -> NodeSpec:
@@ -92,7 +95,10 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
     root = watch_plan(builder, _whole(mission, builder, steps.nodes))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
-    return CompiledTree(mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps, doors)
+    tags = knowledge.known_tags()
+    return CompiledTree(
+        mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps, doors, tags
+    )
 
 
 def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:

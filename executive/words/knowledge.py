@@ -10,11 +10,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.words.command import Task
 from executive.words.robot_config import RobotsFile
+from skills.api import Tag
 from skills.files.errors import InputError, suggestion
 from skills.files.schema import Name, validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import ANY_OBJECT, PERSON, class_forms
-from skills.quantities import Angle, Coordinate, Opening, Quantity, TopHeight
+from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TopHeight
 
 ANYTHING: Final = "object"
 """Name that stands for every class of objects."""
@@ -26,6 +27,9 @@ _UNNAMED: Final = {
     **dict.fromkeys((ANYTHING, ANY_OBJECT, "item", "anything", "something"), ANYTHING),
     EVERYTHING: EVERYTHING,
 }
+DOCK: Final = "dock"
+MOST_TAG: Final = 586
+"""Greatest number of a tag of the family 36h11."""
 Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
@@ -107,6 +111,25 @@ class Person(_Facts):
     pose: Pose | None = Field(default=None, description="exact pose, when it is known")
 
 
+class TagFacts(_Facts):
+    """AprilTag of family 36h11 with the side of its black square (m), on an object, at the dock, or on a wall or door.
+
+    A tag on an object stands `on` its class; any other one has a place and a heading in the world frame.
+    """
+
+    id: Annotated[int, Quantity(ge=0, le=MOST_TAG)] = Field(description="its number in the family")
+    size: Annotated[float, Quantity(gt=0.0, le=2.0, unit="m")] = Field(description="side of the black square, m")
+    on: str | None = Field(default=None, description="the class of the object that carries it, or `dock`")
+    at: tuple[Coordinate, Coordinate, Height] | None = Field(default=None, description="its middle (x, y, z)")
+    yaw: Angle = Field(default=0.0, description="direction in which its face looks, radians")
+
+    @model_validator(mode="after")
+    def _stands_or_moves(self) -> TagFacts:
+        if (self.at is None) is (self.on in (None, DOCK)):
+            raise ValueError("give 'at' for a tag at the dock or on a wall, and 'on' alone for one on an object")
+        return self
+
+
 class Knowledge(_Facts):
     """All knowledge of one world. Names match without regard to case."""
 
@@ -124,9 +147,14 @@ class Knowledge(_Facts):
     )
     things: dict[Name, ObjectFacts] = Field(default_factory=dict, description="the classes of objects by name")
     people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
+    tags: tuple[TagFacts, ...] = Field(default=(), description="the AprilTags that the robot may use")
     defaults: dict[str, dict[str, str]] = Field(
         default_factory=dict, description="for a task, the room for each class or category when the request names none"
     )
+
+    def known_tags(self) -> tuple[Tag, ...]:
+        """Tags as the skills know them."""
+        return tuple(Tag(tag.id, tag.size, tag.on, tag.at, tag.yaw) for tag in self.tags)
 
     def place(self, name: str) -> str | None:
         """Own name of the room or surface that `name` means; None when it is unknown."""
@@ -245,7 +273,7 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputErr
     for name, person in knowledge.people.items():
         yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
     for name, facts in knowledge.things.items():
-        yield from _unless_known(source, ("things", name), name, class_forms())
+        yield from _unless_known(source, ("things", name), name, (*class_forms(), *_tagged(knowledge)))
         for index, usual in enumerate(facts.usual):
             yield from _unless_known(source, ("things", name, "usual", index), usual, knowledge.place_names())
     for task, table in knowledge.defaults.items():
@@ -253,7 +281,19 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputErr
         for word, place in table.items():
             yield from _unless_known(source, ("defaults", task, word), word, knowledge.object_names())
             yield from _unless_known(source, ("defaults", task, word), place, knowledge.place_names())
+    for index, tag in enumerate(knowledge.tags):
+        if tag.on not in (None, DOCK):
+            yield from _unless_known(source, ("tags", index, "on"), str(tag.on), (*knowledge.things, DOCK))
+        if tag.on == DOCK and knowledge.dock is None:
+            yield source.error(("tags", index, "on"), "this world has no dock", "add 'dock', or leave 'on' out")
+        if tag.id in (other.id for other in knowledge.tags[:index]):
+            yield source.error(("tags", index, "id"), f"tag {tag.id} is listed twice", "print each tag once only")
     yield from _doubles(knowledge, source)
+
+
+def _tagged(knowledge: Knowledge) -> set[str]:
+    """Classes of objects that carry a tag, which the robot recognises by it."""
+    return {tag.on for tag in knowledge.tags if tag.on is not None}
 
 
 def _unless_known(

@@ -8,7 +8,7 @@ from typing import Any
 from pydrake.math import RigidTransform
 
 from skills.api import Detection, ObjectObservation, SkillContext
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import class_form
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.tracker import Track
@@ -50,8 +50,7 @@ def _detection(detection: Detection, placed: Detection3D | None) -> Message:
 
 def class_id(class_name: str) -> int:
     """Number of a class in messages; 0 for a class without a form."""
-    forms = class_forms()
-    return forms[class_name].id if class_name in forms else 0
+    return class_form(class_name).id
 
 
 def object_to_detect_message(context: SkillContext, classes: Sequence[str]) -> Message:

@@ -9,7 +9,7 @@ import numpy as np
 
 from skills.api import FLOOR
 from skills.detect.ports import DetectInputs
-from skills.perception.class_forms import ANY_OBJECT, class_forms
+from skills.perception.class_forms import ANY_OBJECT, class_form
 from skills.perception.detection_3d import has_attribute
 from skills.perception.surface_segmentation import Cluster
 from skills.perception.tracker import Track
@@ -133,5 +133,5 @@ def _is_doubted(track: Track, classes: Sequence[str]) -> bool:
 def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
     """Returns whether a cluster has the size of an object of one of the classes."""
     longest = max(cluster.shape.length_m, cluster.shape.height_m)
-    ranges = (class_forms()[name].length_m for name in classes)
+    ranges = (class_form(name).length_m for name in classes)
     return any(_SMALLEST * low < longest < _LARGEST * high for low, high in ranges)

@@ -41,7 +41,7 @@ from skills.detect.viewpoints import look_targets, surface_boxes
 from skills.geometry import wrap
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, viewpoints_beside
-from skills.perception.class_forms import ANY_OBJECT, class_forms, known_attributes
+from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
 from skills.perception.surface_segmentation import Cluster, segment_surfaces, segments_3d
@@ -107,7 +107,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
     def _check(self, inputs: DetectInputs) -> None:
         """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, or without surfaces."""
-        knows = set(self.context.detector.class_names) & set(class_forms()) | {ANY_OBJECT}
+        knows = {*self.context.detector.class_names, ANY_OBJECT}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
         if unknown:

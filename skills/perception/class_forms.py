@@ -54,6 +54,10 @@ class ClassForm(BaseModel):
         return max(self.mass_kg[0], min(by_size_kg, self.mass_kg[1]))
 
 
+ANY_FORM: Final = ClassForm(id=0, form="round", length_m=(0.01, 0.6), width_m=(0.005, 0.4), usual_m=0.15)
+"""Form of objects of a class that has none, such as one that only its tag tells."""
+
+
 class ColourRange(BaseModel):
     """A range of hue (degrees, may wrap past 360), saturation and value (0 to 1)."""
 
@@ -81,6 +85,11 @@ def class_forms() -> Mapping[str, ClassForm]:
     """Loads the classes by name. Raises pydantic.ValidationError when the file beside this module is malformed."""
     forms = read_yaml(Path(__file__).with_name("class_forms.yaml")).data
     return MappingProxyType(TypeAdapter(dict[str, ClassForm]).validate_python(forms))
+
+
+def class_form(name: str) -> ClassForm:
+    """Form of a class; `ANY_FORM` for one without."""
+    return class_forms().get(name, ANY_FORM)
 
 
 @lru_cache(maxsize=1)

@@ -12,7 +12,7 @@ from pydrake.math import RollPitchYaw
 
 from skills.api import FLOOR, Detection, LocalisationEstimate, ObjectKind, ObjectObservation, Surface
 from skills.geometry import inside_polygon
-from skills.perception.class_forms import MEANS_BIG, class_forms, colour_words
+from skills.perception.class_forms import MEANS_BIG, class_form, class_forms, colour_words
 from skills.perception.point_cloud import Mask, camera_pose_W, closed_mask
 from skills.perception.position import Position, locate
 from skills.robot import FloatArray, Image
@@ -57,11 +57,10 @@ def detections_3d(
 ) -> tuple[Detection3D, ...]:
     """Locates detections in the world.
 
-    Leaves out detections without depth, of classes without a form, and far larger than the longest objects of their
-    class.
+    Leaves out detections without depth, and far larger than the longest objects of their class.
     """
-    known = [detection for detection in detections if detection.class_name in class_forms()]
-    placed = zip(known, _positions(image, known), strict=True)
+    found = list(detections)
+    placed = zip(found, _positions(image, found), strict=True)
     return tuple(
         _detection_3d(image, localisation, detection, position, surfaces)
         for detection, position in placed
@@ -70,7 +69,7 @@ def detections_3d(
 
 
 def _is_far_too_large(detection: Detection, position: Position) -> bool:
-    return position.spanned_m > _FAR_TOO_LARGE * class_forms()[detection.class_name].length_m[1]
+    return position.spanned_m > _FAR_TOO_LARGE * class_form(detection.class_name).length_m[1]
 
 
 def _positions(image: Image, detections: Sequence[Detection]) -> list[Position | None]:
@@ -87,7 +86,7 @@ def _positions(image: Image, detections: Sequence[Detection]) -> list[Position |
 
 
 def _is_long(detection: Detection) -> bool:
-    return class_forms()[detection.class_name].form == "long"
+    return class_form(detection.class_name).form == "long"
 
 
 def _detection_3d(

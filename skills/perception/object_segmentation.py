@@ -200,10 +200,10 @@ def _peaks(counts: FloatArray, edges: FloatArray, least: float) -> Iterator[floa
 
 def _hypotheses(window: Window, plane: LevelPlane | None, form: ClassForm) -> Iterator[ObjectSegment]:
     """Yields the segment of each clustering, if the object rests on a plane, or on none that is seen."""
-    standing = window.valid & ~_level(window, plane)
-    clusterings = [_groups_from_above(window, standing), _groups_in_picture(window, standing, parted=False)]
+    standing = window.valid & ~in_plane(window, plane)
+    clusterings = [_groups_from_above(window, standing), groups_in_picture(window, standing)]
     if form.form != "long":
-        clusterings.append(_groups_in_picture(window, standing, parted=True))
+        clusterings.append(groups_in_picture(window, standing, parted=True))
     for labels, count in clusterings:
         mask, fit = _best_groups(window, labels, count, form)
         yield ObjectSegment(window, mask, plane, fit * _contact(window, mask, plane), _covered(window, mask))
@@ -258,7 +258,7 @@ def _largest_inside(window: Window, labels: NDArray[np.int32], count: int) -> li
     return [int(k) for k in order if sizes[k] >= _FEWEST_POINTS]
 
 
-def _level(window: Window, plane: LevelPlane | None) -> Mask:
+def in_plane(window: Window, plane: LevelPlane | None) -> Mask:
     """Points in the plane or below it, after smoothing of the depth noise."""
     if plane is None:
         return np.zeros_like(window.valid)
@@ -280,7 +280,7 @@ def _groups_from_above(window: Window, standing: Mask) -> tuple[NDArray[np.int32
     return labels, count
 
 
-def _groups_in_picture(window: Window, standing: Mask, *, parted: bool) -> tuple[NDArray[np.int32], int]:
+def groups_in_picture(window: Window, standing: Mask, *, parted: bool = False) -> tuple[NDArray[np.int32], int]:
     """Clusters neighbouring pixels without a step in depth: labels (H, W), 0 for none, and the number of labels.
 
     `parted` cuts narrow bridges between clusters.

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skills.api import Detection
-from skills.perception.class_forms import ClassForm, class_forms
+from skills.perception.class_forms import ClassForm, class_form
 from skills.perception.fitting import LevelPlane, fit_circle, fit_rectangle, without_strays
 from skills.perception.object_segmentation import ObjectSegment, Window, segment_object, window_about
 from skills.perception.point_cloud import Mask
@@ -76,11 +76,11 @@ class Position:
 
 
 def locate(image: Image, detection: Detection, taken: Mask | None = None) -> Position | None:
-    """Locates the object of a detection; None without depth. Raises KeyError for a class without a form.
+    """Locates the object of a detection; None without depth.
 
     `taken` (H, W) marks the pixels that belong to other objects.
     """
-    form = class_forms()[detection.class_name]
+    form = class_form(detection.class_name)
     window = window_about(image, detection.box, taken)
     if window is None:
         return None

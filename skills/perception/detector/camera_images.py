@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, Protocol, runtime_checkable
 
 import cv2
 import numpy as np
@@ -27,8 +27,18 @@ _DOWN_IS_UP = -float(np.cos(np.radians(LEAST_ROLL_DEG)))
 Detections = tuple[Detection, ...]
 
 
+@runtime_checkable
+class DetectsWithDepth(Protocol):
+    """Detector that uses a whole image: its depth and its camera's pose, too."""
+
+    def detect_with_depth(self, image: Image, least_score: float | None = None) -> Detections:
+        """Detects the objects in an image, from `least_score` on, if given."""
+
+
 def detect_in_image(detector: Detector, image: Image, least_score: float | None = None) -> Detections:
     """Detects the objects in an image, in several views if the detector can; then from `least_score` on, if given."""
+    if isinstance(detector, DetectsWithDepth):
+        return detector.detect_with_depth(image, least_score)
     picture = _prepared(image, image.grey if image.colour is None else image.colour)
     if isinstance(detector, DetectsInViews):
         return _as_taken(image, detector.detect_in_views(picture, least_score))

@@ -156,3 +156,48 @@ def test_a_file_without_keys_is_refused(write, text):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"nowhere\.yaml: there is no such file"):
         load_knowledge(tmp_path / "nowhere.yaml")
+
+
+TAGS = """\
+tags:
+  - {id: 7, size: 0.06, on: mug}
+  - {id: 520, size: 0.146, on: dock, at: [-1.5, 0.0, 0.4], yaw: 0.0}
+  - {id: 30, size: 0.16, at: [4.0, 1.0, 1.1], yaw: 3.14}
+"""
+
+
+def test_a_class_that_carries_a_tag_needs_no_form(write):
+    knowledge = load_knowledge(write(WORLD.replace("things:", "things:\n  mug: {aliases: [cup]}") + TAGS))
+    assert knowledge.classes("cup") == ("mug",)
+    mug, dock, wall = knowledge.known_tags()
+    assert (mug.id, mug.size_m, mug.on, mug.p_W) == (7, 0.06, "mug", None)
+    assert (dock.on, dock.p_W) == ("dock", (-1.5, 0.0, 0.4))
+    assert (wall.on, wall.yaw_rad) == (None, 3.14)
+
+
+@pytest.mark.parametrize(
+    ("line", "says"),
+    [
+        ("{id: 7, size: 0.06, on: mug}", "'mug' is not known"),
+        ("{id: 7, size: 0.06}", "give 'at' for a tag at the dock or on a wall"),
+        ("{id: 7, size: 0.06, on: coke, at: [1, 1, 1]}", "'on' alone for one on an object"),
+        ("{id: 587, size: 0.06, on: coke}", "id"),
+        ("{id: 7, size: 0.06, on: coke, face: up}", "face"),
+        ("{id: 7, size: 0.06, on: coke}\n  - {id: 7, size: 0.1, on: beer}", "tag 7 is listed twice"),
+    ],
+)
+def test_a_wrong_tag_is_refused_with_its_line(write, line, says):
+    with pytest.raises(InputError, match=says) as refused:
+        load_knowledge(write(f"{WORLD}tags:\n  - {line}\n"))
+    assert refused.value.line >= len(WORLD.splitlines()) + 1
+
+
+def test_a_tag_of_a_dock_needs_the_dock(write):
+    with pytest.raises(InputError, match="this world has no dock"):
+        load_knowledge(
+            write(
+                WORLD.replace("dock: {x: -1.0, y: 0.0, yaw: 0.0}\n", "")
+                + TAGS.splitlines()[0]
+                + "\n  - {id: 5, size: 0.1, on: dock, at: [0, 0, 0.4]}\n"
+            )
+        )

@@ -45,11 +45,10 @@ def test_an_uncertain_heading_adds_sideways_uncertainty_to_far_points():
     assert np.sqrt(np.diag(added)) == pytest.approx([0.0, 0.02, 0.0])
 
 
-def test_a_detection_without_depth_or_of_a_class_without_form_is_left_out():
+def test_a_detection_without_depth_is_left_out():
     image = scene([COKE])
     image.depth_m[:] = 0.0
     assert detections_3d(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
-    assert detections_3d(scene([COKE]), SURE, [Detection("unicorn", 0.9, (1.0, 1.0, 9.0, 9.0))], [TABLE]) == ()
 
 
 # class -> whether it can span 0.6 m, where the longest are (class_forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long

@@ -14,23 +14,23 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2939,
+    "executive/words": 2981,
     "executive/language": 7672,
     "executive/speech": 1588,
     "executive/mission": 1512,
-    "executive/tree": 7406,
-    "executive/run": 3067,
-    "executive/record": 952,
+    "executive/tree": 7412,
+    "executive/run": 3078,
+    "executive/record": 950,
     "executive/store": 1671,
     "executive/conversation": 581,
     "executive/view": 1368,
     "executive/testing": 810,
-    "executive/app": 7419,
-    "executive/cli": 3815,
-    "skills": 25441,
-    "plant": 11611,
+    "executive/app": 7420,
+    "executive/cli": 3842,
+    "skills": 25750,
+    "plant": 11708,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 447, 70, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 450, 72, 7
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

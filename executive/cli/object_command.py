@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
-from executive.cli.number_options import quantity_option
+from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import new_folder, print_json, writing
+from executive.words.knowledge import TagNumber, TagSize
 from plant.models.catalogue import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
@@ -84,6 +85,32 @@ def show(
     typer.echo(f"inertia (kg m^2)  {_numbers(found.inertia_kg_m2)} (xx yy zz xy xz yz)")
     typer.echo(f"collision parts   {found.collision_parts}")
     typer.echo(f"triangles         {found.triangles}")
+
+
+@object_group.command()
+def tag(
+    number: Annotated[int, quantity_argument(TagNumber, metavar="ID", help="Number of the tag in the family 36h11.")],
+    out: Annotated[Path, typer.Option("--out", help="SVG file to print, or a new folder for the plate of a world.")],
+    size: Annotated[float, quantity_option(TagSize, help="Side of the black square, m.")] = 0.1,
+    on: Annotated[
+        Path | None, typer.Option("--on", metavar="DIR", help="Imported model that carries the tag, too.")
+    ] = None,
+    side: Annotated[str, typer.Option(help="Its side: front, back, left, right or top.")] = "front",
+) -> None:
+    """Draws an AprilTag to print, or makes its plate for a world; sticks it on an imported model, too."""
+    from plant.models.builder.tags import stick_on, tag_svg, write_plate
+
+    if on is not None:
+        with _refused(on):
+            stick_on(on, number, size, side)
+    if out.suffix.lower() == ".svg":
+        with writing(out):
+            out.write_text(tag_svg(number, size), encoding="utf-8")
+    else:
+        with new_folder(out) as folder:
+            write_plate(folder, number, size)
+    carrier = f"on: {read_imported(on).class_name}" if on is not None else "at: [x, y, z], yaw: 0.0"
+    typer.echo(f"{out}: for knowledge.yaml, under 'tags': {{id: {number}, size: {size:g}, {carrier}}}")
 
 
 @contextmanager

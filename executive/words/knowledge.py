@@ -28,8 +28,10 @@ _UNNAMED: Final = {
     EVERYTHING: EVERYTHING,
 }
 DOCK: Final = "dock"
-MOST_TAG: Final = 586
-"""Greatest number of a tag of the family 36h11."""
+TagNumber = Annotated[int, Quantity(ge=0, le=586)]
+"""Number of a tag in the family 36h11."""
+TagSize = Annotated[float, Quantity(gt=0.0, le=2.0, unit="m")]
+"""Side of a tag's black square."""
 Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
@@ -117,8 +119,8 @@ class TagFacts(_Facts):
     A tag on an object stands `on` its class; any other one has a place and a heading in the world frame.
     """
 
-    id: Annotated[int, Quantity(ge=0, le=MOST_TAG)] = Field(description="its number in the family")
-    size: Annotated[float, Quantity(gt=0.0, le=2.0, unit="m")] = Field(description="side of the black square, m")
+    id: TagNumber = Field(description="its number in the family")
+    size: TagSize = Field(description="side of the black square, m")
     on: str | None = Field(default=None, description="the class of the object that carries it, or `dock`")
     at: tuple[Coordinate, Coordinate, Height] | None = Field(default=None, description="its middle (x, y, z)")
     yaw: Angle = Field(default=0.0, description="direction in which its face looks, radians")

@@ -22,14 +22,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.robot import FloatArray, Image, Picture
 
-CELLS: Final = 8
-"""Cells along the side of a tag's black square."""
-TAGS: Final = 587
-"""Number of the tags of the family, from 0 on."""
 _SEARCHED_PX, _CROP_PX = 1280, 100
 _WINDOWS: Final = {"adaptiveThreshWinSizeMin": 5, "adaptiveThreshWinSizeMax": 29, "adaptiveThreshWinSizeStep": 8}
-_SMALL: Final = {"minMarkerPerimeterRate": 0.01, "perspectiveRemovePixelPerCell": 8}
+_SMALL: Final = {"minMarkerPerimeterRate": 0.01}
 _EDGES: Final = {"cornerRefinementMethod": cv2.aruco.CORNER_REFINE_APRILTAG}
+_READ: Final = {"perspectiveRemovePixelPerCell": 8}
 _CORNER_SIGMA_PX: Final = 0.2
 _DEPTH_SIGMA_M, _DEPTH_SIGMA_PER_M = 0.002, 0.0015
 _MOST_SIGMAS: Final = 3.0
@@ -55,11 +52,6 @@ class SeenTag:
     ambiguity: float
 
 
-def marker(tag: int, cell_px: int) -> Picture:
-    """Picture of a tag's black square, `CELLS` x `CELLS` cells, without the white margin that it needs around."""
-    return np.asarray(cv2.aruco.generateImageMarker(_family(), tag, CELLS * cell_px), dtype=np.uint8)
-
-
 def find_tags(image: Image, sizes_m: Mapping[int, float]) -> tuple[SeenTag, ...]:
     """Finds the tags of these sizes (m) by id in a picture; other tags, and what only resembles a tag, are ignored."""
     found = (_located(image, tag, corners, sizes_m[tag]) for tag, corners in _quads(image.grey) if tag in sizes_m)
@@ -74,7 +66,7 @@ def _family() -> Any:
 def _detected(picture: Picture, options: Mapping[str, Any]) -> Iterator[tuple[int, FloatArray]]:
     """Yields ids and corners (4, 2) of the tags in a picture, as OpenCV's detector finds them with these options."""
     parameters = cv2.aruco.DetectorParameters()
-    for name, value in options.items():
+    for name, value in {**_READ, **options}.items():
         setattr(parameters, name, value)
     corners, ids, _ = cv2.aruco.ArucoDetector(_family(), parameters).detectMarkers(picture)
     for tag, quad in zip([] if ids is None else ids.ravel().tolist(), corners, strict=True):

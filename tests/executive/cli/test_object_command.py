@@ -203,3 +203,36 @@ def copy_of_flat(folder: Path, old: str, new: str, *, imports: str) -> None:
     text = path.read_text()
     assert old in text
     path.write_text(f"imports: {imports}\n{text.replace(old, new)}")
+
+
+def test_a_tag_is_drawn_to_print_with_its_line_for_the_knowledge_file(tmp_path):
+    result = invoke("object", "tag", 7, "--size", 0.06, "--out", tmp_path / "tag.svg")
+    assert result.exit_code == 0, result.output
+    assert "{id: 7, size: 0.06, at: [x, y, z], yaw: 0.0}" in result.stdout
+    assert 'width="75mm"' in (tmp_path / "tag.svg").read_text()
+
+
+def test_a_tag_is_stuck_on_an_imported_model(mesh, tmp_path):
+    made(mesh, tmp_path / "drill")
+    result = invoke(
+        "object", "tag", 7, "--size", 0.03, "--on", tmp_path / "drill", "--side", "top", "--out", tmp_path / "t.svg"
+    )
+    assert result.exit_code == 0, result.output
+    assert "{id: 7, size: 0.03, on: drill}" in result.stdout
+    assert '<visual name="tag_7">' in (tmp_path / "drill" / "drill.sdf").read_text()
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        ((587, "--out", "t.svg"), "from 0 to 586"),
+        ((7, "--size", 100, "--out", "t.svg"), "2"),
+        ((7, "--on", ".", "--out", "t.svg"), "there is no imported object"),
+    ],
+)
+def test_a_wrong_tag_is_refused(tmp_path, monkeypatch, given, says):
+    monkeypatch.chdir(tmp_path)
+    result = invoke("object", "tag", *given)
+    assert result.exit_code == 2
+    assert says in result.stderr
+    assert not (tmp_path / "t.svg").exists()

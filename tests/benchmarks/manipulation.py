@@ -264,7 +264,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
             "name": trial.name,
             "model": str(place_objects(world, trial.seed)[0].form.file),
             "surface": trial.surface,
-            "clutter": trial.clutter,
+            "clutter": len(before) - 1,
             "seed": trial.seed,
             "lifted": watch.lifted,
             "held_10s": watch.longest_s >= HELD_S,

@@ -13,22 +13,32 @@ from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import Plan
 from plant.models.catalogue import read_imported
 from plant.scenery import OWN_PACKAGE
-from plant.worlds.world import World, load_world
+from plant.worlds.seeding import place_objects
+from plant.worlds.world import World, WorldError, load_world
 
 SURFACES: Final = ("table", "shelf", "floor")
-TAKEN, SECOND = "bench", "side table"
+TAKEN, SECOND, PERSON = "bench", "side table", "Robin"
 _BACK_Y, _SECOND_X = 4.35, 0.13
 _WIDTH_M, _BOARD_M, _BOARDS, _SHELF_DEPTH_M, _SHELF_M = 1.2, 0.025, 3, 0.36, 1.285
 _SECOND_M: Final = (1.0, 0.7, 0.72)  # width, depth, height
+_PERSON_RANGES: Final = {"distance_m": [1.4, 1.6], "bearing_rad": [-1.9, -1.2], "turned_rad": [-0.2, 0.2]}
 _THINGS: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 
 
 def room(
-    folder: Path, class_name: str, others: Sequence[str], surface: str, seed: int, model: Path | None = None
+    folder: Path,
+    class_name: str,
+    others: Sequence[str],
+    surface: str,
+    seed: int,
+    model: Path | None = None,
+    *,
+    person: bool = False,
 ) -> World:
     """A room with an object called `target` of a class, and others, on a surface; its heights come from the seed.
 
-    The target is one of the catalogue's, or the imported one in the folder `model`.
+    The target is one of the catalogue's, or the imported one in the folder `model`. The last of the `others` are left
+    out where they do not fit. A `person` stands at the right of the start.
     """
     rng = np.random.default_rng([seed, SURFACES.index(surface)])
     middle_x, furniture = 2.5, dict[str, Any]()
@@ -79,17 +89,30 @@ def room(
                      "viewpoints": [{"x": second[0] + 0.92, "y": 1.6, "yaw": 3.1416}]},
         },
         "things": {name: {"aliases": [], "categories": [], "usual": [TAKEN]} for name in _THINGS},
+        "people": {PERSON: {"aliases": [], "at": "room"}} if person else {},
     }  # fmt: skip
+    (folder / "knowledge.yaml").write_text(yaml.safe_dump(knowledge, sort_keys=False), encoding="utf-8")
     target = class_name if model is None else read_imported(model).name
     rules = {
         "imports": [] if model is None else [str(model.resolve())],
         "rules": {"from_edge_m": list(from_edge), "clear_m": 0.03, "rim_m": 0.0, "drop_m": 0.001},
         "fronts": {TAKEN: [[[middle_x - 0.35, front], [middle_x + 0.35, front]]]},
-        "objects": [
-            {"name": name, "model": model, "surfaces": [TAKEN]}
-            for name, model in [("target", target), *((f"other_{n}", each) for n, each in enumerate(others))]
-        ],
+        "people": [{"name": PERSON, "model": "person", **_PERSON_RANGES}] if person else [],
     }
-    (folder / "knowledge.yaml").write_text(yaml.safe_dump(knowledge, sort_keys=False), encoding="utf-8")
-    (folder / "objects.yaml").write_text(yaml.safe_dump(rules, sort_keys=False), encoding="utf-8")
-    return load_world(str(folder))
+    for number in range(len(others), 0, -1):
+        try:
+            return _with_objects(folder, rules, target, others[:number], seed)
+        except WorldError:
+            continue
+    return _with_objects(folder, rules, target, (), seed)
+
+
+def _with_objects(folder: Path, rules: dict[str, Any], target: str, others: Sequence[str], seed: int) -> World:
+    """The room of a folder with these objects. Raises WorldError when they do not fit."""
+    models = [("target", target), *((f"other_{n}", each) for n, each in enumerate(others))]
+    objects = [{"name": name, "model": model, "surfaces": [TAKEN]} for name, model in models]
+    text = yaml.safe_dump({**rules, "objects": objects}, sort_keys=False)
+    (folder / "objects.yaml").write_text(text, encoding="utf-8")
+    world = load_world(str(folder))
+    place_objects(world, seed)
+    return world

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from plant.models.catalogue import read_imported
+from plant.worlds.seeding import place_objects, place_people
 from tests.benchmarks.carry import doors, entered
 from tests.benchmarks.manipulation import (
     TimedWorker,
@@ -21,6 +22,7 @@ from tests.benchmarks.manipulation import (
     spread,
     write_sheet,
 )
+from tests.benchmarks.manipulation_room import PERSON, room
 from tests.benchmarks.shapes import DENSITY_KG_M3, SLENDER, random_shape, written_shape
 
 GOOD = {
@@ -132,11 +134,23 @@ def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path: Path):
 
 def test_a_room_is_entered_once_and_a_doorway_is_none():
     rooms = list[str]()
-    for room in ("kitchen", "kitchen", None, "hall", "hall", "bedroom", None, "hall"):
-        rooms = entered(rooms, room)
+    for name in ("kitchen", "kitchen", None, "hall", "hall", "bedroom", None, "hall"):
+        rooms = entered(rooms, name)
     assert rooms == ["kitchen", "hall", "bedroom", "hall"]
     assert doors(rooms) == 3
 
 
 def test_the_opening_between_hall_and_living_room_is_no_door():
     assert doors(["hall", "living room", "kitchen"]) == 1
+
+
+def test_a_crowded_room_leaves_out_the_objects_that_do_not_fit(tmp_path: Path):
+    world = room(tmp_path, "hammer", ["extinguisher"] * 8, "shelf", 22)
+    names = [placed.name for placed in place_objects(world, 22)]
+    assert names[0] == "target"
+    assert len(names) < 9
+
+
+def test_a_person_stands_in_a_room_for_handing_over(tmp_path: Path):
+    (person,) = place_people(room(tmp_path, "coke", (), "table", 3, person=True), 3)
+    assert (person.name, person.receiving is not None) == (PERSON, True)

@@ -80,6 +80,12 @@ def test_an_object_is_carried():
 
 
 @pytest.mark.nightly
+def test_an_object_is_handed_over():
+    result = result_of("hand_over", "--classes", "coke", "--trials", 1, "--jobs", 1, "--json")
+    assert (result["given"], result["false_claims"]) == (1, 0), result
+
+
+@pytest.mark.nightly
 def test_an_object_is_taken_held_and_put_down():
     options = ("--classes", "coke", "--surfaces", "table", "--trials", 1, "--clutter", "0-0", "--jobs", 1, "--json")
     assert len(result_of("manipulation", *options)["runs"]) == 1

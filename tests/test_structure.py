@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7420,
     "executive/cli": 3842,
-    "skills": 25750,
+    "skills": 26106,
     "plant": 11708,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 450, 72, 7
+MODULES, ONE_IMPORTER, SAME_NAME = 453, 74, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

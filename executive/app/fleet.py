@@ -36,7 +36,7 @@ from plant.worlds.world import World
 from skills.api import Surface
 from skills.files.errors import InputError
 from skills.geometry import wrap
-from skills.manipulation.place.placement import spots
+from skills.manipulation.place.free_spots import spots
 from skills.robot import Pose2D
 
 URGENT: Final = 0.5

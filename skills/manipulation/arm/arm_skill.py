@@ -1,8 +1,7 @@
-"""Base of the skills that move the arm: planned motions, contact, weighing, carrying, letting go, stowing."""
+"""Base of the skills that move the arm: planned motions, contact, weighing, carrying, stowing."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -18,9 +17,9 @@ from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
-from skills.manipulation.arm.poses import UP_B, carry_configuration, towards_shoulder
+from skills.manipulation.arm.poses import carry_configuration
 from skills.manipulation.arm.solid_cells import Outline, solid_boxes
-from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities, GripperKind
+from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities
 from skills.routine import Routine, RoutineSkill, SkillFailure, planning_failure
 
 Goal = Callable[[ArmScene, FloatArray], FloatArray]
@@ -42,16 +41,6 @@ _GRIPPER_TURN_S = 1.6
 """Time in which the gripper has turned."""
 _CHECKED_SAMPLE = 3
 """Each so many samples of the arm's trajectory one is checked while the gripper turns."""
-_RELEASE_RAD = 0.4
-"""The finger opens so far to let go, and no farther: wide open it would reach neighbours."""
-_WIDEST_RELEASE = 0.75
-"""Largest opening of a hinged gripper that lets go, as a part of its widest."""
-_ASIDE_M = 0.018
-"""Fixed finger and palm leave the object by so much before the hand is drawn back, or they would drag it along."""
-_LEVEL = 0.5
-"""A closing direction with a smaller vertical share is level."""
-_BACK_M = (0.16, 0.12, 0.08, 0.05)
-"""Distances by which the hand is drawn back, the best first."""
 _AT_ARM_M = 0.12
 """Solid cells nearer to the arm's axis than this are the arm itself."""
 _BEYOND_M = 0.5
@@ -395,24 +384,6 @@ class ArmSkill(RoutineSkill[InputsT]):
             yield Running(message)
         return float(np.median(found))
 
-    def release_opening(self) -> float:
-        """Opening at which the gripper lets go of the object that it holds."""
-        most = _WIDEST_RELEASE if self.gripper.kind is GripperKind.HINGED else 1.0
-        release = self.context.robot.gripper().opening + self.gripper.like_turn(_RELEASE_RAD)
-        return min(release, most * self.gripper.widest)
-
-    def leave_object(self) -> Routine[bool]:
-        """Takes fixed finger and palm off a released object and draws the hand back; returns whether a path was found.
-
-        Two moving fingers are off the object already.
-        """
-        X_BH = self.model.X_BH(self.q_rad())
-        fingers, _, closing = X_BH.rotation().matrix().T
-        if abs(closing[2]) < _LEVEL and self.gripper.kind is GripperKind.HINGED:
-            aside = -_ASIDE_M * (closing * [1.0, 1.0, 0.0] + fingers)
-            yield from self.try_shift_hand(aside, "letting go")
-        return (yield from self.shift_by_first(retreats_B(X_BH, self.model.p_BS), "drawing the hand back"))
-
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
         """Closes the empty gripper and folds the arm onto the body, unless it is stowed already."""
         stowed = self.model.stowed_rad
@@ -433,16 +404,3 @@ class ArmSkill(RoutineSkill[InputsT]):
     def stand_as_usual(self, message: str = "standing as usual") -> Routine[None]:
         """Brings the body to its usual height."""
         yield from self.stand_at(self.context.robot.capabilities().standing_height_m, message)
-
-
-def retreats_B(X_BH: RigidTransform, p_BS: FloatArray) -> list[FloatArray]:
-    """Shifts of the hand (B) away from a released object, best first: back along the fingers, up, up and back.
-
-    The last ones point towards the shoulder at p_BS: a stretched arm has no others.
-    """
-    directions_B = (
-        -X_BH.rotation().matrix()[:, 0],
-        UP_B,
-        math.sqrt(0.5) * (UP_B + towards_shoulder(p_BS, X_BH.translation())),
-    )
-    return [back_m * direction_B for direction_B in directions_B for back_m in _BACK_M]

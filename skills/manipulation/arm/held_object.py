@@ -31,6 +31,8 @@ _LEVEL = 0.5
 """Fingers whose direction has a larger level share point to a side, not down."""
 _FLAT = 1.2
 """An object cannot fall over when it is lower than this multiple of its width."""
+_LONG = 1.5
+"""Ratio of an object's level sides from which on it may have to lie along an edge."""
 _TURNS_BELOW_RAD = 0.36
 """Largest tilt of a hand in which an upright object turns until it is square to the fingers."""
 _SIDE_DROP_M = 0.12
@@ -65,16 +67,37 @@ class HeldObject:
         """Distance (m) of the object's lowest point below the hand's origin, at a rotation of the hand."""
         return -float(np.min(self.corners_H @ rotation.matrix()[2]))
 
-    def rotations(self, azimuth_rad: float) -> list[RotationMatrix]:
+    @property
+    def half_width_m(self) -> float:
+        """Half the object's width, seen from above as it stood."""
+        return 0.5 * float(self._sides_m[self._level_axes[1]])
+
+    @property
+    def _sides_m(self) -> FloatArray:
+        return np.asarray(np.ptp(self.corners_H, axis=0))
+
+    @property
+    def _level_axes(self) -> tuple[int, int]:
+        """Axes of the hand that were level when the object stood, along its longer side first."""
+        upright = int(np.argmax(np.abs(self.R_BH.matrix()[2])))
+        first, second = (axis for axis in range(3) if axis != upright)
+        return (first, second) if self._sides_m[first] >= self._sides_m[second] else (second, first)
+
+    def rotations(self, azimuth_rad: float, along_rad: float | None = None) -> list[RotationMatrix]:
         """Returns rotations of the hand with which the object stands as it stood.
 
-        Fingers that do not point down point towards an azimuth, or somewhat aside.
+        Fingers that do not point down point towards an azimuth, or somewhat aside. The last rotations of fingers that
+        point down bring a long object to lie along a direction.
         """
         x_axis = self.R_BH.matrix()[:, 0]
         level = math.hypot(x_axis[0], x_axis[1]) > _LEVEL
         ahead = azimuth_rad - math.atan2(x_axis[1], x_axis[0]) if level else azimuth_rad
-        turns = (0.0, 0.4, -0.4) if level else tuple(k * math.pi / 4 for k in range(8))
-        return [RotationMatrix.MakeZRotation(ahead + turn) @ self.R_BH for turn in turns]
+        turns = [ahead + turn for turn in (0.0, 0.4, -0.4)] if level else [ahead + k * math.pi / 4 for k in range(8)]
+        longer, shorter = self._level_axes
+        if along_rad is not None and not level and self._sides_m[longer] > _LONG * self._sides_m[shorter]:
+            x, y, _ = self.R_BH.matrix()[:, longer]
+            turns += [along_rad - math.atan2(y, x), along_rad - math.atan2(y, x) + math.pi]
+        return [RotationMatrix.MakeZRotation(turn) @ self.R_BH for turn in turns]
 
     def approaches(self) -> Sequence[tuple[float, float]]:
         """Heights over the surface (m) and tilts (rad) from which the object can go down, the best first."""
@@ -87,16 +110,22 @@ class HeldObject:
         return bool(height < _FLAT * min(x, y))
 
     def above(
-        self, p_BT: FloatArray, p_BS: FloatArray, above_m: float, tilt_rad: float = 0.0
+        self,
+        p_BT: FloatArray,
+        p_BS: FloatArray,
+        above_m: float,
+        tilt_rad: float = 0.0,
+        along_rad: float | None = None,
     ) -> Iterator[RigidTransform]:
         """Yields hand poses with the object, upright as before, at a height over a point p_BT of a surface.
 
-        p_BS is the shoulder. Tilted fingers that point down point away from the shoulder a little.
+        p_BS is the shoulder. Tilted fingers that point down point away from the shoulder a little. A long object may
+        lie along the direction `along_rad`, such as that of the surface's edge.
         """
         azimuth = math.atan2(p_BT[1] - p_BS[1], p_BT[0] - p_BS[0])
         ahead = RotationMatrix.MakeZRotation(azimuth)
         tilt = ahead @ RotationMatrix.MakeYRotation(-tilt_rad) @ ahead.inverse()
-        for rotation in (tilt @ each for each in self.rotations(azimuth)):
+        for rotation in (tilt @ each for each in self.rotations(azimuth, along_rad)):
             middle = rotation @ self.p_HO
             p_BH = np.array([*(p_BT - middle)[:2], p_BT[2] + above_m + self.drop_m(rotation)])
             yield RigidTransform(rotation, p_BH)

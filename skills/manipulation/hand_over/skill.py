@@ -14,7 +14,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 from skills.api import Cause, PlanningError, Question, Running, Succeeded
 from skills.geometry import wrap
 from skills.manipulation.approach.base_placement import go_to_one
-from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import PullWatch
 from skills.manipulation.arm.hold import Grip
@@ -39,17 +38,11 @@ _SAME_PERSON_M = 0.25
 _PERSON_SIZE_M = (0.6, 0.6, 1.8)
 _STILL_S = 0.5
 """Pause in which hand and object come to rest."""
-_FREE_S = 2.0
-"""Time that the open gripper has to become empty."""
 _LETS_GO = "let go"
 _KEEPS = "hold on"
 _POINTS_DOWN = 0.8
 """Vertical share of the hand's direction from which on the hand points down."""
 _TRIES = 2
-_WIDE = 0.75
-"""Opening of a gripper that shakes an object off, as a part of its widest."""
-_SHAKE_RAD = (0.35, -0.35, 0.35, -0.35)
-_SHAKE_RAD_S = 3.0
 _HOLD_OUT_RAD_S = 0.8
 
 
@@ -174,34 +167,11 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
             corners_H = self.context.payload.corners_H
             release = release_of(self.X_WB() @ self.model.X_BH(self.q_rad()), self.p_HT, corners_H)
             self.checkpoint = {"lets_go": True, "release": asdict(release)}
-        yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
-        free = yield from self._feels_nothing(message)
-        yield from self.pause(_STILL_S, message)
-        if not free or (yield from self.hangs_on_hand(held_kg, message)):
-            yield from self._shake(f"shaking the {name} off the fingers")
-            if not (yield from self._feels_nothing(message)):
-                raise SkillFailure(Cause.POSTCONDITION, f"the {name} is still in the open gripper")
+        free = (yield from self.open_hand(message)) and not (yield from self.hangs_on_hand(held_kg, message))
+        if not free and not (yield from self.shake_off(f"shaking the {name} off the fingers", turns_hand=True)):
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is still in the open gripper")
         yield from self.leave_object()
         return (yield from self.verify(name, inputs.person, Release(**self.checkpoint["release"])))
-
-    def _feels_nothing(self, message: str) -> Routine[bool]:
-        """Waits until the gripper feels nothing; returns False when it still does after a while."""
-        end_s = self.context.clock.now() + _FREE_S
-        while self.context.robot.gripper().holding:
-            if self.context.clock.now() > end_s:
-                return False
-            yield Running(message)
-        return True
-
-    def _shake(self, message: str) -> Routine[None]:
-        """Opens wide and turns the hand to and fro, so that an object that sticks to a finger comes off."""
-        yield from self.move_gripper(_WIDE * self.gripper.widest, GRIPPER_FORCE_N, message)
-        q, wrist = self.q_rad(), np.eye(len(self.model.names))[-1]
-        turns = [q + turn_rad * wrist for turn_rad in _SHAKE_RAD]
-        inside = [each for each in turns if np.all((each > self.model.lower_rad) & (each < self.model.upper_rad))]
-        path = np.array([q, *inside, q])
-        yield from self.follow(self.context.stack.arm_planner.trajectory(path, speed_rad_s=_SHAKE_RAD_S), message)
-        yield from self.pause(_STILL_S, message)
 
     def _find(self, name: str) -> Routine[SeenPerson]:
         """Finds the nearest person in several scans, preferring people ahead; waits for missing scans.

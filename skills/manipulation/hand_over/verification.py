@@ -1,4 +1,4 @@
-"""Check that a person has the released object, by the gripper, the arm's load and the camera."""
+"""Check that a person has the released object, by the gripper and the camera."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from skills.api import Cause, InputsT, Surface
 from skills.back_off.ports import BackOffInputs
 from skills.back_off.skill import BackOff
 from skills.manipulation.arm.collision import Box
-from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
+from skills.manipulation.arm.releasing_skill import ReleasingSkill
 from skills.perception.class_forms import PERSON
 from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
@@ -72,10 +72,6 @@ _ASIDE_RAD = (0.0, 0.5, -0.5)
 """Angles about the object at which the hand camera views it, the best first."""
 _HIGHEST_CAMERA_M = 1.4
 """Height of the hand camera below a person's face."""
-_STILL_HELD = 0.5
-"""Part of the object's weight from which on it still hangs on the hand."""
-_LEAST_KG = 0.06
-"""Least mass that weighing can tell from nothing."""
 
 
 class Seen(enum.Enum):
@@ -174,14 +170,8 @@ def names_in(name: str, class_names: Iterable[str]) -> tuple[str, ...]:
     return tuple(each for each in class_names if each in words)
 
 
-class HandOverVerification(LookingSkill[InputsT]):
+class HandOverVerification(ReleasingSkill[InputsT]):
     """Routine that looks whether a person has the released object, at rest, and stows the arm around what bears it."""
-
-    def hangs_on_hand(self, held_kg: float | None, message: str) -> Routine[bool]:
-        """Returns whether the arm still bears most of the held weight; False where that weight is too small to tell."""
-        if held_kg is None or held_kg < _LEAST_KG:
-            return False
-        return (yield from self.weigh(self.p_HT, message)) > _STILL_HELD * held_kg
 
     def verify(self, name: str, person: str, release: Release) -> Routine[Seen]:
         """Checks the release by the camera and by the gripper, which closes meanwhile, and stows the arm.

@@ -29,11 +29,11 @@ class PlacePorts(Skill[PlaceInputs]):
     Inputs = PlaceInputs
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
-        Cause.PLANNING: "no free spot is seen within reach, or the arm finds no path to it",
+        Cause.PLANNING: "no free spot of the surface is seen within reach, or the arm finds no path to it",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
         Cause.POSTCONDITION: "the object is not seen at rest where it was put down, or is still in the gripper",
     }
-    default_timeout_s = 150.0
+    default_timeout_s = 240.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}
     changes_world = True
     gripper_before = True

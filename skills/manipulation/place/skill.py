@@ -17,32 +17,30 @@ from skills.detect.viewpoints import cluster_boxes, surface_boxes
 from skills.estimate.scan_points import SelfFilter
 from skills.geometry import inside_polygon, wrap
 from skills.manipulation.approach.base_placement import first_reachable_spot, free_placements, go_to_one
-from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N, Goal
-from skills.manipulation.arm.collision import ArmScene, Box, box_corners
+from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, Goal
+from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import HeldObject, held_object
-from skills.manipulation.arm.looking_skill import PICTURE_LATENCY_S, LookingSkill
-from skills.manipulation.arm.poses import UP_B, overview_viewpoints, tucked_configuration
+from skills.manipulation.arm.looking_skill import PICTURE_LATENCY_S
+from skills.manipulation.arm.poses import UP_B, tucked_configuration
 from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
-from skills.manipulation.place.placement import (
-    PrePlacePose,
-    above_goal,
-    clear_heights,
-    clear_spots,
-    clearest_first,
-    free_spots,
-    hold_on_path,
-    reaches,
+from skills.manipulation.place.free_spots import (
+    FreeArea,
+    SpotSearch,
+    free_area,
+    longest_edge_rad,
+    objects_W,
     spaced_spots,
-    spots,
     unseen_view,
 )
+from skills.manipulation.place.placement import PrePlacePose, above_goal, clear_heights, hold_on_path, reaches
 from skills.manipulation.place.ports import PlaceInputs, PlacePorts
+from skills.manipulation.place.verification import PlaceVerification
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.ports import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.quantities import Length, Tries, TurnRate
-from skills.robot import FloatArray, Image, Pose2D
+from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure, planning_failure
 
 _SURELY_FREE_M = 0.03
@@ -77,15 +75,8 @@ _TUCKED_M = 0.03
 """Distance beyond the tucked position at which a hand still counts as tucked."""
 _AHEAD_RAD = 0.6
 """Largest bearing of a spot that counts as ahead."""
-_AT_HAND_M = 0.4
-"""Depth below which a pixel shows the held object, or something too near to measure."""
-_HIDDEN = 0.5
-"""Part of such pixels from which on the held object hides the surface."""
 _OVER_SPOT_M = 0.45
 """Distance of the hand from a spot below which it was putting the object down before a restart."""
-_SETTLES_WITHIN_S = 5.0
-_MOVES_ABOUT_M = 0.2
-"""Radius around a spot in which an object that moves is looked for."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +89,10 @@ class PlaceOptions:
 
     lower_rad_s: TurnRate = 0.2
     seen_again_m: Length = 0.12
-    moves: Tries = 2
+    moves: Tries = 5
 
 
-class Place(PlacePorts, LookingSkill[PlaceInputs]):
+class Place(PlacePorts, PlaceVerification[PlaceInputs]):
     """Implementation of `PlacePorts`."""
 
     Options: ClassVar[type] = PlaceOptions
@@ -116,29 +107,31 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         surface = inputs.surface
         if not self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper to put down")
-        self._clear_of = inputs.clear_of
-        if len(self._spots(surface)) == 0:
-            raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no spot out of the way")
         carried = self._carried()
-        held = held_object(self.context.payload, self.gripper, carried)
-        yield from self._go_near(surface, held)
+        search = SpotSearch(surface, held_object(self.context.payload, self.gripper, carried), inputs.clear_of)
+        if len(search.spots()) == 0:
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} has no spot out of the way")
+        yield from self._go_near(search)
         try:
-            yield from self._put_down(surface, held, carried)
+            yield from self._put_down(search, carried)
         except SkillFailure:
             yield from self.stand_as_usual()
             raise
         yield from self.stand_as_usual()
         return Succeeded(f"put the object down on the {surface.name}")
 
-    def _put_down(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[None]:
+    def _put_down(self, search: SpotSearch, carried: RotationMatrix) -> Routine[None]:
         """Finds a spot, lowers the object, lets go, checks, stows."""
-        above = yield from self._find_spot(surface, held, carried)
+        surface, held = search.surface, search.held
+        above = yield from self._find_spot(search, carried)
         spot_W = np.asarray((self.X_WB() @ self.model.X_BH(self.q_rad()) @ held.p_HO)[:2])
-        self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist()}
+        kind = self.context.payload.kind
+        self.checkpoint = {**self.checkpoint, "spot_W": spot_W.tolist(), "kind": None if kind is None else kind.name}
+        held_kg = yield from self.weigh(self.p_HT, f"weighing the object over the {surface.name}")
         yield from self._lower(surface, above)
         put_down = held.box(self.model.X_BH(self.q_rad()))
-        yield from self._let_go()
-        yield from self._check(surface, spot_W, [put_down])
+        yield from self.let_go(held_kg)
+        yield from self.check(surface, spot_W, [put_down], objects_W(search.seen()), self.options.seen_again_m)
         yield from self.stow()
 
     def run_again(self, inputs: PlaceInputs) -> Routine[Succeeded]:
@@ -155,8 +148,8 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         if spot_W is None:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper, and it was not yet over its place")
         if over_spot:
-            yield from self._let_go()
-        yield from self._check(surface, spot_W[:2])
+            yield from self.let_go(None)
+        yield from self.check(surface, spot_W[:2], within_m=self.options.seen_again_m)
         yield from self.stow()
         yield from self.stand_as_usual()
         return Succeeded(f"the object stood on the {surface.name} already")
@@ -168,41 +161,54 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         self.checkpoint = {**self.checkpoint, "carried": rotation.matrix().tolist()}
         return rotation
 
-    def _find_spot(self, surface: Surface, held: HeldObject, carried: RotationMatrix) -> Routine[PrePlacePose]:
-        """Brings the object over a free spot; without one within reach, drives to another seen spot and tries again."""
-        spot_W, gone_to = _by_distance(self._spots(surface), self.X_WB())[0], list[FloatArray]()
-        heights_m, standing = self._heights_m(surface), f"standing up to the {surface.name}"
+    def _find_spot(self, search: SpotSearch, carried: RotationMatrix) -> Routine[PrePlacePose]:
+        """Brings the object over a free spot; without one within reach, drives before others until none is left."""
+        surface, spot_W = search.surface, _by_distance(search.spots(), self.X_WB())[0]
+        heights_m, standing, moves = self._heights_m(surface), f"standing up to the {surface.name}", 0
         while True:
             yield from self.stand_at(heights_m[0], standing)
             yield from self._hold_ahead(surface, carried)
-            on_floor = surface.height_m < _FLOOR_M and self.object_camera.on_hand
-            standing_W = self._standing_W(surface)
-            if on_floor:
-                view = yield from self._look_at_floor(surface)
-            else:
-                _, view = yield from self._seen_on(surface, spot_W)
-            if view is None or (on_floor and len(free_spots(view, self._spots(surface))) == 0):
-                view = unseen_view(surface, standing_W)
+            view = yield from self._view(search, spot_W)
+            search.add(view, spot_W)
             try:
-                above, X_WB = partial(self._go_above, surface, view, held), self.X_WB()
-                corners_W = X_WB.multiply(box_corners(held.box(self.model.X_BH(self.q_rad()))).T).T
+                above, X_WB = partial(self._go_above, search, view), self.X_WB()
+                corners_W = X_WB.multiply(box_corners(search.held.box(self.model.X_BH(self.q_rad()))).T).T
                 clear_m = clear_heights(heights_m, float(X_WB.translation()[2]), corners_W, surface)
                 return (yield from self.attempt_at_heights(clear_m, standing, above))
             except SkillFailure as failure:
-                others = clearest_first(free_spots(view, self._spots(surface)), view, [*gone_to, spot_W])
-                if failure.cause is not Cause.PLANNING or len(others) == 0 or len(gone_to) >= self.options.moves:
+                if failure.cause is not Cause.PLANNING:
                     raise
-            gone_to.append(spot_W)
-            if not (yield from self._draw_in(held)):
+                if moves >= self.options.moves:
+                    raise SkillFailure(Cause.PLANNING, search.why_none()) from failure
+            moves += 1
+            if not (yield from self._draw_in(search.held)):
                 yield from self.carry(carried, "carrying the object on along the surface")
             yield from self.stand_as_usual()
-            spot_W = yield from self._go_before(spaced_spots(others)[:_OTHER_SPOTS], surface, held)
+            spot_W = yield from self._go_on(search)
 
-    _clear_of: tuple[tuple[float, float, float], ...] = ()
+    def _go_on(self, search: SpotSearch) -> Routine[FloatArray]:
+        """Drives before the next spot that the robot can stand before. Raises SkillFailure when none is left."""
+        while others := search.others(self.X_WB().translation()[:2])[:_OTHER_SPOTS]:
+            try:
+                return (yield from self._go_before(others, search))
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+                search.pass_over(others)
+        raise SkillFailure(Cause.PLANNING, search.why_none())
 
-    def _spots(self, surface: Surface) -> FloatArray:
-        """Spots (N, 2) of a surface that the inputs do not rule out."""
-        return clear_spots(spots(surface), self._clear_of)
+    def _view(self, search: SpotSearch, spot_W: FloatArray) -> Routine[SurfaceView]:
+        """Looks at the surface; where the object hides it, earlier pictures and the LiDAR show what stands on it."""
+        surface, standing_W = search.surface, self._standing_W(search.surface)
+        hidden = surface.height_m < _FLOOR_M and self.object_camera.on_hand
+        if hidden:
+            view = yield from self._look_at_floor(surface)
+        else:
+            image, view = yield from self.seen_on(surface, spot_W)
+            hidden = self.is_hidden(image)
+        if view is None or (hidden and len(search.free(view)) == 0):
+            return unseen_view(surface, standing_W)
+        return view
 
     def _standing_W(self, surface: Surface) -> FloatArray:
         """Points (N, 3, world) above a surface from the LiDAR and earlier pictures.
@@ -226,34 +232,35 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
         """Body heights (m) for putting an object down, the usual one first."""
         return body_heights_m(surface.height_m, self.context.robot.capabilities())
 
-    def _go_near(self, surface: Surface, held: HeldObject) -> Routine[None]:
+    def _go_near(self, search: SpotSearch) -> Routine[None]:
         """Drives nearer when the spots nearby are out of the arm's reach."""
-        pose, near = self.context.pose(), spaced_spots(_by_distance(self._spots(surface), self.X_WB()))[:_OTHER_SPOTS]
+        pose, near = self.context.pose(), spaced_spots(_by_distance(search.spots(), self.X_WB()))[:_OTHER_SPOTS]
+        reach = self._reach(search)
         for spot in near:
             offset = np.array([spot[0] - pose.x_m, spot[1] - pose.y_m])
             bearing_rad = wrap(math.atan2(offset[1], offset[0]) - pose.yaw_rad)
             ahead = np.linalg.norm(offset) < max(self.arm.standing_m) and abs(bearing_rad) < _AHEAD_RAD
-            if ahead and self._reach_cost(surface, held, spot)(pose) is not None:
+            if ahead and reach(spot)(pose) is not None:
                 return
-        yield from self._go_before(near, surface, held)
+        yield from self._go_before(near, search)
 
-    def _go_before(self, candidates: Sequence[FloatArray], surface: Surface, held: HeldObject) -> Routine[FloatArray]:
+    def _go_before(self, candidates: Sequence[FloatArray], search: SpotSearch) -> Routine[FloatArray]:
         """Drives to where the arm reaches one of some spots, or as near as possible; returns that spot.
 
         Raises SkillFailure with cause PLANNING when there is no free place before any of them.
         """
-        yield from self._draw_in(held)
+        yield from self._draw_in(search.held)
         context, pose, arm = self.context, self.context.pose(), self.arm
         footprint, best_m = ArmFootprint(context).now(), arm.standing_m[0]
         before = [
             (spot, free_placements((float(spot[0]), float(spot[1])), pose, context.costmap, footprint, each, best_m))
             for spot, each in itertools.product(candidates, (arm.standing_m, arm.nearer_m))
         ]
-        choose = partial(first_reachable_spot, before, partial(self._reach_cost, surface, held))
-        message = f"choosing where to stand at the {surface.name}"
+        choose = partial(first_reachable_spot, before, self._reach(search))
+        message = f"choosing where to stand at the {search.surface.name}"
         chosen = yield from self.compute(choose, latency_s=0.2, name="choose a place", message=message)
         if chosen is None:
-            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {surface.name}")
+            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand at the {search.surface.name}")
         spot, places = chosen
         yield from go_to_one(self, [NavigateInputs(place.pose, 0.08, 0.1, 0.5) for place in places[:_PLACES]])
         return spot
@@ -284,48 +291,24 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
             self.boxes = surface_boxes([surface], self.X_WB())
             yield from self.carry(carried, f"holding the object before the {surface.name}")
 
-    def _reach_cost(self, surface: Surface, held: HeldObject, spot: FloatArray) -> Callable[[Pose2D], float | None]:
+    def _reach(self, search: SpotSearch) -> Callable[[FloatArray], Callable[[Pose2D], float | None]]:
         """Returns a function for the cost of putting the object down on a spot from a pose; None when out of reach.
 
         The highest approach is left out, because the next one reaches as far.
         """
-        model, heights_m = self.model, self._heights_m(surface)
-        p_WT = np.array([spot[0], spot[1], surface.height_m])
+        model, surface, held, area = self.model, search.surface, search.held, search.area()
+        heights_m, edge_rad = self._heights_m(surface), longest_edge_rad(surface)
 
-        def cost(pose: Pose2D) -> float | None:
+        def cost(spot: FloatArray, pose: Pose2D) -> float | None:
+            p_WT = np.array([spot[0], spot[1], surface.height_m])
             for (number, height_m), way in itertools.product(enumerate(heights_m), held.approaches()[1:]):
-                p_BT = pose.transform(height_m).inverse() @ p_WT
-                if any(reaches(model, X_BH) for X_BH in held.above(p_BT, model.p_BS, *way)):
+                X_WB = pose.transform(height_m)
+                above = held.above(X_WB.inverse() @ p_WT, model.p_BS, *way, edge_rad - pose.yaw_rad)
+                if any(reaches(model, X_BH) and area.takes(X_WB @ X_BH) for X_BH in above):
                     return _OTHER_HEIGHT_COST * number + way[1]
             return None
 
-        return cost
-
-    def _seen_on(
-        self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = ()
-    ) -> Routine[tuple[Image, SurfaceView | None]]:
-        """Takes a picture and segments the surface; the view is None when the held object hides all free space.
-
-        The object hides at least the picture's lower half, so the camera looks low. Raises SkillFailure when the
-        picture does not show the surface.
-        """
-        message = f"looking for a free spot on the {surface.name}"
-        X_WB = self.X_WB()
-        self.boxes = [*surface_boxes([surface], X_WB), *beside]
-        p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
-        low_BT = self.model.p_BS + (p_BT - self.model.p_BS) * [0.8, 0.8, 1.0]
-        yield from self.look_at(low_BT, overview_viewpoints(self.model, low_BT), message, CARRY_SPEED_RAD_S)
-        image = yield from self.picture(message)
-        X_WO = self.context.localiser.estimate().X_WO
-        view = yield from self.compute(
-            lambda: segment_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
-        )
-        robot, near = self.context.robot, np.mean(image.depth_m < _AT_HAND_M)
-        hidden = near > _HIDDEN and robot.gripper().holding and robot.scan() is not None
-        if view is None and not hidden:
-            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-        full = view is None or (hidden and len(free_spots(view, self._spots(surface))) == 0)
-        return image, None if full else view
+        return lambda spot: partial(cost, spot)
 
     def _look_at_floor(self, surface: Surface) -> Routine[SurfaceView | None]:
         """Views the floor with the cameras at the body's front, because the held object hides it from a hand camera."""
@@ -341,18 +324,21 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
             views += [] if view is None else [view]
         return max(views, key=lambda view: len(view.plane_points), default=None)
 
-    def _go_above(self, surface: Surface, view: SurfaceView, held: HeldObject) -> Routine[PrePlacePose]:
+    def _go_above(self, search: SpotSearch, view: SurfaceView) -> Routine[PrePlacePose]:
         """Brings the object above the best free spot."""
-        X_WB = self.X_WB()
-        free = free_spots(view, self._spots(surface))
+        X_WB, surface, held = self.X_WB(), search.surface, search.held
+        free = search.free(view)
         if len(free) == 0:
             raise SkillFailure(Cause.PLANNING, f"no free spot is seen on the {surface.name}")
-        X_BW = X_WB.inverse()
+        X_BW, area = X_WB.inverse(), free_area(surface, held, view)
         near = _by_distance(free, X_WB)[:_MOST_SPOTS]
         on_top = [X_BW @ np.array([x, y, view.plane.height_m]) for x, y in near]
         beside = cluster_boxes(view.clusters, X_WB)
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
-        goal = above_goal(on_top, held, self.context.stack.arm_planner, beside, self.release_opening())
+        along_rad = longest_edge_rad(surface) - Pose2D.from_transform(X_WB).yaw_rad
+        takes = partial(_takes, area, X_WB)
+        planner, opening = self.context.stack.arm_planner, self.release_opening()
+        goal = above_goal(on_top, held, planner, beside, opening, takes, along_rad)
         q_rad = yield from self._bring(goal, held, f"bringing the object over the {surface.name}")
         X_BH = self.model.X_BH(q_rad)
         return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
@@ -399,35 +385,9 @@ class Place(PlacePorts, LookingSkill[PlaceInputs]):
                 why = error
         raise SkillFailure(Cause.PLANNING, str(why)) from why
 
-    def _let_go(self) -> Routine[None]:
-        """Opens the gripper and leaves the object without dragging it."""
-        yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, "letting go")
-        yield from self.pause(0.3, "letting go")
-        if not (yield from self.leave_object()):
-            raise SkillFailure(Cause.PLANNING, "the hand cannot be drawn back from the object")
 
-    def _check(self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box] = ()) -> Routine[None]:
-        """Raises SkillFailure with cause POSTCONDITION unless an object stands at rest on the spot.
-
-        The arm avoids `put_down`, the object's box (B), on its path.
-        """
-        if self.context.robot.gripper().holding:
-            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
-        end_s, at_rest = self.context.clock.now() + _SETTLES_WITHIN_S, False
-        while not at_rest:
-            image, view = yield from self._seen_on(surface, spot_W, put_down)
-            if view is None:
-                raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
-            off = [float(np.min(np.linalg.norm(c.points.p_W[:, :2] - spot_W, axis=1))) for c in view.clusters]
-            if not off or min(off) > self.options.seen_again_m:
-                yield from self.try_stow()
-                where = f"on the {surface.name} where it was put down"
-                raise SkillFailure(Cause.POSTCONDITION, f"the object is not seen {where}")
-            p_WO = np.array([*spot_W, surface.height_m])
-            at_rest = yield from self.stays_at_rest(image, p_WO, _MOVES_ABOUT_M, "looking whether it is at rest")
-            if not at_rest and self.context.clock.now() > end_s:
-                yield from self.try_stow()
-                raise SkillFailure(Cause.POSTCONDITION, f"the object still moves on the {surface.name}")
+def _takes(area: FreeArea, X_WB: RigidTransform, X_BH: RigidTransform) -> bool:
+    return area.takes(X_WB @ X_BH)
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

@@ -10,10 +10,10 @@ from pydrake.math import RigidTransform
 from plant.robots.fetch.kind import fetch_capabilities
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
-from skills.manipulation.arm.arm_skill import retreats_B
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
 from skills.manipulation.arm.motion import RrtConnect
+from skills.manipulation.arm.releasing_skill import retreats_B
 
 CAPABILITIES = spot_capabilities()
 MODEL = arm_model(CAPABILITIES)

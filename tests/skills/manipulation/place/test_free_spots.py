@@ -1,15 +1,22 @@
 """Tests of free spots on a seen surface."""
 
+import math
+
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Surface
-from skills.manipulation.place.placement import (
+from skills.manipulation.arm.held_object import HeldObject
+from skills.manipulation.place.free_spots import (
+    BESIDE_M,
     CLEARANCE_M,
     EDGE_M,
+    SpotSearch,
     clear_spots,
-    clearest_first,
+    free_area,
     free_spots,
+    longest_edge_rad,
     spaced_spots,
     spots,
     unseen_view,
@@ -19,6 +26,11 @@ from skills.perception.point_cloud import PointCloud
 from skills.perception.surface_segmentation import Cluster, SurfaceView
 
 TABLE = Surface("table", ((1.0, -0.5), (1.6, -0.5), (1.6, 0.5), (1.0, 0.5)), 0.7)
+DOWN = RotationMatrix.MakeYRotation(np.pi / 2)
+SCREWDRIVER = HeldObject(
+    DOWN, np.array([[x, y, z] for x in (0.21, 0.24) for y in (-0.1, 0.1) for z in (-0.015, 0.015)])
+)
+"""A screwdriver that lies along the y axis of a hand that points down."""
 PLANE = LevelPlane((1.3, 0.0), 0.7, (0.0, 0.0), 0.002)
 
 
@@ -72,12 +84,60 @@ def test_a_full_table_has_no_free_spot():
     assert len(free_spots(_view(things=things), spots(TABLE))) == 0
 
 
-def test_the_spot_with_the_most_clearance_comes_first_and_none_near_an_earlier_one():
-    free = np.array([[1.2, -0.4], [1.2, 0.0], [1.2, 0.4]])
-    view = _view(things=[(1.4, -0.4)])
-    assert clearest_first(free, view, [])[-1] == pytest.approx(free[0])
-    assert clearest_first(free, view, [free[2]])[0] == pytest.approx(free[1])
-    assert len(clearest_first(free[:1], view, [free[0]])) == 0
+def test_a_clear_spot_comes_before_a_nearer_one_beside_an_object_and_a_tried_one_is_left_out():
+    search = SpotSearch(TABLE, SCREWDRIVER)
+    search.add(_view(things=[(1.3, -0.15)]), np.array([1.3, -0.4]))
+    best, *_ = search.others(np.array([0.5, -0.2]))
+    assert np.linalg.norm(best - [1.3, -0.15]) > 0.25
+    search.pass_over([best])
+    assert np.linalg.norm(search.others(np.array([0.5, -0.2]))[0] - best) > 0.19
+
+
+def test_the_part_of_a_surface_that_no_picture_shows_comes_after_the_free_part():
+    search = SpotSearch(TABLE, SCREWDRIVER)
+    search.add(_view(seen_y=(-0.5, 0.0), things=[(x, -0.25) for x in (1.1, 1.2, 1.3, 1.4, 1.5)]), np.array([1.1, -0.4]))
+    ends = [spot[1] for spot in search.others(np.array([0.5, -0.2]))]
+    assert ends[0] < 0.0 < 0.1 < ends[-1]
+    assert not search.tight
+
+
+def test_a_narrow_object_fits_on_a_tight_spot_at_the_end_and_a_full_surface_says_what_stands_there():
+    things = [(x, y) for x in (1.1, 1.25, 1.4, 1.55) for y in np.arange(-0.4, 0.4, 0.15)]
+    search = SpotSearch(TABLE, SCREWDRIVER)
+    search.add(_view(things=things), np.array([1.2, -0.4]))
+    assert len(search.others(np.array([0.5, 0.0]))) > 0
+    assert search.tight
+    search.pass_over(search.others(np.array([0.5, 0.0])))
+    assert search.others(np.array([0.5, 0.0])) == []
+    wide = SpotSearch(TABLE, HeldObject(DOWN, SCREWDRIVER.corners_H * [1.0, 1.0, 12.0]))
+    wide.add(_view(things=things), np.array([1.2, -0.4]))
+    assert wide.others(np.array([0.5, 0.0])) == []
+    assert wide.why_none() == "the table is full: 24 objects, the largest free spot is 20 cm"
+
+
+def _above(held, xy, *, along_rad=None):
+    """Hand poses over a spot of the table, by the direction of the object's long axis."""
+    poses = list(held.above(np.array([*xy, 0.7]), np.zeros(3), 0.1, along_rad=along_rad))
+    return {round(math.degrees(math.atan2(*X.rotation().matrix()[[1, 0], 1])) % 180.0, 1): X for X in poses}
+
+
+def test_a_long_object_fits_along_the_edge_of_a_narrow_board_only():
+    board = Surface("board", ((1.0, -0.5), (1.1, -0.5), (1.1, 0.5), (1.0, 0.5)), 0.7)
+    area, edge_rad = free_area(board, SCREWDRIVER), longest_edge_rad(board)
+    poses = _above(SCREWDRIVER, (1.05, 0.1), along_rad=edge_rad)
+    assert [angle for angle, X in poses.items() if area.takes(X)] == [90.0]
+
+
+def test_an_outline_keeps_off_others_and_off_the_edge():
+    area = free_area(TABLE, SCREWDRIVER, _view(things=[(1.3, 0.0)]))
+    (lying,) = (X for angle, X in _above(SCREWDRIVER, (1.3, 0.3), along_rad=math.pi / 2).items() if angle == 90.0)
+    for shift_m, free in ((0.0, True), (-0.3 + 0.1 + BESIDE_M - 0.005, False), (0.1, False)):
+        assert area.takes(RigidTransform(lying.rotation(), lying.translation() + [0.0, shift_m, 0.0])) is free
+
+
+def test_an_object_that_is_larger_than_the_surface_may_stick_out():
+    stool = Surface("stool", ((0.0, 0.0), (0.12, 0.0), (0.12, 0.12), (0.0, 0.12)), 0.4)
+    assert free_area(stool, SCREWDRIVER).top is None
 
 
 def test_a_hidden_surface_is_free_except_near_known_objects():

@@ -12,6 +12,7 @@ from table_scene import TABLE as TOP
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Succeeded, Surface
 from skills.manipulation.arm.kinematics import arm_model
+from skills.manipulation.place.free_spots import SpotSearch
 from skills.manipulation.place.placement import HeldObject
 from skills.manipulation.place.skill import Place, PlaceInputs
 from skills.robot import Pose2D
@@ -111,7 +112,7 @@ FROM_THE_SIDE = HeldObject(LEVEL_FORWARD, np.array([[0.15, -0.05, -0.03], [0.22,
 )
 def test_the_robot_stands_nearer_to_place_an_object_held_from_above(held, off_m, reached):
     skill = Place(context_of(ScriptedRobot(holding=True)))
-    cost = skill._reach_cost(BENCH, held, np.array([0.1, 0.0]))
+    cost = skill._reach(SpotSearch(BENCH, held))(np.array([0.1, 0.0]))
     assert (cost(Pose2D(0.1 - off_m, 0.0, 0.0)) is not None) is reached
 
 

@@ -1,0 +1,271 @@
+"""Free spots on a surface for the held object, over all pictures of the surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Surface
+from skills.geometry import grid_inside
+from skills.manipulation.arm.held_object import HeldObject
+from skills.perception.fitting import LevelPlane
+from skills.perception.point_cloud import PointCloud
+from skills.perception.surface_segmentation import SurfaceView
+from skills.robot import FloatArray
+
+if TYPE_CHECKING:
+    import shapely
+    from shapely.geometry.base import BaseGeometry
+
+CLEARANCE_M = 0.12
+"""Distance of a comfortable spot from the objects on the surface."""
+EDGE_M = 0.09
+"""Distance of a comfortable spot from the edges of the surface."""
+BESIDE_M = 0.03
+"""Least gap between the object's outline and others, and the surface's edge."""
+_GRID_M = 0.04
+"""Distance between spots."""
+_ROUNDING_M = 1e-6
+_SEEN_WITHIN_M = 0.04
+"""Radius around a spot in which the surface must be seen."""
+_LEAST_SEEN = 15
+"""Number of points of the surface that must be exceeded around a spot."""
+_UNSEEN_M = 0.1
+"""Distance of a spot from all that was seen from which on no picture shows it."""
+_ENOUGH_CLEARANCE_M = 0.3
+"""Distance from objects beyond which a spot gets no better."""
+_PER_CLEARANCE = 3.0
+"""Distance to drive (m) that a metre of clearance is worth."""
+_ANOTHER_M = 0.2
+"""Least distance between two spots that are tried after each other."""
+_SAME_OBJECT_M = 0.08
+"""Distance between the middles of clusters in two pictures up to which they show the same object."""
+_SAMPLE_M = 0.01
+"""Distance between the points of a surface that no picture shows."""
+_CELL_M = 0.01
+"""Distance between the points of objects that an outline is compared with."""
+_SURVEYED_M = 0.01
+"""Uncertainty of a surveyed height."""
+
+
+def spots(surface: Surface, edge_m: float = EDGE_M) -> FloatArray:
+    """Points (N, 2) of a surface at least edge_m from its edges; its middle when it is small."""
+    inside = grid_inside(surface.polygon_W, _GRID_M, first_m=edge_m, margin_m=_ROUNDING_M - edge_m)
+    return inside if len(inside) else np.asarray([np.mean(surface.polygon_W, axis=0)])
+
+
+def clear_spots(candidates: FloatArray, circles_W: Sequence[tuple[float, float, float]]) -> FloatArray:
+    """Returns the candidates (N, 2) that lie in none of the circles (x, y, radius)."""
+    for x, y, radius_m in circles_W:
+        candidates = candidates[np.linalg.norm(candidates - [x, y], axis=1) > radius_m]
+    return candidates
+
+
+def free_spots(view: SurfaceView, candidates: FloatArray, clearance_m: float = CLEARANCE_M) -> FloatArray:
+    """Returns the candidates (N, 2) around which the surface is seen, with no object within clearance_m."""
+    if len(candidates) == 0 or len(view.plane_points) == 0:
+        return np.empty((0, 2))
+    from scipy.spatial import cKDTree
+
+    seen = cKDTree(view.plane_points.p_W[:, :2])
+    around = np.array([len(found) for found in seen.query_ball_point(candidates, _SEEN_WITHIN_M)])
+    return candidates[(around > _LEAST_SEEN) & (clearances_m(view, candidates) > clearance_m)]
+
+
+def clearances_m(view: SurfaceView, points_W: FloatArray) -> FloatArray:
+    """Distances (N,) of points (N, 2) from the nearest object of a view; infinite without one."""
+    return distances_m(objects_W(view), points_W)
+
+
+def objects_W(view: SurfaceView | None) -> FloatArray:
+    """Points (M, 2) of all objects of a view; none without a view."""
+    clusters = () if view is None else view.clusters
+    return np.concatenate([np.empty((0, 2)), *(cluster.points.p_W[:, :2] for cluster in clusters)])
+
+
+def distances_m(of_W: FloatArray, points_W: FloatArray) -> FloatArray:
+    """Distances (N,) of points (N, 2) from the nearest of others (M, 2); infinite without others."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(of_W).query(points_W)[0]) if len(of_W) else np.full(len(points_W), np.inf)
+
+
+def unseen_view(surface: Surface, standing_W: FloatArray) -> SurfaceView:
+    """Returns a level view of a surface that no picture shows; points (N, 3) of objects stand on it.
+
+    The surface counts as seen except within CLEARANCE_M of those points.
+    """
+    inside = grid_inside(surface.polygon_W, _SAMPLE_M, margin_m=0.0)
+    if len(standing_W):
+        inside = inside[np.min(np.linalg.norm(inside[:, None] - standing_W[None, :, :2], axis=2), axis=1) > CLEARANCE_M]
+    points = np.column_stack([inside, np.full(len(inside), surface.height_m)])
+    plane = LevelPlane((0.0, 0.0), surface.height_m, (0.0, 0.0), _SURVEYED_M)
+    unseen = np.zeros((len(points), 2), dtype=np.int64), np.zeros((len(points), 3), dtype=np.uint8)
+    return SurfaceView(plane, PointCloud(points, *unseen), ())
+
+
+def merged(views: Sequence[SurfaceView]) -> SurfaceView:
+    """Returns all that several pictures of a surface show, with the plane of the last one."""
+    clouds = [view.plane_points for view in views]
+    whole = PointCloud(
+        np.concatenate([cloud.p_W for cloud in clouds]),
+        np.concatenate([cloud.pixels for cloud in clouds]),
+        np.concatenate([cloud.colours for cloud in clouds]),
+    )
+    return SurfaceView(views[-1].plane, whole, tuple(cluster for view in views for cluster in view.clusters))
+
+
+def spaced_spots(free: FloatArray, apart_m: float = _ANOTHER_M) -> list[FloatArray]:
+    """Returns spots (N, 2) in their order, without those near an earlier one."""
+    spaced = list[FloatArray]()
+    for spot in free:
+        if all(float(np.linalg.norm(spot - other)) > apart_m for other in spaced):
+            spaced.append(spot)
+    return spaced
+
+
+@dataclass(frozen=True)
+class FreeArea:
+    """Area in which the held object may come to rest: inside `top` (None: anywhere), clear of the points `objects`."""
+
+    top: shapely.Polygon | None
+    objects: shapely.MultiPoint
+    corners_H: FloatArray
+
+    def takes(self, X_WH: RigidTransform) -> bool:
+        """Returns whether the object in a hand at X_WH has its outline there, seen from above."""
+        import shapely
+
+        outline = self._outline(X_WH)
+        if self.top is not None and not self.top.covers(outline):
+            return False
+        return not shapely.dwithin(outline, self.objects, BESIDE_M)
+
+    def _outline(self, X_WH: RigidTransform) -> BaseGeometry:
+        import shapely
+
+        return shapely.MultiPoint(X_WH.multiply(self.corners_H.T)[:2].T).convex_hull
+
+
+def free_area(surface: Surface, held: HeldObject, view: SurfaceView | None = None) -> FreeArea:
+    """Returns the area of a surface inside its edges, clear of the objects of a view.
+
+    An object that is too large for the surface may stick out.
+    """
+    import shapely
+
+    cells = np.unique(np.round(objects_W(view) / _CELL_M), axis=0) * _CELL_M
+    top = shapely.Polygon(surface.polygon_W).buffer(-BESIDE_M, join_style="mitre")
+    inside = FreeArea(top, shapely.MultiPoint(cells), held.corners_H)
+    X_WM = RigidTransform([*np.mean(surface.polygon_W, axis=0), surface.height_m])
+    empty = replace(inside, objects=shapely.MultiPoint())
+    middle = (X_WM @ X_MH for X_MH in held.above(np.zeros(3), np.zeros(3), 0.0, along_rad=longest_edge_rad(surface)))
+    return inside if any(empty.takes(X_WH) for X_WH in middle) else replace(inside, top=None)
+
+
+def longest_edge_rad(surface: Surface) -> float:
+    """Direction of a surface's longest edge in the world."""
+    corners = np.array(surface.polygon_W)
+    edges = np.roll(corners, -1, axis=0) - corners
+    x, y = edges[int(np.argmax(np.linalg.norm(edges, axis=1)))]
+    return float(np.arctan2(y, x))
+
+
+@dataclass
+class SpotSearch:
+    """Search for a free spot on a surface for an object, in none of the circles `clear_of` (x, y, radius).
+
+    Comfortable spots come first, then those that no picture shows yet, and at the end `tight` ones, on which the object
+    only just fits.
+    """
+
+    surface: Surface
+    held: HeldObject
+    clear_of: Sequence[tuple[float, float, float]] = ()
+    tight: bool = False
+    _views: list[SurfaceView] = field(default_factory=list)
+    _tried: list[FloatArray] = field(default_factory=list)
+
+    def spots(self) -> FloatArray:
+        """Spots (N, 2) of the surface, free or not."""
+        edge_m = min(EDGE_M, self.held.half_width_m + BESIDE_M) if self.tight else EDGE_M
+        return clear_spots(spots(self.surface, edge_m), self.clear_of)
+
+    def free(self, view: SurfaceView) -> FloatArray:
+        """Spots (N, 2) that a view shows to be free."""
+        return free_spots(view, self.spots(), self._clearance_m())
+
+    def seen(self) -> SurfaceView | None:
+        """All that was seen of the surface; None before the first picture."""
+        return merged(self._views) if self._views else None
+
+    def area(self) -> FreeArea:
+        """Area of the surface that is free by all that was seen."""
+        return free_area(self.surface, self.held, self.seen())
+
+    def add(self, view: SurfaceView, spot_W: FloatArray) -> None:
+        """Takes in a picture from where the arm tries to put the object down on a spot (2,) or near it."""
+        self._views.append(view)
+        self._tried.append(spot_W)
+
+    def pass_over(self, spots_W: Sequence[FloatArray]) -> None:
+        """Gives up spots (2,) before which the robot cannot stand."""
+        self._tried.extend(spots_W)
+
+    def others(self, here_W: FloatArray) -> list[FloatArray]:
+        """Returns the spots (2,) that are worth a drive from a point (2,), the best first; turns to tight ones last."""
+        ranked = self._ranked(here_W)
+        if not ranked and not self.tight:
+            self.tight, self._tried = True, []
+            ranked = self._ranked(here_W)
+        return ranked
+
+    def _ranked(self, here_W: FloatArray) -> list[FloatArray]:
+        seen, candidates = merged(self._views), self.spots()
+        free, shown = self.free(seen), np.concatenate([seen.plane_points.p_W[:, :2], objects_W(seen)])
+        unseen = candidates[distances_m(shown, candidates) > _UNSEEN_M]
+        costs = [_drive_m(free, here_W) + _PER_CLEARANCE * _lacks_m(seen, free), _drive_m(unseen, here_W)]
+        ordered = [
+            spots_W[np.argsort(cost, kind="stable")] for spots_W, cost in zip((free, unseen), costs, strict=True)
+        ]
+        left = [spot for spot in np.concatenate(ordered) if not any(_near(spot, other) for other in self._tried)]
+        return spaced_spots(np.array(left).reshape(-1, 2))
+
+    def why_none(self) -> str:
+        """Reason why the search found no spot, by all that was seen."""
+        seen, name = merged(self._views), self.surface.name
+        middles = np.array([cluster.shape.centre for cluster in seen.clusters]).reshape(-1, 2)
+        count = len(spaced_spots(middles, _SAME_OBJECT_M))
+        if not count or len(self.free(seen)):
+            return f"no free spot of the {name} is within the arm's reach"
+        inside = grid_inside(self.surface.polygon_W, _CELL_M)
+        room_m = np.minimum(clearances_m(seen, inside), _from_edge_m(self.surface, inside))
+        objects = "1 object" if count == 1 else f"{count} objects"
+        return f"the {name} is full: {objects}, the largest free spot is {200.0 * float(room_m.max()):.0f} cm"
+
+    def _clearance_m(self) -> float:
+        return min(CLEARANCE_M, self.held.half_width_m + BESIDE_M) if self.tight else CLEARANCE_M
+
+
+def _near(spot: FloatArray, other: FloatArray) -> bool:
+    return float(np.linalg.norm(spot - other)) <= _ANOTHER_M
+
+
+def _drive_m(spots_W: FloatArray, here_W: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(spots_W - here_W, axis=1))
+
+
+def _lacks_m(view: SurfaceView, spots_W: FloatArray) -> FloatArray:
+    """Clearances (N,) that spots (N, 2) lack (m)."""
+    return np.asarray(_ENOUGH_CLEARANCE_M - np.minimum(clearances_m(view, spots_W), _ENOUGH_CLEARANCE_M))
+
+
+def _from_edge_m(surface: Surface, points_W: FloatArray) -> FloatArray:
+    """Distances (N,) of points (N, 2) from a surface's edges."""
+    import shapely
+
+    return np.asarray(shapely.distance(shapely.Polygon(surface.polygon_W).exterior, shapely.points(points_W)))

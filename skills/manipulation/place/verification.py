@@ -1,0 +1,149 @@
+"""Release of an object on a surface, and the check by gripper, arm and camera that it rests there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from skills.api import Cause, InputsT, Surface
+from skills.detect.viewpoints import surface_boxes
+from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S
+from skills.manipulation.arm.collision import Box
+from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints
+from skills.manipulation.arm.releasing_skill import ReleasingSkill
+from skills.manipulation.place.free_spots import distances_m, objects_W
+from skills.perception.detection_3d import detections_3d
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
+from skills.perception.surface_segmentation import SurfaceView, segment_surface
+from skills.robot import FloatArray, Image
+from skills.routine import Routine, SkillFailure
+
+_AT_HAND_M = 0.4
+"""Depth below which a pixel shows the held object, or something too near to measure."""
+_HIDDEN = 0.5
+"""Part of such pixels from which on the held object hides the surface."""
+_SETTLES_WITHIN_S = 5.0
+_MOVES_ABOUT_M = 0.2
+"""Radius around a spot in which an object that moves is looked for."""
+_NEW_M = 0.025
+"""Distance from all that stood on the surface before beyond which a point belongs to the object."""
+_LEAST_NEW = 10
+"""Number of such points that show the object."""
+_ON_SURFACE_M = 0.15
+"""Height over the surface below which a detected object rests on it."""
+_NOT_SEEN = np.empty((0, 2))
+
+
+class PlaceVerification(ReleasingSkill[InputsT]):
+    """Routine that lets go of an object on a surface, and looks whether it rests there."""
+
+    def let_go(self, held_kg: float | None) -> Routine[None]:
+        """Opens the gripper and leaves the object without dragging it; shakes an object off that sticks to the hand.
+
+        Raises SkillFailure with cause POSTCONDITION when it still sticks, or the hand cannot leave it.
+        """
+        message = "letting go"
+        free = (yield from self.open_hand(message)) or (yield from self.shake_off(message, turns_hand=False))
+        p_BH = self.model.X_BH(self.q_rad()).translation()
+        left = yield from self.leave_object()
+        if free and (yield from self.hangs_on_hand(held_kg, message)):
+            yield from self.try_shift_hand(p_BH - self.model.X_BH(self.q_rad()).translation(), message)
+            free = yield from self.shake_off("shaking the object off the fingers", turns_hand=False)
+            left = yield from self.leave_object()
+            free = free and not (yield from self.hangs_on_hand(held_kg, message))
+        if not free:
+            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
+        if not left:
+            raise SkillFailure(Cause.POSTCONDITION, "the object is put down, and the hand cannot be drawn back from it")
+
+    def check(
+        self,
+        surface: Surface,
+        spot_W: FloatArray,
+        put_down: Sequence[Box] = (),
+        before_W: FloatArray = _NOT_SEEN,
+        within_m: float = 0.12,
+    ) -> Routine[None]:
+        """Raises SkillFailure with cause POSTCONDITION unless an object rests within `within_m` of the spot (2,).
+
+        `before_W` (N, 2) are the points of the objects that stood there before. The arm avoids `put_down`, the object's
+        box (B), on its path.
+        """
+        if self.context.robot.gripper().holding:
+            raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
+        end_s = self.context.clock.now() + _SETTLES_WITHIN_S
+        p_WO = np.array([*spot_W, surface.height_m])
+        while True:
+            image = yield from self._seen_again(surface, spot_W, put_down, before_W, within_m)
+            if image is None:
+                yield from self.try_stow()
+                where = f"on the {surface.name} where it was put down"
+                raise SkillFailure(Cause.POSTCONDITION, f"the object is not seen {where}")
+            if (yield from self.stays_at_rest(image, p_WO, _MOVES_ABOUT_M, "looking whether it is at rest")):
+                return
+            if self.context.clock.now() > end_s:
+                yield from self.try_stow()
+                raise SkillFailure(Cause.POSTCONDITION, f"the object still moves on the {surface.name}")
+
+    def _seen_again(
+        self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box], before_W: FloatArray, within_m: float
+    ) -> Routine[Image | None]:
+        """Returns a picture that shows the object near its spot by its depth or its class, from near if need be."""
+        for near in (False, True):
+            try:
+                image, view = yield from self.seen_on(surface, spot_W, put_down, near=near)
+            except SkillFailure as failure:
+                if failure.cause is not Cause.PLANNING:
+                    raise
+                continue
+            points_W = objects_W(view)
+            own = (distances_m(before_W, points_W) > _NEW_M) & (np.linalg.norm(points_W - spot_W, axis=1) < within_m)
+            if np.count_nonzero(own) >= _LEAST_NEW or (yield from self._is_detected(image, surface, spot_W, within_m)):
+                return image
+        return None
+
+    def _is_detected(self, image: Image, surface: Surface, spot_W: FloatArray, within_m: float) -> Routine[bool]:
+        """Returns whether the detector finds the object's class near the spot: a flat object hardly stands out."""
+        context, kind = self.context, self.checkpoint.get("kind")
+        if kind not in context.detector.class_names:
+            return False
+        place = context.localiser.estimate()
+
+        def detected() -> bool:
+            found = detections_3d(image, place, detect_in_image(context.detector, image), ())
+            offsets_W = [one.position_W - [*spot_W, surface.height_m] for one in found if one.class_name == kind]
+            return any(np.hypot(x, y) < within_m and abs(z) < _ON_SURFACE_M for x, y, z in offsets_W)
+
+        message = f"looking for the {kind} on the {surface.name}"
+        return (yield from self.compute(detected, latency_s=DETECTION_LATENCY_S, name="look again", message=message))
+
+    def seen_on(
+        self, surface: Surface, spot_W: FloatArray, beside: Sequence[Box] = (), *, near: bool = False
+    ) -> Routine[tuple[Image, SurfaceView | None]]:
+        """Takes a picture, from afar or near, and segments the surface; no view when the held object hides it.
+
+        The object hides at least the picture's lower half, so from afar the camera looks low. Raises SkillFailure with
+        cause PLANNING when the picture does not show the surface.
+        """
+        message = f"looking for a free spot on the {surface.name}"
+        X_WB, p_BS = self.X_WB(), self.model.p_BS
+        self.boxes = [*surface_boxes([surface], X_WB), *beside]
+        p_BT = X_WB.inverse() @ np.array([spot_W[0], spot_W[1], surface.height_m])
+        low_BT = p_BS + (p_BT - p_BS) * [0.8, 0.8, 1.0]
+        viewpoints = close_viewpoints(p_BS, p_BT) if near else overview_viewpoints(self.model, low_BT)
+        yield from self.look_at(p_BT if near else low_BT, viewpoints, message, CARRY_SPEED_RAD_S)
+        image = yield from self.picture(message)
+        X_WO = self.context.localiser.estimate().X_WO
+        view = yield from self.compute(
+            lambda: segment_surface(image, X_WO, surface), latency_s=0.15, name="segment", message=message
+        )
+        if view is None and not self.is_hidden(image):
+            raise SkillFailure(Cause.PLANNING, f"the {surface.name} is not seen from here")
+        return image, view
+
+    def is_hidden(self, image: Image) -> bool:
+        """Returns whether the held object hides a picture, and the LiDAR has to do."""
+        robot = self.context.robot
+        near = float(np.mean(image.depth_m < _AT_HAND_M))
+        return near > _HIDDEN and robot.gripper().holding and robot.scan() is not None

@@ -12,7 +12,7 @@ import numpy as np
 
 from executive.mission.load import load_stack
 from executive.mission.request import Start
-from executive.words.knowledge import Knowledge, Pose, RobotFacts
+from executive.words.knowledge import DOCK, Knowledge, Pose, RobotFacts
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
@@ -154,7 +154,8 @@ def knowledge_for(robot: PlacedRobot, names: Iterable[str], knowledge: Knowledge
     others = tuple(other for other in names if other != robot.name)
     facts = RobotFacts(name=robot.name, others=others, require_wake=knowledge.robot.require_wake)
     dock = None if robot.dock is None else _pose(robot.dock)
-    return knowledge.model_copy(update={"robot": facts, "start": _pose(robot.start), "dock": dock})
+    tags = tuple(tag for tag in knowledge.tags if tag.on != DOCK or dock == knowledge.dock)
+    return knowledge.model_copy(update={"robot": facts, "start": _pose(robot.start), "dock": dock, "tags": tags})
 
 
 def _pose(pose: Pose2D) -> Pose:

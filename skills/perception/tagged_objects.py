@@ -43,13 +43,11 @@ class TagDetector:
 
     def detect_with_depth(self, image: Image, least_score: float | None = None) -> tuple[Detection, ...]:
         """Detects the objects in an image; a tag replaces what the other detector takes its object for."""
-        tagged = [
-            Detection(self._classes[seen.id], TAG_SCORE, box_of_carrier(image, seen, self._classes[seen.id]))
-            for seen in find_tags(image, self._sizes_m)
-        ]
-        others = detect_in_image(self._detector, image, least_score)
-        boxes = [each.box for each in tagged]
-        return (*tagged, *(one for one in others if all(box_overlap(one.box, box) < _LEAST_OVERLAP for box in boxes)))
+        others, tagged = detect_in_image(self._detector, image, least_score), list[Detection]()
+        for seen in find_tags(image, self._sizes_m):
+            name = self._classes[seen.id]
+            tagged += _unless_same([Detection(name, TAG_SCORE, box_of_carrier(image, seen, name))], tagged)
+        return (*tagged, *_unless_same(others, tagged))
 
     def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
         """Returns the detections of the other detector, since a picture without depth locates no tag."""
@@ -60,6 +58,11 @@ class TagDetector:
 
     def __dir__(self) -> Iterable[str]:
         return {*super().__dir__(), *dir(self._detector)}
+
+
+def _unless_same(found: Iterable[Detection], known: Sequence[Detection]) -> list[Detection]:
+    """Detections that are not about the same object as one of those known."""
+    return [one for one in found if all(box_overlap(one.box, other.box) < _LEAST_OVERLAP for other in known)]
 
 
 def box_of_carrier(image: Image, tag: SeenTag, class_name: str) -> Box:

@@ -2,28 +2,46 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import Final
 
 from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.board import FromBoard
 from executive.tree.goals import command_goal
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery
 from executive.tree.plan import Assembled, PlanBuilder, StepPart, failure_trigger, pose_2d
 from executive.words import leaf_steps as model
 from executive.words.command import Command, Task
+from executive.words.knowledge import DOCK
 from skills.api import Cause
 from skills.files.errors import InputError
 from skills.robot import Pose2D
+
+_BEFORE_M: Final = 0.7
+"""Distance by which the robot stands farther from the tag than on the dock when it looks for it."""
 
 
 def dock_plan(builder: PlanBuilder, dock: Pose2D, level: float) -> NodeSpec:
     """Docks and charges; where the robot does not charge, it backs off and docks again."""
     charge = builder.skill("charge", {"level": level})
-    attempt = builder.at("attempt").sequence(
-        "dock and charge", builder.navigate(dock, "the dock", exactly=True), charge
-    )
+    attempt = builder.at("attempt").sequence("dock and charge", *_onto_dock(builder, dock), charge)
     again = Recovery((failure_trigger(Cause.POSTCONDITION, of=charge),), uses=2)
     return builder.recover("charge at the dock", attempt, (builder.at("again").skill("back_off"), again), attempts=3)
+
+
+def _onto_dock(builder: PlanBuilder, dock: Pose2D) -> tuple[NodeSpec, ...]:
+    """Drives onto the dock; with a tag at the dock, first before it, where the cameras show the tag."""
+    tag = next((tag for tag in builder.knowledge.known_tags() if tag.on == DOCK), None)
+    if tag is None or "locate_dock" not in builder.registry:
+        return (builder.navigate(dock, "the dock", exactly=True),)
+    key, below = builder.key("dock-pose"), builder.at("before")
+    look = below.skill("locate_dock", {"tag": tag, "dock": dock}, {"dock": key})
+    east_m, north_m = _BEFORE_M * math.cos(tag.yaw_rad), _BEFORE_M * math.sin(tag.yaw_rad)
+    before = replace(dock, x_m=dock.x_m + east_m, y_m=dock.y_m + north_m)
+    drive = below.navigate(before, "the place before the dock")
+    return drive, look, builder.navigate(FromBoard(key), "the dock", exactly=True)
 
 
 def charge_plan(builder: PlanBuilder) -> NodeSpec:

@@ -60,15 +60,15 @@ def write_plate(folder: Path, tag: int, size_m: float) -> Path:
 def stick_on(folder: Path, tag: int, size_m: float, side: str) -> None:
     """Puts the plate of a tag on a side of the imported model in a folder.
 
-    Raises ObjectImportError where it is there already or wider than that side, InputError when there is no model.
+    Raises ObjectImportError where it is there already, or wider than that side, InputError when there is no model.
     """
     model, outward = read_imported(folder), SIDES.get(side)
     if outward is None:
         raise ObjectImportError(f"there is no side {side[:20]!r}", "give front, back, left, right or top")
     sdf = folder / f"{model.name}.sdf"
-    text, visual = sdf.read_text(encoding="utf-8"), f'<visual name="tag_{tag}">'
+    text, visual = sdf.read_text(encoding="utf-8"), f'<visual name="tag_{tag}_{side}">'
     if visual in text:
-        raise ObjectImportError(f"{model.name} has tag {tag} already", "give another tag")
+        raise ObjectImportError(f"the {side} of {model.name} has tag {tag} already", "name another --side")
     widths = [size for size, axis in zip(model.size_m, outward, strict=True) if axis == 0]
     if _PLATE * size_m > min(widths):
         most_m = min(widths) / _PLATE

@@ -219,7 +219,7 @@ def test_a_tag_is_stuck_on_an_imported_model(mesh, tmp_path):
     )
     assert result.exit_code == 0, result.output
     assert "{id: 7, size: 0.03, on: drill}" in result.stdout
-    assert '<visual name="tag_7">' in (tmp_path / "drill" / "drill.sdf").read_text()
+    assert '<visual name="tag_7_top">' in (tmp_path / "drill" / "drill.sdf").read_text()
 
 
 @pytest.mark.parametrize(

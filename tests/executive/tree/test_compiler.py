@@ -13,10 +13,12 @@ from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.policies import Timeout
 from executive.words.command import parse_command
-from executive.words.leaf_steps import Do
+from executive.words.knowledge import TagFacts
+from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Place
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
+from skills.charge.locate_dock import LocateDock
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource
 from skills.robot import Pose2D
@@ -400,3 +402,15 @@ def test_a_spec_becomes_its_node_on_the_runs_clock(context, clock):
 def test_outputs_of_a_node_follow_from_its_options():
     assert writes(NodeSpec("remember", "alice/r", "r", {"key": "alice/pose"})) == {"alice/pose": Pose2D}
     assert writes(LIMIT) == {}
+
+
+def test_a_tag_at_the_dock_is_looked_for_before_the_robot_drives_onto_it(knowledge, registry):
+    dock, text = knowledge.dock, parse_command(CHARGE)
+    tag = TagFacts(id=520, size=0.146, on="dock", at=(dock.x + 0.7, dock.y, 0.4), yaw=3.14159)
+    mission = Mission(name="m", robot="Alice", steps=steps_of_commands([text]))
+    with_tag = knowledge.model_copy(update={"tags": (tag,)})
+    skills = {**registry, "locate_dock": LocateDock}
+    before, look, onto, _ = skills_of(compile_mission(mission, knowledge=with_tag, registry=skills))
+    assert port(before, "goal").value.x_m == pytest.approx(dock.x - 0.7)
+    assert (look.name, port(look, "tag").value.id) == ("locate_dock", 520)
+    assert port(onto, "goal").key == look.options["outputs"]["dock"]

@@ -44,6 +44,7 @@ TABLE = {
     "charge": {DIES: Cause.ERROR, "battery falls": Cause.POSTCONDITION},
     "check_door": {DIES: Cause.ERROR},
     "clear_costmap": {},
+    "locate_dock": {DIES: Cause.ERROR},
     "navigate": {RAISES: Cause.ERROR, DIES: Cause.ERROR, LEASE: Cause.PRECONDITION},
     "pose_arm": ARM,
     "relocalise": {DIES: Cause.PRECONDITION},

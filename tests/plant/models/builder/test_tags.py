@@ -88,10 +88,11 @@ def test_a_tag_wider_than_its_side_is_refused(crate):
         stick_on(crate, 7, 0.15, "front")
 
 
-def test_a_tag_is_stuck_on_once(crate):
+def test_a_tag_is_stuck_on_each_side_once(crate):
     stick_on(crate, 7, 0.1, "front")
-    with pytest.raises(ObjectImportError, match="has tag 7 already"):
-        stick_on(crate, 7, 0.1, "back")
+    stick_on(crate, 7, 0.1, "back")
+    with pytest.raises(ObjectImportError, match="the front of crate has tag 7 already"):
+        stick_on(crate, 7, 0.1, "front")
 
 
 def test_an_unknown_side_is_refused_with_the_sides(crate):

@@ -1,0 +1,85 @@
+"""The locate_dock skill: finds by the dock's tag where the dock stands, before the robot drives onto it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from skills.api import Cause, Part, Succeeded, Tag
+from skills.perception.fiducials import find_tags
+from skills.quantities import Count, Delay, Share
+from skills.robot import Pose2D
+from skills.routine import Routine, RoutineSkill, SkillFailure
+
+
+@dataclass(frozen=True)
+class LocateDockInputs:
+    """The dock's tag, and the robot's pose on the dock, both as the map has them."""
+
+    tag: Tag
+    dock: Pose2D
+
+
+@dataclass(frozen=True)
+class LocateDockOptions:
+    """Number of `pictures` by each camera, and the ambiguity of a tag's pose beyond which a picture does not count."""
+
+    pictures: Count = 3
+    most_ambiguity: Share = 0.3
+    latency_s: Delay = 0.2
+
+
+class LocateDock(RoutineSkill[LocateDockInputs]):
+    """Looks for the dock's tag with the body cameras, and tells the robot's pose on the dock. Moves nothing.
+
+    Where no camera shows the tag, that is the pose of the map.
+    """
+
+    name = "locate_dock"
+    Inputs = LocateDockInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    Options: ClassVar[type] = LocateDockOptions
+    options: LocateDockOptions
+    outputs: ClassVar[Mapping[str, type]] = {"dock": Pose2D}
+    causes: ClassVar[Mapping[Cause, str]] = {Cause.PRECONDITION: "the robot does not know where it is"}
+    default_timeout_s = 60.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 5.0, "localisation": 5.0}
+
+    def run(self, inputs: LocateDockInputs) -> Routine[Succeeded]:
+        """Takes the pictures, and averages over those that show the tag."""
+        context, tag, mapped = self.context, inputs.tag, inputs.dock
+        if not context.localiser.estimate().localised:
+            raise SkillFailure(Cause.PRECONDITION, "the robot does not know where it is")
+        p_BT = context.X_WB().inverse() @ tag.X_WT().translation()
+        X_TD, docks = tag.X_WT().inverse() @ mapped.transform(), list[Pose2D]()
+        for camera in context.robot.capabilities().body_cameras:
+            if camera.looks_towards(math.atan2(p_BT[1], p_BT[0])):
+                with suppress(SkillFailure):  # a camera that gives no picture shows no tag
+                    for _ in range(self.options.pictures):
+                        seen = yield from self._seen(camera.source, tag)
+                        docks += [Pose2D.from_transform(X_WT @ X_TD) for X_WT in seen]
+        if not docks:
+            return Succeeded("no camera shows the dock's tag; the dock is where the map has it", {"dock": mapped})
+        x, y, c, s = np.mean([(d.x_m, d.y_m, math.cos(d.yaw_rad), math.sin(d.yaw_rad)) for d in docks], axis=0)
+        off_m = math.hypot(x - mapped.x_m, y - mapped.y_m)
+        said = f"the dock's tag shows the dock {off_m:.2f} m from where the map has it"
+        return Succeeded(said, {"dock": Pose2D(float(x), float(y), math.atan2(s, c))})
+
+    def _seen(self, source: str, tag: Tag) -> Routine[list[RigidTransform]]:
+        """Poses X_WT of the tag in a new picture of a camera."""
+        robot, options, message = self.context.robot, self.options, "looking for the dock's tag"
+        image = yield from self.sense(lambda: robot.image(source), latency_s=0.0, name="picture", message=message)
+        X_WO = self.context.localiser.estimate().X_WO
+        found = yield from self.compute(
+            lambda: find_tags(image, {tag.id: tag.size_m}),
+            latency_s=options.latency_s,
+            name="find tags",
+            message=message,
+        )
+        return [X_WO @ each.X_OT for each in found if each.ambiguity <= options.most_ambiguity]

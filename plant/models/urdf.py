@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
@@ -67,13 +68,13 @@ def friction(coefficient: float) -> Mapping[str, float]:
 
 
 def pad_shapes(
-    pads: Mapping[str, Any], coefficient: float, stiffness_n_m: float
+    pads: Sequence[Mapping[str, Any]], coefficient: float, stiffness_n_m: float
 ) -> Iterable[tuple[Shape, Mapping[str, float]]]:
-    """Rubber pads: spheres of a `radius` at each of `xz` and `y`, each with its proximity properties."""
+    """Rubber pads: grids of spheres of a `radius` at each of `xz` and `y`, each with its proximity properties."""
     contact = {**friction(coefficient), "point_contact_stiffness": stiffness_n_m}
-    for x, z in pads["xz"]:
-        for y in pads["y"]:
-            yield {"sphere": pads["radius"], "xyz": [x, y, z]}, contact
+    for grid in pads:
+        for (x, z), y in itertools.product(grid["xz"], grid["y"]):
+            yield {"sphere": grid["radius"], "xyz": [x, y, z]}, contact
 
 
 def add_joint(

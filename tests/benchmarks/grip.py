@@ -62,7 +62,8 @@ FINGER_GAINS, SLIDE_GAINS = PdControllerGains(p=60.0, d=0.8), PdControllerGains(
 CLOSING_S, LOADING_S, HOLDING_S, SHAKING_S, PULLING_S = 0.8, 0.5, 5.0, 1.0, 8.0
 SHAKE_M, SHAKE_RAD_S, MOST_LOAD = 0.02, 4.0 * math.pi, 3.0
 TURNED_DEG, SLID_M, LOST_M = 10.0, 0.005, 0.03
-PAD_END_M, HALF_BREADTH_M, PAD_Z_M, BESIDE_M = 0.239, 0.030, -0.036, 0.004
+PAD_END_M, HALF_BREADTH_M, PAD_Z_M, BESIDE_M = 0.239, 0.023, -0.036, 0.004
+"""The half breadth is the mean of the fixed jaw's and the finger's."""
 
 
 @dataclass(frozen=True)
@@ -249,7 +250,7 @@ def spheres(pads: str, part: Mapping[str, Any]) -> Iterator[tuple[urdf.Shape, Ma
     facts = spot_facts()
     if pads == "dots":
         dots = {"radius": DOT_M, "y": DOTS_Y_M, "xz": DOTS[part["link"]]}
-        yield from urdf.pad_shapes(dots, facts["pad_friction"], DOT_STIFFNESS_N_M)
+        yield from urdf.pad_shapes([dots], facts["pad_friction"], DOT_STIFFNESS_N_M)
     elif pads == "grid":
         yield from urdf.pad_shapes(part["pads"], facts["pad_friction"], facts["pad_stiffness_n_m"])
 

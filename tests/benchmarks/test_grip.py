@@ -11,7 +11,7 @@ BY_NAME = {thing.name: thing for thing in THINGS}
 @pytest.mark.parametrize("name", ["hammer bar", "round handle", "25 mm peg", "bottle's neck"])
 def test_gripper_holds_a_thing_beside_its_centre_of_mass(name):
     result = held("grid", BY_NAME[name], 100.0, TIME_STEP_S)
-    assert result["held"] and result["shaken_deg"] < 10.0, result
+    assert result["held"] and result["shaken_deg"] < 12.0, result
 
 
 def test_round_handle_settles_between_sparse_dots():

@@ -159,18 +159,21 @@ def _add_lift(robot: ElementTree.Element, lift: Mapping[str, Any], root: str) ->
 
 def _add_finger(robot: ElementTree.Element, name: str, side: int, finger: Mapping[str, Any], *, pads: bool) -> None:
     """Adds a finger; the finger of side -1 is mirrored along z, the direction of closing."""
-    rubber = finger["pads"]
     part = {
         **{key: value for key, value in finger.items() if key != "pads"},
         "com": _mirrored(finger["com"], side),
         "shapes": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["shapes"]],
         "visuals": [{**shape, "xyz": _mirrored(shape["xyz"], side)} for shape in finger["visuals"]],
-        **({"pads": {**rubber, "xz": [[x, side * z] for x, z in rubber["xz"]]}} if pads else {}),
+        **({"pads": [_mirrored_grid(grid, side) for grid in finger["pads"]]} if pads else {}),
         "axis": (0, 0, side),
         "range": (0.0, finger["travel"]),
     }
     _add(robot, name, part)
     urdf.add_joint(robot, name, HAND_LINK, name, part, "prismatic")
+
+
+def _mirrored_grid(grid: Mapping[str, Any], side: int) -> Mapping[str, Any]:
+    return {**grid, "xz": [[x, side * z] for x, z in grid["xz"]]}
 
 
 def _mirrored(xyz: Sequence[float], side: int) -> list[float]:

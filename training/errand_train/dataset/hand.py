@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -29,9 +30,8 @@ def hand_mesh(opening_rad: float) -> Mesh:
     for shape in links[_FINGER]["collision"]:
         _add_box(finger, "black", shape)
     for link, part in ((_PALM, mesh), (_FINGER, finger)):
-        pads = links[link]["pads"]
-        for x, z in pads["xz"]:
-            for y in pads["y"]:
+        for grid in links[link]["pads"]:
+            for (x, z), y in itertools.product(grid["xz"], grid["y"]):
                 part.add_box("pad", (x - 0.006, y - 0.006, z - 0.006), (x + 0.006, y + 0.006, z + 0.006))
     c, s = np.cos(-opening_rad), np.sin(-opening_rad)
     mesh.add_mesh(finger, [[c, 0, s], [0, 1, 0], [-s, 0, c]], links[_FINGER]["offset"])

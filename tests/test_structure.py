@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7421,
     "executive/cli": 3842,
-    "skills": 26194,
+    "skills": 26243,
     "plant": 11712,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 454, 73, 8

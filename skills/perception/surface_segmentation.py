@@ -50,6 +50,8 @@ _SAME_OBJECT_M = 0.06
 _LEAST_OVERLAP = 0.2
 _LEAST_PART = 0.15
 _APART_M = 0.035
+_MOSTLY_AMONG = 0.8
+"""Share of a cluster's pixels from which on it counts as a part of a detected object."""
 _COLUMN_M = 0.04
 _UNDER_HANGING_M = 0.12
 _LOWEST_HIDDEN_M = 0.28
@@ -78,7 +80,8 @@ _SEGMENT_SCORE = 0.7
 """Probability that a segment is an object: one picture may show noise, or a part of one."""
 _RIM_M = 0.02
 _BORDER_PX = 2
-_LONGEST_M = 0.6
+LONGEST_M = 0.6
+"""Length (m) from which on a segment is no object, but a wall or furniture."""
 _SIGMA_M = (0.012, 0.012, 0.008)
 
 
@@ -212,8 +215,10 @@ def _apart(cluster: Cluster, detected: Detection3D) -> float:
 def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
     """Splits a detected object from a cluster that holds others as well, such as one that touches it.
 
-    A part right above or below the object is not split off, since its box has only left it out.
+    A part right above or below the object is not split off, since its box has only left it out. Joins clusters that
+    the detected object holds.
     """
+    view = _join_detected(view, detected)
     whole = matching_cluster(view.clusters, detected)
     if whole is None or len(detected.pixels) == 0:
         return view
@@ -227,6 +232,24 @@ def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
     parts = tuple(_cluster(points, whole.surface, whole.plane, detected.eye_W) for points in halves)
     others = tuple(each for each in view.clusters if each is not whole)
     return SurfaceView(view.plane, view.plane_points, (*parts, *others))
+
+
+def _join_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
+    """Joins the clusters among a detected object's pixels: where depth is lost, a wrench falls to pieces."""
+    if len(detected.pixels) == 0 or len(view.clusters) < 2:
+        return view
+    pixels = [each.points.pixels for each in view.clusters]
+    among = np.split(
+        _are_among(np.concatenate(pixels), detected.pixels), np.cumsum([len(each) for each in pixels])[:-1]
+    )
+    parts = [each for each, own in zip(view.clusters, among, strict=True) if np.mean(own) > _MOSTLY_AMONG]
+    if len(parts) < 2:
+        return view
+    clouds = [(each.points.p_W, each.points.pixels, each.points.colours) for each in parts]
+    points = PointCloud(*(np.concatenate(each) for each in zip(*clouds, strict=True)))
+    whole = _cluster(points, parts[0].surface, parts[0].plane, detected.eye_W)
+    rest = tuple(each for each in view.clusters if not any(each is part for part in parts))
+    return SurfaceView(view.plane, view.plane_points, (whole, *rest))
 
 
 def _are_among(pixels: NDArray[np.int64], of_object: NDArray[np.int64]) -> Mask:
@@ -375,7 +398,7 @@ def _unlabelled(view: SurfaceView, labelled: Sequence[Detection3D], p_WC: FloatA
 
 def _stands_on(cluster: Cluster, outline_W: tuple[tuple[float, float], ...]) -> bool:
     centre = np.array([cluster.shape.centre])
-    return cluster.shape.length_m < _LONGEST_M and bool(inside_polygon(centre, outline_W, -_RIM_M)[0])
+    return cluster.shape.length_m < LONGEST_M and bool(inside_polygon(centre, outline_W, -_RIM_M)[0])
 
 
 def _is_cut_off(cluster: Cluster, image: Image) -> bool:

@@ -18,6 +18,7 @@ from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.surface_segmentation import (
+    LONGEST_M,
     Cluster,
     SurfaceView,
     matching_cluster,
@@ -33,11 +34,16 @@ SURFACE_AROUND_M = 0.2
 """Half side of the patch around the object that counts as surface although its edge may be unseen."""
 _SURFACE_YIELDS_M = 0.003
 """Depth by which the surface is taken lower than it was seen."""
+_NEIGHBOUR_GROWN_M = 0.005
+"""Distance by which the boxes of neighbours are larger than what was seen of them, by the noise of the depth."""
 
 
 @dataclass(frozen=True)
 class CloseView:
-    """Close view of an object and its obstacles, with X_WB at that time. `others` are objects among the boxes."""
+    """Close view of an object and its obstacles, with X_WB at that time.
+
+    `others` are the objects among the boxes; what is longer than objects are, such as a wall, is none.
+    """
 
     target: Target
     boxes: tuple[Box, ...]
@@ -84,13 +90,17 @@ def examine(
         return None
     names = {id(matching_cluster(view.clusters, each)): each.class_name for each in found}
     others = tuple(
-        Obstacle(_observed(each, names.get(id(each), ANY_OBJECT), seen, image), tuple(cluster_boxes([each], X_WB)))
+        Obstacle(
+            _observed(each, names.get(id(each), ANY_OBJECT), seen, image),
+            tuple(cluster_boxes([each], X_WB, _NEIGHBOUR_GROWN_M)),
+        )
         for each in view.clusters
         if each is not cluster
     )
     surfaces = surface_boxes([_seen_surface(view, surface, cluster.shape.centre)], X_WB)
     boxes = (*surfaces, *(box for other in others for box in other.boxes))
-    return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, others)
+    objects = tuple(other for other in others if max(other.seen.size_m) < LONGEST_M)
+    return CloseView(_target(cluster, X_WB), boxes, cluster_box(cluster, X_WB), X_WB, objects)
 
 
 def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArray) -> SurfaceView:

@@ -71,6 +71,8 @@ _WIDE_PARALLEL: Final = 0.98
 """Opening of a parallel gripper that reaches for an object, as a part of its widest."""
 _GAP_BESIDE_M = 0.045
 """Space left beside an object by a gripper that opens only as far as needed."""
+_LEAST_BESIDE_M = 0.025
+"""Least space that the fingers need beside an object that passes between them."""
 _LESS_OPEN_RAD = 0.2
 """A narrower opening must differ at least by this from the wide one."""
 _GRASPABLE_M = 0.09
@@ -209,11 +211,23 @@ def wide_share(gripper: GripperCapabilities) -> float:
 def openings(candidates: Sequence[GraspCandidate], gripper: GripperCapabilities) -> tuple[float, ...]:
     """Returns openings for the approach: wide and, because neighbours may leave no space, only as far as needed.
 
-    The opening is about proportional to the finger's angle.
+    The latter are for the narrowest and the widest grasp. An opening is about proportional to the finger's angle.
     """
-    wide = wide_share(gripper) * gripper.widest
-    narrow = gripper.opening_for(min(each.width_m for each in candidates) + _GAP_BESIDE_M)
-    return (wide, narrow) if narrow < wide - gripper.like_turn(_LESS_OPEN_RAD) else (wide,)
+    widths_m, found = [each.width_m for each in candidates], [wide_share(gripper) * gripper.widest]
+    for width_m in (min(widths_m), max(widths_m)):
+        narrow = gripper.opening_for(width_m + _GAP_BESIDE_M)
+        if narrow < found[0] and min(abs(narrow - each) for each in found) > gripper.like_turn(_LESS_OPEN_RAD):
+            found.append(narrow)
+    return tuple(found)
+
+
+def passing(
+    candidates: Sequence[GraspCandidate], opening: float, gripper: GripperCapabilities
+) -> Sequence[GraspCandidate]:
+    """Returns the grasps whose object passes between the fingers at one of the `openings`."""
+    if opening >= wide_share(gripper) * gripper.widest:
+        return candidates
+    return [each for each in candidates if gripper.opening_for(each.width_m + _LEAST_BESIDE_M) <= opening]
 
 
 def body_heights_m(base_m: float, capabilities: Capabilities) -> tuple[float, ...]:

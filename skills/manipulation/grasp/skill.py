@@ -33,6 +33,7 @@ from skills.manipulation.grasp.reach import (
     body_heights_m,
     choose_with_look,
     openings,
+    passing,
     reach_check,
     space_about,
     up_B,
@@ -317,7 +318,8 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
 
         def planned(scene: ArmScene, opening: float, space: Surroundings) -> tuple[GraspPlan, float]:
             scene.set_opening(opening)
-            return stack.grasp_planner.plan(scene, q, candidates, space, stack.arm_planner, self._rng), opening
+            grasps = passing(candidates, opening, self.gripper)
+            return stack.grasp_planner.plan(scene, q, grasps, space, stack.arm_planner, self._rng), opening
 
         def plan() -> tuple[GraspPlan, float]:
             """Plans for the first opening with a plan; only the last opening is asked for the objects in the way."""

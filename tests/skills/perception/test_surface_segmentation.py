@@ -218,3 +218,14 @@ def test_a_gap_of_two_centimetres_divides_two_cans():
 def test_a_low_bar_stays_whole_where_the_noise_of_the_surface_hides_a_part_of_it():
     halves = [Can(1.0, y, 0.012, 0.014, GREEN) for y in np.arange(-0.1, 0.1, 0.012) if abs(y) > 0.01]
     assert len(viewed(scene(halves)).clusters) == 1
+
+
+def test_the_pieces_of_a_detected_object_are_joined():
+    pieces = [Can(1.0, y, 0.012, 0.014, GREEN) for y in (-0.09, -0.08, -0.07, 0.07, 0.08, 0.09)]
+    image = scene([*pieces, Can(1.2, 0.2, 0.033, 0.115, BLUE)])
+    view = viewed(image)
+    assert len(view.clusters) == 3
+    (detected,) = detections_3d(image, PLACE, [seen_as("wrench", image, GREEN)], [TABLE])
+    joined = split_detected(view, detected)
+    assert len(joined.clusters) == 2
+    assert matching_cluster(joined.clusters, detected).shape.length_m == pytest.approx(0.2, abs=0.02)

@@ -39,3 +39,10 @@ def test_a_neighbour_is_reported_with_its_position_and_size():
 
 def test_a_missing_object_is_not_seen():
     assert examined([], ONE) is None
+
+
+def test_a_wall_beside_the_object_is_an_obstacle_and_no_object_in_the_way():
+    wall = [Can(1.15, y, 0.03, 0.3, GREEN) for y in np.arange(-0.36, 0.37, 0.04)]
+    view = examined([ONE, *wall], ONE)
+    assert view.others == ()
+    assert len(view.boxes) > 1

@@ -12,8 +12,16 @@ from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.held_object import square_hand_pose
 from skills.manipulation.arm.poses import hand_rotation
+from skills.manipulation.grasp.candidates import GraspCandidate
 from skills.manipulation.grasp.planning import GeometricGraspPlanner
-from skills.manipulation.grasp.reach import ReachCheck, body_heights_m, raise_onto_surface, space_about
+from skills.manipulation.grasp.reach import (
+    ReachCheck,
+    body_heights_m,
+    openings,
+    passing,
+    raise_onto_surface,
+    space_about,
+)
 from skills.robot import Pose2D
 
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
@@ -115,3 +123,11 @@ def test_an_object_that_seems_sunk_into_its_surface_is_raised_onto_it(seen_m, st
 
 def test_an_object_on_no_known_surface_stays_where_it_was_seen():
     assert raise_onto_surface(CAN, ()) == CAN
+
+
+def test_a_gripper_that_opens_for_a_neck_is_not_led_about_the_body_of_the_bottle():
+    neck, body = (GraspCandidate(RigidTransform(), width_m, 0.0, 0.0) for width_m in (0.028, 0.062))
+    wide, for_neck, for_body = openings([neck, body], GRIPPER)
+    assert wide > for_body > for_neck
+    assert passing([neck, body], for_neck, GRIPPER) == [neck]
+    assert passing([neck, body], for_body, GRIPPER) == passing([neck, body], wide, GRIPPER) == [neck, body]

@@ -234,7 +234,8 @@ class _LastPose:
 class SkillContext:
     """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
-    `doors` are those on the robot's map, `tags` the AprilTags that it knows.
+    `doors` are those on the robot's map, `tags` the AprilTags that it knows. `walls` are the map's columns (N, 2) of
+    cells that are solid at the arm's heights (`skills.manipulation.arm.solid_cells`).
     """
 
     robot: Robot
@@ -254,6 +255,7 @@ class SkillContext:
     traffic: Traffic = NO_TRAFFIC
     doors: tuple[Doorway, ...] = ()
     tags: tuple[Tag, ...] = ()
+    walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
 
     def X_WB(self) -> RigidTransform:

@@ -18,19 +18,19 @@ LINES = {
     "executive/language": 7672,
     "executive/speech": 1588,
     "executive/mission": 1512,
-    "executive/tree": 7430,
-    "executive/run": 3078,
+    "executive/tree": 7586,
+    "executive/run": 3083,
     "executive/record": 950,
-    "executive/store": 1671,
+    "executive/store": 1675,
     "executive/conversation": 581,
     "executive/view": 1368,
     "executive/testing": 810,
-    "executive/app": 7421,
+    "executive/app": 7450,
     "executive/cli": 3842,
-    "skills": 26243,
-    "plant": 11712,
+    "skills": 26357,
+    "plant": 11717,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 454, 73, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 455, 73, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

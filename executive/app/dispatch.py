@@ -37,6 +37,7 @@ from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.visitor import Assigner, MissionEnd, Progress, RunEntry
 from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionState, MissionStore
+from executive.tree.last_known import Sign
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
 from plant.robots.robot_kind import PlacedRobot
@@ -221,11 +222,12 @@ class Dispatch(Assigner):
     def _try_another(self, name: str, end: MissionEnd) -> bool:
         """Offers a failed mission to the other robots, once; returns whether one of them can do it.
 
-        The robot's gripper must be empty, and it must not have put anything down.
+        The robot's gripper must be empty, and it must not have let anything go.
         """
         number, robot = self._auction.under_way[name], self._robots[name]
-        mission = self.missions[number]
-        clear = end.seen is not None and not end.seen.holding and not robot.progress.put
+        mission, known = self.missions[number], self._robots[name].last_known
+        let_go = robot.progress.put or (known is not None and known.sign is Sign.RELEASED)
+        clear = end.seen is not None and not end.seen.holding and not let_go
         again = replace(mission, tried={name: f"it tried: {end.result.message}"})
         others = (other for other in self._auction.robots if other != name)
         if (
@@ -342,12 +344,12 @@ class Dispatch(Assigner):
     def _requeue(self, name: str, result: RobotResult) -> int:
         """Queues the rest of a robot's mission; returns its number."""
         number = self._auction.hand_back(name)
-        mission, done = self.missions[number], self._robots[name].progress.done
-        if done:
-            share = Share(mission.options[name].tree, result, done)
-            options = {other: rest_of(each, done) for other, each in mission.options.items()}
-            self.missions[number] = replace(mission, options=options, shares=(*mission.shares, share))
-        self._given.hand_back(number)
+        mission, robot = self.missions[number], self._robots[name]
+        done, known = robot.progress.done, robot.last_known
+        shares = (Share(mission.options[name].tree, result, done),) if done else ()
+        options = {other: rest_of(each, done, known) for other, each in mission.options.items()}
+        self.missions[number] = replace(mission, options=options, shares=(*mission.shares, *shares))
+        self._given.hand_back(number, known)
         self.store.finish(number, MissionState.QUEUED, "")
         self._log_missions()
         return number
@@ -368,7 +370,9 @@ class Dispatch(Assigner):
         self.over.append(EndedMission(number, ended, since_s, self._now_s))
         self._end_part(number, Share(tree, result, len(tree.parts)), seen)
         tried = {} if result.outcome is Outcome.SUCCESS else mission.tried
-        message = "; ".join([result.message, *(f"{other} before: {why}" for other, why in tried.items())])
+        known, reasons = self._robots[name].last_known, (f"{other} before: {why}" for other, why in tried.items())
+        lies = known is not None and known.sign is not Sign.SEEN and result.outcome is not Outcome.SUCCESS
+        message = "; ".join([result.message, *([str(known)] if lies else []), *reasons])
         self._finish(number, MissionState(result.outcome.value), message)
 
     def _end_part(self, number: int, share: Share, seen: Mapping[str, Any] | None) -> None:

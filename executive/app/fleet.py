@@ -24,6 +24,7 @@ from executive.store.missions import MissionStore, StoredMission
 from executive.tree.check import Checked
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import RoutePlanner, load_estimates
+from executive.tree.last_known import LastKnown, LastKnownTracker
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import KnowsPlace
 from executive.words.command import Command, Task
@@ -43,6 +44,7 @@ URGENT: Final = 0.5
 """Share of the low charge at which a robot goes to its dock although it holds an object."""
 _TOUCHED: Final = (Status.RUNNING, Status.SUCCESS)
 _HEADINGS: Final = 16
+NOT_GIVEN: Final = GivenMission()
 
 
 @dataclass(frozen=True)
@@ -67,15 +69,16 @@ def fleet_mission(
     world: World,
     knowledge: Knowledge,
     robots: Mapping[str, PlacedRobot],
-    done: int = 0,
+    given: GivenMission = NOT_GIVEN,
 ) -> FleetMission:
-    """Prepares a mission of the store, without its first `done` commands, for these robots.
+    """Prepares what is left of a mission of the store for these robots, by how it was given to them before.
 
     Raises InputError with the mission's number if none of them can do it.
     """
     try:
         options = _options(stored, world, knowledge, robots)
-        return FleetMission(stored, {name: rest_of(each, done) for name, each in options.items()})
+        rests = {name: rest_of(each, given.done, given.last_known) for name, each in options.items()}
+        return FleetMission(stored, rests)
     except InputError as error:
         what = f"mission {stored.id} ({stored.request.name}): {error.message}"
         raise InputError(what, hint=error.hint or "it stays in the queue", file=error.file, line=error.line) from error
@@ -110,9 +113,11 @@ def _options(
     return {name: setting.for_robot(name).compile(mission) for name, mission in missions.items()}
 
 
-def rest_of(prepared: Prepared, done: int) -> Prepared:
-    """Returns a mission of plain commands without the first `done`."""
-    return with_commands(prepared, prepared.tree.commands[done:]) if done else prepared
+def rest_of(prepared: Prepared, done: int, last_known: LastKnown | None) -> Prepared:
+    """Returns a mission of plain commands without the first `done`; the object is searched first where it was known."""
+    if not done and (last_known is None or not is_plain(prepared.tree)):
+        return prepared
+    return with_commands(replace(prepared, last_known=last_known), prepared.tree.commands[done:])
 
 
 def surfaces_of(prepared: Prepared) -> frozenset[str]:
@@ -263,15 +268,17 @@ def _changing(node: NodeSpec, over: set[str]) -> list[NodeSpec]:
 
 
 class ProgressJournal:
-    """Follows the progress of a mission and reports each change of it."""
+    """Follows the progress of a mission and reports each change of it; `last_known` is where its object is."""
 
     def __init__(self, tree: CompiledTree, tell: Callable[[MissionProgress], None]) -> None:
         self._tree, self._tell = tree, tell
+        self._tracker = LastKnownTracker(tree.root)
         self._statuses: dict[str, Status] = {}
         self.progress = MissionProgress(0)
 
     def note(self, note: TickNote) -> None:
         """Takes the changes of a tick."""
+        self._tracker.note(note.board, note.pose)
         if not note.changes:
             return
         for change in note.changes:
@@ -281,6 +288,11 @@ class ProgressJournal:
         if progress != self.progress:
             self.progress = progress
             self._tell(progress)
+
+    @property
+    def last_known(self) -> LastKnown | None:
+        """Last known place of the mission's object."""
+        return self._tracker.last
 
 
 @dataclass
@@ -316,6 +328,11 @@ class FleetRobot:
     def progress(self) -> MissionProgress:
         """Progress of its mission."""
         return MissionProgress(0) if self.journal is None else self.journal.progress
+
+    @property
+    def last_known(self) -> LastKnown | None:
+        """Last known place of its mission's object."""
+        return None if self.journal is None else self.journal.last_known
 
 
 class Offers:

@@ -11,6 +11,7 @@ from typing import Final
 from executive.app.artifacts import Artifacts
 from executive.app.dispatch import Dispatch, silence
 from executive.app.fleet import (
+    NOT_GIVEN,
     FleetMission,
     charging_missions,
     fleet_mission,
@@ -124,7 +125,7 @@ def simulated_fleet(
                 world=where,
                 knowledge=knowledge,
                 robots=robots,
-                done=given[each.id].done if each.id in given else 0,
+                given=given.get(each.id, NOT_GIVEN),
             )
         except InputError as error:
             left_out.add(error)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.last_known import LastKnown
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
@@ -28,7 +29,8 @@ class Prepared:
     `meant` is the meaning of its sentence, if it has one. `robots` are all robots of the run by their names.
 
     In a run with several robots, `others` are the missions of the other robots. This mission begins when the missions
-    of the robots `after` have ended; the speaker stands at `speaker_W` (None: beside this robot).
+    of the robots `after` have ended; the speaker stands at `speaker_W` (None: beside this robot). `last_known` is where
+    another robot last knew the object of the mission to be.
     """
 
     request: Request
@@ -41,6 +43,7 @@ class Prepared:
     others: tuple[Prepared, ...] = ()
     after: tuple[str, ...] = ()
     speaker_W: Pose2D | None = None
+    last_known: LastKnown | None = None
 
     @property
     def all(self) -> tuple[Prepared, ...]:
@@ -54,7 +57,8 @@ class Prepared:
 
     def with_mission(self, mission: Mission) -> Prepared:
         """Compiles another mission in place of this one. Raises InputError if it cannot be compiled."""
-        tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
+        known, registry = self.last_known, installed_skills()
+        tree = compile_mission(mission, knowledge=self.knowledge, registry=registry, last_known=known)
         return replace(self, mission=mission, meant=None).with_tree(tree)
 
     def with_tree(self, tree: CompiledTree) -> Prepared:

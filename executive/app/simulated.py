@@ -29,6 +29,7 @@ from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
+from skills.manipulation.arm.solid_cells import wall_columns
 from skills.navigate.lattice import search
 from skills.robot import Clock, Pose2D
 from skills.stack import RobotStack, default_stack
@@ -200,6 +201,7 @@ def run_entry(
     stack = stack or default_stack()
     seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
     scan_map, keepout_map = load_grid_map(world.scan_map_seen_from(seen_from_m)), load_grid_map(world.keepout_map_path)
+    scan_maps = [load_grid_map(path) for path in world.scan_map_paths]
     start = believed or (simulation.starts[tree.robot_name] if start_known else None)
     try:
         localiser = stack.localiser.build(scan_map, start, surely=start_known and believed is None)
@@ -212,4 +214,5 @@ def run_entry(
         costmap=stack.costmap.build(keepout_map),
         detector=shared_detector(stack),
         stack=stack,
+        walls=wall_columns(scan_maps, tree.surfaces),
     )

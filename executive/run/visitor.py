@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from py_trees.behaviour import Behaviour
 
 from executive.record.work import Work
@@ -28,7 +30,8 @@ class RunEntry:
     """Robot with its tree, estimators, detector and stack.
 
     The mission begins when the robots `after` have succeeded with theirs, and fails when one of them fails. The person
-    who asked for it stands at `speaker_W` (world frame; None: where the robot begins).
+    who asked for it stands at `speaker_W` (world frame; None: where the robot begins). `walls` are those of the robot's
+    map (`skills.api.SkillContext`).
     """
 
     tree: CompiledTree
@@ -39,6 +42,7 @@ class RunEntry:
     stack: RobotStack = field(default_factory=default_stack)
     after: tuple[str, ...] = ()
     speaker_W: Pose2D | None = None
+    walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
 
 
 @dataclass(frozen=True)

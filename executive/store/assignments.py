@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from executive.store.database import form
 from executive.store.missions import MissionState, MissionStore
+from executive.tree.last_known import LastKnown
 
 _FAILED: Final = (MissionState.FAILURE, MissionState.ERROR, MissionState.CANCELLED)
 
@@ -18,7 +19,8 @@ class GivenMission:
 
     `robot` is the present or last robot; the mission was passed to another `reassigned` times. The first `done` of its
     commands are done and are not repeated; `blocked` is the reason why the mission cannot restart from its present
-    command. `referee` is the verdict at the end, as JSON values.
+    command. `last_known` is where its robot last knew the object to be. `referee` is the verdict at the end, as JSON
+    values.
 
     A mission that no robot could do alone is split into missions that are `part_of` it; a part that `follows` another
     begins when that one is done.
@@ -28,6 +30,7 @@ class GivenMission:
     reassigned: int = 0
     done: int = 0
     blocked: str | None = None
+    last_known: LastKnown | None = None
     referee: Mapping[str, Any] | None = None
     part_of: int | None = None
     follows: int | None = None
@@ -54,9 +57,10 @@ class GivenMissions:
         """Notes how many commands are done, and why the present one cannot be restarted (None: it can)."""
         self._put(mission, replace(self._of(mission), done=done, blocked=blocked))
 
-    def hand_back(self, mission: int) -> None:
-        """Returns the mission, so that it waits for another robot."""
-        self._put(mission, replace(self._of(mission), blocked=None))
+    def hand_back(self, mission: int, last_known: LastKnown | None = None) -> None:
+        """Returns the mission, so that it waits for another robot, with what is newly known of its object."""
+        known = self._of(mission)
+        self._put(mission, replace(known, blocked=None, last_known=last_known or known.last_known))
 
     def split(self, mission: int, parts: Sequence[int]) -> None:
         """Notes that the mission is split into parts, which run one after the other."""

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from executive.mission.certainty import refuse_certain_comparisons
 from executive.mission.gripper import InGripper, held_after_either
+from executive.tree.last_known import LastKnown
 from executive.tree.nodes.policies import under_policy
 from executive.tree.plan import PICK_UPS, Assembled, PlanBuilder, Registry
 from executive.words.command import START, Command
@@ -119,7 +120,8 @@ class Assembler:
     """Assembler of one mission's subtrees by the `plans` of its steps.
 
     `pick_ups` and `move_aside` hold for steps that do not say otherwise; `flow` is the data flow at the present point.
-    Values that steps set have blackboard keys below `values_base`.
+    Values that steps set have blackboard keys below `values_base`. `last_known` is where another robot last knew the
+    object of the mission to be.
     """
 
     knowledge: Knowledge
@@ -129,11 +131,15 @@ class Assembler:
     pick_ups: int = PICK_UPS
     move_aside: int = 0
     values_base: str = ""
+    last_known: LastKnown | None = None
     flow: Flow = field(default_factory=Flow)
 
     def builder(self, path_id: str, source: SourceLine | None) -> PlanBuilder:
         """Returns the builder of nodes that belong to no single command."""
-        return PlanBuilder(self.knowledge, self.registry, path_id, self.start_key, Command(goal=START), source)
+        here = Command(goal=START)
+        return PlanBuilder(
+            self.knowledge, self.registry, path_id, self.start_key, here, source, last_known=self.last_known
+        )
 
     def level(self, steps: Sequence[Step], base: str) -> Assembled:
         """Assembles steps in a row; a step under a policy becomes one subtree, other steps keep theirs."""

@@ -105,18 +105,21 @@ def check_tree(
 
     commands = ((part, part.command) for part in tree.parts if part.command is not None)
     impossible = errors((part, each) for part, it in commands for each in _impossible(it, knowledge, abilities))
-    needs = ((part, _objection(part, held if part.opening else part.held, knowledge)) for part in tree.parts)
+    starts = ((part, held if part.opening else part.held) for part in tree.parts)
+    needs = ((part, _objection(part, before, knowledge, abilities)) for part, before in starts)
     grasps = errors((part, each) for part, each in needs if each is not None)
     full = errors(_full_surfaces(tree, knowledge, abilities))
     estimate, unreachable, warnings = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
     return Checked((*impossible, *grasps, *unreachable), estimate, (*full, *warnings))
 
 
-def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge) -> Fault | None:
-    """Returns the error of a part that cannot run with the object in the gripper, or None."""
+def _objection(part: StepPart, held: InGripper | None, knowledge: Knowledge, abilities: Abilities) -> Fault | None:
+    """Returns the error of a part that cannot run with the object in the gripper, or without a gripper; or None."""
     skill = part.skill
     if part.command is not None or skill is None:
         return None if part.command is None else objection(part.command, held, knowledge)
+    if not abilities.gripper and (skill.gripper_before is not None or skill.gripper_after is not None):
+        return f"this kind of robot has no gripper, which {skill.name} needs", "choose another kind of robot"
     if skill.gripper_before is True and held is None:
         return f"{skill.name} needs an object in the gripper, and no step before has grasped one", "grasp one first"
     if skill.gripper_before is False and held is not None and held.sure:

@@ -15,6 +15,7 @@ from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedNode
 from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr
 from executive.tree.context import RunContext
+from executive.tree.last_known import LastKnown
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import buttons_of
 from executive.tree.nodes.door_check import doorway
@@ -30,7 +31,7 @@ from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
-from skills.api import Tag
+from skills.api import Surface, Tag
 from skills.files.errors import InputError, suggestion
 from skills.perception.doorway import Doorway
 
@@ -41,8 +42,8 @@ __all__ = ["CompiledTree", "StepPart", "compile_mission"]
 class CompiledTree:
     """Tree of a mission for one robot, as data.
 
-    `parts` are its parts with goal conditions in order, `steps` the compiled steps, `doors` and `tags` the doors and
-    the AprilTags of the knowledge file. Its root has monitors and interrupts above the mission: see
+    `parts` are its parts with goal conditions in order, `steps` the compiled steps, `doors`, `tags` (AprilTags) and
+    `surfaces` those of the knowledge file. Its root has monitors and interrupts above the mission: see
     `executive.tree.nodes.interrupts`.
     """
 
@@ -54,6 +55,7 @@ class CompiledTree:
     steps: tuple[Step, ...] = ()
     doors: tuple[Doorway, ...] = ()
     tags: tuple[Tag, ...] = ()
+    surfaces: tuple[Surface, ...] = ()
 
     @property
     def mission(self) -> NodeSpec:
@@ -75,13 +77,16 @@ class CompiledTree:
         return tuple(node.path_id for node in self.root.walk())
 
 
-def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registry) -> CompiledTree:
+def compile_mission(
+    mission: Mission, *, knowledge: Knowledge, registry: Registry, last_known: LastKnown | None = None
+) -> CompiledTree:
     """Compiles a mission to a tree and checks its wiring; each node has the line of the mission file behind it.
 
     Args:
         mission: the mission; its robot and name become the first parts of the path ids.
         knowledge: the world's places, surfaces, objects and people.
         registry: the skills by name.
+        last_known: where another robot last knew the object of the mission to be; it is searched there first.
 
     Raises InputError when there are no steps, a place, object or skill is unknown, ports are wired wrongly, or a
     command cannot be carried out; with the file and line where known, and all further errors in `others`.
@@ -90,15 +95,14 @@ def compile_mission(mission: Mission, *, knowledge: Knowledge, registry: Registr
         raise InputError(f"the mission '{mission.name}' has no commands", hint="add at least one step")
     base, start = f"{slug(mission.robot_name)}/{slug(mission.name)}", start_key(mission.robot_name, mission.name)
     pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
-    assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0)
+    assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0, last_known=last_known)
     builder, steps = assembler.builder(base, mission.source), mission_plan(assembler, mission, base)
     root = watch_plan(builder, _whole(mission, builder, steps.nodes))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
-    tags = knowledge.known_tags()
-    return CompiledTree(
-        mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps, doors, tags
-    )
+    tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.surfaces))
+    own = (mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps)
+    return CompiledTree(*own, doors, tags, surfaces)
 
 
 def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from executive.mission.gripper import InGripper
 from executive.tree.board import Constant, FromBoard
+from executive.tree.last_known import LastKnown
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing_skill
@@ -24,8 +25,9 @@ from skills.robot import Pose2D
 
 Registry = Mapping[str, type[Skill[Any]]]
 STOW: Final = "stow"
+BACK_OFF: Final = "back_off"
 _BLOCKED: Final = Recovery((Trigger(frozenset({Cause.PLANNING, Cause.EXECUTION}), "navigate"),))
-NAVIGATE_RECOVERIES: Final[Mapping[str, Recovery]] = {"clear_costmap": _BLOCKED, "back_off": _BLOCKED}
+NAVIGATE_RECOVERIES: Final[Mapping[str, Recovery]] = {"clear_costmap": _BLOCKED, BACK_OFF: _BLOCKED}
 """Recoveries of a drive that is blocked, by the skill that each runs before the next attempt."""
 PICK_UPS: Final = 2
 """Number of times that a dropped object is picked up again, unless a mission says otherwise."""
@@ -90,7 +92,7 @@ class PlanBuilder:
     `avoided`: objects there are at their goal. With `in_gripper`, an earlier step has grasped the object; `carried` is
     the object that an earlier step has grasped, whether this step uses it or not. A dropped object is picked up again
     at most `pick_ups` times; at most `move_aside` objects that block a grasp are moved aside. `following` is the next
-    command.
+    command. `last_known` is where another robot last knew the object of the mission to be.
     """
 
     knowledge: Knowledge
@@ -106,6 +108,7 @@ class PlanBuilder:
     pick_ups: int = PICK_UPS
     move_aside: int = 0
     following: Command | None = None
+    last_known: LastKnown | None = None
 
     def at(self, *parts: str) -> PlanBuilder:
         """Returns the builder of a subtree below."""
@@ -135,15 +138,17 @@ class PlanBuilder:
         """Builds a leaf that runs the skill `name`, below this path id or `here`. Inputs that are no bindings are
         constants; `outputs` are blackboard keys.
 
-        Before a skill that moves the base but not the arm, the leaf stows the arm if it may be anywhere. Raises
-        InputError when no skill of that name is registered.
+        Before a skill that moves the base but not the arm, the leaf stows the arm if it may be anywhere; where the arm
+        has no free path, the robot backs off before it stows again. Raises InputError when no skill of that name is
+        registered.
         """
         if name not in self.registry:
             raise self.error(*missing_skill(name, self.registry))
         skill = self.registry[name]
         bound = {port: v if isinstance(v, Constant | FromBoard) else Constant(v) for port, v in (inputs or {}).items()}
         drives = Part.BASE in skill.uses and Part.ARM not in skill.uses
-        first = {"first": self.registry[STOW]} if drives and STOW in self.registry else {}
+        stowing = (STOW,) if name == BACK_OFF or BACK_OFF not in self.registry else (STOW, BACK_OFF, STOW)
+        first = {"first": tuple(map(self.registry.__getitem__, stowing))} if drives and STOW in self.registry else {}
         ports = {"inputs": MappingProxyType(bound), "outputs": MappingProxyType(dict(outputs or {}))}
         options = {"skill": skill, **ports, "limit_s": skill.default_timeout_s, **first}
         return self.node("skill", name, part="" if here else slug(name), **options)
@@ -217,6 +222,11 @@ class PlanBuilder:
         if not classes:
             raise self.error(f"the object '{name}' is not known", suggestion(name, self.knowledge.object_names()))
         return classes
+
+    def last_known_of(self, item: ObjectKind) -> LastKnown | None:
+        """Returns where an object was last known to be; None when nobody knows."""
+        known = self.last_known
+        return known if known is not None and known.kind.name in self.classes(item.name) else None
 
     def required_object(self, item: ObjectKind | None) -> ObjectKind:
         """Returns an object of the command. Raises InputError when the command names none, or an unknown one."""

@@ -264,11 +264,16 @@ class World:
         """Path of the grid at the height of the LiDAR."""
         return self._maps / "scan.yaml"
 
+    @property
+    def scan_map_paths(self) -> tuple[Path, ...]:
+        """Paths of the grids at the heights of LiDARs."""
+        return tuple(sorted(self._maps.glob("*scan.yaml")))
+
     def scan_map_seen_from(self, height_m: float | None) -> Path:
         """Path of the grid with the narrowest band around the height of a LiDAR, else `scan_map_path`."""
         if height_m is None:
             return self.scan_map_path
-        bands = {path: _band_m(path) for path in sorted(self._maps.glob("*scan.yaml"))}
+        bands = {path: _band_m(path) for path in self.scan_map_paths}
         fitting = [(high - low, path) for path, (low, high) in bands.items() if low <= height_m <= high]
         return min(fitting)[1] if fitting else self.scan_map_path
 

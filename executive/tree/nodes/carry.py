@@ -26,7 +26,7 @@ from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.guard import Holds
 from executive.tree.nodes.pick_up import LOOK_AGAIN_S, go_near_plan, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery, Trigger
-from executive.tree.nodes.search import detect_plan, place_phrase
+from executive.tree.nodes.search import BACK_M, HALF_M, detect_plan, place_phrase
 from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import START
 from executive.words.outlines import Point, distance_m, inside
@@ -59,7 +59,7 @@ def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromB
     to = "the start" if isinstance(pose, FromBoard) else person
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
-    hand_over = builder.skill("hand_over", ports)
+    hand_over = builder.skill("hand_over", ports, _released(builder, "hand_over"))
     give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
     bring = builder.at("bring").sequence(f"bring it to {person}", way, give)
     return recover_fallen_plan(builder.at("carry-on"), item, f"to {to}", bring, (way, give), (hand_over,))
@@ -84,12 +84,17 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
 def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) -> NodeSpec:
     """Carries the item to a surface and puts it down, both under guards."""
     view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
-    place = builder.skill("place", {"surface": builder.surface(surface)})
+    place = builder.skill("place", {"surface": builder.surface(surface)}, _released(builder, "place"))
     return builder.sequence(
         f"put it on {surface}",
         _holding(carry, item, to, go_near_plan(carry, view, f"the {surface}")),
         _holding(builder.at("put"), item, to, place, until_put_down=True),
     )
+
+
+def _released(builder: PlanBuilder, skill: str) -> dict[str, str]:
+    """Output of a skill that lets an object go: where that was, for the robot that looks for it."""
+    return {"released_W": builder.key("released")} if builder.has_ports(skill, (), ("released_W",)) else {}
 
 
 def carried_along_plan(builder: PlanBuilder, drive: NodeSpec, to: str) -> NodeSpec:
@@ -150,11 +155,8 @@ MISSED: Final = Trigger(frozenset({Cause.POSTCONDITION}))
 """Failures after which an object is picked up again: of a guard that it is held, and of a skill that puts it down."""
 _TURNS_RAD: Final = tuple(math.radians(turn) for turn in (0, 30, -30, 60, -60, 90, -90, 120, -120, 150, -150, 180))
 LOST_WITHIN_M: Final = 2.0
-BACK_M: Final = 0.5
-"""Distance to back off, so that an object before the feet is about as far ahead as in a grasp."""
 AHEAD_M: Final = 0.6
 """Distance before the middle of the body at which a carried object falls."""
-HALF_M: Final = 1.2
 ASIDE_M: Final = ((-0.4, 0.9), (-0.4, -0.9))
 """Further viewpoints of the floor: forward and left of the pose at which the object was lost (m)."""
 

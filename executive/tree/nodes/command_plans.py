@@ -17,12 +17,13 @@ from executive.tree.nodes.guard import HoldsNothingElse
 from executive.tree.nodes.pick_up import go_near_plan, held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
     find_plan,
+    last_known_floor,
     place_phrase,
     refuse_several,
-    required_surfaces,
     search_plan,
     set_answer_options,
     surfaces_elsewhere,
+    surfaces_first_known,
 )
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import START, TIME_UNITS_S, Command, Task
@@ -126,11 +127,13 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     if builder.command.item is not None:
         raise builder.error("the one gripper cannot take hold of a second object", "put the first one down before")
     place = None if builder.command.goal is None else builder.place(builder.command.goal)
-    surfaces = set(required_surfaces(builder, item, place))
+    surfaces = set(surfaces_first_known(builder, item, place))
     if anywhere and builder.anywhere:
         name = builder.knowledge.object_name(item.name) or item.name
         surfaces |= set(surfaces_elsewhere(builder.knowledge, name, place, builder.avoided))
     around = tuple(builder.surface(name) for name in builder.knowledge.surfaces if name in surfaces)
+    if (floor := last_known_floor(builder, item)) is not None:
+        around = (*around, floor)
     key = builder.key("detection")
     search = search_plan(builder.at("find"), item, place, key, anywhere=anywhere)
     get = pick_up_plan(builder, item, search, key, around)

@@ -14,19 +14,27 @@ from executive.tree.behaviour import Explained, ExplainedDecorator
 from executive.tree.board import Board, FromBoard, SurfaceOfDetection, pose_beside
 from executive.tree.goals import surfaces_to_search
 from executive.tree.node import NodeSpec
+from executive.tree.nodes.aside import floor_square
+from executive.tree.nodes.pick_up import go_near_plan
 from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
-from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish, Surface
 from skills.detect.descriptions import count_of, count_sentence, distinct_objects, plural
 from skills.files.errors import listing
+from skills.geometry import compose
+from skills.robot import Pose2D
 
 ANSWER_TOPIC: Final = "answer"
 Ports = Mapping[str, object]
 
 NO_PORTS: Final[Ports] = MappingProxyType({})
 MOST_ELSEWHERE: Final = 3
+HALF_M: Final = 1.2
+"""Half the side of the square of floor on which a fallen object is searched."""
+BACK_M: Final = 0.5
+"""Distance to back off, so that an object before the feet is about as far ahead as in a grasp."""
 MOST_ASIDE: Final = 2
 ASIDE_M: Final = 0.45
 _TALLY: Final = "observations"
@@ -201,14 +209,18 @@ def people_looks(
 def detect_plan(
     builder: PlanBuilder,
     item: ObjectKind,
-    surfaces: tuple[str, ...] | FromBoard,
+    surfaces: tuple[str | Surface, ...] | FromBoard,
     key: str,
     extra: Ports = NO_PORTS,
     *,
     tallied: bool = False,
 ) -> NodeSpec:
     """Looks for the object on surfaces, by name or from the blackboard, from the robot's present pose."""
-    where_to_look = surfaces if isinstance(surfaces, FromBoard) else tuple(map(builder.surface, surfaces))
+    where_to_look: tuple[Surface, ...] | FromBoard
+    if isinstance(surfaces, FromBoard):
+        where_to_look = surfaces
+    else:
+        where_to_look = tuple(each if isinstance(each, Surface) else builder.surface(each) for each in surfaces)
     ports = {"classes": builder.search_classes(item.name), "attributes": item.attributes, "surfaces": where_to_look}
     tally = {_TALLY: builder.key("all")} if tallied else {}
     return builder.skill("detect", {**ports, **extra}, {"observation": key, **tally})
@@ -230,7 +242,7 @@ def search_plan(
     If it is not in its place, the robot looks at some surfaces from the side, then, with `anywhere`, at surfaces
     elsewhere. Raises InputError when the place has no surfaces.
     """
-    surfaces = required_surfaces(builder, item, place)
+    surfaces = surfaces_first_known(builder, item, place)
     name = builder.knowledge.object_name(item.name) or item.name
     elsewhere = (
         surfaces_elsewhere(builder.knowledge, name, place, builder.avoided) if anywhere and builder.anywhere else ()
@@ -242,12 +254,32 @@ def search_plan(
         "selector",
         f"find {item}",
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
+        *_looks_at_last_known(builder.at("last-known"), item, key),
         *(look for _, look in looks),
         *_looks_from_aside(builder, item, surfaces, key),
         *(look for _, look in further),
         exhausted_cause=Cause.PRECONDITION,
         exhausted_message=f"found no {item} {looked}",
     )
+
+
+def last_known_floor(builder: PlanBuilder, item: ObjectKind) -> Surface | None:
+    """Returns the floor around where another robot last knew the object to be; None for an object on a surface."""
+    known = builder.last_known_of(item)
+    if known is None or known.surface in builder.knowledge.surfaces:
+        return None
+    x, y, _ = known.position_W
+    return floor_square(Pose2D(x, y, 0.0), 0.0, HALF_M)
+
+
+def _looks_at_last_known(builder: PlanBuilder, item: ObjectKind, key: str) -> Iterator[NodeSpec]:
+    """Iterates over looks at the floor where another robot last knew the object to be."""
+    known, floor = builder.last_known_of(item), last_known_floor(builder, item)
+    if known is None or floor is None or known.robot_W is None:
+        return
+    here = f"where {known}"
+    drive = go_near_plan(builder, compose(known.robot_W, Pose2D(-BACK_M, 0.0, 0.0)), f"the place {here}")
+    yield builder.sequence(f"look {here}", drive, detect_plan(builder, item, (floor,), key))
 
 
 def _looks_from_aside(
@@ -265,6 +297,13 @@ def _looks_from_aside(
             below = builder.at(f"{name}-aside")
             look = detect_plan(below, item, (name,), key)
             yield below.sequence(f"look at {name} from aside", below.navigate(aside, f"the side of the {name}"), look)
+
+
+def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
+    """Returns the required surfaces, and before them the one where another robot last saw the object."""
+    known, surfaces = builder.last_known_of(item), required_surfaces(builder, item, place)
+    first = [known.surface] if known is not None and known.surface in builder.knowledge.surfaces else []
+    return tuple(dict.fromkeys((*filter(None, first), *surfaces)))
 
 
 def required_surfaces(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:

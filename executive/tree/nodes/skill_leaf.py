@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field
 from typing import Any, Final, TypeVar
 
@@ -23,7 +23,7 @@ from executive.words.goal import GoalCondition, GoalKind
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.leaf_steps import CallSkill
 from executive.words.slug import slug
-from skills.api import Cause, Failed, Running, Skill, Step, Succeeded, Surface
+from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded, Surface
 from skills.files.errors import listing, suggestion
 from skills.robot import Pose2D
 
@@ -50,8 +50,9 @@ class SkillLeaf(ExplainedLeaf):
     | suspended | RUNNING; the next tick calls `Skill.resume`, and the time between does not count |
     | halted | INVALID with CANCELLED |
 
-    `end` is called in every case. Each attempt gets a new skill object, so that attempts share nothing. `first` is the
-    skill that stows the arm: it runs before the skill if the arm may be anywhere, unless the robot has no arm.
+    `end` is called in every case. Each attempt gets a new skill object, so that attempts share nothing. `first` are the
+    skills that stow the arm: they run before the skill if the arm may be anywhere, unless the robot has no arm. After
+    an arm skill without a path the next one follows, which moves the base, and so on.
     """
 
     kind = "skill"
@@ -60,8 +61,9 @@ class SkillLeaf(ExplainedLeaf):
     context: RunContext
     inputs: Mapping[str, Binding] = field(default_factory=dict)
     outputs: Mapping[str, str] = field(default_factory=dict)
-    first: type[Skill[Any]] | None = None
+    first: Sequence[type[Skill[Any]]] = ()
     _first: Skill[Any] | None = field(default=None, init=False)
+    _left: list[type[Skill[Any]]] = field(default_factory=list, init=False)
     _skill: Skill[Any] | None = field(default=None, init=False)
     _values: Any = field(default=None, init=False)
     _false_start: Failed | None = field(default=None, init=False)
@@ -73,7 +75,7 @@ class SkillLeaf(ExplainedLeaf):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for skill in filter(None, (self.skill, self.first)):
+        for skill in (self.skill, *self.first):
             skill.loaded()  # no tick has to wait for it
         self._time = StoppableTime(self.context.clock)
 
@@ -153,11 +155,17 @@ class SkillLeaf(ExplainedLeaf):
         values = {port: binding.read(board) for port, binding in self.inputs.items()}
         self._skill = self.skill(self.context.for_skill(self.path_id))
         self._values = self.skill.Inputs(**values)
-        if self.first is not None and self.context.arm_order.anywhere and self.context.robot.capabilities().arm:
-            self._first = self.first(self.context.for_skill(f"{self.path_id}/first"))
-            self._first.begin(self.first.Inputs())
+        self._left = list(self.first)
+        if self._left and self.context.arm_order.anywhere and self.context.robot.capabilities().arm:
+            self._begin_next()
         else:
             self._skill.begin(self._values)
+
+    def _begin_next(self) -> None:
+        """Begins the next skill that stows the arm."""
+        kind = self._left.pop(0)
+        self._first = kind(self.context.for_skill(f"{self.path_id}/first"))
+        self._first.begin(kind.Inputs())
 
     def _go_on(self) -> None:
         """Resumes the skill in the first tick after a suspension; `update` reports a defect."""
@@ -177,7 +185,7 @@ class SkillLeaf(ExplainedLeaf):
         return step
 
     def _bring_in(self, first: Skill[Any], skill: Skill[Any]) -> Running:
-        """Runs one step of the skill that stows the arm; begins the skill itself, and its time, at its end."""
+        """Runs one step of a skill that stows the arm; begins the next one, or the skill itself with its time."""
         step = first.step()
         if isinstance(step, Running) and self._time.elapsed_s() <= first.default_timeout_s:
             return step
@@ -185,6 +193,10 @@ class SkillLeaf(ExplainedLeaf):
         first.end()
         self.context.arm_order.note_end(type(first), succeeded=isinstance(step, Succeeded))
         self._time = StoppableTime(self.context.clock)
+        has_no_path = isinstance(step, Failed) and step.cause is Cause.PLANNING
+        if self._left and (has_no_path if Part.ARM in first.uses else isinstance(step, Succeeded)):
+            self._begin_next()
+            return Running(step.message)
         skill.begin(self._values)
         return Running("the arm is brought in" if isinstance(step, Succeeded) else f"goes on: {step.message}")
 

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, InputsT, Running, SkillContext
-from skills.estimate.scan_points import segment_distance
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.manipulation.arm.poses import carry_configuration
-from skills.manipulation.arm.solid_cells import Outline, solid_boxes
+from skills.manipulation.arm.solid_cells import Outline, OwnSpace, solid_boxes, wall_boxes
 from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities
 from skills.routine import Routine, RoutineSkill, SkillFailure, planning_failure
 
@@ -41,8 +38,6 @@ _GRIPPER_TURN_S = 1.6
 """Time in which the gripper has turned."""
 _CHECKED_SAMPLE = 3
 """Each so many samples of the arm's trajectory one is checked while the gripper turns."""
-_AT_ARM_M = 0.12
-"""Solid cells nearer to the arm's axis than this are the arm itself."""
 _BEYOND_M = 0.5
 """Length by which the hand and the held object reach farther than the arm."""
 _OUTLINE_MARGIN_M = 0.05
@@ -186,7 +181,9 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def arm_points_B(self) -> FloatArray:
         """Points (J + 1, 3) of the arm in the body frame: the joints from the shoulder on, and the gripper's tip."""
-        q_rad = self.q_rad()
+        return self._arm_points_B(self.q_rad())
+
+    def _arm_points_B(self, q_rad: FloatArray) -> FloatArray:
         tip_B = self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
         return np.vstack([self.model.points_B(q_rad), tip_B])
 
@@ -221,19 +218,18 @@ class ArmSkill(RoutineSkill[InputsT]):
         return prepared
 
     def seen_boxes(self, beyond_m: float = 0.0) -> list[Box]:
-        """Boxes (B) around the solid cells within the arm's reach and `beyond_m`, without the arm and `known_W`."""
-        X_WB = self.X_WB()
-        arm_W = self.arm_points_B() @ X_WB.rotation().matrix().T + X_WB.translation()
-        segments, own = list(pairwise(arm_W)), self._outline()
+        """Boxes (B) around the solid cells and walls within the arm's reach and `beyond_m`, without `known_W`.
 
-        def left_out(points_W: FloatArray) -> NDArray[np.bool_]:
-            out = np.any([segment_distance(points_W, *each) < _AT_ARM_M for each in segments], axis=0)
-            for low, high in self.known_W:
-                out |= np.all((points_W > low) & (points_W < high), axis=1)
-            return np.asarray(out | own.holds(points_W))
-
+        Cells at the body, the arm and the held object are left out: a small error of the pose must not block the arm.
+        """
+        context, X_WB, q_rad = self.context, self.X_WB(), self.q_rad()
+        held_H = context.payload.corners_H if context.robot.gripper().holding else None
+        held_W = None if held_H is None else (X_WB @ self.model.X_BH(q_rad), held_H)
+        arm_W, stowed_W = (X_WB @ self._arm_points_B(q_rad).T for q_rad in (q_rad, self.model.stowed_rad))
+        own = OwnSpace(self._outline(), (arm_W,), tuple(self.known_W), held_W)
         reach_m = _BEYOND_M + self.arm.max_reach_m + beyond_m
-        return solid_boxes(self.context.solid.cells, X_WB, reach_m, left_out)
+        seen = solid_boxes(context.solid.cells, X_WB, reach_m, own.holds)
+        return [*seen, *wall_boxes(context.walls, X_WB, reach_m, replace(own, lines_W=(arm_W, stowed_W)).holds)]
 
     def _outline(self) -> Outline:
         """The body's outline with a margin."""

@@ -82,14 +82,14 @@ def touching(
                 near = radius + reach[n]
                 if (x - p_BX[n, 0]) ** 2 + (y - p_BX[n, 1]) ** 2 + (z - p_BX[n, 2]) ** 2 > near * near:
                     continue
+                if _centre_gap(x, y, z, box_halves[n], R_BX[n], p_BX[n]) > radius + padding_m:
+                    continue
                 for s in range(first, last):
                     if placed[s] <= k:
                         _place(R_BS[s], p_BS[s], R[link], p[link], R_LS[s], p_LS[s])
                         placed[s] = k + 1
-                    near, apart = radii[s] + reach[n], 0.0
-                    for i in range(3):
-                        apart += (p_BS[s, i] - p_BX[n, i]) ** 2
-                    if apart > near * near:
+                    gap = _centre_gap(p_BS[s, 0], p_BS[s, 1], p_BS[s, 2], box_halves[n], R_BX[n], p_BX[n])
+                    if gap > radii[s] + padding_m:
                         continue
                     if _gap(kinds[s], halves[s], R_BS[s], p_BS[s], box_halves[n], R_BX[n], p_BX[n]) <= padding_m:
                         if found.shape[0] == 0:
@@ -194,6 +194,16 @@ def _gap(
         span = box_half[0] * abs(ax) + box_half[1] * abs(ay) + box_half[2] * abs(az)
         gap = max(gap, abs(cx * ax + cy * ay + cz * az) - length - span)
     return float(gap)
+
+
+@compiled
+def _centre_gap(x: float, y: float, z: float, half: FloatArray, R_BX: FloatArray, p_BX: FloatArray) -> float:
+    """Distance (m) of a point of the body frame from a box; a long box has a bounding sphere that holds too much."""
+    dx, dy, dz = x - p_BX[0], y - p_BX[1], z - p_BX[2]
+    cx = R_BX[0, 0] * dx + R_BX[1, 0] * dy + R_BX[2, 0] * dz
+    cy = R_BX[0, 1] * dx + R_BX[1, 1] * dy + R_BX[2, 1] * dz
+    cz = R_BX[0, 2] * dx + R_BX[1, 2] * dy + R_BX[2, 2] * dz
+    return float(_from_box(cx, cy, cz, half))
 
 
 @compiled

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from skills.api import InputsT, Running
+from skills.api import Cause, Failed, InputsT, Running, Step
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import UP_B, towards_shoulder
@@ -37,7 +38,21 @@ _LEAST_KG = 0.06
 
 
 class ReleasingSkill(LookingSkill[InputsT]):
-    """Routine that lets go of the held object."""
+    """Routine that lets go of the held object.
+
+    The output `released_W` of its end is where the hand has opened, and a failure after that is one of the
+    POSTCONDITION, whatever kept the arm or the camera from its work: the object is to be looked for.
+    """
+
+    def step(self) -> Step:
+        """Runs the routine on; adds where the object was let go to its end."""
+        step, released_W = super().step(), self.checkpoint.get("released_W")
+        if isinstance(step, Running) or released_W is None:
+            return step
+        ended = replace(step, outputs={**step.outputs, "released_W": tuple(released_W)})
+        if isinstance(ended, Failed) and ended.cause in (Cause.PLANNING, Cause.EXECUTION):
+            return replace(ended, cause=Cause.POSTCONDITION)
+        return ended
 
     def release_opening(self) -> float:
         """Opening at which the gripper lets go of the object that it holds."""
@@ -48,6 +63,8 @@ class ReleasingSkill(LookingSkill[InputsT]):
     def open_hand(self, message: str) -> Routine[bool]:
         """Opens the gripper just far enough; returns whether it feels nothing then."""
         yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
+        released_W = self.X_WB() @ self.model.X_BH(self.q_rad()) @ self.p_HT
+        self.checkpoint = {"released_W": released_W.tolist(), **self.checkpoint}
         free = yield from self._feels_nothing(message)
         yield from self.pause(_STILL_S, message)
         return free

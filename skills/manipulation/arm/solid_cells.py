@@ -1,20 +1,26 @@
-"""Solid cells of the world within the arm's reach, from depth pictures, and boxes around them."""
+"""Solid cells of the world within the arm's reach, from depth pictures and the map, and boxes around them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, pairwise
 from typing import Final
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.estimate.compiled import compiled
+from skills.estimate.grid_map import GridMap
+from skills.estimate.scan_points import segment_distance
+from skills.geometry import inside_polygon
 from skills.manipulation.arm.collision import Box
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, lens_rays
 from skills.robot import FloatArray, Image, Intrinsics
+from skills.world_model import Surface
 
 CELL_M: Final = 0.04
 """Side of a cell."""
@@ -38,6 +44,18 @@ _STRIDE_PX = 8
 """Distance in pixels between the rows and columns of a stored view."""
 _MOST_VIEWS = 32
 """Number of views that are stored."""
+_AT_ARM_M = 0.12
+"""Solid cells nearer to the arm's axis than this are the arm itself."""
+_AT_HELD_M = 0.05
+"""Solid cells nearer to the held object than this are the object itself, or in contact with it."""
+_AGREE_M = 0.03
+"""Distance within which an occupied cell of one grid counts as occupied in another: their noise."""
+_AT_SURFACE_M = 0.06
+"""Distance from a surveyed surface within which occupied cells are its edge."""
+_FEWEST_COLUMNS = 8
+"""Number of connected columns from which on they are a wall."""
+_WALL_LEVELS = np.arange(round(0.08 / CELL_M), round(2.0 / CELL_M))
+"""Levels of the cells of a wall, from just above the floor to above the arm."""
 
 Cells = NDArray[np.int64]
 View = tuple[Image, RigidTransform]
@@ -56,6 +74,35 @@ class Outline:
         """Mask (N,) of the world points within the outline."""
         points_B = (points_W - self.X_WB.translation()) @ self.X_WB.rotation().matrix()[:, :2]
         return np.asarray(np.all((points_B > self.low_m) & (points_B < self.high_m), axis=1))
+
+
+@dataclass(frozen=True)
+class OwnSpace:
+    """Space of the robot itself: its outline, and what is near its arm, the `lines_W` (3, K), or the held object.
+
+    Space between the corners in `known_W` belongs to it, too, and so does the box about the corners (N, 3) of the
+    object `held_W`, with their pose X_WH.
+    """
+
+    outline: Outline
+    lines_W: tuple[FloatArray, ...]
+    known_W: tuple[tuple[FloatArray, FloatArray], ...] = ()
+    held_W: tuple[RigidTransform, FloatArray] | None = None
+
+    def holds(self, points_W: FloatArray) -> NDArray[np.bool_]:
+        """Mask (N,) of the world points in this space."""
+        within = self.outline.holds(points_W)
+        for start, end in chain.from_iterable(pairwise(line_W.T) for line_W in self.lines_W):
+            within |= segment_distance(points_W, start, end) < _AT_ARM_M
+        for low, high in self.known_W:
+            within |= np.all((points_W > low) & (points_W < high), axis=1)
+        if self.held_W is not None:
+            X_WH, held_H = self.held_W
+            X_HW = X_WH.inverse()
+            p_H = points_W @ X_HW.rotation().matrix().T + X_HW.translation()
+            low, high = held_H.min(axis=0) - _AT_HELD_M, held_H.max(axis=0) + _AT_HELD_M
+            within |= np.all((p_H > low) & (p_H < high), axis=1)
+        return within
 
 
 def add_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) -> Cells:
@@ -134,6 +181,38 @@ def boxes_around(cells: Cells, X_WB: RigidTransform, chosen: Callable[[FloatArra
     """Boxes in the body frame around the cells whose centres p_W (N, 3) are `chosen`."""
     X_BW = X_WB.inverse()
     return [_box(low, high, X_BW) for low, high in merge_cells(cells[chosen(cell_centres(cells))])]
+
+
+def wall_columns(grids: Sequence[GridMap], surfaces: Iterable[Surface]) -> Cells:
+    """Columns (N, 2) of cells that all grids of a map show as occupied, so that they are solid at all their heights.
+
+    A grid knows no heights, and the band of a LiDAR shows the tops of tables and their edges. So the surveyed surfaces
+    are left out, since the arm reaches over them, and so are single posts, such as the legs of chairs.
+    """
+    first, *others = sorted(grids, key=lambda grid: np.count_nonzero(grid.occupied))
+    points_W = first.centres(np.argwhere(first.occupied))
+    for grid in others:
+        points_W = points_W[grid.distance_m(points_W) < _AGREE_M]
+    for surface in surfaces:
+        points_W = points_W[~inside_polygon(points_W, surface.polygon_W, _AT_SURFACE_M)]
+    columns = np.unique(np.floor(points_W / CELL_M).astype(np.int64), axis=0)
+    if len(columns) == 0:
+        return columns
+    low = columns.min(axis=0)
+    picture = np.zeros(columns.max(axis=0) - low + 1, dtype=np.uint8)
+    picture[tuple((columns - low).T)] = 1
+    _, parts, about, _ = cv2.connectedComponentsWithStats(picture)
+    return np.asarray(np.argwhere((parts > 0) & (about[parts, cv2.CC_STAT_AREA] >= _FEWEST_COLUMNS)) + low)
+
+
+def wall_boxes(
+    columns: Cells, X_WB: RigidTransform, reach_m: float, left_out: Callable[[FloatArray], NDArray[np.bool_]]
+) -> list[Box]:
+    """Boxes in the body frame around the wall columns within a reach, without the cells that are `left_out`."""
+    off_m = (columns + 0.5) * CELL_M - X_WB.translation()[:2]
+    near = columns[np.linalg.norm(off_m, axis=1) < reach_m]
+    cells = np.column_stack([np.repeat(near, len(_WALL_LEVELS), axis=0), np.tile(_WALL_LEVELS, len(near))])
+    return boxes_around(cells, X_WB, lambda p_W: ~left_out(p_W))
 
 
 def cell_centres(cells: Cells) -> FloatArray:

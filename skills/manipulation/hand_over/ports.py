@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from skills.api import Cause, Skill
+from skills.quantities import Coordinate, Height
 
 
 @dataclass(frozen=True)
@@ -18,11 +19,15 @@ class HandOverInputs:
 
 
 class HandOverPorts(Skill[HandOverInputs]):
-    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and checks who has it."""
+    """Finds a person by LiDAR, goes there, holds the object out, lets go when they take it, and checks who has it.
+
+    The output `released_W` is where the hand has let the object go, also after a failure; a failure before has none.
+    """
 
     done_by: ClassVar[str] = "skills.manipulation.hand_over.skill:HandOver"
     name = "hand_over"
     Inputs = HandOverInputs
+    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held, there is no new scan, or nobody is seen near",
         Cause.PLANNING: "no free place before the person, or no free path for the arm",

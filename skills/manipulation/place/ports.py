@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from skills.api import Cause, Skill, Surface
-from skills.quantities import Coordinate, Length
+from skills.quantities import Coordinate, Height, Length
 
 
 @dataclass(frozen=True)
@@ -22,16 +22,20 @@ class PlaceInputs:
 
 
 class PlacePorts(Skill[PlaceInputs]):
-    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is within reach."""
+    """Puts the held object down on a surface and stows the arm. Goes nearer when no free spot is within reach.
+
+    The output `released_W` is where the hand has let the object go, also after a failure; a failure before has none.
+    """
 
     done_by: ClassVar[str] = "skills.manipulation.place.skill:Place"
     name = "place"
     Inputs = PlaceInputs
+    outputs: ClassVar[Mapping[str, type]] = {"released_W": tuple[Coordinate, Coordinate, Height]}
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "nothing is held",
         Cause.PLANNING: "no free spot of the surface is seen within reach, or the arm finds no path to it",
         Cause.EXECUTION: "the robot or its arm did not reach its goal",
-        Cause.POSTCONDITION: "the object is not seen at rest where it was put down, or is still in the gripper",
+        Cause.POSTCONDITION: "it was let go and is not seen at rest where it was put down, or is still in the gripper",
     }
     default_timeout_s = 240.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"joints": 0.5, "gripper": 0.5}

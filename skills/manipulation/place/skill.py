@@ -147,6 +147,7 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
             return (yield from self.run(inputs))
         if spot_W is None:
             raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper, and it was not yet over its place")
+        self.checkpoint = {"released_W": spot_W.tolist(), **self.checkpoint}
         if over_spot:
             yield from self.let_go(None)
         yield from self.check(surface, spot_W[:2], within_m=self.options.seen_again_m)

@@ -32,7 +32,7 @@ from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 from tests.benchmarks.fleet import begun_again
-from tests.executive.conftest import default_end
+from tests.executive.conftest import COKE, default_end
 
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
@@ -50,7 +50,8 @@ class ScriptedMission(Prepared):
     registry: Mapping[str, type[Skill]] = field(default_factory=dict)
 
     def with_mission(self, mission):
-        tree = compile_mission(mission, knowledge=self.knowledge, registry=self.registry)
+        known = {"knowledge": self.knowledge, "last_known": self.last_known}
+        tree = compile_mission(mission, registry=self.registry, **known)
         return replace(
             self, request=replace(self.request, commands=lines_of_steps(tree.steps)), mission=mission, tree=tree
         )
@@ -492,6 +493,68 @@ def test_a_dropped_object_is_taken_by_the_other_robot(fleet, script, registry):
     script.ends["place"] = lambda skill: (lose if skill.context.robot.name == "Alice" else fleet.put_down)(skill)
     assert fleet.run() == [("Bob", "success", 1)]
     assert fleet.robots["Alice"].holding is fleet.robots["Bob"].holding is False
+
+
+def looks_of(script, seen_by_alice=COKE):
+    """The first surface of each look of Bob, who sees the object at once."""
+    looks = []
+
+    def detect(skill):
+        if skill.context.robot.name == "Alice":
+            seen = default_end(script, "detect")(skill)
+            return replace(seen, outputs={"observation": seen_by_alice, "observations": ()}) if script.seen_on else seen
+        looks.append(skill.inputs.surfaces[0])
+        return Succeeded("seen", {"observation": COKE, "observations": (COKE,)})
+
+    script.ends.update(detect=detect, approach=lambda skill: Succeeded("near", {"observation": seen_by_alice}))
+    return looks
+
+
+def test_the_other_robot_looks_first_where_the_object_was_seen(fleet, script):
+    fleet.queue("Take [Nothing] to [Nothing] and do [grasp] to [coke]")
+    looks = looks_of(script, replace(COKE, surface="bedside table"))
+    too_wide = Failed(Cause.PLANNING, "too wide")
+    script.ends["grasp"] = lambda skill: too_wide if skill.context.robot.name == "Alice" else fleet.hold(skill)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert looks[0].name == "bedside table"
+
+
+def test_the_other_robot_looks_first_at_the_floor_where_the_object_fell(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    fleet.queue(TAKE, PUT)
+    looks = looks_of(script)
+    lost = []
+
+    def lose(skill):
+        robot = fleet.robots[skill.context.robot.name]
+        if robot.name == "Alice" and robot.holding:
+            robot.let_go()
+            lost.append(robot)
+            script.seen_on = set()
+            return Failed(Cause.POSTCONDITION, "it slipped")
+        return fleet.put_down(skill)
+
+    script.ends.update(grasp=fleet.hold, place=lose)
+    assert fleet.run() == [("Bob", "success", 1)]
+    assert lost
+    assert (looks[0].name, looks[0].height_m) == ("floor", 0.0)
+
+
+def test_an_object_that_was_let_go_is_not_placed_by_another_robot(fleet, script, registry):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
+    registry["place"].outputs = {"released_W": tuple[float, float, float]}
+    fleet.queue(TAKE, PUT)
+
+    def lose(skill):
+        fleet.robots[skill.context.robot.name].let_go()
+        script.seen_on = set()
+        return Failed(Cause.POSTCONDITION, "it is not seen where it was put down", {"released_W": (1.5, 2.0, 0.8)})
+
+    script.ends.update(grasp=fleet.hold, place=lose)
+    assert fleet.run() == [("Alice", "failure", 0)]
+    assert "; the coke was let go at (1.50, 2.00) m" in fleet.message(1)
 
 
 def test_a_mission_stays_with_a_robot_that_holds_its_object(fleet, script, registry):

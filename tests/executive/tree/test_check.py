@@ -286,6 +286,12 @@ def test_a_robot_without_a_gripper_is_refused_for_each_step_that_needs_one(check
     assert errors_in(checked) == [(2, "this kind of robot has no gripper to take the coke with")]
 
 
+def test_a_skill_that_needs_a_gripper_is_refused_for_a_robot_without_one(check):
+    drive = CallSkill(skill="navigate", values={"x": 3.0, "y": 0.0})
+    found = errors_in(check(drive, DROPPED, abilities=replace(ABLE, gripper=False)))
+    assert found == [(2, "this kind of robot has no gripper, which place needs")]
+
+
 def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, knowledge):
     (name,) = knowledge.surfaces_in("bedroom")
     sizes = {"widths_m": {"coke": 0.066}, "apart_m": 0.1}

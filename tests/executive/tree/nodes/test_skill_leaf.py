@@ -54,7 +54,7 @@ def leaf_of(
         outputs=outputs or {},
         limit_s=limit_s,
         context=context,
-        first=more.get("first"),
+        first=more.get("first", ()),
     )
     return leaf, log
 
@@ -205,23 +205,23 @@ def test_a_skill_that_raises_what_is_no_exception_fails_with_its_name(context, c
     assert (leaf.cause, leaf.message) == (Cause.ERROR, f"listed raised {type(defect).__name__}: {defect}")
 
 
-def stow_of(log, *steps):
-    """A skill for the arm alone that gives these steps in turn."""
+def stow_of(log, *steps, called="stow", part=Part.ARM):
+    """A skill for one part alone that gives these steps in turn."""
 
     class Stowing(Skill[Inputs]):
-        name = "stow"
+        name = called
         Inputs: ClassVar[type] = Inputs
-        uses = frozenset({Part.ARM})
+        uses = frozenset({part})
 
         def begin(self, inputs: Inputs) -> None:
-            log.append("begin stow")
+            log.append(f"begin {called}")
             self.steps = list(steps)
 
         def step(self) -> Any:
             return self.steps.pop(0)
 
         def end(self) -> None:
-            log.append("end stow")
+            log.append(f"end {called}")
 
     return Stowing
 
@@ -237,23 +237,48 @@ def armed(context, robot, monkeypatch):
 @pytest.mark.parametrize("last", [Succeeded("stowed"), Failed(Cause.PLANNING, "no way")])
 def test_an_arm_that_may_be_anywhere_is_brought_in_before_the_skill_begins(armed, clock, last):
     calls: list[str] = []
-    leaf, log = leaf_of(armed, [Succeeded("gone")], first=stow_of(calls, Running("stowing"), last))
+    leaf, log = leaf_of(armed, [Succeeded("gone")], first=(stow_of(calls, Running("stowing"), last),))
     assert tick(leaf, clock, 2) == [Status.RUNNING] * 2
     assert (calls, log) == (["begin stow", "end stow"], ["begin 0"])
     assert tick(leaf, clock) == [Status.SUCCESS]
 
 
+NO_WAY = Failed(Cause.PLANNING, "no way")
+
+
+@pytest.mark.parametrize(
+    ("stow", "back", "begun"),
+    [
+        (NO_WAY, Succeeded("backed off"), ["stow", "back_off", "stow again"]),
+        (NO_WAY, Failed(Cause.PLANNING, "no clearance"), ["stow", "back_off"]),
+        (Failed(Cause.EXECUTION, "held fast"), Succeeded("backed off"), ["stow"]),
+        (Succeeded("stowed"), Succeeded("backed off"), ["stow"]),
+    ],
+)
+def test_robot_backs_off_where_the_arm_has_no_path_and_stows_again(armed, clock, stow, back, begun):
+    calls: list[str] = []
+    first = (
+        stow_of(calls, stow),
+        stow_of(calls, back, called="back_off", part=Part.BASE),
+        stow_of(calls, Succeeded("stowed"), called="stow again"),
+    )
+    leaf, log = leaf_of(armed, [Succeeded("gone")], first=first)
+    assert tick(leaf, clock, len(begun) + 1)[-1] == Status.SUCCESS
+    assert calls == [f"{when} {each}" for each in begun for when in ("begin", "end")]
+    assert log[0] == "begin 0"
+
+
 def test_an_arm_that_is_where_it_is_to_be_stays_there(armed, clock):
     armed.arm_order.anywhere = False
     calls: list[str] = []
-    leaf, _ = leaf_of(armed, [Succeeded("gone")], first=stow_of(calls))
+    leaf, _ = leaf_of(armed, [Succeeded("gone")], first=(stow_of(calls),))
     assert tick(leaf, clock) == [Status.SUCCESS]
     assert calls == []
 
 
 def test_a_halt_while_the_arm_is_brought_in_ends_that(armed, clock):
     calls: list[str] = []
-    leaf, log = leaf_of(armed, [], first=stow_of(calls, *[Running("stowing")] * 9))
+    leaf, log = leaf_of(armed, [], first=(stow_of(calls, *[Running("stowing")] * 9),))
     tick(leaf, clock, 2)
     leaf.stop(Status.INVALID)
     assert (calls, log, leaf.active) == (["begin stow", "end stow"], [], False)

@@ -4,6 +4,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from table_scene import CAMERA, TABLE, Can, scene
 
+from skills.estimate.grid_map import GridMap
 from skills.manipulation.arm.solid_cells import (
     CELL_M,
     Outline,
@@ -13,7 +14,10 @@ from skills.manipulation.arm.solid_cells import (
     merge_cells,
     never_seen,
     solid_boxes,
+    wall_boxes,
+    wall_columns,
 )
+from skills.world_model import Surface
 
 NOTHING = np.empty((0, 3), dtype=np.int64)
 BODY = RigidTransform([0.0, 0.0, 0.5])
@@ -117,3 +121,52 @@ def test_boxes_of_chosen_cells_have_nothing_behind_them():
     boxes = boxes_around(cells, BODY, lambda p: p[:, 2] > 0.85)
     assert inside(boxes, (0.97, 0.0, 0.9))
     assert not inside(boxes, (1.15, 0.0, 0.9))
+
+
+def grid_of(*rectangles):
+    """A grid of 2 m x 2 m with occupied rectangles (x0, y0, x1, y1) in m."""
+    occupied = np.zeros((80, 80), dtype=bool)
+    for x0, y0, x1, y1 in rectangles:
+        occupied[round(y0 / 0.025) : round(y1 / 0.025), round(x0 / 0.025) : round(x1 / 0.025)] = True
+    return GridMap(occupied, 0.025, (0.0, 0.0))
+
+
+WALL, TABLE_EDGE, CHAIR_BACK, SOFA = (
+    (0.0, 0.0, 2.0, 0.1),
+    (0.2, 1.0, 1.2, 1.05),
+    (1.5, 1.0, 1.55, 1.4),
+    (1.4, 1.6, 2, 2),
+)
+DESK = Surface("desk", ((0.2, 1.0), (1.2, 1.0), (1.2, 1.6), (0.2, 1.6)), 0.75)
+
+
+def shown(columns, *rectangle):
+    (x0, y0, x1, y1), middles = rectangle, (columns + 0.5) * CELL_M
+    inner = (middles > (x0 - 0.03, y0 - 0.03)) & (middles < (x1 + 0.03, y1 + 0.03))
+    return bool(np.any(np.all(inner, axis=1)))
+
+
+def test_walls_are_what_all_grids_show():
+    high, low = grid_of(WALL, CHAIR_BACK), grid_of(WALL, SOFA)
+    columns = wall_columns([high, low], ())
+    assert shown(columns, *WALL)
+    assert not shown(columns, *CHAIR_BACK)
+    assert not shown(columns, *SOFA)
+    assert shown(wall_columns([high], ()), *CHAIR_BACK)  # a map without a second grid cannot tell
+
+
+def test_the_edges_of_surfaces_and_single_posts_are_no_walls():
+    columns = wall_columns([grid_of(WALL, TABLE_EDGE, (1.6, 0.6, 1.65, 0.65))], [DESK])
+    assert shown(columns, *WALL)
+    assert not shown(columns, *TABLE_EDGE)
+    assert not shown(columns, 1.6, 0.6, 1.65, 0.65)
+    assert len(wall_columns([grid_of()], [DESK])) == 0
+
+
+def test_a_wall_is_solid_at_all_heights_of_the_arm_within_its_reach():
+    columns = wall_columns([grid_of(WALL)], ())
+    boxes = wall_boxes(columns, BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
+    assert inside(boxes, (0.6, 0.05, 0.3))
+    assert inside(boxes, (0.6, 0.05, 1.8))
+    assert not inside(boxes, (0.2, 0.05, 1.0))
+    assert not inside(boxes, (1.5, 0.05, 1.0))

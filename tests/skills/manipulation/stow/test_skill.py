@@ -1,6 +1,6 @@
 """The stow skill: stowed when empty, near the body when holding."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -69,3 +69,34 @@ def test_the_arm_comes_near_before_a_raised_body_is_lowered(holding):
     assert robot.height_m == pytest.approx(0.52)
     assert len(robot.hand_x_m) == 1
     assert robot.hand_x_m[0] < 0.56 < MODEL.X_BH(OUT).translation()[0]
+
+
+def wall(x0_m, y0_m, x1_m, y1_m):
+    """Columns of 4 cm of a wall between two corners."""
+    x, y = (np.arange(round(a / 0.04), round(b / 0.04)) for a, b in ((x0_m, x1_m), (y0_m, y1_m)))
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+BEHIND = np.array([2.9, -0.3, 0.3, 0.0, 0.3, 0.0])
+"""An arm that points back: its straight way home sweeps the left side."""
+
+
+def most_left_m(robot):
+    turned = np.vstack([trajectory.positions_rad for trajectory in robot.arm_commands])
+    return max(float(MODEL.points_B(q)[:, 1].max()) for q in turned)
+
+
+def test_the_arm_is_stowed_around_a_wall_of_the_map():
+    free, walled = ScriptedRobot(q=BEHIND.copy()), ScriptedRobot(q=BEHIND.copy())
+    assert isinstance(outcome(Stow(context_of(free)), StowInputs()), Succeeded)
+    context = replace(context_of(walled), walls=wall(-0.2, 0.44, 1.2, 0.56))
+    assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
+    assert most_left_m(free) > 0.44 > most_left_m(walled)
+
+
+def test_walls_at_the_arm_by_a_small_error_of_the_pose_do_not_block_it():
+    robot = ScriptedRobot(q=OUT.copy())
+    x, y, _ = MODEL.X_BH(OUT).translation()
+    context = replace(context_of(robot), walls=wall(x - 0.04, y - 0.6, x + 0.08, y + 0.6))
+    assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
+    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
     "executive/words": 2981,
-    "executive/language": 7672,
+    "executive/language": 7676,
     "executive/speech": 1588,
     "executive/mission": 1512,
     "executive/tree": 7586,
@@ -26,9 +26,9 @@ LINES = {
     "executive/view": 1368,
     "executive/testing": 810,
     "executive/app": 7450,
-    "executive/cli": 3842,
-    "skills": 26357,
-    "plant": 11717,
+    "executive/cli": 3848,
+    "skills": 26425,
+    "plant": 11727,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 455, 73, 8
 """All modules; those that one other imports; file names that stand more than once."""

@@ -22,7 +22,7 @@ from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
 from skills.files.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
-from skills.perception.class_forms import class_forms, known_attributes
+from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
 from skills.robot import Capabilities, Pose2D
 from skills.stack import DEFAULT_FILE, default_component
 
@@ -80,7 +80,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     tagged = frozenset(tag.on for tag in prepared.tree.tags if tag.on is not None)
     stack = None if robot.stack_file is None else robot_stack(robot)
     if stack is not None and stack.detector != default_component("detector"):
-        seen = abilities.classes & frozenset(shared_detector(stack).class_names)
+        seen = frozenset(class_forms()) & frozenset(shared_detector(stack).class_names)
         abilities = replace(abilities, classes=seen)
     return check_tree(
         prepared.tree,
@@ -129,7 +129,7 @@ def abilities_of(kind: str) -> Abilities:
     return Abilities(
         masses,
         0.0 if capabilities.arm is None else capabilities.arm.max_payload_kg,
-        frozenset(class_forms()),
+        frozenset(shipped_forms()),
         known_attributes(),
         reached_heights_m(capabilities),
         {name: form.width_m[0] for name, form in class_forms().items()},

@@ -20,10 +20,12 @@ from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store import trigger_source
 from executive.tree import registry
+from plant.models.catalogue import load_catalogue
 from plant.robots import robot_kind as kinds
 from skills.files.errors import InputError
-from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
+from skills.files.plugins import CLASSES, LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
 from skills.files.yaml_source import yaml_of
+from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
 from skills.stack import SLOTS, stack_data
 
@@ -66,7 +68,7 @@ def plugins(
 
 def groups() -> Sequence[str]:
     """Returns the entry-point groups that Errand reads."""
-    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, COMMANDS_GROUP)
+    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, CLASSES, COMMANDS_GROUP)
 
 
 def _of_others() -> Sequence[EntryPoint]:
@@ -105,6 +107,10 @@ def _load(key: str, limit_s: float) -> None:
         raise InputError(f"there is no plug-in {key}")
     if entry.group == registry.GROUP:
         registry.skills_of([entry], limit_s=limit_s)
+    if entry.group == CLASSES:  # its tables, and none of its code
+        class_forms()
+        load_catalogue()
+        return
     is_command = entry.group == COMMANDS_GROUP
     try:
         run_plugin(entry, lambda: as_command(entry.name, entry.load()) if is_command else entry.load(), limit_s=limit_s)

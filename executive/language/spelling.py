@@ -27,6 +27,7 @@ from rapidfuzz.distance import OSA
 
 from executive.language.lexicon import read_table
 from executive.words.knowledge import Knowledge
+from skills.files.plugins import class_tables
 
 if TYPE_CHECKING:
     from executive.language.parser import DependencyParser
@@ -347,4 +348,7 @@ def _despaced(name: str) -> str:
 @cache
 def _synonyms() -> tuple[tuple[tuple[str, ...], ...], Mapping[str, tuple[str, ...]]]:
     data = read_table("synonyms.yaml")
-    return tuple(map(tuple, data["same"])), {kind: tuple(members) for kind, members in data["kinds"].items()}
+    others = [ring for _, more in class_tables("synonyms.yaml") for ring in more["same"]]
+    return tuple(map(tuple, [*data["same"], *others])), {
+        kind: tuple(members) for kind, members in data["kinds"].items()
+    }

@@ -15,10 +15,12 @@ from typing import Annotated, Any, Final
 from pydantic import BaseModel, ConfigDict, Field
 
 from skills.files.errors import InputError
+from skills.files.plugins import class_entries
 from skills.files.schema import validate
 from skills.files.yaml_source import read_yaml, yaml_of
 from skills.robot import quantities
 
+CATALOGUE: Final = "catalogue.yaml"
 MODELS_FOLDER = Path(__file__).resolve().parent
 
 
@@ -45,12 +47,20 @@ class ModelClass(BaseModel):
     id: int
     forms: dict[str, ModelForm] = Field(min_length=1)
 
+    def placed_in(self, folder: Path) -> ModelClass:
+        """Returns the class with its files in another folder than the project's."""
+        forms = {name: form.model_copy(update={"file": str(folder / form.file)}) for name, form in self.forms.items()}
+        return self.model_copy(update={"forms": forms})
+
 
 @cache
 def load_catalogue() -> Mapping[str, ModelClass]:
-    """Reads all classes by name; the result is cached."""
-    entries = read_yaml(MODELS_FOLDER / "catalogue.yaml").data
-    return MappingProxyType({name: ModelClass.model_validate(entry) for name, entry in entries.items()})
+    """Reads all classes by name, with those of other distributions; cached. Raises InputError for a broken one."""
+    entries = read_yaml(MODELS_FOLDER / CATALOGUE).data
+    found = {name: ModelClass.model_validate(entry) for name, entry in entries.items()}
+    for file, classes in class_entries(CATALOGUE, ModelClass):
+        found = {**{name: each.placed_in(file.parent) for name, each in classes.items()}, **found}
+    return MappingProxyType(found)
 
 
 FACTS_FILE: Final = "object.yaml"

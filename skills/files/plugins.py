@@ -10,9 +10,27 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import Distribution, EntryPoint, EntryPoints, SelectableGroups, entry_points
-from typing import Final, TypeVar
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Final, TypeVar
 
-__all__ = ["LIMIT_S", "OURS", "PluginDefect", "distribution_of", "installed_plugins", "run_in_thread", "run_plugin"]
+from skills.files.errors import InputError
+
+__all__ = [
+    "CLASSES",
+    "LIMIT_S",
+    "OURS",
+    "PluginDefect",
+    "class_entries",
+    "class_tables",
+    "distribution_of",
+    "installed_plugins",
+    "run_in_thread",
+    "run_plugin",
+]
+
+CLASSES: Final = "errand.classes"
+"""Group of the packages with classes of objects; the value names the package, whose code does not run."""
 
 OURS: Final = "spot-errand"
 """Distribution of this project, whose modules need no time limit."""
@@ -46,6 +64,37 @@ def installed_plugins(group: str) -> EntryPoints:
 @cache
 def _all_installed() -> SelectableGroups:
     return entry_points()
+
+
+def class_tables(name: str) -> Iterator[tuple[Path, Any]]:
+    """Yields path and data of a YAML file from each package with classes that has it. Raises InputError."""
+    from skills.files.yaml_source import read_yaml
+
+    for entry in sorted(installed_plugins(CLASSES), key=lambda entry: entry.name):
+        try:
+            spec = find_spec(entry.value)
+        except (ImportError, ValueError):
+            spec = None
+        if spec is None or not spec.submodule_search_locations:
+            what = f"{entry.value} of distribution {distribution_of(entry)}, which has classes, is no package"
+            raise InputError(what, hint="repair or uninstall that distribution")
+        file = Path(spec.submodule_search_locations[0]) / name
+        if file.is_file():
+            yield file, read_yaml(file).data
+
+
+def class_entries(name: str, kind: type[ResultT]) -> Iterator[tuple[Path, dict[str, ResultT]]]:
+    """Yields the file and its entries by class of each package with classes that has it. Raises InputError."""
+    from pydantic import TypeAdapter, ValidationError
+
+    from skills.files.schema import first_error
+
+    for file, data in class_tables(name):
+        try:
+            yield file, TypeAdapter(dict[str, kind]).validate_python(data)  # type: ignore[valid-type]
+        except ValidationError as error:
+            where, what, hint = first_error(error.errors())
+            raise InputError(f"{'.'.join(map(str, where))}: {what}", hint=hint, file=file) from error
 
 
 def run_plugin(entry: EntryPoint, call: Callable[[], ResultT], *, limit_s: float = LIMIT_S) -> ResultT:

@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
+from skills.files.errors import InputError
+from skills.files.plugins import class_entries
 from skills.files.yaml_source import read_yaml
 
+FORMS_FILE: Final = "class_forms.yaml"
 PERSON: Final = "person"
 """The class of people."""
 ANY_OBJECT: Final = "thing"
@@ -81,10 +84,26 @@ class ColourRange(BaseModel):
 
 
 @lru_cache(maxsize=1)
-def class_forms() -> Mapping[str, ClassForm]:
-    """Loads the classes by name. Raises pydantic.ValidationError when the file beside this module is malformed."""
-    forms = read_yaml(Path(__file__).with_name("class_forms.yaml")).data
+def shipped_forms() -> Mapping[str, ClassForm]:
+    """Loads the project's own classes by name. Raises pydantic.ValidationError when their file is malformed."""
+    forms = read_yaml(Path(__file__).with_name(FORMS_FILE)).data
     return MappingProxyType(TypeAdapter(dict[str, ClassForm]).validate_python(forms))
+
+
+@lru_cache(maxsize=1)
+def class_forms() -> Mapping[str, ClassForm]:
+    """Loads all classes by name, with those of other distributions.
+
+    Raises InputError for a class of another distribution that is malformed, or has the name or id of another class.
+    """
+    found = dict(shipped_forms())
+    for file, forms in class_entries(FORMS_FILE, ClassForm):
+        for name, form in forms.items():
+            if name in found or form.id in (other.id for other in found.values()):
+                hint = "give it another name and a new id, or uninstall that distribution"
+                raise InputError(f"class {name!r} has the name or the id ({form.id}) of another", hint=hint, file=file)
+            found[name] = form
+    return MappingProxyType(found)
 
 
 def class_form(name: str) -> ClassForm:

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7450,
     "executive/cli": 3848,
-    "skills": 26425,
+    "skills": 26434,
     "plant": 11727,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 455, 73, 8

@@ -31,6 +31,8 @@ _FREE_S = 2.0
 """Time that the open gripper has to become empty."""
 _SHAKE_RAD = (0.35, -0.35, 0.35, -0.35)
 _SHAKE_RAD_S = 3.0
+_CALM_S = 0.2
+"""Pause before weighing, in which the arm comes to rest."""
 _STILL_HELD = 0.5
 """Part of the object's weight from which on it still hangs on the hand."""
 _LEAST_KG = 0.06
@@ -99,7 +101,8 @@ class ReleasingSkill(LookingSkill[InputsT]):
         """Returns whether the arm still bears most of the held weight; False where that weight is too small to tell."""
         if held_kg is None or held_kg < _LEAST_KG:
             return False
-        return (yield from self.weigh(self.p_HT, message)) > _STILL_HELD * held_kg
+        yield from self.pause(_CALM_S, message)
+        return (yield from self.weigh(self.p_HT, message)) > max(_STILL_HELD * held_kg, _LEAST_KG)
 
     def leave_object(self) -> Routine[bool]:
         """Takes fixed finger and palm off a released object and draws the hand back; returns whether a path was found.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from skills.manipulation.arm.releasing_skill import ReleasingSkill
 from skills.manipulation.place.free_spots import distances_m, objects_W
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
+from skills.perception.point_cloud import Mask
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
@@ -90,6 +91,11 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         self, surface: Surface, spot_W: FloatArray, put_down: Sequence[Box], before_W: FloatArray, within_m: float
     ) -> Routine[Image | None]:
         """Returns a picture that shows the object near its spot by its depth or its class, from near if need be."""
+
+        def new(points_W: FloatArray) -> Mask:
+            near = np.linalg.norm(points_W - spot_W, axis=1) < within_m
+            return np.asarray(near & (distances_m(before_W, points_W) > _NEW_M))
+
         for near in (False, True):
             try:
                 image, view = yield from self.seen_on(surface, spot_W, put_down, near=near)
@@ -97,14 +103,14 @@ class PlaceVerification(ReleasingSkill[InputsT]):
                 if failure.cause is not Cause.PLANNING:
                     raise
                 continue
-            points_W = objects_W(view)
-            own = (distances_m(before_W, points_W) > _NEW_M) & (np.linalg.norm(points_W - spot_W, axis=1) < within_m)
-            if np.count_nonzero(own) >= _LEAST_NEW or (yield from self._is_detected(image, surface, spot_W, within_m)):
+            if np.count_nonzero(new(objects_W(view))) >= _LEAST_NEW or (
+                yield from self._is_detected(image, surface, new)
+            ):
                 return image
         return None
 
-    def _is_detected(self, image: Image, surface: Surface, spot_W: FloatArray, within_m: float) -> Routine[bool]:
-        """Returns whether the detector finds the object's class near the spot: a flat object hardly stands out."""
+    def _is_detected(self, image: Image, surface: Surface, new: Callable[[FloatArray], Mask]) -> Routine[bool]:
+        """Returns whether the detector finds a `new` object of the class: a flat one hardly stands out."""
         context, kind = self.context, self.checkpoint.get("kind")
         if kind not in context.detector.class_names:
             return False
@@ -112,8 +118,8 @@ class PlaceVerification(ReleasingSkill[InputsT]):
 
         def detected() -> bool:
             found = detections_3d(image, place, detect_in_image(context.detector, image), ())
-            offsets_W = [one.position_W - [*spot_W, surface.height_m] for one in found if one.class_name == kind]
-            return any(np.hypot(x, y) < within_m and abs(z) < _ON_SURFACE_M for x, y, z in offsets_W)
+            own_W = np.array([one.position_W for one in found if one.class_name == kind]).reshape(-1, 3)
+            return bool(np.any(new(own_W[:, :2]) & (np.abs(own_W[:, 2] - surface.height_m) < _ON_SURFACE_M)))
 
         message = f"looking for the {kind} on the {surface.name}"
         return (yield from self.compute(detected, latency_s=DETECTION_LATENCY_S, name="look again", message=message))

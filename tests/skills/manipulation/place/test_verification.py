@@ -93,6 +93,6 @@ def test_a_neighbour_that_stood_there_before_is_not_taken_for_the_object():
 def test_a_flat_object_is_seen_by_its_class():
     flat = ScriptedRobot(things=(Can(0.95, 0.0, 0.04, 0.004, BLUE),))
     _seen(flat, kind="beer", detector=Colours())
-    for kind in ("coke", None):
+    for kind, before_W in (("coke", NOTHING), (None, NOTHING), ("beer", SPOT_W[None, :])):
         with pytest.raises(SkillFailure, match="not seen"):
-            _seen(flat, kind=kind)
+            _seen(flat, kind=kind, before_W=before_W)

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 7676,
     "executive/speech": 1588,
     "executive/mission": 1512,
-    "executive/tree": 7586,
+    "executive/tree": 7590,
     "executive/run": 3083,
     "executive/record": 950,
     "executive/store": 1675,

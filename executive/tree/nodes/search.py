@@ -240,14 +240,18 @@ def search_plan(
     """Looks for the object where it was detected before, then at each surface; the first detection ends the search.
 
     If it is not in its place, the robot looks at some surfaces from the side, then, with `anywhere`, at surfaces
-    elsewhere. Raises InputError when the place has no surfaces.
+    elsewhere. Where another robot last saw it, the floor beside the surface counts too, since it may have fallen out of
+    that robot's gripper. Raises InputError when the place has no surfaces.
     """
     surfaces = surfaces_first_known(builder, item, place)
     name = builder.knowledge.object_name(item.name) or item.name
     elsewhere = (
         surfaces_elsewhere(builder.knowledge, name, place, builder.avoided) if anywhere and builder.anywhere else ()
     )
-    looks = look_plans(builder, item, surfaces, key)
+    known = builder.last_known_of(item)
+    first = tuple(each for each in surfaces if known is not None and each == known.surface)
+    floor = {"floor": True} if builder.has_ports("detect", ("floor",)) else NO_PORTS
+    looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, surfaces[len(first) :], key))
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
     looked = place_phrase(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
     return builder.node(

@@ -66,7 +66,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
         """Opens the gripper just far enough; returns whether it feels nothing then."""
         yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
         released_W = self.X_WB() @ self.model.X_BH(self.q_rad()) @ self.p_HT
-        self.checkpoint = {"released_W": released_W.tolist(), **self.checkpoint}
+        self.checkpoint = {**self.checkpoint, "released_W": released_W.tolist()}
         free = yield from self._feels_nothing(message)
         yield from self.pause(_STILL_S, message)
         return free

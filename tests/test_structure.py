@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2981,
+    "executive/words": 2993,
     "executive/language": 7676,
     "executive/speech": 1588,
     "executive/mission": 1512,
@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 581,
     "executive/view": 1368,
     "executive/testing": 810,
-    "executive/app": 7450,
-    "executive/cli": 3848,
-    "skills": 26434,
-    "plant": 11727,
+    "executive/app": 7476,
+    "executive/cli": 3852,
+    "skills": 26841,
+    "plant": 11801,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 455, 73, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 459, 73, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

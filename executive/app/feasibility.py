@@ -80,7 +80,7 @@ def check_prepared(prepared: Prepared, planner: RoutePlanner | None = None) -> C
     tagged = frozenset(tag.on for tag in prepared.tree.tags if tag.on is not None)
     stack = None if robot.stack_file is None else robot_stack(robot)
     if stack is not None and stack.detector != default_component("detector"):
-        seen = frozenset(class_forms()) & frozenset(shared_detector(stack).class_names)
+        seen = frozenset(class_forms()) & {*shared_detector(stack).class_names} | {*world.own_objects}
         abilities = replace(abilities, classes=seen)
     return check_tree(
         prepared.tree,
@@ -110,6 +110,7 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
         only = own.class_name not in others or own.class_name not in masses
         masses[own.class_name] = own.mass_kg if only else min(own.mass_kg, masses[own.class_name])
         others.add(own.class_name)
+    widths = {name: min(each.object.size_m) for name, each in world.own_objects.items()}
     rules = world.seed_rules
     takers = frozenset(person.name for person in rules.people if person.receives)
     taken_m2: dict[str, float] = {}
@@ -117,7 +118,15 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
         if len(rule.surfaces) == 1:
             width_m = abilities.widths_m.get(rule.model, 0.0)
             taken_m2[rule.surfaces[0]] = taken_m2.get(rule.surfaces[0], 0.0) + (width_m + rules.rules.clear_m) ** 2
-    return replace(abilities, masses_kg=masses, takers=takers, taken_m2=taken_m2, apart_m=rules.rules.clear_m)
+    return replace(
+        abilities,
+        masses_kg=masses,
+        classes=abilities.classes | widths.keys(),
+        widths_m={**abilities.widths_m, **widths},
+        takers=takers,
+        taken_m2=taken_m2,
+        apart_m=rules.rules.clear_m,
+    )
 
 
 @cache

@@ -25,7 +25,7 @@ from executive.mission.request import Request
 from executive.mission.resolve import mission_from_file
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
-from executive.words.knowledge import Knowledge, Pose
+from executive.words.knowledge import Knowledge, Pose, with_own_objects
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
 from executive.words.robot_config import RobotConfig, find_robot, robots_of_file
 from executive.words.yaml_steps import steps_from_lines
@@ -149,10 +149,11 @@ class Setting:
 
     def for_file(self, loaded: Mission) -> Prepared:
         """Compiles a mission file for the robot of this setting. Raises InputError."""
-        knowledge = knowledge_of_mission(loaded, self.knowledge)
+        world = _with_imports(loaded, self.world)
+        knowledge = knowledge_of_mission(loaded, with_own_objects(self.knowledge, world.own_objects))
         answer = self.answerer(self.request.questions or loaded.questions)
         mission = mission_from_file(loaded, parser=load_parser(), knowledge=knowledge, answer=answer)
-        world = _with_people(loaded, _with_objects(loaded, self.world, knowledge), knowledge)
+        world = _with_people(loaded, _with_objects(loaded, world, knowledge), knowledge)
         file, text = self.request.file, self.request.text
         text = file.read_text(encoding="utf-8") if text is None and file is not None else text
         own = replace(self, request=replace(self.request, text=text), world=world, knowledge=knowledge)
@@ -359,8 +360,8 @@ def _with_people(loaded: Mission, world: World, knowledge: Knowledge) -> World:
         raise loaded.error(("people",), str(error), "change the route or its name here") from error
 
 
-def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
-    """Adds the models and objects of a mission file to the world. Raises InputError."""
+def _with_imports(loaded: Mission, world: World) -> World:
+    """Adds the models of a mission file to the world. Raises InputError."""
     problems = Problems()
     for index, folder in enumerate(import_folders(loaded)):
         try:
@@ -368,6 +369,12 @@ def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
         except InputError as error:
             problems.add(loaded.error(("imports", index), str(error), ""))
     problems.raise_any()
+    return world
+
+
+def _with_objects(loaded: Mission, world: World, knowledge: Knowledge) -> World:
+    """Adds the objects of a mission file to the world. Raises InputError."""
+    problems = Problems()
     for name, file in (loaded.objects or {}).items():
         surfaces = tuple(knowledge.place(surface) or surface for surface in file.surfaces)
         try:

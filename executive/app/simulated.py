@@ -27,10 +27,13 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.snapshot_file import SnapshotError
 from plant.worlds.world import World, WorldError
+from skills.detection import Detector
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
+from skills.files.object_model import read_model
 from skills.manipulation.arm.solid_cells import wall_columns
 from skills.navigate.lattice import search
+from skills.perception.model_detector import ModelDetector, models_of
 from skills.robot import Clock, Pose2D
 from skills.stack import RobotStack, default_stack
 
@@ -212,7 +215,14 @@ def run_entry(
         robot=simulation.robots[tree.robot_name],
         localiser=localiser,
         costmap=stack.costmap.build(keepout_map),
-        detector=shared_detector(stack),
+        detector=_detector(stack, world),
         stack=stack,
         walls=wall_columns(scan_maps, tree.surfaces),
     )
+
+
+def _detector(stack: RobotStack, world: World) -> Detector:
+    """Returns the detector of a stack, with the models of the world's own objects. Raises InputError."""
+    networks = shared_detector(stack)
+    models = [read_model(each.folder) for each in world.own_objects.values()]
+    return ModelDetector(networks, [*models_of(networks).values(), *models]) if models else networks

@@ -50,5 +50,5 @@ def with_map(world: World, folder: Path) -> World:
 
 
 def knowledge_of(world: World) -> Knowledge:
-    """Loads the knowledge of a world. Raises InputError."""
-    return load_knowledge(world.knowledge_path)
+    """Loads the knowledge of a world and of its imported objects. Raises InputError."""
+    return load_knowledge(world.knowledge_path, tuple(world.own_objects))

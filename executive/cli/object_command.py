@@ -34,10 +34,13 @@ def import_command(
         Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB or COLLADA.")
     ],
     name: Annotated[str, typer.Option(help="Name of the model in worlds: letters, digits and _.")],
-    mass: Annotated[float, quantity_option(Mass, help="Mass, kg.")],
-    out: Annotated[Path, typer.Option("--out", help="New folder for the model.")],
+    mass: Annotated[float | None, quantity_option(Mass, help="Mass, kg; by default by its volume.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="New folder for the model; by default its name.")] = None,
     class_name: Annotated[
-        str | None, typer.Option("--class", help="The class that the detector reports for it; by default none.")
+        str | None,
+        typer.Option(
+            "--class", help="The class that the detector reports for it; by default the robot knows its model."
+        ),
     ] = None,
     scale: Annotated[float, quantity_option(Factor, help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
     up: Annotated[
@@ -55,6 +58,7 @@ def import_command(
     wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
         wanted.check()
+    out = Path(name) if out is None else out
     with _refused(mesh), new_folder(out) as folder:
         made = import_object(mesh, wanted, folder)
     if (doubt := _unlike_its_class(made)) is not None:
@@ -161,7 +165,7 @@ def _in_words(made: ImportedObject) -> str:
 
 
 def _class_of(found: ImportedObject) -> str:
-    return found.class_name if found.class_name != found.name else "of its own, which no detector knows"
+    return found.class_name if found.class_name != found.name else "of its own, known by its model"
 
 
 def _numbers(values: tuple[float, ...]) -> str:

@@ -112,7 +112,7 @@ def knowledge_of_mission(mission: Mission, knowledge: Knowledge) -> Knowledge:
         what = "the robots of a mission do not stand in its knowledge"
         raise mission.error((_KEY, _ROBOTS), what, "write 'robots' at the top of the file")
     merged = _merged(knowledge.model_dump(mode="json", exclude_none=True), mission.knowledge)
-    return knowledge_of_source(document.below((_KEY,), merged))
+    return knowledge_of_source(document.below((_KEY,), merged), tuple(knowledge.things))
 
 
 def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

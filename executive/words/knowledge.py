@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Final
 
@@ -246,25 +246,37 @@ def _resolve(
     return next(own, None) or next(alias, None)
 
 
-def load_knowledge(path: Path | str) -> Knowledge:
-    """Reads a world's `knowledge.yaml`.
+def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
+    """Reads a world's `knowledge.yaml`; `own` are the names of imported objects, which it need not mention.
 
     Raises:
         InputError: with file, line and hint, for broken YAML, unknown or missing keys, wrong values, and for names
             that are not defined or mean two things.
     """
-    return knowledge_of_source(read_yaml(path))
+    return knowledge_of_source(read_yaml(path), own)
 
 
-def knowledge_of_source(source: YamlSource) -> Knowledge:
+def knowledge_of_source(source: YamlSource, own: Collection[str] = ()) -> Knowledge:
     """Reads the knowledge of a parsed document. Raises InputError as `load_knowledge`."""
     knowledge = validate(Knowledge, source)
-    for error in _cross_errors(knowledge, source):
+    for error in _cross_errors(knowledge, source, own):
         raise error
-    return knowledge
+    return with_own_objects(knowledge, own)
 
 
-def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputError]:
+def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
+    """Adds the names of imported objects that are not known yet. Raises InputError if one means another object."""
+    new = [name for name in own if name not in knowledge.things]
+    for name in new:
+        for word in (name, name.replace("_", " ")):
+            if (other := knowledge.object_name(word)) is not None:
+                what = f"the imported object {name!r} has a name that means {other!r} in this world"
+                raise InputError(what, hint="import it under another name")
+    facts = {name: ObjectFacts(aliases=(name.replace("_", " "),) if "_" in name else ()) for name in new}
+    return knowledge.model_copy(update={"things": {**knowledge.things, **facts}}) if new else knowledge
+
+
+def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]) -> Iterator[InputError]:
     """Errors in references from one part of the file to another."""
     tasks = [task.value for task in Task]
     for index, door in enumerate(knowledge.doors):
@@ -275,7 +287,7 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource) -> Iterator[InputErr
     for name, person in knowledge.people.items():
         yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
     for name, facts in knowledge.things.items():
-        yield from _unless_known(source, ("things", name), name, (*class_forms(), *_tagged(knowledge)))
+        yield from _unless_known(source, ("things", name), name, (*class_forms(), *_tagged(knowledge), *own))
         for index, usual in enumerate(facts.usual):
             yield from _unless_known(source, ("things", name, "usual", index), usual, knowledge.place_names())
     for task, table in knowledge.defaults.items():

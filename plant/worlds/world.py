@@ -191,6 +191,11 @@ class World:
         rooms = [corner for room in self.rooms.values() for corner in room]
         return tuple(rooms) or ((x - reach_m, y - reach_m), (x + reach_m, y + reach_m))
 
+    @property
+    def own_objects(self) -> Mapping[str, Import]:
+        """Imported models without a class of the detector, by name."""
+        return {name: each for name, each in self.imports.items() if each.object.class_name == name}
+
     def with_routes(self, routes: Mapping[str, Route]) -> World:
         """Returns the world with people on these routes by name, whether they are in the world already or not.
 

@@ -44,7 +44,9 @@ from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints,
 from skills.perception.class_forms import ANY_OBJECT, known_attributes
 from skills.perception.detection_3d import Detection3D, detections_3d, observation
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
-from skills.perception.surface_segmentation import Cluster, segment_surfaces, segments_3d
+from skills.perception.model_detector import models_of
+from skills.perception.model_matching import identified
+from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.perception.visibility import Coverage, in_plain_view
 from skills.robot import FloatArray, Image
@@ -80,6 +82,8 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
         """Searches each surface in turn; an object counts when a view from another side confirms it."""
+        models = models_of(self.context.detector)
+        self._own = models if any(name in models for name in inputs.classes) else {}
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
         X_WB = self.X_WB()
@@ -87,7 +91,8 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         targets = self._targets(inputs, X_WB)
         if not targets:
             raise SkillFailure(Cause.PRECONDITION, f"{surface_names(inputs.surfaces)} is out of sight from here")
-        self._tracker, self._coverage = Tracker(self.context.detector.class_names), Coverage(inputs.surfaces)
+        names = (*self.context.detector.class_names, *((*self._own, ANY_OBJECT) if self._own else ()))
+        self._tracker, self._coverage = Tracker(tuple(dict.fromkeys(names))), Coverage(inputs.surfaces)
         self._tried: dict[int, int] = {}
         self._clusters: list[Cluster] = []
         blocked: list[SkillFailure] = []
@@ -107,7 +112,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
     def _check(self, inputs: DetectInputs) -> None:
         """Raises SkillFailure with cause PRECONDITION for an unknown class or attribute, or without surfaces."""
-        knows = {*self.context.detector.class_names, ANY_OBJECT}
+        knows = {*self.context.detector.class_names, ANY_OBJECT, *self._own}
         unknown = [name for name in inputs.classes if name not in knows]
         unknown += [word for word in inputs.attributes if word.lower() not in known_attributes()]
         if unknown:
@@ -279,12 +284,14 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         place, detector = self.context.localiser.estimate(), self.context.detector
 
         def examine() -> Look:
-            found = detect_in_image(detector, image, FAINT_SCORE)
+            by_model = {*self._own} - {*detector.class_names}
+            found = () if {*inputs.classes} <= by_model else detect_in_image(detector, image, FAINT_SCORE)
             placed = detections_3d(image, place, found, inputs.surfaces)
             views = [view for view in segment_surfaces(image, place.X_WO, inputs.surfaces) if view is not None]
-            if ANY_OBJECT in inputs.classes:
+            if self._own or ANY_OBJECT in inputs.classes:
                 sure = [each for each in placed if each.detection.score >= SURE_SCORE]
-                placed += segments_3d(image, place, views, sure, inputs.surfaces)
+                loose = loose_clusters(image, place, views, sure, inputs.surfaces)
+                placed += identified(loose, image, place, self._own)
             return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)

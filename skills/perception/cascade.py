@@ -13,16 +13,22 @@ class Cascade:
     """Cascade of networks in an ONNX `file`; Errand's own unless one is named.
 
     With `views`, a picture of the hand camera that leaves doubts is judged in several views (test-time augmentation).
+    `objects` are folders of `errand object import`: own objects, which are recognised by their models.
     """
 
     file: str | None = None
     views: bool = True
+    objects: tuple[str, ...] = ()
 
     def build(self) -> Detector:
-        """Loads the detector. Raises ModelFileError when its file cannot be used."""
+        """Loads the detector. Raises ModelFileError or InputError when a file cannot be used."""
+        from skills.files.object_model import read_model
         from skills.perception.detector.augmentation import AugmentedDetector
         from skills.perception.detector.model_files import MODEL_FILE
         from skills.perception.detector.onnx_detector import load_detector
+        from skills.perception.model_detector import ModelDetector
 
         single = load_detector(MODEL_FILE if self.file is None else Path(self.file))
-        return AugmentedDetector(single) if self.views else single
+        networks = AugmentedDetector(single) if self.views else single
+        models = [read_model(Path(folder)) for folder in self.objects]
+        return ModelDetector(networks, models) if models else networks

@@ -370,23 +370,22 @@ def _convexity(part: NDArray[np.uint8] | Mask) -> float:
     return float(part.sum()) / max(float(hull_cells), 1.0)
 
 
-def segments_3d(
+def loose_clusters(
     image: Image,
     place: LocalisationEstimate,
     views: Iterable[SurfaceView],
     labelled: Sequence[Detection3D],
     surfaces: Sequence[Surface],
-) -> tuple[Detection3D, ...]:
-    """Detections of `ANY_OBJECT` for the objects on some surfaces that none of the `labelled` detections explains.
+) -> list[Cluster]:
+    """Clusters of the objects on some surfaces that none of the `labelled` detections explains.
 
-    Leaves out segments that the picture's edge cuts off, that stand beside the surface, such as a wall, or that are
+    Leaves out clusters that the picture's edge cuts off, that stand beside the surface, such as a wall, or that are
     longer than 0.6 m.
     """
     outlines = {surface.name: surface.polygon_W for surface in surfaces}
     p_WC = camera_pose_W(image, place.X_WO).translation()
     clusters = (cluster for view in views for cluster in _unlabelled(view, labelled, p_WC))
-    whole = (one for one in clusters if _stands_on(one, outlines[one.surface]) and not _is_cut_off(one, image))
-    return tuple(_segment_3d(one, image, place) for one in whole)
+    return [one for one in clusters if _stands_on(one, outlines[one.surface]) and not _is_cut_off(one, image)]
 
 
 def _unlabelled(view: SurfaceView, labelled: Sequence[Detection3D], p_WC: FloatArray) -> Iterator[Cluster]:
@@ -407,7 +406,7 @@ def _is_cut_off(cluster: Cluster, image: Image) -> bool:
     return min(u0, v0, lens.width - 1 - u1, lens.height - 1 - v1) < _BORDER_PX
 
 
-def _segment_3d(cluster: Cluster, image: Image, place: LocalisationEstimate) -> Detection3D:
+def segment_3d(cluster: Cluster, image: Image, place: LocalisationEstimate) -> Detection3D:
     """A cluster as the detection of an object without a class."""
     shape, X_WO = cluster.shape, place.X_WO
     u0, v0, u1, v1 = (float(value) for value in cluster.box)

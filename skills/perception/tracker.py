@@ -3,7 +3,7 @@
 A detection belongs to the track that it fits by position (Mahalanobis distance) and class; positions are fused in
 information form (inverse covariances add). A track that a picture should show and does not loses belief. A faint
 detection begins no track, but supports one. A segment without a label (`ANY_OBJECT`) gives a position, and no evidence
-of a class.
+of a class, unless `ANY_OBJECT` is among the tracker's names: then it says that the segment is none of the others.
 """
 
 from __future__ import annotations
@@ -220,7 +220,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
     A faint detection of the same class, or a segment, only renews the time of the one before.
     """
-    unlabelled = detected.class_name == ANY_OBJECT != track.latest.class_name
+    unlabelled = detected.class_name == ANY_OBJECT != track.latest.class_name and ANY_OBJECT not in track.classes
     if detected.detection.score >= SURE_SCORE and not unlabelled:
         return detected
     same = unlabelled or detected.class_name == track.latest.class_name
@@ -229,7 +229,7 @@ def _latest(track: Track, detected: Detection3D) -> Detection3D:
 
 def _classes(before: Mapping[str, float], detected: Detection3D) -> Mapping[str, float]:
     """Class probabilities after a detection; the rest of its scores is spread over the other classes."""
-    if detected.class_name == ANY_OBJECT:
+    if detected.class_name == ANY_OBJECT and ANY_OBJECT not in before:
         return before
     score = float(np.clip(detected.detection.score, 0.3, 0.97))
     others = (1.0 - score) / max(len(before) - 1, 1)

@@ -236,3 +236,41 @@ def test_a_wrong_tag_is_refused(tmp_path, monkeypatch, given, says):
     assert result.exit_code == 2
     assert says in result.stderr
     assert not (tmp_path / "t.svg").exists()
+
+
+OWN = """\
+name: bring the mug
+imports: [big_mug]
+objects:
+  my mug: {model: big_mug, surfaces: [workbench]}
+steps:
+  - say: bring me the big mug
+"""
+
+
+def test_an_object_with_a_name_alone_is_a_word_of_its_mission(mesh, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = invoke("object", "import", mesh, "--name", "big_mug")
+    assert result.exit_code == 0, result.output
+    assert "big_mug, class of its own, known by its model, 0.200 x 0.060 x 0.040 m, 0.288 kg" in result.stdout
+    (tmp_path / "m.yaml").write_text(OWN)
+    result = invoke("check", "m.yaml")
+    assert result.exit_code == 0, result.output
+
+
+def test_an_object_in_a_world_is_a_word_there(mesh, tmp_path):
+    assert made(mesh, tmp_path / "drill").exit_code == 0
+    world = tmp_path / "world"
+    copy_of_flat(world, "{name: wrench, model: wrench", "{name: my drill, model: drill", imports="[../drill]")
+    result = invoke("parse", "bring me the drill from the workshop", "--world", world)
+    assert result.exit_code == 0, result.output
+    assert "do [grasp] to [drill]" in result.stdout
+
+
+def test_an_object_with_the_name_of_another_thing_is_refused_where_both_are(mesh, tmp_path):
+    assert invoke("object", "import", mesh, "--name", "bottle", "--out", tmp_path / "bottle").exit_code == 0
+    (tmp_path / "m.yaml").write_text(OWN.replace("big_mug", "bottle").replace("big mug", "bottle"))
+    result = invoke("check", tmp_path / "m.yaml")
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert "the imported object 'bottle' has a name that means 'beer' in this world; import it under another" in line

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.models.builder.importing.mesh_files import Patch, read_patches
+from plant.models.builder.importing.recognition import recognition_model
 from plant.models.builder.importing.resting_pose import feet, resting_rotation
 from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, solid_of, unique_points
 from plant.models.builder.mesh import (
@@ -36,6 +37,8 @@ SMALLEST_M: Final = 0.005
 PROUD_M: Final = 0.0003
 """Distance by which the small spheres stand out, so that they bear the body."""
 PLACES: Final = 6
+USUAL_KG_M3: Final = 600.0
+"""Density of an object of unknown mass: between wood and a plastic bottle that is full."""
 PERSON: Final = "person"
 _UNITS: Final = (("millimetres", 0.001), ("centimetres", 0.01), ("inches", 0.0254), ("feet", 0.3048), ("km", 1000.0))
 _PLAUSIBLE_M: Final = (0.02, 1.5)
@@ -53,11 +56,11 @@ _ROUND_SAME, _ROUND_WIDEST = 0.02, 0.52
 class ImportOptions:
     """Options of an import: name, mass (kg), class, metres per unit, the axis that is up, and closing of holes.
 
-    Without a class, the object has a class of its own, which no detector knows.
+    Without a class, the robot knows the object by its model. Without a mass, the volume gives it (`USUAL_KG_M3`).
     """
 
     name: str
-    mass_kg: float
+    mass_kg: float | None = None
     class_name: str | None = None
     scale: float = 1.0
     up: str | None = None
@@ -77,7 +80,7 @@ class ImportOptions:
         if self.class_name is not None and self.class_name not in classes:
             hint = f"known are {', '.join(classes)}; leave it out for an object of another kind"
             raise ObjectImportError(f"there is no class {self.class_name[:60]!r}", hint)
-        if not (math.isfinite(self.mass_kg) and self.mass_kg > 0.0):
+        if self.mass_kg is not None and not (math.isfinite(self.mass_kg) and self.mass_kg > 0.0):
             raise ObjectImportError(f"the mass {self.mass_kg:g} kg is not positive", "weigh the object")
         if not (math.isfinite(self.scale) and self.scale > 0.0):
             raise ObjectImportError(f"the scale {self.scale:g} is not positive", "give metres per unit")
@@ -109,7 +112,8 @@ def import_object(mesh: Path, options: ImportOptions, folder: Path) -> ImportedO
     """
     options.check()
     body = _at_rest(_placed(mesh, options))
-    mass = scale_mass(_mass(body.solid), options.mass_kg)
+    mass_kg = body.solid.volume_m3 * USUAL_KG_M3 if options.mass_kg is None else options.mass_kg
+    mass = scale_mass(_mass(body.solid), mass_kg)
     _refuse_impossible(mass)
     parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
     bearing = feet(body.solid.points, mass.com)
@@ -127,6 +131,7 @@ def import_object(mesh: Path, options: ImportOptions, folder: Path) -> ImportedO
     write_text(folder / f"{options.name}.sdf", model_sdf(model))
     _write_appearance(folder, options.name, body.patches)
     made = _facts(options, body, mass, len(parts))
+    recognition_model(made.class_name, body.patches, body.solid.points, mass.com).write(folder)
     write_imported(folder, made)
     return made
 
@@ -279,7 +284,7 @@ def _facts(options: ImportOptions, body: _Body, mass: MassProperties, parts: int
     return ImportedObject(
         name=options.name,
         class_name=options.class_name or options.name,
-        mass_kg=options.mass_kg,
+        mass_kg=round(mass.mass_kg, 4),
         size_m=(x, y, z),
         com_m=(com_x, com_y, com_z),
         inertia_kg_m2=(m[0, 0], m[1, 1], m[2, 2], m[0, 1], m[0, 2], m[1, 2]),

@@ -26,6 +26,8 @@ _LEAST_TIPPING_RAD: Final = 0.05
 _LEAST_AREA: Final = 0.04
 _MOST_CANDIDATES: Final = 60
 _OTHER_SIDE: Final = 0.97
+MOST_RESTS: Final = 10
+_OTHER_REST: Final = 0.85
 _PROJECTIONS, _EXACT = 200, 0.02
 DOWN: Final = (0.0, 0.0, -1.0)
 
@@ -58,6 +60,15 @@ def resting_rotation(points: FloatArray, com: FloatArray) -> FloatArray:
     longest = max(corners[1] - corners[0], corners[2] - corners[1], key=lambda edge: float(np.linalg.norm(edge)))
     c, s = longest / np.linalg.norm(longest)
     return np.asarray(np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ flat)
+
+
+def resting_rotations(points: FloatArray, com: FloatArray) -> FloatArray:
+    """Rotations (K, 3, 3) in which a body rests: the given one, then the steadiest on sides that differ clearly."""
+    downs = [np.array(DOWN)]
+    for side in sorted(resting_sides(points, com), key=lambda side: -side.tipping_rad):
+        if all(float(side.normal @ down) < _OTHER_REST for down in downs):
+            downs.append(side.normal)
+    return np.stack([_turning(down, np.array(DOWN)) for down in downs[:MOST_RESTS]])
 
 
 def resting_sides(points: FloatArray, com: FloatArray) -> list[Side]:

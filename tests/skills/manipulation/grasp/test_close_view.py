@@ -12,14 +12,14 @@ PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 ONE, OTHER = Can(1.0, 0.0, 0.033, 0.115, GREEN), Can(1.0, 0.067, 0.033, 0.115, GREEN)
 
 
-def examined(things, at, p_WB=(0.0, 0.0, 0.0)):
-    seen = ObjectObservation(0.0, ObjectKind("thing"), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
+def examined(things, at, p_WB=(0.0, 0.0, 0.0), name="thing"):
+    seen = ObjectObservation(0.0, ObjectKind(name), (at.x, at.y, 0.81), (0.066, 0.066, 0.115), 0.0, 0.7, "table")
     return examine(scene(things), RigidTransform(p_WB), TABLE, seen, PLACE, (), 0.12)
 
 
-@pytest.mark.parametrize("at", [ONE, OTHER])
-def test_of_two_touching_objects_the_seen_one_is_the_target_and_the_other_an_obstacle(at):
-    view = examined([ONE, OTHER], at)
+@pytest.mark.parametrize(("at", "name"), [(ONE, "thing"), (OTHER, "thing"), (OTHER, "mug")])
+def test_of_two_touching_objects_the_seen_one_is_the_target_and_the_other_an_obstacle(at, name):
+    view = examined([ONE, OTHER], at, name=name)
     assert view.target.centre_B == pytest.approx((at.x, at.y), abs=0.012)
     assert view.target.width_m == pytest.approx(0.066, abs=0.012)
     assert len(view.boxes) == 2  # the table and the other can

@@ -1,0 +1,286 @@
+"""Recognition of own objects: segments of a depth picture are compared with models in size, shape and colours.
+
+An object rests on a surface, so its pose is one of its resting rotations, a turn about the vertical and a place. For
+some turns the segment's points are compared with the model's surface; the best are refined by iterated closest points
+(point to plane). A pose counts when the points of the segment lie on the model, the picture shows no farther surface
+through the model, and the colours agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from skills.api import Detection, LocalisationEstimate
+from skills.files.object_model import ObjectModel
+from skills.perception.detection_3d import Detection3D
+from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, nearest_pixels, project
+from skills.perception.surface_segmentation import Cluster, segment_3d
+from skills.robot import FloatArray, Image
+
+_TURNS: Final = 24
+_POSES: Final = 3
+_STEPS: Final = 8
+_POINTS: Final = 250
+_HEIGHT_M, _HEIGHT_SHARE = 0.010, 0.06
+_WIDER_M, _LEAST_WIDTH = 0.015, 0.6
+_FAR_M: Final = 0.02
+_FAR_SIGMAS: Final = 10.0
+_IN_SEGMENT_M: Final = 0.01
+_FRONT: Final = 0.15
+_CELL_PX: Final = 8.0
+
+
+@dataclass(frozen=True)
+class Sight:
+    """A depth picture, and the pose of its camera in the world."""
+
+    image: Image
+    X_WC: RigidTransform
+
+    def sigma_m(self, z: FloatArray) -> FloatArray:
+        """Error of depths (m)."""
+        return 0.002 + 0.0015 * z**2
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Pose X_WM of a model that a segment may show, and its agreement with the picture.
+
+    `on_model` is the share of the segment's points on the model, `off` their mean distance from it in sigmas of the
+    depth; `shown` is the share of the model's front that the segment shows, of what is not hidden by or part of
+    something else, `hidden` the share that is; `colour` is the mean difference in Lab.
+    """
+
+    model: ObjectModel
+    X_WM: RigidTransform
+    on_model: float
+    off: float
+    shown: float
+    hidden: float
+    colour: float
+
+
+def fits(cluster: Cluster, sight: Sight, models: Iterable[ObjectModel]) -> list[Fit]:
+    """Fits of a segment to the models that have its size."""
+    return [fit for model in models for fit in _best(cluster, sight, model)]
+
+
+def _best(cluster: Cluster, sight: Sight, model: ObjectModel) -> Iterator[Fit]:
+    step = max(1, len(cluster.points) // _POINTS)
+    p_W = cluster.points.p_W[::step]
+    poses = [_refined(p_W, model, X_WM) for X_WM in _first_poses(cluster, p_W, sight, model)]
+    found = [_judged(cluster, sight, model, X_WM) for X_WM in poses]
+    if found:
+        yield max(found, key=quality)
+
+
+def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectModel) -> list[RigidTransform]:
+    """Poses of the model whose surface lies nearest to a segment's points, one for each of some directions."""
+    along, across = _view(cluster, sight)
+    height_m = float(np.percentile(p_W[:, 2] - cluster.plane.z(p_W[:, :2]), 99.5))
+    left, right = np.percentile(p_W @ across, [1, 99])
+    near = float(np.percentile(p_W @ along, 2))
+    tried = list[tuple[float, float, RigidTransform]]()
+    some = p_W[:: max(1, len(p_W) // 120)]
+    for R in model.rests:
+        rest = model.points @ R.T
+        top_m = float(np.ptp(rest[:, 2]))
+        if abs(top_m - height_m) > _HEIGHT_M + _HEIGHT_SHARE * top_m:
+            continue
+        for turn in np.arange(_TURNS) * (2.0 * math.pi / _TURNS):
+            R_WM = RotationMatrix.MakeZRotation(float(turn)).matrix() @ R
+            turned = model.points @ R_WM.T
+            low, high = (turned @ across).min(), (turned @ across).max()
+            if not _LEAST_WIDTH * (high - low) - _WIDER_M < right - left < high - low + _WIDER_M:
+                continue
+            xy = (near - (turned @ along).min()) * along + 0.5 * (left + right - low - high) * across
+            p_WM = np.array([xy[0], xy[1], cluster.base_m - rest[:, 2].min()])
+            off = model.tree.query((some - p_WM) @ R_WM)[0]
+            cost = float(np.minimum(off, _FAR_M).mean())
+            tried.append((cost, float(turn), RigidTransform(RotationMatrix.ProjectToRotationMatrix(R_WM), p_WM)))
+    return _apart(sorted(tried, key=lambda one: one[0]))
+
+
+def _apart(tried: list[tuple[float, float, RigidTransform]]) -> list[RigidTransform]:
+    """The first poses that are not nearly the same."""
+    chosen = list[RigidTransform]()
+    for _, _, X in tried:
+        if all((X.rotation().inverse() @ other.rotation()).ToAngleAxis().angle() > 0.5 for other in chosen):
+            chosen.append(X)
+        if len(chosen) == _POSES:
+            break
+    return chosen
+
+
+def _view(cluster: Cluster, sight: Sight) -> tuple[FloatArray, FloatArray]:
+    """Level unit vectors (3,) along and across the view of a segment."""
+    off = np.array(cluster.shape.centre) - sight.X_WC.translation()[:2]
+    x, y = off / max(float(np.linalg.norm(off)), 1e-6)
+    return np.array([x, y, 0.0]), np.array([-y, x, 0.0])
+
+
+def _refined(p_W: FloatArray, model: ObjectModel, X_WM: RigidTransform) -> RigidTransform:
+    """Pose after some steps of iterated closest points, point to plane, about the vertical."""
+    R_WM, p_WM = X_WM.rotation().matrix(), np.array(X_WM.translation())
+    base_m = p_WM[2]
+    for _ in range(_STEPS):
+        q_M = (p_W - p_WM) @ R_WM
+        far, index = model.tree.query(q_M)
+        near = far < _FAR_M
+        if np.count_nonzero(near) < 10:
+            break
+        n_W = model.normals[index[near]] @ R_WM.T
+        residual = np.einsum("ij,ij->i", q_M[near] - model.points[index[near]], model.normals[index[near]])
+        lever = p_W[near] - p_WM
+        moved = np.column_stack([n_W, n_W[:, 1] * lever[:, 0] - n_W[:, 0] * lever[:, 1]])
+        weight = 1.0 / np.maximum(1.0, np.abs(residual) / 0.004)
+        normal = (moved * weight[:, None]).T @ moved + np.diag([1e-3, 1e-3, len(residual), 1e-5])
+        step = np.linalg.solve(
+            normal, (moved * weight[:, None]).T @ residual + [0, 0, len(residual) * (base_m - p_WM[2]), 0]
+        )
+        p_WM = p_WM + step[:3]
+        R_WM = RotationMatrix.MakeZRotation(float(step[3])).matrix() @ R_WM
+    return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R_WM), p_WM)
+
+
+def _judged(cluster: Cluster, sight: Sight, model: ObjectModel, X_WM: RigidTransform) -> Fit:
+    """Agreement of a pose with the segment and the picture."""
+    step = max(1, len(cluster.points) // (3 * _POINTS))
+    points = cluster.points.p_W[::step]
+    q_M = (points - X_WM.translation()) @ X_WM.rotation().matrix()
+    far, index = model.tree.query(q_M)
+    plane = np.abs(np.einsum("ij,ij->i", q_M - model.points[index], model.normals[index]))
+    off = np.where(far < _FAR_M, np.minimum(plane, far), far)
+    z = (points - sight.X_WC.translation()) @ sight.X_WC.rotation().matrix()[:, 2]
+    sigma_m = sight.sigma_m(z)
+    on = off < 0.003 + 2.5 * sigma_m
+    agree, through, hidden = _shown(points, sight, model, X_WM)
+    seen = max(agree + through, 1)
+    colour = _colour_difference(cluster.points.colours[::step][on], model.colours[index[on]])
+    return Fit(
+        model,
+        X_WM,
+        float(on.mean()),
+        float(np.minimum(off / sigma_m, _FAR_SIGMAS).mean()),
+        agree / seen,
+        hidden / max(seen + hidden, 1),
+        colour,
+    )
+
+
+def _shown(p_W: FloatArray, sight: Sight, model: ObjectModel, X_WM: RigidTransform) -> tuple[int, int, int]:
+    """Numbers of points on the model's front: in the segment p_W (N, 3), looked through, and part of something else."""
+    from scipy.spatial import cKDTree
+
+    X_CM = sight.X_WC.inverse() @ X_WM
+    p_C = model.points @ X_CM.rotation().matrix().T + X_CM.translation()
+    n_C = model.normals @ X_CM.rotation().matrix().T
+    facing = -np.einsum("ij,ij->i", n_C, p_C) > _FRONT * np.linalg.norm(p_C, axis=1)
+    above = (model.points @ X_WM.rotation().matrix()[2]) + X_WM.translation()[2] > p_W[:, 2].min()
+    p_C = p_C[facing & above & (p_C[:, 2] > MIN_DEPTH_M)]
+    lens, depth = sight.image.depth_intrinsics, sight.image.depth_m
+    u, v = project(p_C, lens)
+    inside = (u > 1) & (v > 1) & (u < lens.width - 2) & (v < lens.height - 2)
+    p_C, u, v = p_C[inside], u[inside], v[inside]
+    if not len(p_C):
+        return 0, 0, 1
+    front = _front(u, v, p_C[:, 2])
+    z, p_WS = p_C[front, 2], sight.X_WC @ p_C[front].T
+    own = cKDTree(p_W).query(p_WS.T)[0] < _IN_SEGMENT_M
+    (columns, rows), reach = nearest_pixels(u[front], v[front], lens).T, (-1, 0, 1)
+    around = np.stack([depth[rows + j, columns + i] for i in reach for j in reach]).astype(np.float64)
+    around[around < MIN_DEPTH_M] = np.nan
+    known = ~np.isnan(around).all(axis=0)
+    off = around[:, known] - z[known]
+    tolerance = 0.006 + 3.0 * sight.sigma_m(z[known])
+    agree = (np.abs(off) < tolerance).any(axis=0)  # a comparison with NaN is false
+    behind = np.nanmin(off, axis=0) > 0.0
+    shown = agree & own[known]
+    through = ~agree & behind
+    return int(shown.sum()), int(through.sum()), int((~shown & ~through).sum())
+
+
+def _front(u: FloatArray, v: FloatArray, z: FloatArray) -> NDArray[np.bool_]:
+    """Returns which points no other point of the model hides, on a coarse grid of pixels."""
+    cells = np.floor(np.column_stack([u, v]) / _CELL_PX).astype(np.int64)
+    _, index = np.unique(cells, axis=0, return_inverse=True)
+    nearest = np.full(int(index.max()) + 1, np.inf)
+    np.minimum.at(nearest, index.reshape(-1), z)
+    return np.asarray(z < nearest[index.reshape(-1)] + 0.02)
+
+
+def _colour_difference(seen: NDArray[np.uint8], of_model: NDArray[np.uint8]) -> float:
+    """Mean difference of colours (N, 3) in Lab, after the lightness of all is made equal within limits."""
+    if len(seen) == 0:
+        return 100.0
+    a, b = (_lab(colours) for colours in (seen, of_model))
+    gain = float(np.clip(a[:, 0].mean() / max(b[:, 0].mean(), 1.0), 0.6, 1.4))
+    b = b * [gain, 1.0, 1.0]
+    return float(np.minimum(np.linalg.norm(a - b, axis=1), 60.0).mean())
+
+
+def _lab(colours: NDArray[np.uint8]) -> FloatArray:
+    scaled = (colours.reshape(1, -1, 3) / np.float32(255.0)).astype(np.float32)
+    return np.asarray(cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB)[0], dtype=np.float64)
+
+
+def quality(fit: Fit) -> float:
+    """Likeness of a fit, 0 to 1."""
+    shape = max(0.0, 1.0 - 4.0 * (1.0 - fit.on_model)) * max(0.0, 1.0 - 3.0 * (1.0 - fit.shown))
+    return float(shape * math.exp(-((fit.colour / 30.0) ** 2)) * math.exp(-(fit.off**4)))
+
+
+_LEAST: Final = 0.35
+_ALIKE: Final = 0.75
+_MOST_HIDDEN: Final = 0.5
+
+
+def identified(
+    clusters: Iterable[Cluster], image: Image, place: LocalisationEstimate, models: Mapping[str, ObjectModel]
+) -> tuple[Detection3D, ...]:
+    """Detections of segments, with the name of the model that each fits; `ANY_OBJECT` for one that fits none.
+
+    A segment that fits two models almost equally well may be either (`alternatives`).
+    """
+    sight = Sight(image, camera_pose_W(image, place.X_WO))
+    return tuple(_identified(each, sight, place, models) for each in clusters)
+
+
+def _identified(
+    cluster: Cluster, sight: Sight, place: LocalisationEstimate, models: Mapping[str, ObjectModel]
+) -> Detection3D:
+    unknown = segment_3d(cluster, sight.image, place)
+    found = sorted(fits(cluster, sight, models.values()), key=quality, reverse=True)
+    good = [fit for fit in found if quality(fit) >= _LEAST and fit.hidden <= _MOST_HIDDEN]
+    if not good:
+        return unknown
+    first, others = good[0], [fit for fit in good[1:] if quality(fit) > _ALIKE * quality(good[0])]
+    if others:
+        alternatives = tuple((fit.model.name, 0.5) for fit in (first, *others))
+        return replace(unknown, detection=replace(unknown.detection, score=0.5, alternatives=alternatives))
+    return _detected(first, unknown)
+
+
+def _detected(fit: Fit, segment: Detection3D) -> Detection3D:
+    """A segment with the name, the place and the extents of the model that it fits."""
+    R_WM, p_WM = fit.X_WM.rotation(), fit.X_WM.translation()
+    turned = fit.model.points @ R_WM.matrix().T
+    yaw = float(RollPitchYaw(R_WM).yaw_angle())
+    (x, y), (length, width), angle_deg = cv2.minAreaRect(turned[:, :2].astype(np.float32))
+    yaw = math.radians(angle_deg) + (0.0 if length >= width else 0.5 * math.pi)
+    z = 0.5 * float(turned[:, 2].min() + turned[:, 2].max())
+    return replace(
+        segment,
+        detection=Detection(fit.model.name, 0.55 + 0.4 * quality(fit), segment.detection.box),
+        position_W=p_WM + [x, y, z],
+        size_m=(max(length, width), min(length, width), float(np.ptp(turned[:, 2]))),
+        yaw_rad=yaw,
+    )

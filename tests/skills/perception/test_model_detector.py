@@ -1,0 +1,48 @@
+"""Models of own objects in files, and the detector that has them."""
+
+import numpy as np
+import pytest
+from own_models import can_model
+
+from executive.record.work import CountedDetector, Work
+from skills.files.errors import InputError
+from skills.files.object_model import RECOGNITION_FILE, read_model
+from skills.perception.model_detector import ModelDetector, models_of
+from skills.testing.estimators import PlainColours
+
+MODEL = can_model("tin", 0.04, 0.12, (190, 15, 20))
+
+
+def test_a_model_is_read_as_it_was_written(tmp_path):
+    MODEL.write(tmp_path)
+    read = read_model(tmp_path)
+    assert read.name == "tin"
+    np.testing.assert_allclose(read.points, MODEL.points, atol=1e-6)
+    np.testing.assert_array_equal(read.colours, MODEL.colours)
+
+
+@pytest.mark.parametrize("content", [None, b"", b"no archive"])
+def test_a_folder_without_a_model_is_refused_in_one_sentence(tmp_path, content):
+    if content is not None:
+        (tmp_path / RECOGNITION_FILE).write_bytes(content)
+    with pytest.raises(InputError, match="errand object import"):
+        read_model(tmp_path)
+
+
+def test_a_model_with_too_few_colours_is_refused(tmp_path):
+    MODEL.write(tmp_path)
+    with np.load(tmp_path / RECOGNITION_FILE) as data:
+        changed = {**data, "colours": data["colours"][:5]}
+    np.savez(tmp_path / RECOGNITION_FILE, **changed)
+    with pytest.raises(InputError, match="damaged"):
+        read_model(tmp_path)
+
+
+def test_detector_with_models_detects_as_its_networks_do():
+    networks = PlainColours()
+    detector = CountedDetector(ModelDetector(networks, [MODEL]), Work())
+    assert list(models_of(detector)) == ["tin"]
+    assert detector.class_names == networks.class_names
+    picture = np.zeros((40, 60, 3), np.uint8)
+    assert detector.detect([picture]) == networks.detect([picture])
+    assert models_of(networks) == {}

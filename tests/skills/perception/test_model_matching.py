@@ -1,0 +1,71 @@
+"""Recognition of own objects in analytic scenes."""
+
+import numpy as np
+import pytest
+from own_models import can_model
+from pydrake.math import RigidTransform
+from table_scene import BLUE, RED, TABLE, Can, scene
+
+from skills.api import LocalisationEstimate
+from skills.perception.class_forms import ANY_OBJECT
+from skills.perception.model_matching import identified
+from skills.perception.surface_segmentation import loose_clusters, segment_surface
+
+PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
+TIN = Can(1.0, -0.1, 0.04, 0.12, RED)
+MODEL = can_model("tin", 0.04, 0.12, RED)
+
+
+def seen(things, models):
+    image = scene(things)
+    clusters = loose_clusters(image, PLACE, [segment_surface(image, RigidTransform(), TABLE)], [], [TABLE])
+    return identified(clusters, image, PLACE, {model.name: model for model in models})
+
+
+def test_an_object_like_its_model_gets_its_name_place_and_size():
+    (found,) = seen([TIN], [MODEL])
+    assert (found.class_name, found.surface) == ("tin", "table")
+    assert found.detection.score > 0.8
+    assert found.position_W == pytest.approx([1.0, -0.1, 0.81], abs=0.006)
+    assert found.size_m == pytest.approx((0.08, 0.08, 0.12), abs=0.006)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        Can(1.0, -0.1, 0.04, 0.12, BLUE),
+        Can(1.0, -0.1, 0.04, 0.17, RED),
+        Can(1.0, -0.1, 0.028, 0.12, RED),
+        Can(1.0, -0.1, 0.055, 0.12, RED),
+    ],
+    ids=["colour", "higher", "narrower", "wider"],
+)
+def test_an_object_that_differs_stays_a_thing(other):
+    (found,) = seen([other], [MODEL])
+    assert found.class_name == ANY_OBJECT
+    assert found.detection.alternatives == ()
+
+
+def test_each_object_gets_the_name_of_its_own_model():
+    models = [MODEL, can_model("pot", 0.05, 0.09, BLUE)]
+    found = seen([TIN, Can(1.1, 0.2, 0.05, 0.09, BLUE), Can(1.1, 0.0, 0.02, 0.05, RED)], models)
+    assert sorted(each.class_name for each in found) == ["pot", ANY_OBJECT, "tin"]
+
+
+def test_models_that_nothing_tells_apart_are_alternatives_without_a_claim():
+    (found,) = seen([TIN], [MODEL, can_model("twin", 0.04, 0.12, RED)])
+    assert found.class_name == ANY_OBJECT
+    assert {name for name, _ in found.detection.alternatives} == {"tin", "twin"}
+
+
+def test_an_object_behind_another_is_claimed_only_while_half_of_it_shows():
+    behind = Can(1.15, -0.02, 0.04, 0.12, RED)
+    wall = Can(1.0, 0.0, 0.045, 0.2, BLUE)
+    names = [each.class_name for each in seen([behind, wall], [MODEL])]
+    assert "tin" not in names
+
+
+def test_no_model_is_aligned_with_segments_of_another_size(monkeypatch):
+    monkeypatch.setattr("skills.perception.model_matching._refined", None)
+    (found,) = seen([Can(1.0, -0.1, 0.04, 0.25, RED)], [MODEL])
+    assert found.class_name == ANY_OBJECT

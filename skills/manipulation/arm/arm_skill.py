@@ -14,7 +14,7 @@ from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
-from skills.manipulation.arm.poses import carry_configuration
+from skills.manipulation.arm.poses import carry_configuration, hangs_below
 from skills.manipulation.arm.solid_cells import Outline, OwnSpace, solid_boxes, wall_boxes
 from skills.robot import ArmCapabilities, ArmTrajectory, CommandId, FloatArray, GripperCapabilities
 from skills.routine import Routine, RoutineSkill, SkillFailure, planning_failure
@@ -299,8 +299,8 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def carry(self, R_BH: RotationMatrix, message: str, speed_rad_s: float | None = CARRY_SPEED_RAD_S) -> Routine[None]:
         """Draws the hand near the body, turned as in R_BH about the vertical, so that the object stays upright."""
-        arm = self.arm
-        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q), message, speed_rad_s)
+        arm, hangs = self.arm, hangs_below(self.context.payload.corners_H, self.gripper)
+        yield from self.move_to(lambda scene, q: carry_configuration(scene, arm, R_BH, q, hangs), message, speed_rad_s)
 
     def move_straight(
         self,

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.kinematics import ArmModel
-from skills.robot import ArmCapabilities, FloatArray
+from skills.robot import ArmCapabilities, FloatArray, GripperCapabilities
 from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
@@ -18,6 +18,9 @@ _JOINT_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
 """Cost of each joint's turn among configurations that look at a point."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 """Pitches of the hand that carries when it cannot keep the object upright, in groups, the best first."""
+_HANGS_M = 0.03
+"""Distance of an object's middle beyond the fingertips from which on it hangs."""
+_TURNS_HANGING_RAD = tuple(np.linspace(-np.pi, np.pi, 8, endpoint=False))
 _CLOSE_BELOW_RAD = tuple(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]))
 """Angles below level at which a close view looks down, the best first."""
 _CLOSE_M = (0.42, 0.36, 0.48)
@@ -111,20 +114,27 @@ def towards_shoulder(p_BS: FloatArray, p_B: FloatArray) -> FloatArray:
 
 
 def carry_configuration(
-    scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray
+    scene: ArmScene, arm: ArmCapabilities, R_BH: RotationMatrix, q_near_rad: FloatArray, hangs: bool = False
 ) -> FloatArray:
     """Returns arm angles (J,) with the hand near the body, the object as upright as in R_BH.
 
     Where the object cannot stay upright, the hand points forward and slightly up, so that the object rests on a finger
-    and leans on the palm; else level, or down. Raises PlanningError when no pose is free.
+    and leans on the palm; else level, or down. An object that `hangs` far below fingers that point down stays there,
+    ahead of the body: with the hand level its weight would turn it out. Raises PlanningError when no pose is free.
     """
     points_down = R_BH.matrix()[2, 0] < -0.8
-    upright = [] if points_down else _turned(R_BH, (0.0, 0.4, -0.4))
+    turns = _TURNS_HANGING_RAD if points_down else (0.0, 0.4, -0.4)
+    upright = _turned(R_BH, turns) if hangs or not points_down else []
     for rotations in (upright, *map(_forward, _CARRY_PITCHES_RAD)):
         q = _best_free(scene, rotations, arm.carry_x_m, arm.carry_z_m, arm.carry_best_x_m, q_near_rad)
         if q is not None:
             return q
     raise PlanningError("no pose to carry the object near the body is free of contact")
+
+
+def hangs_below(corners_H: FloatArray | None, gripper: GripperCapabilities) -> bool:
+    """Returns whether the middle of a held object, given by its corners (N, 3), is well beyond the fingertips."""
+    return corners_H is not None and float(np.mean(corners_H[:, 0])) > gripper.tip_x_m + _HANGS_M
 
 
 def tucked_configuration(

@@ -34,9 +34,9 @@ _LEAST_OF_THIN = 0.35
 """The same for a thin object, as a part of its height."""
 _LEAST_BEYOND = 0.25
 """Part of a flat object's height by which the fingers may end above its middle."""
-_WELL_BEYOND_M = 0.008
+_WELL_BEYOND_M = 0.006
 """Depth by which the fingers should end below an object's middle: rounded tips above it press a round handle out."""
-_PER_HIGH_M = 40.0
+_PER_HIGH_M = 60.0
 """Cost of fingers that end higher, per metre."""
 _BESIDE_THIN_M = 0.012
 """Gap between the fixed finger and a thin object."""
@@ -120,6 +120,8 @@ def _attitudes(target: Target, placement: Placement, gripper: GripperCapabilitie
 
     With the first lean, fingers of different length end level on both sides of an object of that width.
     """
+    if placement.rim:
+        return [(0.5 * np.pi, 0.0)]
     if target.upright:
         tilts = (60.0, 75.0, 90.0) if placement.below_top_m else (0.0, 10.0, 20.0, 32.0, 45.0)
         return [(float(np.radians(tilt)), 0.0) for tilt in tilts]

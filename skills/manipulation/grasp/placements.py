@@ -41,6 +41,18 @@ _SLICE_M = 0.03
 """Half the height of a slice of an upright object, and the distance between slices."""
 _FEWEST_POINTS = 25
 """A slice with fewer points has no outline."""
+_RIM_STEP_RAD = np.pi / 6.0
+_RIM_M = 0.012
+"""Depth below the top down to which points belong to a rim."""
+_RIM_DEPTH_M = 0.035
+"""Depth to which a finger enters a hollow object, which must be as deep there."""
+_WALL_M = 0.01
+"""Distance from the rim at which the hollow begins."""
+_FINGER_SPACE_M = 0.045
+"""Distance from the rim over which the hollow must be seen."""
+_THICKEST_RIM_M = 0.03
+_RIM_COST = 0.3
+"""Cost of a grasp by the rim, which turns more easily than a whole object."""
 _MOST_POINTS = 4000
 """Number of points that are enough to slice an upright object."""
 _NARROWER_M = 0.015
@@ -99,7 +111,7 @@ class Placement:
     """Position of a grasp: point (x, y), azimuth of the approach, local width and depth (m), cost.
 
     `lever_m` is the estimated level distance of the centre of mass. For an upright object, the point is `height_m` over
-    the surface, or the fingers reach `below_top_m` below its top from above.
+    the surface, or the fingers reach `below_top_m` below its top from above. At a `rim` they point straight down.
     """
 
     xy: FloatArray
@@ -110,12 +122,14 @@ class Placement:
     lever_m: float = 0.0
     height_m: float = 0.0
     below_top_m: float = 0.0
+    rim: bool = False
 
 
 def placements(target: Target, p_BS: FloatArray, ahead_rad: float) -> list[Placement]:
     """Returns the positions of grasps on an object that lies at ahead_rad from the shoulder at p_BS."""
+    rims = list(_rims(target))
     if not target.upright:
-        return _round(target, ahead_rad) if target.round else list(_along(target, ahead_rad))
+        return [*(_round(target, ahead_rad) if target.round else _along(target, ahead_rad)), *rims]
     target = replace(target, points_B=target.points_B[:: 1 + len(target.points_B) // _MOST_POINTS])
     heights_m = np.arange(_SLICE_M, target.height_m - 0.5 * _SLICE_M, _SLICE_M)
     slices = [(float(each), target.slice(p_BS, each - _SLICE_M, each + _SLICE_M)) for each in heights_m]
@@ -126,7 +140,7 @@ def placements(target: Target, p_BS: FloatArray, ahead_rad: float) -> list[Place
     better = [each for each in slices if _is_better(each[1], usual)]
     aside = [_aside(target, part, each_m, ahead_rad) for each_m, part in [(usual_m, usual), *better]]
     above = _above(target, p_BS, ahead_rad, middle)
-    return [_with_lever(each, middle, usual_m) for each in itertools.chain(*aside, above)]
+    return [*(_with_lever(each, middle, usual_m) for each in itertools.chain(*aside, above)), *rims]
 
 
 def _is_better(part: Target, usual: Target) -> bool:
@@ -163,6 +177,25 @@ def _above(target: Target, p_BS: FloatArray, ahead_rad: float, middle: FloatArra
             widest_m = part.width_m
             for each in _round(part, ahead_rad) if part.round else _along(part, ahead_rad, middle):
                 yield replace(each, below_top_m=depth_m)
+
+
+def _rims(target: Target) -> Iterator[Placement]:
+    """Yields positions about the rim of a hollow object, which one finger enters from above."""
+    centre = np.array(target.centre_B)
+    below_top_m = target.height_m + target.base_m - target.points_B[:, 2]
+    for azimuth in np.arange(0.0, 2.0 * np.pi, _RIM_STEP_RAD):
+        s, t = _turned(azimuth) @ (target.points_B[:, :2] - centre).T
+        local = (np.abs(t) < _BREADTH_M) & (s > 0.0)
+        wall = s[local & (below_top_m < _RIM_M)]
+        if len(wall) < _FEWEST_POINTS:
+            continue
+        inner, outer = np.percentile(wall, [1, 99])
+        inside = below_top_m[local & (s < inner - _WALL_M) & (s > inner - _FINGER_SPACE_M)]
+        if outer - inner < _THICKEST_RIM_M and len(inside) > _FEWEST_POINTS and np.percentile(inside, 5) > _RIM_DEPTH_M:
+            lever_m = 0.5 * float(inner + outer)
+            xy, cost = centre + lever_m * _turned(azimuth)[0], _RIM_COST + _PER_LEVER_M * lever_m
+            width_m, azimuth_rad = float(outer - inner), float(azimuth + 0.5 * np.pi)
+            yield Placement(xy, azimuth_rad, width_m, 0.0, cost, lever_m, below_top_m=_RIM_DEPTH_M, rim=True)
 
 
 def _round(target: Target, ahead_rad: float) -> list[Placement]:

@@ -109,7 +109,7 @@ class GeometricGraspPlanner:
 
     padding_m: Margin = 0.01
     final_padding_m: Margin = 0.002
-    approach_rad_s: TurnRate = 0.4
+    approach_rad_s: TurnRate = 0.5
     last_rad_s: TurnRate = 0.15
     beside_fixed_m: Margin = 0.010
     beside_fixed_low_m: Margin = 0.017

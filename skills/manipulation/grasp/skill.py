@@ -54,6 +54,8 @@ _PER_KG_N = 12.0
 """Additional force per kilogram of the object."""
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the object's centre of mass."""
+_THIN_FORCE_N = 50.0
+"""Force on a thin object, which the ends of the fingers press out when they press harder."""
 _MOST_OF_FORCE = 0.95
 """Largest force of a grip, as a part of the gripper's limit."""
 _RELAX_M = 0.002
@@ -349,7 +351,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
-        force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
+        force_n = closing_force_n(view.target.height_m, plan.candidate.lever_m, self.options.force_n)
         most_n = _MOST_OF_FORCE * self.gripper.max_force_n
         yield from self.move_gripper(0.0, min(force_n + _PER_KG_N * least_kg, most_n), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
@@ -431,3 +433,8 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if not (yield from self.shift_by_first(offsets_B, message, clear_of_boxes=True)):
             yield from self.shift_by_first(offsets_B, message)
         yield from self.move_gripper(0.0, GRIPPER_FORCE_N, "closing the empty gripper")
+
+
+def closing_force_n(height_m: float, lever_m: float, usual_n: float) -> float:
+    """Force (N) on an object of a height that is held lever_m beside its centre of mass: gentle on a thin one."""
+    return min(_THIN_FORCE_N, usual_n) if height_m < THIN_M else usual_n + _PER_LEVER_N_M * lever_m

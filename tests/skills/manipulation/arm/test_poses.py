@@ -5,6 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from plant.robots.fetch.kind import fetch_capabilities
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
@@ -52,6 +53,18 @@ def test_an_arm_that_carries_keeps_its_elbow_near_the_body(tilt_rad):
     scene = ArmScene(fetch, model, {fetch.lift_joint: fetch.standing_height_m - fetch.height_range_m[0]})
     q = carry_configuration(scene, fetch.arm, hand_rotation(tilt_rad, 0.0, 1.0), model.stowed_rad)
     assert scene.beyond_body_m(q)[1] < 0.04  # 0.14 where nothing is said about it
+
+
+@pytest.mark.parametrize("tilt_rad", [1.1, 1.57])
+def test_an_object_that_hangs_below_the_fingers_is_carried_hanging(tilt_rad):
+    spot, model = spot_capabilities(), arm_model(spot_capabilities())
+    scene = ArmScene(spot, model, {})
+    scene.hold([Box(RigidTransform([0.36, 0.0, 0.0]), (0.32, 0.09, 0.09))])
+    R_BH = hand_rotation(tilt_rad, 0.3, 1.0)
+    hanging = carry_configuration(scene, spot.arm, R_BH, model.stowed_rad, hangs=True)
+    assert model.X_BH(hanging).rotation().matrix()[2, 0] == pytest.approx(R_BH.matrix()[2, 0], abs=1e-6)
+    level = carry_configuration(scene, spot.arm, R_BH, model.stowed_rad)
+    assert model.X_BH(level).rotation().matrix()[2, 0] > 0.0
 
 
 def test_an_object_that_cannot_be_drawn_in_is_refused():

@@ -93,3 +93,24 @@ def test_a_handle_beside_the_middle_costs_more_the_farther_it_is():
 
 def test_an_object_that_is_wide_over_all_its_height_has_no_placement_for_the_gripper():
     assert grasp_candidates(_target(_drum(0.08, 0.0, 0.3), width_m=0.16, height_m=0.3), P_BS, GRIPPER) == []
+
+
+def _bowl(depth_m, *, radius_m=0.08, height_m=0.055):
+    """A bowl seen from above: the rim, and its inside as deep as depth_m."""
+    angle, r = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 180), np.linspace(0.0, radius_m, 40))
+    z = np.where(r.ravel() > radius_m - 0.008, height_m, height_m - depth_m) + BASE_M
+    points = np.column_stack([X_M + (r * np.cos(angle)).ravel(), (r * np.sin(angle)).ravel(), z])
+    return Target(points, (X_M, 0.0), 0.0, 2.0 * radius_m, 2.0 * radius_m, height_m, BASE_M, False)
+
+
+def test_a_bowl_is_taken_by_its_rim_with_one_finger_inside():
+    best = _best(_bowl(0.045))
+    R, rim_m = best.X_BH.rotation().matrix(), GRIPPER.fixed_z_m + 0.017 + 0.5 * best.width_m
+    rim = (best.X_BH @ np.array([GRIPPER.tip_x_m, 0.0, rim_m]))[:2] - [X_M, 0.0]
+    assert best.width_m < 0.03
+    assert np.linalg.norm(rim) == pytest.approx(0.072, abs=0.01)
+    assert abs(R[:2, 2] @ rim) > 0.95 * np.linalg.norm(rim)  # the gripper closes along the radius
+
+
+def test_a_plate_has_no_rim_that_a_finger_enters():
+    assert grasp_candidates(_bowl(0.02), P_BS, GRIPPER) == []

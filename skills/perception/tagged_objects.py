@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -88,7 +89,7 @@ def _boxes(window: Window, tag: SeenTag, own: Box, reach_m: float) -> Iterator[B
     lowest_m = float(tag.X_OT.translation()[2])
     u0, v0, u1, v1 = own
     on_tag = (window.u >= u0) & (window.u <= u1) & (window.v >= v0) & (window.v <= v1)
-    below = (plane for plane in level_planes(window) if plane.height_m < lowest_m - _BELOW_M)
+    below = (plane for plane in level_planes(replace(window, inside=on_tag)) if plane.height_m < lowest_m - _BELOW_M)
     for plane in (*below, None):
         labels, _ = groups_in_picture(window, near & ~in_plane(window, plane))
         counts = np.bincount(labels[on_tag & (labels > 0)], minlength=1)

@@ -25,9 +25,14 @@ HERE = LocalisationEstimate(1.5, RigidTransform(), np.zeros((3, 3)), True)
 @pytest.fixture
 def table():
     """The table with a mug that carries tag 7 on its front."""
+    return seen_from(X_WC)
+
+
+def seen_from(X_WC, size_m=0.06):
+    """Image of the table from a camera; the tag has a size."""
     plain = scene([MUG, Can(1.2, -0.3, 0.03, 0.2, (150, 20, 20))], X_WC=X_WC)
-    X_WT = Tag(7, 0.06, p_W=(MUG.x - MUG.radius - 0.001, MUG.y, TABLE.height_m + 0.06), yaw_rad=np.pi).X_WT()
-    drawn = picture_of([(7, 0.06, X_WC.inverse() @ X_WT)], LENS, ground=0)
+    X_WT = Tag(7, size_m, p_W=(MUG.x - MUG.radius - 0.001, MUG.y, TABLE.height_m + 0.06), yaw_rad=np.pi).X_WT()
+    drawn = picture_of([(7, size_m, X_WC.inverse() @ X_WT)], LENS, ground=0)
     tag = drawn.depth_m < 3.0
     grey, depth = np.where(tag, drawn.grey, plain.grey), np.where(tag, drawn.depth_m, plain.depth_m)
     return replace(plain, grey=grey, colour=np.repeat(grey[..., None], 3, axis=2), depth_m=depth)
@@ -49,6 +54,13 @@ def test_its_box_holds_the_object_and_not_the_table(table):
     np.testing.assert_allclose(mug.position_W, [MUG.x, MUG.y, TABLE.height_m + 0.06], atol=0.02)
     np.testing.assert_allclose(mug.size_m, [0.09, 0.09, 0.12], atol=0.025)
     assert mug.surface == "table"
+
+
+def test_its_box_holds_the_object_where_the_edges_of_the_picture_show_the_floor_alone():
+    far = seen_from(camera_pose(np.array([-0.3, 0.1, 1.45]), np.array([1.0, 0.1, TABLE.height_m])), 0.09)
+    (found,) = detect_in_image(with_tags(NETWORKS, [Tag(7, 0.09, on="mug")]), far)
+    (mug,) = detections_3d(far, HERE, [found], [TABLE])
+    np.testing.assert_allclose(mug.position_W, [MUG.x, MUG.y, TABLE.height_m + 0.06], atol=0.02)
 
 
 def test_a_tag_outvotes_what_its_object_is_taken_for(table):

@@ -6,16 +6,17 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Final
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from skills.api import Cause, Part, Succeeded, Tag
-from skills.perception.fiducials import find_tags
-from skills.quantities import Count, Delay, Share
+from skills.perception.tag_views import look_for_tags
+from skills.quantities import Count
 from skills.robot import Pose2D
 from skills.routine import Routine, RoutineSkill, SkillFailure
+
+_MESSAGE: Final = "looking for the dock's tag"
 
 
 @dataclass(frozen=True)
@@ -28,11 +29,9 @@ class LocateDockInputs:
 
 @dataclass(frozen=True)
 class LocateDockOptions:
-    """Number of `pictures` by each camera, and the ambiguity of a tag's pose beyond which a picture does not count."""
+    """Number of `pictures` by each camera that looks towards the tag."""
 
     pictures: Count = 3
-    most_ambiguity: Share = 0.3
-    latency_s: Delay = 0.2
 
 
 class LocateDock(RoutineSkill[LocateDockInputs]):
@@ -62,24 +61,12 @@ class LocateDock(RoutineSkill[LocateDockInputs]):
             if camera.looks_towards(math.atan2(p_BT[1], p_BT[0])):
                 with suppress(SkillFailure):  # a camera that gives no picture shows no tag
                     for _ in range(self.options.pictures):
-                        seen = yield from self._seen(camera.source, tag)
-                        docks += [Pose2D.from_transform(X_WT @ X_TD) for X_WT in seen]
+                        seen = yield from look_for_tags(self, camera.source, {tag.id: tag.size_m}, _MESSAGE)
+                        X_WO = context.localiser.estimate().X_WO
+                        docks += [Pose2D.from_transform(X_WO @ each.X_OT @ X_TD) for each in seen]
         if not docks:
             return Succeeded("no camera shows the dock's tag; the dock is where the map has it", {"dock": mapped})
         x, y, c, s = np.mean([(d.x_m, d.y_m, math.cos(d.yaw_rad), math.sin(d.yaw_rad)) for d in docks], axis=0)
         off_m = math.hypot(x - mapped.x_m, y - mapped.y_m)
         said = f"the dock's tag shows the dock {off_m:.2f} m from where the map has it"
         return Succeeded(said, {"dock": Pose2D(float(x), float(y), math.atan2(s, c))})
-
-    def _seen(self, source: str, tag: Tag) -> Routine[list[RigidTransform]]:
-        """Poses X_WT of the tag in a new picture of a camera."""
-        robot, options, message = self.context.robot, self.options, "looking for the dock's tag"
-        image = yield from self.sense(lambda: robot.image(source), latency_s=0.0, name="picture", message=message)
-        X_WO = self.context.localiser.estimate().X_WO
-        found = yield from self.compute(
-            lambda: find_tags(image, {tag.id: tag.size_m}),
-            latency_s=options.latency_s,
-            name="find tags",
-            message=message,
-        )
-        return [X_WO @ each.X_OT for each in found if each.ambiguity <= options.most_ambiguity]

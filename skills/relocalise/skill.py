@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -12,11 +13,14 @@ from skills.api import Cause, LocalisationEstimate, Localiser, Running, Searchin
 from skills.navigate.base import MovingSkill
 from skills.navigate.sensor_watch import WatchOptions, low_points
 from skills.patience import PATIENCE_S
+from skills.perception.tag_views import look_for_tags
 from skills.quantities import Delay, Height, Length, Margin, Share, Speed, Turn, TurnRate
 from skills.relocalise.ports import RelocaliseInputs, RelocalisePorts
-from skills.robot import Capabilities, FloatArray, NoImageError, Scan
+from skills.robot import Capabilities, FloatArray, NoImageError, Pose2D, Scan
 from skills.routine import Routine, SkillFailure
 
+_TAG_VARIANCES = (0.05**2, 0.05**2, 0.03**2)
+"""Variances of a pose by a tag: x, y (m^2) and yaw (rad^2)."""
 _BEYOND_M = 5.0
 """Distance beyond which points are ignored."""
 
@@ -101,7 +105,8 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
             if drive and not (yield from self._drive()):
                 break
             for turn in range(max(1, inputs.turns)):
-                if (yield from self._agreed(localiser)) or (yield from self._found(localiser)):
+                found = (yield from self._agreed(localiser)) or (yield from self._found_by_tag(localiser))
+                if found or (yield from self._found(localiser)):
                     pose = self.context.pose()
                     return Succeeded(f"found itself at ({pose.x_m:.2f}, {pose.y_m:.2f}) m")
                 if turn + 1 < inputs.turns:
@@ -124,6 +129,21 @@ class Relocalise(RelocalisePorts, MovingSkill[RelocaliseInputs]):
             return False
         localiser.accept(found)
         return (yield from self._agreed(localiser))
+
+    def _found_by_tag(self, localiser: Localiser) -> Routine[bool]:
+        """Looks for the tags on walls; uses the pose from which one is seen where the map has it, if scans agree."""
+        assert isinstance(localiser, SearchingLocaliser)
+        walls = {tag.id: tag for tag in self.context.tags if tag.on is None}
+        sizes_m = {tag.id: tag.size_m for tag in walls.values()}
+        for camera in self.context.robot.capabilities().body_cameras if walls else ():
+            with suppress(SkillFailure):  # a camera that gives no picture shows no tag
+                seen = yield from look_for_tags(self, camera.source, sizes_m, "looking for tags")
+                for tag in sorted(seen, key=lambda each: each.ambiguity):
+                    X_WO = Pose2D.from_transform(walls[tag.id].X_WT() @ tag.X_OT.inverse()).transform()
+                    localiser.accept(LocalisationEstimate(tag.stamp_s, X_WO, np.diag(_TAG_VARIANCES), True))
+                    if (yield from self._agreed(localiser)):
+                        return True
+        return False
 
     def _agreed(self, localiser: Localiser) -> Routine[bool]:
         """Returns whether the scans of a whole second agree with the map."""

@@ -6,12 +6,14 @@ import math
 import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
+from tag_pictures import picture_of
 
-from skills.api import Cause, Failed, Running, Succeeded
+from plant.robots.robot_kind import robot_kind
+from skills.api import Cause, Failed, Running, Succeeded, Tag
 from skills.estimate.monte_carlo import MonteCarloOptions
 from skills.estimate.particle_filter import FilterOptions
 from skills.relocalise.skill import Relocalise, RelocaliseInputs
-from skills.robot import Pose2D
+from skills.robot import FrameTree, Intrinsics, Pose2D
 from skills.testing.estimators import KnownPlace
 
 START = Pose2D(1.5, 2.0, 0.0)
@@ -173,3 +175,37 @@ def test_searching_changes_nothing_until_it_is_accepted():
     bench.localiser.accept(found)
     assert bench.localiser.estimate().X_WO.IsNearlyEqualTo(found.X_WO, 1e-9)
     assert bench.localiser.estimate().localised
+
+
+WALL_TAG = Tag(30, 0.15, p_W=(4.94, 1.5, 0.5), yaw_rad=math.pi)
+
+
+def tagged(bench, monkeypatch):
+    """Context of a robot that knows the tag on a wall of the first of two rooms alike, and whose cameras show it."""
+    robot = bench.robot
+    cameras = {camera.source: camera for camera in robot_kind("spot").capabilities().body_cameras}
+    known = dataclasses.replace(robot.capabilities(), cameras=tuple(cameras.values()))
+
+    def image(source, **_):
+        X_OC = robot.odometry().X_OB @ cameras[source].X_FC
+        X_CT = (robot.pose.transform(0.5) @ cameras[source].X_FC).inverse() @ WALL_TAG.X_WT()
+        shown = [(30, 0.15, X_CT)] if X_CT.translation()[2] > 0.3 and source == "frontright" else []
+        lens = Intrinsics(320, 240, 165.0, 165.0, 160.0, 120.0)
+        frames = FrameTree({"hand_camera": ("odom", X_OC)})
+        return dataclasses.replace(picture_of(shown, lens), source=source, frames=frames)
+
+    monkeypatch.setattr(robot, "capabilities", lambda: known)
+    monkeypatch.setattr(robot, "image", image)
+    return dataclasses.replace(bench.context(), tags=(WALL_TAG,))
+
+
+def test_a_tag_on_a_wall_tells_one_room_from_another_alike(monkeypatch):
+    component = MonteCarloOptions(particles=FilterOptions(seed=1))
+    bench = Bench(Pose2D(3.6, 1.5, 0.0), surveyed=TWIN_ROOMS, component=component, start_known=False)
+    bench.tick()
+    step, said = outcome(bench, context=tagged(bench, monkeypatch))
+    assert isinstance(step, Succeeded), step
+    assert "looking for tags" in said
+    assert "searching the whole map" not in said
+    assert bench.pose_error()[0] < 0.05
+    assert bench.robot.travelled_m == 0.0

@@ -215,8 +215,8 @@ def _apart(cluster: Cluster, detected: Detection3D) -> float:
 def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
     """Splits a detected object from a cluster that holds others as well, such as one that touches it.
 
-    A part right above or below the object is not split off, since its box has only left it out. Joins clusters that
-    the detected object holds.
+    A part right above or below the object is not split off, since its box has only left it out. Joins low clusters
+    that the detected object holds.
     """
     view = _join_detected(view, detected)
     whole = matching_cluster(view.clusters, detected)
@@ -235,14 +235,18 @@ def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
 
 
 def _join_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
-    """Joins the clusters among a detected object's pixels: where depth is lost, a wrench falls to pieces."""
-    if len(detected.pixels) == 0 or len(view.clusters) < 2:
+    """Joins the low clusters among a detected object's pixels: where depth is lost, a wrench falls to pieces.
+
+    Higher ones are objects of their own, which a large box may hold as well.
+    """
+    low = [each for each in view.clusters if each.shape.height_m < _LOW_M]
+    if len(detected.pixels) == 0 or len(low) < 2:
         return view
-    pixels = [each.points.pixels for each in view.clusters]
+    pixels = [each.points.pixels for each in low]
     among = np.split(
         _are_among(np.concatenate(pixels), detected.pixels), np.cumsum([len(each) for each in pixels])[:-1]
     )
-    parts = [each for each, own in zip(view.clusters, among, strict=True) if np.mean(own) > _MOSTLY_AMONG]
+    parts = [each for each, own in zip(low, among, strict=True) if np.mean(own) > _MOSTLY_AMONG]
     if len(parts) < 2:
         return view
     clouds = [(each.points.p_W, each.points.pixels, each.points.colours) for each in parts]

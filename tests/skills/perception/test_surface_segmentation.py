@@ -1,5 +1,7 @@
 """Segmentation of surfaces in analytic scenes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
@@ -229,3 +231,10 @@ def test_the_pieces_of_a_detected_object_are_joined():
     joined = split_detected(view, detected)
     assert len(joined.clusters) == 2
     assert matching_cluster(joined.clusters, detected).shape.length_m == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_neighbour_within_the_box_of_a_large_detected_object_stays_one_of_its_own():
+    image = scene([Can(0.95, 0.0, 0.05, 0.25, RED), Can(1.12, 0.13, 0.033, 0.115, RED)])
+    (detected,) = detections_3d(image, PLACE, [seen_as("extinguisher", image)], [TABLE])
+    whole = replace(detected, pixels=np.argwhere(np.all(image.colour == RED, axis=-1))[:, ::-1])
+    assert len(split_detected(viewed(image), whole).clusters) == 2

@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7476,
     "executive/cli": 3852,
-    "skills": 26933,
+    "skills": 27041,
     "plant": 11801,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 460, 73, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 461, 74, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -54,8 +54,6 @@ _CLOSED_RAD = 0.06
 """A finger that closes below this angle has gripped nothing."""
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the object's centre of mass."""
-_THIN_FORCE_N = 50.0
-"""Force on a thin object, which the ends of the fingers press out when they press harder."""
 _RELAX_M = 0.002
 """Distance by which fingers that touch the surface are raised before they close."""
 _RELAX_THIN_M = 0.0005
@@ -349,7 +347,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
-        force_n = closing_force_n(view.target.height_m, plan.candidate.lever_m, self.options.force_n)
+        force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
         yield from self.move_gripper(0.0, grip_n(force_n, HeldLoad(least_kg), self.gripper), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         opening = self._check_held(name, None)
@@ -442,8 +440,3 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if not (yield from self.shift_by_first(offsets_B, message, clear_of_boxes=True)):
             yield from self.shift_by_first(offsets_B, message)
         yield from self.move_gripper(0.0, GRIPPER_FORCE_N, "closing the empty gripper")
-
-
-def closing_force_n(height_m: float, lever_m: float, usual_n: float) -> float:
-    """Force (N) on an object of a height that is held lever_m beside its centre of mass: gentle on a thin one."""
-    return min(_THIN_FORCE_N, usual_n) if height_m < THIN_M else usual_n + _PER_LEVER_N_M * lever_m

@@ -8,7 +8,7 @@ from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningErr
 from skills.manipulation.arm.forces import HeldLoad
 from skills.manipulation.grasp.candidates import GraspCandidate
 from skills.manipulation.grasp.planning import GraspPlan
-from skills.manipulation.grasp.skill import Grasp, GraspInputs, closing_force_n
+from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.robot import CommandState, CommandStatus
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -195,7 +195,3 @@ def test_a_failure_to_plan_returns_the_objects_in_the_way():
 
 def test_another_failure_returns_that_no_object_is_in_the_way():
     assert outcome(Grasp(context_of(ScriptedRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}
-
-
-def test_a_thin_object_is_held_gently_and_a_hammer_beside_its_middle_firmly():
-    assert closing_force_n(0.012, 0.05, 80.0) < closing_force_n(0.03, 0.0, 80.0) < closing_force_n(0.03, 0.05, 80.0)

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7476,
     "executive/cli": 3852,
-    "skills": 27034,
+    "skills": 27035,
     "plant": 11801,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 461, 74, 8

@@ -53,7 +53,7 @@ from skills.world_model import IN_THE_WAY
 _CLOSED_RAD = 0.06
 """A finger that closes below this angle has gripped nothing."""
 _PER_LEVER_N_M = 400.0
-"""Additional force per metre between the grip and the object's centre of mass."""
+"""Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
 _RELAX_M = 0.002
 """Distance by which fingers that touch the surface are raised before they close."""
 _RELAX_THIN_M = 0.0005
@@ -347,7 +347,8 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
         self.context.payload.kind = seen.kind
-        force_n = self.options.force_n + _PER_LEVER_N_M * plan.candidate.lever_m
+        lever_m = plan.candidate.lever_m if view.target.height_m > THIN_M else 0.0
+        force_n = self.options.force_n + _PER_LEVER_N_M * lever_m
         yield from self.move_gripper(0.0, grip_n(force_n, HeldLoad(least_kg), self.gripper), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         opening = self._check_held(name, None)

@@ -120,6 +120,10 @@ Factor = Annotated[float, Quantity(gt=0.0, le=1_000.0)]
 Force = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N")]
 Torque = Annotated[float, Quantity(gt=0.0, le=2_000.0, unit="N m")]
 Mass = Annotated[float, Quantity(gt=0.0, le=100.0, unit="kg")]
+TagNumber = Annotated[int, Quantity(ge=0, le=586)]
+"""Number of an AprilTag in the family 36h11."""
+TagSize = Annotated[float, Quantity(gt=0.0, le=2.0, unit="m")]
+"""Side of a tag's black square."""
 Count = Annotated[int, Quantity(ge=1, le=100_000)]
 """Number of items, at least one."""
 Tries = Annotated[int, Quantity(ge=0, le=1_000)]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from skills.quantities import Angle, Coordinate, Delay, Height, Length, Margin, Share
+from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share, TagNumber, TagSize
 from skills.robot import Robot, Scan
 
 if TYPE_CHECKING:
@@ -56,8 +56,8 @@ class Tag:
     direction `yaw_rad`: at a dock (`on` it), or on a wall.
     """
 
-    id: int
-    size_m: Length
+    id: TagNumber
+    size_m: TagSize
     on: str | None = None
     p_W: tuple[Coordinate, Coordinate, Height] | None = None
     yaw_rad: Angle = 0.0

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2993,
+    "executive/words": 2989,
     "executive/language": 7676,
     "executive/speech": 1588,
     "executive/mission": 1512,
@@ -26,11 +26,11 @@ LINES = {
     "executive/view": 1368,
     "executive/testing": 810,
     "executive/app": 7476,
-    "executive/cli": 3852,
-    "skills": 27035,
+    "executive/cli": 3851,
+    "skills": 27041,
     "plant": 11801,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 461, 74, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 462, 74, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -12,11 +12,10 @@ import typer
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import new_folder, print_json, writing
-from executive.words.knowledge import TagNumber, TagSize
 from plant.models.catalogue import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
-from skills.quantities import Factor, Mass
+from skills.quantities import Factor, Mass, TagNumber, TagSize
 
 PICTURE_PX = (640, 480)
 

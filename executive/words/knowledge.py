@@ -15,7 +15,7 @@ from skills.files.errors import InputError, suggestion
 from skills.files.schema import Name, validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.perception.class_forms import ANY_OBJECT, PERSON, class_forms
-from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TopHeight
+from skills.quantities import Angle, Coordinate, Height, Opening, Quantity, TagNumber, TagSize, TopHeight
 
 ANYTHING: Final = "object"
 """Name that stands for every class of objects."""
@@ -28,10 +28,6 @@ _UNNAMED: Final = {
     EVERYTHING: EVERYTHING,
 }
 DOCK: Final = "dock"
-TagNumber = Annotated[int, Quantity(ge=0, le=586)]
-"""Number of a tag in the family 36h11."""
-TagSize = Annotated[float, Quantity(gt=0.0, le=2.0, unit="m")]
-"""Side of a tag's black square."""
 Corner = tuple[Coordinate, Coordinate]
 Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 

@@ -244,7 +244,11 @@ def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
         skill.context.robot._robot.holding = True
         return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
 
+    def release(skill: Any) -> SkillStep:
+        return Succeeded(f"{name} done", {"released_W": (0.0, 0.0, 0.9)})
+
     special = {"detect": detect, "grasp": grasp, "approach": lambda s: Succeeded("near", {"observation": COKE})}
+    special |= {"place": release, "hand_over": release}
     return special.get(name, lambda skill: Succeeded(f"{name} done"))
 
 

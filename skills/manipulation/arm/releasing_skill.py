@@ -15,8 +15,8 @@ from skills.manipulation.arm.poses import UP_B, towards_shoulder
 from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine
 
-_RELEASE_RAD = 0.4
-"""The finger opens so far to let go, and no farther: wide open it would reach neighbours."""
+_RELEASE_RAD = 0.55
+"""The finger opens so far that its tip passes beside a bottle, and no farther: wide open it would reach neighbours."""
 _WIDE = 0.75
 """Largest opening of a hinged gripper that lets go, as a part of its widest."""
 _ASIDE_M = 0.018

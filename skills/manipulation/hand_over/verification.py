@@ -25,7 +25,7 @@ from skills.routine import Routine, SkillFailure
 
 LOOKS = 3
 """Number of views of a head camera of the place where it saw nothing."""
-SETTLES_WITHIN_S = 8.0
+SETTLES_WITHIN_S = 20.0
 """Time after the release within which a borne object must come to rest."""
 _TALL_M = 0.05
 """Only an object that is taller than this is recognised by its height."""

@@ -55,6 +55,7 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
     "world show": {"folder": "flat"},
     "object import": {"mesh": "good.stl", "--name": "tool", "--mass": "0.5", "--out": "made"},
     "object show": {"folder": "object"},
+    "object tag": {"number": "7", "--out": "made.svg"},
     "new-skill": {"name": "wave", "folder": "made"},
 }
 """What each command is called with beside the hostile text; no key, no need."""

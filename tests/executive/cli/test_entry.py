@@ -73,7 +73,9 @@ def test_a_check_imports_nothing_that_understands_sentences_and_no_skill_that_de
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     language, skills = (line.split() for line in run.stdout.splitlines()[-2:])
     assert language == ["executive.language.parser", "executive.language.questions"]
-    assert skills == [f"skills.{name}.skill" for name in ("charge", "check_door", "clear_costmap", "speak")]
+    assert skills == [
+        f"skills.{name}.skill" for name in ("charge", "check_door", "clear_costmap", "locate_dock", "speak")
+    ]
 
 
 @pytest.mark.parametrize(("arguments", "code"), [(["--help"], 0), (["parse"], 2)])

@@ -28,7 +28,7 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
 
     def put_down(skill):
         skill.context.robot._robot.holding = False
-        return Succeeded("put down")
+        return Succeeded("put down", {"released_W": (0.0, 0.0, 0.9)})
 
     def hold(skill):
         skill.context.robot._robot.holding = True

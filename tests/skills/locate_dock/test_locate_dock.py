@@ -9,7 +9,7 @@ from tag_pictures import picture_of
 from executive.testing.bench import scripted_bench
 from plant.robots.robot_kind import robot_kind
 from skills.api import Running, Succeeded, Tag
-from skills.charge.locate_dock import LocateDock, LocateDockInputs
+from skills.locate_dock.skill import LocateDock, LocateDockInputs
 from skills.robot import FrameTree, Intrinsics, Pose2D
 from skills.testing.robot import Start
 

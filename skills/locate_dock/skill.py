@@ -11,7 +11,6 @@ from typing import ClassVar, Final
 import numpy as np
 
 from skills.api import Cause, Part, Succeeded, Tag
-from skills.perception.tag_views import look_for_tags
 from skills.quantities import Count
 from skills.robot import Pose2D
 from skills.routine import Routine, RoutineSkill, SkillFailure
@@ -52,6 +51,8 @@ class LocateDock(RoutineSkill[LocateDockInputs]):
 
     def run(self, inputs: LocateDockInputs) -> Routine[Succeeded]:
         """Takes the pictures, and averages over those that show the tag."""
+        from skills.perception.tag_views import look_for_tags
+
         context, tag, mapped = self.context, inputs.tag, inputs.dock
         if not context.localiser.estimate().localised:
             raise SkillFailure(Cause.PRECONDITION, "the robot does not know where it is")

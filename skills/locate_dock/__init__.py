@@ -1,0 +1,1 @@
+"""The locate_dock skill."""

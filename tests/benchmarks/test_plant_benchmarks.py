@@ -3,6 +3,7 @@
 import pytest
 
 from plant.simulation import Simulation
+from plant.snapshot_file import SnapshotWriter
 from plant.worlds.world import load_world
 
 SECOND_S = 1.0
@@ -31,3 +32,9 @@ def test_one_picture(benchmark, simulation, source):
     spot = simulation.robots["Alice"]
     benchmark.pedantic(lambda: spot.image(source), rounds=5, warmup_rounds=1)
     benchmark.extra_info["pictures per second"] = round(1.0 / benchmark.stats["median"], 1)
+
+
+def test_one_snapshot_of_the_state(benchmark, simulation, tmp_path):
+    writer = SnapshotWriter(tmp_path / "often.plant", simulation.engine, simulation.referee, {}, ["Alice"])
+    benchmark.pedantic(writer, rounds=50, warmup_rounds=5)
+    benchmark.extra_info["snapshots per second"] = round(1.0 / benchmark.stats["median"], 1)

@@ -9,7 +9,7 @@ BUDGETS = {
     "arm_configuration_checks": 2_070,
     "arm_edge_checks": 11,
     "bytes_logged": 456_000,
-    "contact_points": 8_910,
+    "contact_points": 16_700,
     "depth_pictures_160x120": 234,
     "depth_pictures_640x480": 9,
     "detect_class_pictures": 136,

@@ -1,7 +1,5 @@
 """A plant continues from the saved state of another plant."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -96,13 +94,11 @@ def test_another_mission_begins_a_new_chapter_in_the_same_world(kept):
     assert simulation.referee.drops == 0
 
 
-def test_keeping_the_state_takes_less_than_a_millisecond(kept, tmp_path):
+def test_a_snapshot_is_written_a_hundred_times_into_one_small_file(kept, tmp_path):
     simulation, _ = kept
-    writer = SnapshotWriter(tmp_path / "timed.plant", simulation.engine, simulation.referee, {}, ["Alice"])
-    times = []
+    path = tmp_path / "often.plant"
+    writer = SnapshotWriter(path, simulation.engine, simulation.referee, {}, ["Alice"])
     for _ in range(100):
-        begun = time.perf_counter()
         writer()
-        times.append(time.perf_counter() - begun)
-    assert np.median(times) < 1e-3
-    assert read_snapshot(tmp_path / "timed.plant").number == 100
+    assert read_snapshot(path).number == 100
+    assert sum(file.stat().st_size for file in tmp_path.iterdir()) < 200_000

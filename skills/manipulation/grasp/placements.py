@@ -71,6 +71,8 @@ _BESIDE_RAD = 1.0
 """Angle from which on the far side of a box is hidden from the shoulder."""
 _TOP_DEPTHS_M = (0.098, 0.045)
 """Depths below its top to which fingers reach that grasp an upright object from above."""
+_ROUND_TOP_COST = 1.0
+"""Cost of holding an object by a round top alone: a bottle's neck tapers, and slips out of the fingertips."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,8 @@ def _above(target: Target, p_BS: FloatArray, ahead_rad: float, middle: FloatArra
         if part.width_m < widest_m - _NARROWER_M:
             widest_m = part.width_m
             for each in _round(part, ahead_rad) if part.round else _along(part, ahead_rad, middle):
-                yield replace(each, below_top_m=depth_m)
+                slips = part.round and depth_m < _TOP_DEPTHS_M[0]
+                yield replace(each, below_top_m=depth_m, cost=each.cost + slips * _ROUND_TOP_COST)
 
 
 def _rims(target: Target) -> Iterator[Placement]:

@@ -67,6 +67,13 @@ def test_a_slim_bottle_is_still_taken_by_its_body():
     assert _best(slim).width_m == pytest.approx(0.06, abs=0.004)
 
 
+def test_the_round_top_of_a_bottle_alone_costs_more_than_a_grasp_that_reaches_its_shoulder():
+    bottle = _target(_drum(0.033, 0.0, 0.14), _drum(0.014, 0.14, 0.22), width_m=0.066, height_m=0.22)
+    above = [each for each in placements(bottle, P_BS, 0.0) if each.below_top_m]
+    top, deeper = ([each.cost for each in above if (each.below_top_m < 0.06) == shallow] for shallow in (True, False))
+    assert min(top) > max(deeper)
+
+
 def test_a_tank_with_a_hose_beside_it_is_taken_below_the_hose():
     tank, hose = _drum(0.045, 0.0, 0.30), _drum(0.012, 0.1, 0.30) + [0.0, 0.06, 0.0]
     best = _best(_target(tank, hose, width_m=0.12, height_m=0.30))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NO_DETECTOR", "Detection", "Detector", "NoDetector", "NoDetectorError", "box_overlap"]
+__all__ = ["NO_DETECTOR", "Detection", "Detector", "DetectorWrapper", "NoDetector", "NoDetectorError", "box_overlap"]
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,28 @@ class NoDetector:
 
 
 NO_DETECTOR: Final = NoDetector()
+
+
+class DetectorWrapper:
+    """Detector around another `detector`, whose methods and attributes it has, except for its own."""
+
+    def __init__(self, detector: Detector) -> None:
+        self._detector = detector
+
+    @property
+    def class_names(self) -> tuple[str, ...]:
+        """Classes that the other detector knows."""
+        return self._detector.class_names
+
+    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
+        """Returns the detections of the other detector."""
+        return self._detector.detect(pictures)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._detector, name)
+
+    def __dir__(self) -> Iterable[str]:
+        return {*super().__dir__(), *dir(self._detector)}
 
 
 def box_overlap(a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:

@@ -20,14 +20,14 @@ LINES = {
     "executive/mission": 1512,
     "executive/tree": 7590,
     "executive/run": 3083,
-    "executive/record": 950,
+    "executive/record": 943,
     "executive/store": 1675,
     "executive/conversation": 581,
     "executive/view": 1368,
     "executive/testing": 810,
     "executive/app": 7476,
     "executive/cli": 3851,
-    "skills": 27044,
+    "skills": 27052,
     "plant": 11801,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 462, 74, 8

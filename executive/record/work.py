@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any, Final, TypeVar
 
 from skills.api import Detector
+from skills.detection import DetectorWrapper
 
 
 class Work:
@@ -32,23 +33,15 @@ class Work:
         return MappingProxyType(dict(sorted(both.items())))
 
 
-class CountedDetector:
-    """Wrapper of a detector that counts its pictures by method; it has all `methods` of the detector."""
+class CountedDetector(DetectorWrapper):
+    """Detector that counts the pictures of another one by method, in `methods`."""
 
     def __init__(self, detector: Detector, work: Work) -> None:
-        self._detector = detector
+        super().__init__(detector)
         found = {name: getattr(detector, name) for name in dir(detector) if name.startswith("detect")}
         self.methods = tuple(name for name, method in found.items() if callable(method))
         for name in self.methods:
             setattr(self, name, _counted(found[name], f"{name}_pictures", work))
-
-    @property
-    def class_names(self) -> tuple[str, ...]:
-        """Classes that the detector knows."""
-        return self._detector.class_names
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._detector, name)
 
 
 def _counted(method: Callable[..., Any], counter: str, work: Work) -> Callable[..., Any]:

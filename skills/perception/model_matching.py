@@ -9,14 +9,14 @@ through the model, and the colours agree.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Detection, LocalisationEstimate
 from skills.files.object_model import ObjectModel
@@ -26,16 +26,33 @@ from skills.perception.surface_segmentation import Cluster, segment_3d
 from skills.robot import FloatArray, Image
 
 _TURNS: Final = 24
+"""Number of turns about the vertical that are tried."""
 _POSES: Final = 3
+"""Number of the best poses that are refined."""
 _STEPS: Final = 8
+"""Number of steps of iterated closest points."""
 _POINTS: Final = 250
+"""Number of a segment's points that a refinement uses, about."""
 _HEIGHT_M, _HEIGHT_SHARE = 0.010, 0.06
+"""Largest difference of the height, in metres and as a part of the model's."""
 _WIDER_M, _LEAST_WIDTH = 0.015, 0.6
+"""Distance by which a segment may be wider than its model (m), and its least width as a part of the model's."""
 _FAR_M: Final = 0.02
+"""Distance from the model beyond which a point is not on it."""
 _FAR_SIGMAS: Final = 10.0
+"""Distance from the model beyond which a point counts no more, in sigmas of the depth."""
 _IN_SEGMENT_M: Final = 0.01
+"""Distance from a segment's points within which a point of the model belongs to the segment."""
 _FRONT: Final = 0.15
+"""Least cosine between a surface's normal and the view at which the camera sees the surface."""
 _CELL_PX: Final = 8.0
+"""Side of the cells in which the nearest points of a model hide the others."""
+_LEAST: Final = 0.35
+"""Least quality of a fit that identifies an object."""
+_ALIKE: Final = 0.75
+"""Quality of another fit, as a part of the best one's, from which on the object may be either."""
+_MOST_HIDDEN: Final = 0.5
+"""Largest share of a model's front that may be hidden."""
 
 
 @dataclass(frozen=True)
@@ -70,16 +87,15 @@ class Fit:
 
 def fits(cluster: Cluster, sight: Sight, models: Iterable[ObjectModel]) -> list[Fit]:
     """Fits of a segment to the models that have its size."""
-    return [fit for model in models for fit in _best(cluster, sight, model)]
+    return [fit for model in models if (fit := _best(cluster, sight, model)) is not None]
 
 
-def _best(cluster: Cluster, sight: Sight, model: ObjectModel) -> Iterator[Fit]:
+def _best(cluster: Cluster, sight: Sight, model: ObjectModel) -> Fit | None:
     step = max(1, len(cluster.points) // _POINTS)
     p_W = cluster.points.p_W[::step]
     poses = [_refined(p_W, model, X_WM) for X_WM in _first_poses(cluster, p_W, sight, model)]
     found = [_judged(cluster, sight, model, X_WM) for X_WM in poses]
-    if found:
-        yield max(found, key=quality)
+    return max(found, key=quality, default=None)
 
 
 def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectModel) -> list[RigidTransform]:
@@ -88,7 +104,7 @@ def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectM
     height_m = float(np.percentile(p_W[:, 2] - cluster.plane.z(p_W[:, :2]), 99.5))
     left, right = np.percentile(p_W @ across, [1, 99])
     near = float(np.percentile(p_W @ along, 2))
-    tried = list[tuple[float, float, RigidTransform]]()
+    tried = list[tuple[float, RigidTransform]]()
     some = p_W[:: max(1, len(p_W) // 120)]
     for R in model.rests:
         rest = model.points @ R.T
@@ -105,14 +121,14 @@ def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectM
             p_WM = np.array([xy[0], xy[1], cluster.base_m - rest[:, 2].min()])
             off = model.tree.query((some - p_WM) @ R_WM)[0]
             cost = float(np.minimum(off, _FAR_M).mean())
-            tried.append((cost, float(turn), RigidTransform(RotationMatrix.ProjectToRotationMatrix(R_WM), p_WM)))
+            tried.append((cost, RigidTransform(RotationMatrix.ProjectToRotationMatrix(R_WM), p_WM)))
     return _apart(sorted(tried, key=lambda one: one[0]))
 
 
-def _apart(tried: list[tuple[float, float, RigidTransform]]) -> list[RigidTransform]:
+def _apart(tried: list[tuple[float, RigidTransform]]) -> list[RigidTransform]:
     """The first poses that are not nearly the same."""
     chosen = list[RigidTransform]()
-    for _, _, X in tried:
+    for _, X in tried:
         if all((X.rotation().inverse() @ other.rotation()).ToAngleAxis().angle() > 0.5 for other in chosen):
             chosen.append(X)
         if len(chosen) == _POSES:
@@ -238,11 +254,6 @@ def quality(fit: Fit) -> float:
     return float(shape * math.exp(-((fit.colour / 30.0) ** 2)) * math.exp(-(fit.off**4)))
 
 
-_LEAST: Final = 0.35
-_ALIKE: Final = 0.75
-_MOST_HIDDEN: Final = 0.5
-
-
 def identified(
     clusters: Iterable[Cluster], image: Image, place: LocalisationEstimate, models: Mapping[str, ObjectModel]
 ) -> tuple[Detection3D, ...]:
@@ -273,7 +284,6 @@ def _detected(fit: Fit, segment: Detection3D) -> Detection3D:
     """A segment with the name, the place and the extents of the model that it fits."""
     R_WM, p_WM = fit.X_WM.rotation(), fit.X_WM.translation()
     turned = fit.model.points @ R_WM.matrix().T
-    yaw = float(RollPitchYaw(R_WM).yaw_angle())
     (x, y), (length, width), angle_deg = cv2.minAreaRect(turned[:, :2].astype(np.float32))
     yaw = math.radians(angle_deg) + (0.0 if length >= width else 0.5 * math.pi)
     z = 0.5 * float(turned[:, 2].min() + turned[:, 2].max())

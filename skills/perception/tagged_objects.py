@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from skills.detection import Detection, Detector, box_overlap
+from skills.detection import Detection, Detector, DetectorWrapper, box_overlap
 from skills.perception.class_forms import class_form
 from skills.perception.detector.camera_images import detect_in_image
 from skills.perception.fiducials import SeenTag, find_tags
@@ -29,11 +28,14 @@ def with_tags(detector: Detector, tags: Iterable[Tag]) -> Detector:
     return TagDetector(detector, tuple(carried.values())) if carried else detector
 
 
-class TagDetector:
-    """Detector that adds the objects with known tags to the detections of another, whose methods it has."""
+class TagDetector(DetectorWrapper):
+    """Detector that adds the objects with known tags to the detections of another.
+
+    A picture without depth locates no tag.
+    """
 
     def __init__(self, detector: Detector, tags: Sequence[Tag]) -> None:
-        self._detector = detector
+        super().__init__(detector)
         self._sizes_m = {tag.id: tag.size_m for tag in tags}
         self._classes = {tag.id: str(tag.on) for tag in tags}
 
@@ -49,16 +51,6 @@ class TagDetector:
             name = self._classes[seen.id]
             tagged += _unless_same([Detection(name, TAG_SCORE, box_of_carrier(image, seen, name))], tagged)
         return (*tagged, *_unless_same(others, tagged))
-
-    def detect(self, pictures: Sequence[NDArray[np.uint8]]) -> list[tuple[Detection, ...]]:
-        """Returns the detections of the other detector, since a picture without depth locates no tag."""
-        return self._detector.detect(pictures)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._detector, name)
-
-    def __dir__(self) -> Iterable[str]:
-        return {*super().__dir__(), *dir(self._detector)}
 
 
 def _unless_same(found: Iterable[Detection], known: Sequence[Detection]) -> list[Detection]:

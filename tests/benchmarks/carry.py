@@ -11,9 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -27,7 +24,7 @@ from executive.app.simulated import simulate
 from executive.run.outcome import Outcome
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
-from tests.benchmarks.manipulation import LOOK_S, ROBOT, TARGET, left_s, run_texts
+from tests.benchmarks.manipulation import LOOK_S, ROBOT, TARGET, attempts, run_texts
 
 PLACES: Final = {
     "coke": "kitchen",
@@ -156,12 +153,7 @@ def main() -> None:
     if unknown := [name for name in classes if name not in PLACES]:
         parser.error(f"no class {', '.join(unknown)} is in the flat; there are {', '.join(PLACES)}")
     chosen = [(name, options.seed + number) for name in classes for number in range(options.trials)]
-    runs, begun_s = list[dict[str, Any]](), time.monotonic()
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        for each in pool.imap_unordered(attempt, chosen):
-            runs.append(each)
-            rest_s = left_s(len(runs), len(chosen), time.monotonic() - begun_s)
-            print(f"{told(each)}  [{len(runs)} of {len(chosen)}, {rest_s:.0f} s left]", file=sys.stderr, flush=True)
+    runs = list(attempts(attempt, chosen, options.jobs, told))
     print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
 
 

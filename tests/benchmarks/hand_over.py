@@ -11,10 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
-import sys
 import tempfile
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -22,7 +19,7 @@ from typing import Any
 from executive.app.placed_robots import only_robot
 from executive.app.simulated import simulate
 from executive.run.outcome import Outcome
-from tests.benchmarks.manipulation import CLASSES, ROBOT, TARGET, left_s, run_texts
+from tests.benchmarks.manipulation import CLASSES, ROBOT, TARGET, attempts, run_texts
 from tests.benchmarks.manipulation_room import PERSON, TAKEN, room
 
 
@@ -83,12 +80,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="one line of JSON at the end")
     options = parser.parse_args()
     chosen = [(name, options.seed + n) for name in options.classes.split(",") for n in range(options.trials)]
-    runs, begun_s = list[dict[str, Any]](), time.monotonic()
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        for each in pool.imap_unordered(attempt, chosen):
-            runs.append(each)
-            rest_s = left_s(len(runs), len(chosen), time.monotonic() - begun_s)
-            print(f"{told(each)}  [{len(runs)} of {len(chosen)}, {rest_s:.0f} s left]", file=sys.stderr, flush=True)
+    runs = list(attempts(attempt, chosen, options.jobs, told))
     print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
 
 

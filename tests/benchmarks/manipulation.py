@@ -67,6 +67,7 @@ from tests.benchmarks.shapes import written_shape
 from tests.visitors import OnMessage
 
 ResultT = TypeVar("ResultT")
+JobT = TypeVar("JobT")
 ReadT = TypeVar("ReadT")
 
 TARGET: Final = "target"
@@ -414,9 +415,16 @@ def write_sheet(path: Path, shown: Sequence[tuple[Mapping[str, Any], Picture]]) 
     return f"{path}: {len(shown)} failed trials"
 
 
-def left_s(done: int, count: int, elapsed_s: float) -> float:
-    """About how long (s) the rest of the trials take."""
-    return elapsed_s / done * (count - done)
+def attempts(
+    attempt: Callable[[JobT], ResultT], jobs: Sequence[JobT], processes: int, line: Callable[[ResultT], str]
+) -> Iterator[ResultT]:
+    """The results of jobs in processes of their own, each shown in a line with the time left."""
+    begun_s = time.monotonic()
+    with multiprocessing.get_context("spawn").Pool(processes) as pool:
+        for done, each in enumerate(pool.imap_unordered(attempt, jobs), start=1):
+            left_s = (time.monotonic() - begun_s) / done * (len(jobs) - done)
+            print(f"{line(each)}  [{done} of {len(jobs)}, {left_s:.0f} s left]", file=sys.stderr, flush=True)
+            yield each
 
 
 def told(run: dict[str, Any]) -> str:
@@ -489,14 +497,10 @@ def main() -> None:
     if options.shapes is not None and (options.shapes < 1 or options.clutter not in (None, "0")):
         parser.error("--shapes takes at least one, as any object, alone on its surface: leave --clutter out")
     options.clutter = options.clutter or "0-4"
-    runs, shown, begun_s = list[dict[str, Any]](), list[tuple[Mapping[str, Any], Picture]](), time.monotonic()
-    with tempfile.TemporaryDirectory() as folder, multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
+    with tempfile.TemporaryDirectory() as folder:
         chosen = list(trials(options) if options.shapes is None else shape_trials(options, Path(folder)))
-        for each, picture in pool.imap_unordered(attempt, chosen):
-            runs.append(each)
-            shown += [] if picture is None else [(each, picture)]
-            rest_s = left_s(len(runs), len(chosen), time.monotonic() - begun_s)
-            print(f"{told(each)}  [{len(runs)} of {len(chosen)}, {rest_s:.0f} s left]", file=sys.stderr, flush=True)
+        ended = list(attempts(attempt, chosen, options.jobs, lambda each: told(each[0])))
+    runs, shown = [run for run, _ in ended], [(run, picture) for run, picture in ended if picture is not None]
     for line in failures(runs):
         print(line, file=sys.stderr)
     if options.sheet is not None:

@@ -126,7 +126,7 @@ def attempt(chosen: tuple[str, int]) -> dict[str, Any]:
     }
 
 
-def told(run: Mapping[str, Any]) -> str:
+def trial_line(run: Mapping[str, Any]) -> str:
     """One line of a trial."""
     ended = "carried" if run["carried"] else "lost" if run["lost"] else "not carried" if run["taken"] else "not taken"
     return (
@@ -153,7 +153,7 @@ def main() -> None:
     if unknown := [name for name in classes if name not in PLACES]:
         parser.error(f"no class {', '.join(unknown)} is in the flat; there are {', '.join(PLACES)}")
     chosen = [(name, options.seed + number) for name in classes for number in range(options.trials)]
-    runs = list(attempts(attempt, chosen, options.jobs, told))
+    runs = list(attempts(attempt, chosen, options.jobs, trial_line))
     print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
 
 

@@ -49,7 +49,7 @@ def attempt(chosen: tuple[str, int]) -> dict[str, Any]:
     }
 
 
-def told(run: Mapping[str, Any]) -> str:
+def trial_line(run: Mapping[str, Any]) -> str:
     """One line of a trial."""
     ended = "given" if run["given"] else "not given" if run["taken"] else "not taken"
     false = ", false claim" if run["false_claim"] else ""
@@ -80,7 +80,7 @@ def main() -> None:
     parser.add_argument("--json", action="store_true", help="one line of JSON at the end")
     options = parser.parse_args()
     chosen = [(name, options.seed + n) for name in options.classes.split(",") for n in range(options.trials)]
-    runs = list(attempts(attempt, chosen, options.jobs, told))
+    runs = list(attempts(attempt, chosen, options.jobs, trial_line))
     print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
 
 

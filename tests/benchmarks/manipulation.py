@@ -289,7 +289,7 @@ def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
 def is_false_claim(claimed: bool, *, lifted: bool, held_s: float) -> bool:
     """Whether "holding" was claimed of what was never lifted, or never of what was held for long.
 
-    What falls as it is lifted, and is not claimed, is told rightly.
+    What falls as it is lifted, and is not claimed, is reported rightly.
     """
     return (claimed and not lifted) or (not claimed and held_s >= HELD_S)
 
@@ -427,7 +427,7 @@ def attempts(
             yield each
 
 
-def told(run: dict[str, Any]) -> str:
+def trial_line(run: dict[str, Any]) -> str:
     """One line of a trial."""
     marks = " ".join(
         name if run[name] else "-" * len(name) for name in ("lifted", "held_10s", "placed", "placed_upright")
@@ -499,7 +499,7 @@ def main() -> None:
     options.clutter = options.clutter or "0-4"
     with tempfile.TemporaryDirectory() as folder:
         chosen = list(trials(options) if options.shapes is None else shape_trials(options, Path(folder)))
-        ended = list(attempts(attempt, chosen, options.jobs, lambda each: told(each[0])))
+        ended = list(attempts(attempt, chosen, options.jobs, lambda each: trial_line(each[0])))
     runs, shown = [run for run, _ in ended], [(run, picture) for run, picture in ended if picture is not None]
     for line in failures(runs):
         print(line, file=sys.stderr)

@@ -24,6 +24,6 @@ def test_a_generated_object_is_asked_for_among_others(tmp_path, monkeypatch):
 
 def test_shares_count_found_and_mistaken_objects():
     rows = [("mug", True, True, False), ("mug", True, False, True), ("cup", False, False, False)]
-    told = summary([Asked(name, 0, there, found, wrong, "", 1.0) for name, there, found, wrong in rows])
-    assert (told["asked"], told["found"], told["mistaken_of_there"]) == (2, 0.5, 0.5)
-    assert (told["absent"], told["mistaken_of_absent"], told["by_object"]) == (1, 0.0, {"mug": "1/2"})
+    counts = summary([Asked(name, 0, there, found, wrong, "", 1.0) for name, there, found, wrong in rows])
+    assert (counts["asked"], counts["found"], counts["mistaken_of_there"]) == (2, 0.5, 0.5)
+    assert (counts["absent"], counts["mistaken_of_absent"], counts["by_object"]) == (1, 0.0, {"mug": "1/2"})

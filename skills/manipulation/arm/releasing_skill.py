@@ -42,8 +42,8 @@ _LEAST_KG = 0.06
 class ReleasingSkill(LookingSkill[InputsT]):
     """Routine that lets go of the held object.
 
-    The output `released_W` of its end is where the hand has opened, and a failure after that is one of the
-    POSTCONDITION, whatever kept the arm or the camera from its work: the object is to be looked for.
+    The output `released_W` of its end is where the hand has opened, and a later failure has the cause
+    POSTCONDITION, whatever stopped the arm or the camera, because the object must be looked for.
     """
 
     def step(self) -> Step:

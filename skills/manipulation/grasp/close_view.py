@@ -105,10 +105,10 @@ def examine(
 
 def _split_others(view: SurfaceView, own: Sequence[Detection3D], p_WC: FloatArray) -> SurfaceView:
     """Splits the clusters of objects that touch, except those of the object's own detections, which are split."""
-    kept = [each for one in own if (each := matching_cluster(view.clusters, one)) is not None]
-    rest = tuple(each for each in view.clusters if not any(each is one for one in kept))
+    own_clusters = [each for one in own if (each := matching_cluster(view.clusters, one)) is not None]
+    rest = tuple(each for each in view.clusters if not any(each is one for one in own_clusters))
     split = split_touching(replace(view, clusters=rest), p_WC)
-    return replace(view, clusters=(*{id(each): each for each in kept}.values(), *split.clusters))
+    return replace(view, clusters=(*{id(each): each for each in own_clusters}.values(), *split.clusters))
 
 
 def _seen_surface(view: SurfaceView, surface: Surface, centre: tuple[float, float]) -> Surface:

@@ -140,7 +140,7 @@ WALL, TABLE_EDGE, CHAIR_BACK, SOFA = (
 DESK = Surface("desk", ((0.2, 1.0), (1.2, 1.0), (1.2, 1.6), (0.2, 1.6)), 0.75)
 
 
-def shown(columns, *rectangle):
+def shows_wall(columns, *rectangle):
     (x0, y0, x1, y1), middles = rectangle, (columns + 0.5) * CELL_M
     inner = (middles > (x0 - 0.03, y0 - 0.03)) & (middles < (x1 + 0.03, y1 + 0.03))
     return bool(np.any(np.all(inner, axis=1)))
@@ -149,17 +149,17 @@ def shown(columns, *rectangle):
 def test_walls_are_what_all_grids_show():
     high, low = grid_of(WALL, CHAIR_BACK), grid_of(WALL, SOFA)
     columns = wall_columns([high, low], ())
-    assert shown(columns, *WALL)
-    assert not shown(columns, *CHAIR_BACK)
-    assert not shown(columns, *SOFA)
-    assert shown(wall_columns([high], ()), *CHAIR_BACK)  # a map without a second grid cannot tell
+    assert shows_wall(columns, *WALL)
+    assert not shows_wall(columns, *CHAIR_BACK)
+    assert not shows_wall(columns, *SOFA)
+    assert shows_wall(wall_columns([high], ()), *CHAIR_BACK)  # a map without a second grid cannot tell
 
 
 def test_the_edges_of_surfaces_and_single_posts_are_no_walls():
     columns = wall_columns([grid_of(WALL, TABLE_EDGE, (1.6, 0.6, 1.65, 0.65))], [DESK])
-    assert shown(columns, *WALL)
-    assert not shown(columns, *TABLE_EDGE)
-    assert not shown(columns, 1.6, 0.6, 1.65, 0.65)
+    assert shows_wall(columns, *WALL)
+    assert not shows_wall(columns, *TABLE_EDGE)
+    assert not shows_wall(columns, 1.6, 0.6, 1.65, 0.65)
     assert len(wall_columns([grid_of()], [DESK])) == 0
 
 

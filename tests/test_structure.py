@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7476,
     "executive/cli": 3851,
-    "skills": 27052,
+    "skills": 27146,
     "plant": 11801,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 462, 74, 8

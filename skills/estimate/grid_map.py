@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Annotated, Final, Literal
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Annotated, Any, Final, Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from skills.estimate.compiled import distances
-from skills.files.errors import InputError
-from skills.files.outside import file_beside
-from skills.files.picture_files import read_brightness
+from skills.files.errors import InputError, count_text, nearest_name
+from skills.files.outside import file_beside, is_file
+from skills.files.picture_files import Brightness, read_brightness
 from skills.files.schema import validate
-from skills.files.yaml_source import YamlSource, read_yaml
+from skills.files.yaml_source import YamlSource, quoted_key, read_yaml
 from skills.quantities import Angle, Coordinate, Height, Quantity, Share
 from skills.robot import FloatArray
 
@@ -101,6 +101,10 @@ def signed_distance(occupied: BoolGrid, resolution_m: float) -> NDArray[np.float
 CellSize = Annotated[float, Quantity(ge=0.005, le=1.0, unit="m")]
 
 
+def _lower(value: Any) -> Any:
+    return value.lower() if isinstance(value, str) else value
+
+
 class _MapFile(BaseModel):
     """The keys of a map_server YAML file, and the band of heights."""
 
@@ -112,7 +116,7 @@ class _MapFile(BaseModel):
     occupied_thresh: Share
     free_thresh: Share
     negate: bool = False
-    mode: Literal["trinary", "scale", "raw"] | None = None
+    mode: Annotated[Literal["trinary", "scale", "raw"] | None, BeforeValidator(_lower)] = None
     trinary: bool | None = None
     height_band_m: tuple[Height, Height] | None = None
 
@@ -127,47 +131,108 @@ def load_grid_map(path: Path) -> GridMap:
 
     Raises InputError, with file and line, when the file is no such map or its picture cannot be used.
     """
-    source = read_yaml(path)
+    _refuse_other_files(path)
+    source, strange = _without_unknown_keys(read_yaml(path))
     file = validate(_MapFile, source)
     if not file.free_thresh < file.occupied_thresh:
         what = f"free_thresh: {file.free_thresh:g} should be below occupied_thresh, {file.occupied_thresh:g}"
         raise source.error(("free_thresh",), what, "swap the two, or correct them")
-    if file.trinary is not None and file.mode is not None:
-        raise source.error(("trinary",), "trinary: 'mode' says it, too", "remove 'trinary'")
-    shares, opacity = _picture(source, file)
-    occupied, unknown = _classify(shares, opacity, file)
-    notes = _notes(shares, file)
+    if file.trinary is not None and file.mode is not None and file.trinary != (file.mode == "trinary"):
+        raise source.error(("trinary",), f"trinary: 'mode' says {file.mode}", "remove 'trinary'")
+    picture, moved = _picture(source, file)
+    occupied, unknown = _classify(picture, file)
+    notes = (*strange, *moved, *_notes(picture, file, occupied, unknown))
     if file.origin[2] != 0.0:
         return _turned(occupied, unknown, file, source, notes)
     return GridMap(occupied, file.resolution, file.origin[:2], unknown, file.height_band_m, notes)
 
 
-def _picture(source: YamlSource, file: _MapFile) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Brightness and opacity of the map's picture. Raises InputError in the line that names it."""
+_PICTURES: Final = frozenset({".pgm", ".png", ".bmp", ".ppm", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp"})
+_OTHER_MAPS: Final = {
+    ".posegraph": "a pose graph of slam_toolbox",
+    ".data": "the scans of a pose graph of slam_toolbox",
+    ".pbstream": "a state of Cartographer",
+    ".bt": "an octree of OctoMap",
+    ".ot": "an octree of OctoMap",
+    ".db": "a database of RTAB-Map",
+}
+
+
+def _refuse_other_files(path: Path) -> None:
+    """Refuses a picture of a map, and maps of other forms. Raises InputError with the file to give instead."""
+    suffix = path.suffix.lower()
+    if suffix in _PICTURES:
+        beside = path.with_suffix(".yaml")
+        hint = f"give {beside}" if is_file(beside) else "give the YAML file with 'image', 'resolution' and 'origin'"
+        raise InputError("it is the picture of a map, which has no scale", hint=hint, file=path)
+    if suffix in _OTHER_MAPS:
+        hint = "start its program, and save the map by `ros2 run nav2_map_server map_saver_cli -f NAME`"
+        raise InputError(f"it is {_OTHER_MAPS[suffix]}", hint=hint, file=path)
+
+
+def _without_unknown_keys(source: YamlSource) -> tuple[YamlSource, tuple[str, ...]]:
+    """The file without the keys that mean nothing here, and a remark on each; misspelled required keys stay."""
+    if not isinstance(source.data, dict) or not source.data.keys() & _MapFile.model_fields.keys():
+        return source, ()
+    lacking = {name for name, field in _MapFile.model_fields.items() if field.is_required()} - source.data.keys()
+    optional = _MapFile.model_fields.keys() - source.data.keys()
+    known, notes = {}, list[str]()
+    for key, value in source.data.items():
+        if key in _MapFile.model_fields or nearest_name(str(key), lacking) is not None:
+            known[key] = value
+        else:
+            near = nearest_name(str(key), optional)
+            advice = "" if near is None else f"; did you mean '{near}'?"
+            notes.append(f"line {source.line((key,))}: the {quoted_key(key)} is unknown and counts for nothing{advice}")
+    return replace(source, data=known), tuple(notes)
+
+
+def _picture(source: YamlSource, file: _MapFile) -> tuple[Brightness, tuple[str, ...]]:
+    """The map's picture, and a remark if it lies elsewhere. Raises InputError in the line that names it."""
+    name = file.image.replace("\\", "/").rpartition("/")[2]
+    beside, notes = source.path.parent / name, tuple[str, ...]()
     try:
-        picture = file_beside(source.path, file.image)
-        shares, opacity = read_brightness(picture, most_pixels=MOST_CELLS)
+        if _is_absolute(file.image) and not is_file(Path(file.image)) and name and is_file(beside):
+            notes, picture = (f"image: there is no {file.image[:100]}; {name} beside the file is read",), beside
+        else:
+            picture = file_beside(source.path, file.image)
+        found = read_brightness(picture, most_pixels=MOST_CELLS)
     except InputError as error:
         what = f"image: {error.message}" if error.file == source.path else f"image: {file.image[:100]}: {error.message}"
         raise source.error(("image",), what, error.hint) from error
-    if min(shares.shape) < 2:
-        rows, columns = shares.shape
+    if min(found.shares.shape) < 2:
+        rows, columns = found.shares.shape
         what = f"image: it has {columns} x {rows} cells"
         raise source.error(("image",), what, "name a picture of 2 x 2 cells or more")
-    return shares, opacity
+    return found, notes
 
 
-def _notes(shares: NDArray[np.float64], file: _MapFile) -> tuple[str, ...]:
-    """Remarks on a map whose thresholds probably do not mean what its file says."""
-    unknown = UNKNOWN_GREY / 255.0
-    free = (unknown if file.negate else 1.0 - unknown) < file.free_thresh
-    share = float(np.mean(np.abs(shares - unknown) < 0.5 / 255.0))
-    if file.read_as == "raw" or not free or share == 0.0:
-        return ()
-    return (
-        f"{100.0 * share:.0f} % of the picture has the grey {UNKNOWN_GREY}, by which map_saver means unknown ground. "
-        f"It counts as free, since free_thresh is {file.free_thresh:g}; write 0.196 unless that is meant",
-    )
+def _is_absolute(name: str) -> bool:
+    return PurePosixPath(name).is_absolute() or PureWindowsPath(name).is_absolute()
+
+
+def _notes(picture: Brightness, file: _MapFile, occupied: BoolGrid, unknown: BoolGrid) -> tuple[str, ...]:
+    """Remarks on a map that probably does not mean what its file says, or that map_server reads otherwise."""
+    notes = []
+    if picture.more_bytes:
+        notes.append(f"image: it has {count_text(picture.more_bytes, 'byte')} after the last pixel, which are not read")
+    grey = UNKNOWN_GREY / 255.0
+    free = (grey if file.negate else 1.0 - grey) < file.free_thresh
+    share = float(np.mean(np.abs(picture.shares - grey) < 0.5 / 255.0))
+    if file.read_as != "raw" and free and share > 0.0:
+        notes.append(
+            f"{100.0 * share:.0f} % of the picture has the grey {UNKNOWN_GREY}, by which map_saver means unknown "
+            f"ground. It counts as free, since free_thresh is {file.free_thresh:g}; write 0.196 unless that is meant"
+        )
+    if picture.opacity is not None and file.read_as == "trinary":
+        averaged = _by_thresholds((3.0 * picture.shares + picture.opacity) / 4.0, file)
+        other = float(np.mean((averaged[0] != occupied) | (averaged[1] != unknown)))
+        if other > 0.0:
+            notes.append(
+                f"map_server reads {100.0 * other:.0f} % of the picture otherwise, since it takes opacity for a fourth "
+                "colour; here transparent cells are unknown. Remove the alpha channel, and both read the same"
+            )
+    return tuple(notes)
 
 
 def _turned(
@@ -193,24 +258,27 @@ def _turned(
     return GridMap(occupied[row, column] & inside, step, origin_m, unknown, file.height_band_m, notes)
 
 
-def _classify(
-    shares: NDArray[np.float64], opacity: NDArray[np.float64] | None, file: _MapFile
-) -> tuple[BoolGrid, BoolGrid]:
+def _classify(picture: Brightness, file: _MapFile) -> tuple[BoolGrid, BoolGrid]:
     """Occupied and unknown cells, row 0 at the bottom, by the mode and thresholds as map_server applies them.
 
-    Values between the thresholds are unknown in trinary mode, in which opacity counts as a fourth colour. In scale mode
-    they are what is likelier, and unknown where the picture is transparent. In raw mode a value is the percentage
-    itself, and unknown above 100.
+    Values between the thresholds are unknown in trinary mode, and in scale mode what is likelier. In raw mode a value
+    is the percentage itself, and unknown above 100. In the first two modes cells that are not opaque are unknown.
     """
     if file.read_as == "raw":
-        percent = np.flipud(np.rint(255.0 * shares))
+        percent = np.flipud(np.rint(255.0 * picture.shares))
         unknown = percent > 100.0
         return (percent >= 50.0) & ~unknown, unknown
-    if opacity is not None and file.read_as == "trinary":
-        shares = (3.0 * shares + opacity) / 4.0
+    occupied, unknown = _by_thresholds(picture.shares, file)
+    if picture.opacity is not None:
+        hidden = np.flipud(picture.opacity < 1.0)
+        return occupied & ~hidden, unknown | hidden
+    return occupied, unknown
+
+
+def _by_thresholds(shares: NDArray[np.float64], file: _MapFile) -> tuple[BoolGrid, BoolGrid]:
+    """Occupied and unknown cells, row 0 at the bottom, by brightness and the thresholds."""
     probability = np.flipud(shares if file.negate else 1.0 - shares)
     if file.read_as == "scale":
-        unknown = np.zeros(shares.shape, dtype=np.bool_) if opacity is None else np.flipud(opacity < 1.0)
-        return (probability >= (file.free_thresh + file.occupied_thresh) / 2.0) & ~unknown, unknown
+        return probability >= (file.free_thresh + file.occupied_thresh) / 2.0, np.zeros(shares.shape, dtype=np.bool_)
     occupied = probability > file.occupied_thresh
     return occupied, ~occupied & (probability >= file.free_thresh)

@@ -7,6 +7,7 @@ import re
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from skills.files.errors import InputError
 from skills.files.outside import read_bytes
 
-__all__ = ["MOST_PIXELS", "check_picture", "read_brightness", "read_pixels"]
+__all__ = ["MOST_PIXELS", "Brightness", "check_picture", "read_brightness", "read_pixels"]
 
 MOST_PIXELS: Final = 64_000_000
 """Limit that keeps a picture from filling the memory; `executive.cli` sets the same limit in OpenCV."""
@@ -30,6 +31,7 @@ _PNM: Final = re.compile(rb"P([2356])" + (_SPACE + rb"(\d{1,9})") * 3 + rb"\s")
 _ANY_PNM: Final = re.compile(rb"P[1-6]" + (_SPACE + rb"(\d{1,9})") * 2)
 _COMMENT: Final = re.compile(rb"#[^\n\r]*")
 _NUMBERS: Final = re.compile(rb"[\d\s]*")
+_TRANSPARENT_GREY: Final = b"tRNS"
 _HINT: Final = "name a file in PNG, JPEG, WebP, TIFF or BMP"
 
 
@@ -49,8 +51,20 @@ def check_picture(file: Path, *, most_pixels: int = MOST_PIXELS) -> None:
         raise _unreadable(file, content)
 
 
-def read_brightness(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    """Reads brightness (H, W) from 0 to 1, the mean of the colours, and opacity (None without transparency).
+@dataclass(frozen=True)
+class Brightness:
+    """Brightness (H, W) of a picture from 0 to 1, the mean of its colours, and opacity (None without transparency).
+
+    `more_bytes` counts the bytes that follow the last pixel of a PGM or PPM.
+    """
+
+    shares: NDArray[np.float64]
+    opacity: NDArray[np.float64] | None = None
+    more_bytes: int = 0
+
+
+def read_brightness(file: Path, *, most_pixels: int) -> Brightness:
+    """Reads the brightness and opacity of a picture.
 
     The values of a PGM or PPM are divided by the maximum in its header.
 
@@ -60,44 +74,56 @@ def read_brightness(file: Path, *, most_pixels: int) -> tuple[NDArray[np.float64
     content = _content(file, most_pixels)
     head = _PNM.match(content)
     if head is not None:
-        return _pnm_brightness(content, head, file), None
+        return _pnm_brightness(content, head, file)
     pixels = _decoded(content, file, cv2.IMREAD_UNCHANGED)
     shares = pixels.astype(np.float64) / np.iinfo(pixels.dtype).max
     if shares.ndim == 2:
-        return shares, None
-    return np.asarray(shares[..., :3].mean(axis=2)), shares[..., 3] if shares.shape[2] == 4 else None
+        return Brightness(shares, _grey_opacity(content, shares))
+    return Brightness(np.asarray(shares[..., :3].mean(axis=2)), shares[..., 3] if shares.shape[2] == 4 else None)
 
 
-def _pnm_brightness(content: bytes, head: re.Match[bytes], file: Path) -> NDArray[np.float64]:
+def _grey_opacity(content: bytes, shares: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Opacity of a grey PNG in which one grey is transparent, which OpenCV leaves out; None for other pictures."""
+    at = content.find(_TRANSPARENT_GREY, 0, content.find(b"IDAT")) + len(_TRANSPARENT_GREY)
+    if not content.startswith(_PNG) or at < len(_PNG) or len(content) < at + 2:
+        return None
+    grey = int.from_bytes(content[at : at + 2], "big") / ((1 << content[24]) - 1)
+    return np.where(np.abs(shares - grey) < 1e-6, 0.0, 1.0)
+
+
+def _pnm_brightness(content: bytes, head: re.Match[bytes], file: Path) -> Brightness:
     """Brightness of a PGM or PPM picture."""
     kind = head[1]
     columns, rows, most = (int(number) for number in head.groups()[1:])
     count = rows * columns * (3 if kind in b"36" else 1)
     if not 0 < most < 65_536:
         raise InputError(f"its greatest value is {most}", hint="save it with one from 1 to 65535", file=file)
-    values = _numbers(content[head.end() :]) if kind in b"23" else _raw(content, head.end(), count, most)
-    if len(values) != count:
+    values, more = _numbers(content[head.end() :]) if kind in b"23" else _raw(content, head.end(), count, most)
+    if len(values) < count:
         what = f"its head says {columns} x {rows} pixels, {count} values, and it has {len(values)}"
         raise InputError(what, hint="save it again", file=file)
-    shares = np.clip(values / most, 0.0, 1.0).reshape(rows, columns, -1)
-    return np.asarray(shares.mean(axis=2))
+    more += len(values) - count
+    shares = np.clip(values[:count] / most, 0.0, 1.0).reshape(rows, columns, -1)
+    return Brightness(np.asarray(shares.mean(axis=2)), more_bytes=more)
 
 
-def _numbers(body: bytes) -> NDArray[np.float64]:
-    """Numbers of a text; none where the text holds anything else."""
+def _numbers(body: bytes) -> tuple[NDArray[np.float64], int]:
+    """Numbers at the start of a text, and the number of bytes that follow them."""
     text = _COMMENT.sub(b"", body)
-    return np.fromstring(text, dtype=np.float64, sep=" ") if _NUMBERS.fullmatch(text) and text.strip() else np.empty(0)
+    found = _NUMBERS.match(text)
+    numbers = b"" if found is None else found[0]
+    return np.array(numbers.split(), dtype=np.float64), len(text) - len(numbers)
 
 
-def _raw(content: bytes, start: int, count: int, most: int) -> NDArray[np.float64]:
-    """Values of one or two bytes from `start` on, followed by nothing but white space."""
+def _raw(content: bytes, start: int, count: int, most: int) -> tuple[NDArray[np.float64], int]:
+    """Values of one or two bytes from `start` on, and the number of bytes after them, without white space."""
     kind = np.dtype(np.uint8 if most < 256 else ">u2")
     needed = count * kind.itemsize
     if len(content) - start == needed + 1 and content[start - 1 : start + 1] == b"\r\n":
         start += 1
-    length = needed if content[start + needed :].strip() == b"" else len(content) - start
-    body = content[start : start + length]
-    return np.frombuffer(body[: len(body) // kind.itemsize * kind.itemsize], kind).astype(np.float64)
+    body = content[start : start + needed]
+    values = np.frombuffer(body[: len(body) // kind.itemsize * kind.itemsize], kind).astype(np.float64)
+    return values, len(content[start + needed :].strip())
 
 
 def _content(file: Path, most_pixels: int) -> bytes:

@@ -14,23 +14,23 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2989,
+    "executive/words": 3014,
     "executive/language": 7676,
     "executive/speech": 1588,
-    "executive/mission": 1512,
+    "executive/mission": 1546,
     "executive/tree": 7590,
     "executive/run": 3083,
     "executive/record": 943,
-    "executive/store": 1675,
+    "executive/store": 1681,
     "executive/conversation": 581,
     "executive/view": 1368,
     "executive/testing": 810,
-    "executive/app": 7476,
-    "executive/cli": 3851,
+    "executive/app": 7479,
+    "executive/cli": 4123,
     "skills": 27146,
     "plant": 11801,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 462, 74, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 463, 74, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Final
@@ -32,6 +33,7 @@ _DRIVES: Final = (
     ("fetch", None),
 )
 """Kinds of robots, and the components in place of their default ones."""
+STEPS: Final = len(_DRIVES) + 3
 TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
@@ -49,17 +51,18 @@ def newly_compiled() -> int:
     return sum(sum(code.stats.cache_misses.values()) for code in codes.values())
 
 
-def compile_kernels() -> None:
+def compile_kernels(advance: Callable[[], None] = lambda: None) -> None:
     """Drives with each kind of robot and component, moves an arm, and surveys, each for a short time.
 
-    Takes some seconds if the cache holds all code already.
+    Takes some seconds if the cache holds all code already. Calls `advance` after each of STEPS.
     """
     with TemporaryDirectory() as folder:
         for number, (kind, stack) in enumerate(_DRIVES):
             _drive(kind, stack, Path(folder) / str(number))
-    _solve_arm()
-    _map_cells()
-    _survey()
+            advance()
+    for step in (_solve_arm, _map_cells, _survey):
+        step()
+        advance()
 
 
 def _drive(kind: str, components: str | None, folder: Path) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -12,8 +14,9 @@ from rich.console import Console
 from rich.markup import escape
 
 from executive.app.checker import Checked, Checker
+from executive.cli.defaults import yielding
 from executive.cli.options import takes_request
-from executive.cli.output import BAD_INPUT, console_for, finish
+from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar
 from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
@@ -26,6 +29,7 @@ SHOWN_NODES: Final = 40
 @takes_request("world", "given", "stack", "start", "robots")
 def check(
     request: Request,
+    context: typer.Context,
     files: Annotated[
         list[Path],
         typer.Argument(metavar="MISSION...", help="Files, or names of `errand missions`.", show_default=False),
@@ -34,11 +38,21 @@ def check(
     verbose: Annotated[bool, typer.Option("-v", "--verbose", help="Show commands and trees, too.")] = False,
 ) -> None:
     """Checks mission files without running them: commands, tree, paths on the map, time and battery."""
-    checker = Checker(request)
-    checked = [checker.check_file(file) for file in files]
+    checker, console = Checker(), console_for(as_json)
+    with progress_bar(console, "files", len(files)) as advance:
+        checked = [_check(checker, replace(request, file=file), context, advance) for file in files]
     for one in () if as_json else checked:
         _show(one, console_for(as_json=False), verbose=verbose)
     finish(to_json(checked), as_json, good=all(one.ok for one in checked), otherwise=BAD_INPUT)
+
+
+def _check(checker: Checker, request: Request, context: typer.Context, advance: Callable[[], None]) -> Checked:
+    """Checks a request for a file; what the file leaves open is as the file of defaults says."""
+    with suppress(InputError):  # the check reports it
+        request = yielding(request, context)
+    checked = checker.check(request)
+    advance()
+    return checked
 
 
 def to_json(checked: Sequence[Checked]) -> dict[str, Any]:

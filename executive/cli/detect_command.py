@@ -13,7 +13,7 @@ from rich.console import Console
 
 from executive.app.picture_files import draw_detections, open_detector, read_picture, write_picture
 from executive.cli.number_options import quantity_option
-from executive.cli.output import BAD_INPUT, console_for, finish, show_table
+from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar, show_table
 from skills.detection import Detection, Detector
 from skills.files.errors import InputError
 from skills.perception.detector.onnx_detector import DetectorOptions
@@ -49,7 +49,7 @@ def detect(
     images: Annotated[list[Path], typer.Argument(metavar="IMAGE...", help="Pictures: PNG, JPEG, WebP, TIFF, BMP.")],
     threshold: Annotated[float, quantity_option(Share, help="Least score of a reported detection.")] = 0.5,
     model: Annotated[Path | None, typer.Option(help="File of another detector.")] = None,
-    draw: Annotated[Path | None, typer.Option(help="Folder for the pictures with boxes.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Folder for the pictures with boxes.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="The last line of standard output is the result.")] = False,
 ) -> None:
     """Finds beer, coke, extinguishers, hammers, screwdrivers, wrenches, people, cylinders and cubes in pictures.
@@ -57,8 +57,13 @@ def detect(
     If a picture cannot be read, the others are processed nevertheless, and the exit status is 2.
     """
     detector = open_detector(model, DetectorOptions(threshold=threshold))
-    names: Sequence[Path | None] = [None] * len(images) if draw is None else _drawing_names(images, draw)
-    results = [one for group in _groups(zip(images, names, strict=True)) for one in _detect(detector, group)]
+    names: Sequence[Path | None] = [None] * len(images) if out is None else _drawing_names(images, out)
+    results = list[PictureResult]()
+    with progress_bar(console_for(as_json), "pictures", len(images)) as advance:
+        for group in _groups(zip(images, names, strict=True)):
+            for one in _detect(detector, group):
+                results.append(one)
+                advance()
     for one in results:
         if one.error is not None:
             typer.echo(f"errand: {one.error}", err=True)

@@ -10,13 +10,13 @@ import gc
 import os
 import sys
 import threading
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import FunctionType
-from typing import Any, Final, NoReturn
+from typing import Annotated, Any, Final, NoReturn
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -31,8 +31,21 @@ _COLLECTED_AFTER: Final = (30_000, 20, 50)
 COMMANDS_GROUP: Final = "errand.commands"
 """The entry-point group of plug-ins: name = the word after `errand`, value = a `typer.Typer` or a function with typer's
 options."""
+EXIT_CODES: Final = "Exit codes: 0 success; 1 the mission was not achieved; 2 bad input, named in one line."
 _KNOWN: Final[Mapping[str, str]] = {"dataset": "errand-train"}
 """Commands of the project's other distribution."""
+
+
+RENAMED: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
+    "tree": {"--output": ("--out",)},
+    "parse": {"--svg": ("--format", "svg", "--out")},
+    "log": {"--map": ("--format", "map", "--out"), "--ros2": ("--format", "ros2", "--out")},
+    "replay": {"--html": ("--out",)},
+    "report": {"--html": ("--out",)},
+    "detect": {"--draw": ("--out",)},
+    "object": {"--picture": ("--out",)},
+}
+"""Former options of commands, which are accepted with a warning, and what stands for them now."""
 
 
 @dataclass(frozen=True)
@@ -91,14 +104,36 @@ def shipped_command(name: str) -> Any:
 def as_command(name: str, found: Any) -> Any:
     """Converts a `typer.Typer`, or a function with typer's options, to a command. Raises TypeError."""
     if isinstance(found, typer.Typer):
-        return get_command(found)
+        found._add_completion = False  # only the root installs it
+        return _with_epilog(get_command(found))
     if not isinstance(found, FunctionType):
         raise TypeError("it is neither a typer.Typer nor a function")
     from executive.cli.options import StartCommand  # loads the model of requests
 
     alone = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
     alone.command(name=name, cls=StartCommand)(found)
-    return get_command(alone)
+    return _with_epilog(get_command(alone))
+
+
+def _with_epilog(command: Any) -> Any:
+    """Adds the exit codes to the help of a command and of the commands below it."""
+    command.epilog = command.epilog or EXIT_CODES
+    for each in getattr(command, "commands", {}).values():
+        _with_epilog(each)
+    return command
+
+
+def current(command: str, words: Sequence[str]) -> list[str]:
+    """Replaces former options of a command by the present ones, and warns of each."""
+    present = list[str]()
+    for word in words:
+        former, equals, value = word.partition("=")
+        if (now := RENAMED.get(command, {}).get(former)) is None:
+            present.append(word)
+            continue
+        typer.echo(f"errand: warning: {former} is now {' '.join(now)}", err=True)
+        present += [*now, *((value,) if equals else ())]
+    return present
 
 
 def help_lines(shipped: Collection[str]) -> dict[str, str]:
@@ -171,6 +206,7 @@ class _LazyGroup(TyperGroup):
         """Imports and returns the command that the first argument names."""
         if args and args[0] in COMMANDS:
             self.add_command(shipped_command(args[0]), args[0])
+            args = [args[0], *current(args[0], args[1:])]
         elif args and (found := plugin_command(args[0])) is not None:
             self.add_command(found, args[0])
         return super().resolve_command(ctx, args)
@@ -193,17 +229,33 @@ app = typer.Typer(
     name="errand",
     cls=_LazyGroup,
     help="From an English request to a robot's work.",
+    epilog=EXIT_CODES,
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"max_content_width": 120},
 )
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"errand {version('spot-errand')}")
+        raise typer.Exit
+
+
 @app.callback()
-def _errand() -> None:
+def _errand(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
     """From an English request to a robot's work."""
+    from executive.cli.defaults import default_map
+
+    context.default_map = default_map(Path())
 
 
 def main() -> NoReturn:

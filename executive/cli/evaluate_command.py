@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import shlex
-import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from executive.cli.defaults import typed_options, yielding
 from executive.cli.number_options import quantity_option
-from executive.cli.options import ANYWAY, AS_JSON, request_arguments, takes_request
-from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer, writing
+from executive.cli.options import ANYWAY, AS_JSON, REQUEST_OPTIONS, request_arguments, takes_request
+from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer, writing
 from executive.mission.request import Request
 from skills.files.errors import InputError
 from skills.quantities import Count
@@ -35,6 +35,7 @@ ResultsPath = Annotated[Path | None, typer.Option(help="Results file; by default
 @takes_request(without=("file", "seed", "record"), out=Path("out/evaluate"))
 def evaluate(
     request: Request,
+    context: typer.Context,
     file: EvaluationOrMission = None,
     seeds: Annotated[str | None, typer.Option(help="Such as 1-20 or 1,4,7; by default 1-20.")] = None,
     jobs: Annotated[int, quantity_option(Count, help="Number of processes on this machine.")] = 2,
@@ -66,10 +67,12 @@ def evaluate(
     from executive.app.evaluate.workers import Pool
     from executive.words.mission import DEFAULT_WORLD
 
-    console, out, request = console_for(as_json), request.out, replace(request, out=Request.out)
-    has_own, of_file = each_fault or request != Request(), file is not None and is_evaluation(file)
+    console, out = console_for(as_json), request.out
+    has_own = each_fault or bool(typed_options(context) & REQUEST_OPTIONS)
+    of_file = file is not None and is_evaluation(file)
     pool, stored_in = Pool(jobs, workers, scheduler), results or out / RESULTS
-    run = partial(evaluate_runs, pool=pool, out=out, tell=plain_lines(console), progress=partial(_bar, console))
+    bar = partial(progress_bar, console, "runs")
+    run = partial(evaluate_runs, pool=pool, out=out, tell=plain_lines(console), progress=bar)
     if random_missions is not None:
         _refuse_options(has_own or file is not None, "--random-missions chooses the runs itself", _FOR_RANDOM)
         evaluation = drawn_missions(random_missions, worlds or DEFAULT_WORLD, seeds or "1-")
@@ -81,11 +84,13 @@ def evaluate(
         found = run(evaluation, results=stored_in, before=None if anyway else refuse_impossible_runs)
     else:
         _refuse_options(worlds is not None, "--worlds is for --random-missions", "name one world by --world")
-        evaluation = _at_seeds(replace(request, file=file), seeds or "1-20", each_fault=each_fault, anyway=anyway)
-        with _file_of(results) as stored_in:
-            found = run(evaluation, results=stored_in)
+        asked = yielding(replace(request, out=Request.out, file=file), context)
+        evaluation = _at_seeds(asked, seeds or "1-20", each_fault=each_fault, anyway=anyway)
+        stored_in = results or _own_results(out, evaluation)
+        found = run(evaluation, results=stored_in)
     by_seed = random_missions is None and not of_file
-    values = _show_seeds(found.cases, console) if by_seed else _show(evaluation, found, stored_in, console)
+    values = _show_seeds(found.cases, console) if by_seed else _show(evaluation, found, console)
+    console.print(f"Results: {stored_in}; a report: errand report {stored_in} --out report.html", markup=False)
     finish(values, as_json, good=all(case.report.achieved for case in found.cases))
 
 
@@ -99,33 +104,20 @@ def _refuse_options(given: bool, what: str, hint: str, file: Path | None = None)
         raise InputError(what, hint=hint, file=file)
 
 
-@contextmanager
-def _bar(console: Console, total: int) -> Iterator[Callable[[], None]]:
-    """Shows a progress bar over a number of runs."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+def _own_results(out: Path, evaluation: Evaluation) -> Path:
+    """Returns the results file of a folder; an earlier one of other or of finished runs gets another name."""
+    from executive.app.evaluate.results import ResultsFile
+    from executive.app.evaluate.workers import installed_code
 
-    text = TextColumn("{task.description}")
-    columns = (text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task("runs", total=total)
-        yield lambda: bar.advance(task)
-
-
-@contextmanager
-def _file_of(results: Path | None) -> Iterator[Path]:
-    """Yields the results file that the user names, else a temporary one."""
-    if results is not None:
-        yield results
-        return
-    with tempfile.TemporaryDirectory(prefix="errand-results-") as folder:
-        yield Path(folder) / RESULTS
+    file = out / RESULTS
+    if file.is_file():
+        with ResultsFile(file) as stored, stored.claim():
+            about, done = stored.about(), len(stored.done_ids())
+        begun = about.get("digest") == evaluation.digest and about.get("code") == installed_code()
+        if not begun or done >= len(evaluation.runs):
+            free = (out / f"results-{number}.sqlite" for number in count(1))
+            file.rename(next(each for each in free if not each.exists()))
+    return file
 
 
 def _at_seeds(asked: Request, seeds: str, *, each_fault: bool, anyway: bool) -> Evaluation:
@@ -181,13 +173,12 @@ def _seed_row(case: Case) -> tuple[str, ...]:
     )
 
 
-def _show(evaluation: Evaluation, found: Results, stored_in: Path, console: Console) -> dict[str, Any]:
+def _show(evaluation: Evaluation, found: Results, console: Console) -> dict[str, Any]:
     """Shows the results of an evaluation file or of random missions; returns JSON values."""
     from executive.app.evaluate.evaluation_file import CONDITION
     from executive.app.evaluate.summary import groups_of, standings_json, totals_of
 
     _show_cases(console, found)
-    console.print(f"Results: {stored_in}; a report: errand report {stored_in} --html report.html", markup=False)
     rate, groups = found.about.get("missions_per_hour"), groups_of(found.cases)
     conditions = [
         {CONDITION: group.name, "runs": len(group.cases), **totals_of(group.cases)}
@@ -251,7 +242,9 @@ def command_of(run: RunSpec) -> str:
 
 def report(
     results: Annotated[Path, typer.Argument(metavar="RESULTS", help="A results file of `errand evaluate`.")],
-    html: Annotated[Path | None, typer.Option(help="Write an HTML page that needs no other file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Write an HTML page that needs no other file.")
+    ] = None,
     against: Annotated[Path | None, typer.Option(metavar="RESULTS", help="Compare with another results file.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
@@ -266,11 +259,11 @@ def report(
             with ResultsFile(against) as compared_with:
                 other = _results(compared_with).cases
         _show_report(console, found, other)
-        if html is not None:
+        if out is not None:
             page = to_page(found, stored.evidence, command_of, against=other, other=str(against or ""))
-            with writing(html):
-                html.write_text(page, encoding="utf-8")
-            console.print(f"Written: {html}", markup=False)
+            with writing(out):
+                out.write_text(page, encoding="utf-8")
+            console.print(f"Written: {out}", markup=False)
         finish(summary_json(found, command_of, other), as_json)
 
 

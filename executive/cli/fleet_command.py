@@ -9,12 +9,11 @@ from typing import Annotated, Any
 import typer
 
 from executive.app.report import VERDICTS
-from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, takes_request
+from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, show_table
 from executive.mission.request import Request
 from executive.store.assignments import GivenMissions
-from executive.store.missions import STORE as STORE_NAME
-from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.missions import MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
@@ -29,7 +28,7 @@ fleet = typer.Typer(
 Queue = Annotated[Path, typer.Argument(metavar="QUEUE", help="The store of `errand queue add`, or its folder.")]
 
 
-@fleet.command()
+@fleet.command(cls=StartCommand)
 @takes_request("robots", "world", "seed", "faults", "time_limit_s", "record")
 def run(
     request: Request,
@@ -69,7 +68,7 @@ def run(
             tell=silence if quiet else tell,
             record=request.record,
         )
-        folder = out or store.parent / "fleet"
+        folder = out or (queue if is_folder(queue) else store.parent) / "fleet"
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         page = PageView(None, tell, port=view_port) if view or view_for is not None else None
         run_fleet(dispatch, out=folder, seed=request.seed, time_limit_s=request.time_limit_s, page=page, first=first)
@@ -101,7 +100,7 @@ def status(queue: Queue, as_json: AS_JSON = False) -> None:
 
 
 def _store(queue: Path) -> Path:
-    return queue / STORE_NAME if is_folder(queue) else queue
+    return store_in(queue) if is_folder(queue) else queue
 
 
 def _to_do(missions: MissionStore) -> Sequence[StoredMission]:

@@ -33,13 +33,22 @@ RECORDING: Final = "recording.html"
 LOG_SUFFIX: Final = ".mcap"
 
 
+class LogFormat(StrEnum):
+    """Formats of `errand log`."""
+
+    TEXT = "text"
+    MAP = "map"
+    ROS2 = "ros2"
+
+
 def log(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
     as_json: Annotated[bool, typer.Option("--json", help="All transitions as one JSON list.")] = False,
-    ros2: Annotated[Path | None, typer.Option(help="Convert it to a ROS 2 bag (MCAP), and end.")] = None,
-    map_file: Annotated[
-        Path | None, typer.Option("--map", help="Draw map, trajectory, path and particles as PNG, and end.")
-    ] = None,
+    form: Annotated[
+        LogFormat,
+        typer.Option("--format", help="map draws map, trajectory, path and particles as PNG; ros2 writes a bag."),
+    ] = LogFormat.TEXT,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="The picture, or the folder of the bag.")] = None,
     at: Annotated[float, quantity_option(Delay, help="Time of the map (s); by default the end.")] = math.inf,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
@@ -47,20 +56,23 @@ def log(
     """Prints the timeline of a run: nodes with causes, detections, outcome, tracebacks of defects."""
     history = read_history(file)
     history = history if robot is None else history.of_robot(robot)
-    if ros2 is not None:
+    if (form is LogFormat.TEXT) != (out is None):
+        what = "--out is for --format map and ros2" if out is not None else f"--format {form.value} writes a file"
+        raise InputError(what, hint="name both: --format map --out map.png")
+    if form is LogFormat.ROS2 and out is not None:
         from executive.record.ros2 import write_ros2
 
-        typer.echo(f"{write_ros2(history.events, ros2)} messages in {ros2}", err=True)
+        typer.echo(f"{write_ros2(history.events, out)} messages in {out}", err=True)
         return
-    if map_file is not None:
+    if out is not None:
         import cv2
 
         from executive.view.map_picture import map_picture
 
         _, png = cv2.imencode(".png", map_picture(history.events, at))
-        with writing(map_file):
-            map_file.write_bytes(png.tobytes())
-        typer.echo(f"the map is in {map_file}", err=True)
+        with writing(out):
+            out.write_bytes(png.tobytes())
+        typer.echo(f"the map is in {out}", err=True)
         return
     if as_json:
         sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
@@ -99,7 +111,9 @@ def _row(entry: Entry, prefix: str) -> tuple[str | Text, ...]:
 
 def replay(
     file: Annotated[Path, typer.Argument(metavar="LOG", help="A log.mcap that a run has written.", show_default=False)],
-    html: Annotated[Path | None, typer.Option(help="Write one HTML file that needs no server, and end.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Write one HTML file that needs no server, and end.")
+    ] = None,
     scene: Annotated[bool, typer.Option(help="Show the 3D recording beside the log.")] = True,
     port: Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")] = 0,
     view_for: Annotated[float | None, quantity_option(Wait, help="End after this time, s.")] = None,
@@ -109,11 +123,11 @@ def replay(
     history.trees()
     beside = file.parent / RECORDING
     recording = beside if scene and beside.is_file() else None
-    if html is not None:
+    if out is not None:
         from executive.view.html import log_page
 
-        with writing(html):
-            html.write_text(log_page(history.events, recording), encoding="utf-8")
+        with writing(out):
+            out.write_text(log_page(history.events, recording), encoding="utf-8")
         return
     _serve(history, recording, port, view_for)
 
@@ -164,7 +178,7 @@ def tree(
     robot: Annotated[
         str | None, typer.Option(metavar="NAME", help="For a log: the robot to show among several.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Write the tree to this file.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Write the tree to this file.")] = None,
     ascii_only: Annotated[bool, typer.Option("--ascii", help="Text without special characters.")] = False,
 ) -> None:
     """Shows the tree of a sentence or a mission file before it runs, or the last state of the tree in a log."""
@@ -173,11 +187,11 @@ def tree(
     few = most or _MOST.get(form)
     shown = shown if few is None else fold_to(shown, few)
     text = _FORMS[form](shown) if form in _FORMS else to_text(shown, ascii_only=ascii_only) + "\n"
-    if output is None:
+    if out is None:
         sys.stdout.write(text)
     else:
-        with writing(output):
-            output.write_text(text, encoding="utf-8")
+        with writing(out):
+            out.write_text(text, encoding="utf-8")
 
 
 def _view(text: str | None, request: Request, at_s: float | None, robot: str | None) -> NodeView:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import cv2
 import numpy as np
 import typer
+from shapely import Polygon
 
 from executive.app.signals import ended_by_signals
 from executive.app.worlds import open_world
@@ -185,9 +186,17 @@ class _Drive:
         purpose = "" if goal is None else f", to {goal[0]}"
         self._console.print(
             f"{now_s:6.0f} s  {mapper.driven_m:6.1f} m  {len(mapper.keyframes)} keyframes, "
-            f"{len(mapper.graph.closures)} loops{purpose}",
+            f"{len(mapper.graph.closures)} loops{purpose}{self._left()}",
             markup=False,
         )
+
+    def _left(self) -> str:
+        """Returns the explored share of the rooms and the wall time left at this pace; empty while both are unknown."""
+        grid, explored = self._survey.known_grid()
+        floor_m2 = sum(Polygon(outline).area for outline in self._world.rooms.values())
+        share = min(float(explored.sum()) * grid.resolution_m**2 / floor_m2, 0.99) if floor_m2 else 0.0
+        left_s = (time.monotonic() - self._begun_s) * (1.0 - share) / max(share, 0.01)
+        return f"; {share:.0%} of the rooms seen, about {max(1, round(left_s / 60.0))} min left" if share > 0.05 else ""
 
     def _draw(self) -> None:
         from executive.app.picture_files import write_picture

@@ -36,8 +36,8 @@ class NumberReader:
             raise OutOfRangeError(f"{error.what}; {error.hint}") from error
 
 
-def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True) -> Any:
-    """Returns a typer option that takes a number of a quantity."""
+def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True, group: str | None = None) -> Any:
+    """Returns a typer option that takes a number of a quantity; `group` is its heading in the help."""
     reader = NumberReader(hint)
     return typer.Option(
         *names,
@@ -45,6 +45,7 @@ def quantity_option(hint: Any, *names: str, help: str, show_default: bool = True
         metavar=f"<{range_text(hint).removeprefix('from ')}>",
         help=help,
         show_default=show_default,
+        rich_help_panel=group,
     )
 
 

@@ -71,13 +71,13 @@ def import_command(
 @object_group.command()
 def show(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of `errand object import`.")],
-    picture: Annotated[Path | None, typer.Option("--picture", help="Draw the model into this PNG file.")] = None,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="Draw the model into this PNG file.")] = None,
     as_json: AS_JSON = False,
 ) -> None:
     """Shows an imported model: extents, mass, inertia, collision parts."""
     found = read_imported(folder)
-    if picture is not None:
-        _draw(folder, found, picture)
+    if out is not None:
+        _draw(folder, found, out)
     if as_json:
         print_json(_facts(found, folder))
         return

@@ -17,9 +17,11 @@ from typing import Annotated, Any, Final, get_args, get_origin, get_type_hints
 import typer
 from typer.core import TyperCommand
 
+from executive.cli.defaults import yielding
 from executive.cli.number_options import quantity_option
 from executive.mission.request import Request, parse_start
 from executive.words.forms import Option
+from executive.words.forms import OptionGroup as Group
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
@@ -27,26 +29,47 @@ _START: Final = "--start"
 _NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 
 
+def grouped(group: Group, *names: str, **settings: Any) -> Any:
+    """Returns a typer option that stands under a heading of the help."""
+    return typer.Option(*names, rich_help_panel=group.value, **settings)
+
+
 START = Annotated[
     str | None, typer.Option(_START, metavar="X Y YAW", help="Start of the robot, in metres and radians.")
 ]
 STORE = Annotated[
-    Path | None, typer.Option(help="File of the missions; by default missions.sqlite in the folder for logs.")
+    Path | None, grouped(Group.OUTPUT, help="File of the missions; by default a hidden one in the folder for logs.")
 ]
-ANYWAY = Annotated[bool, typer.Option("--anyway", help="Begin in spite of errors of `errand check`.")]
-AS_JSON = Annotated[bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")]
-QUIET = Annotated[bool, typer.Option("--quiet", help="Show no lines and no tree during the run.")]
-VIEW = Annotated[bool, typer.Option("--view", help="Serve a live page on 127.0.0.1, which stays after the end.")]
-VIEW_FOR = Annotated[float | None, quantity_option(Wait, help="Time that the page stays after the end, s.")]
-VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.")]
+ANYWAY = Annotated[bool, grouped(Group.REQUEST, "--anyway", help="Begin in spite of errors of `errand check`.")]
+AS_JSON = Annotated[
+    bool, grouped(Group.OUTPUT, "--json", help="The last line of standard output is the result as JSON.")
+]
+QUIET = Annotated[bool, grouped(Group.OUTPUT, "--quiet", help="Show no lines and no tree during the run.")]
+VIEW = Annotated[bool, grouped(Group.PAGE, "--view", help="Serve a live page on 127.0.0.1, which stays after the end.")]
+VIEW_FOR = Annotated[
+    float | None, quantity_option(Wait, help="Time that the page stays after the end, s.", group=Group.PAGE)
+]
+VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
 
 
 class StartCommand(TyperCommand):
-    """Command whose `--start` takes three numbers or one word."""
+    """Command whose `--start` takes three numbers or one word, and whose help has a heading for each group."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Joins the numbers after `--start`, and parses as click does."""
         return super().parse_args(ctx, join_start(args))
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Writes the arguments, then the options of each group, then the others."""
+        records: dict[str, list[tuple[str, str]]] = {name: [] for name in ("Arguments", *Group)}
+        for each in self.get_params(ctx):
+            if (record := each.get_help_record(ctx)) is not None:
+                name = "Arguments" if each.param_type_name == "argument" else getattr(each, "rich_help_panel", None)
+                records.setdefault(name or "Options", []).append(record)
+        for name, rows in records.items():
+            if rows:
+                with formatter.section(name):
+                    formatter.write_dl(rows)
 
 
 def join_start(arguments: Sequence[str]) -> list[str]:
@@ -86,12 +109,12 @@ class _Typed:
         option, kind = self.option, self.kind
         plain = next(each for each in get_args(kind) if each is not NoneType) if NoneType in get_args(kind) else kind
         if quantity_of(plain) is not None:
-            info = quantity_option(plain, *self.names, help=option.help)
+            info = quantity_option(plain, *self.names, help=option.help, group=option.group)
             kind = get_args(plain)[0] if plain is kind else get_args(plain)[0] | None
         elif option.argument:
             info = typer.Argument(metavar=option.metavar, help=option.help, show_default=False)
         else:
-            info = typer.Option(*self.names, metavar=option.metavar, help=option.help)
+            info = typer.Option(*self.names, metavar=option.metavar, help=option.help, rich_help_panel=option.group)
         if option.read is not None:
             kind, default = (bool, False) if option.typed is bool else (option.typed | None, None)
         elif self.several:
@@ -141,6 +164,10 @@ def _typed_fields(model: Any = Request, part: str = "") -> Iterator[_Typed]:
             yield from _typed_fields(hint, each.name)
 
 
+REQUEST_OPTIONS: Final = frozenset(each.name for each in _typed_fields()) - {"file", "out"}
+"""Names of the options that make a request what it is, wherever its files go."""
+
+
 def start_pose(text: str | None) -> Pose2D | None:
     """Parses a pose in `X Y YAW`; None without one. Raises InputError."""
     start = None if text is None else parse_start(text)
@@ -170,12 +197,15 @@ def takes_request(
         """Returns the command with the options of the fields before its own."""
         signature = inspect.signature(function, eval_str=True)
         _, *own = (each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values())
-        parameters = [*(each.parameter(defaults.get(each.name, each.default)) for each in fields), *own]
+        context = inspect.Parameter("context", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)
+        options = [each.parameter(defaults.get(each.name, each.default)) for each in fields]
+        parameters = [context, *options, *(each for each in own if each.name != "context")]
 
         @functools.wraps(function)
-        def command(**given: Any) -> None:
+        def command(context: typer.Context, **given: Any) -> None:
             request = _request([(each, given.pop(each.name)) for each in fields])
-            function(request, **given)
+            request = yielding(request, context) if context.default_map else request
+            function(request, **({"context": context, **given} if "context" in signature.parameters else given))
 
         command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
         command.__annotations__ = {each.name: each.annotation for each in parameters}

@@ -59,6 +59,31 @@ def finish(
         raise typer.Exit(otherwise)
 
 
+@contextmanager
+def progress_bar(console: Console, what: str, total: int) -> Iterator[Callable[[], None]]:
+    """Shows a bar over `total` steps with the time left; nothing without a terminal, or for a single step.
+
+    The yielded function ends a step.
+    """
+    if not console.is_terminal or total < 2:
+        yield lambda: None
+        return
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
+    left = TimeRemainingColumn()
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), left)
+    with Progress(*columns, TextColumn("left"), console=console, transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)
+
+
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:
     """Prints a table: in a box at a terminal, else one line for each row, with columns two spaces apart."""
     if console.is_terminal:

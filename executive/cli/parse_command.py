@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -20,6 +21,13 @@ from skills.files.errors import InputError
 from skills.files.outside import read_text
 
 
+class ParseFormat(StrEnum):
+    """Formats of `errand parse`."""
+
+    TEXT = "text"
+    SVG = "svg"
+
+
 def parse(
     sentence: Annotated[str | None, typer.Argument(help="The sentence.", show_default=False)] = None,
     file: Annotated[Path | None, typer.Option(help="A file with one sentence on each line.")] = None,
@@ -30,15 +38,17 @@ def parse(
         bool, typer.Option("--json", help="The last line of standard output is the result as JSON.")
     ] = False,
     explained: Annotated[bool, typer.Option("--explain", help="Show each step from words to commands.")] = False,
-    svg: Annotated[
-        Path | None, typer.Option(help="Draw the dependency arcs of the one sentence into this file.")
-    ] = None,
+    form: Annotated[
+        ParseFormat, typer.Option("--format", help="svg draws the dependency arcs of the one sentence.")
+    ] = ParseFormat.TEXT,
+    out: Annotated[Path | None, typer.Option("-o", "--out", help="The file of the drawing.")] = None,
 ) -> None:
     """Shows the commands that a sentence means."""
     if (sentence is None) == (file is None):
         raise InputError("errand parse takes one sentence or --file", hint='try: errand parse "go to the kitchen"')
-    if svg is not None and sentence is None:
-        raise InputError("--svg draws one sentence", hint='try: errand parse "go to the kitchen" --svg arcs.svg')
+    if (form is ParseFormat.SVG) != (out is not None) or (out is not None and sentence is None):
+        hint = 'try: errand parse "go to the kitchen" --format svg --out arcs.svg'
+        raise InputError("--format svg draws one sentence into the file --out", hint=hint)
     knowledge = None if open_words else knowledge_of(open_world(world or DEFAULT_WORLD))
     if file is None:
         lines = [sentence or ""]
@@ -51,12 +61,12 @@ def parse(
             print(json.dumps(_values(meaning, explained), ensure_ascii=False), flush=True)
         return
     meanings = list(parsed)
-    if svg is not None:
+    if out is not None:
         trace = meanings[0].trace
         if trace is None or not trace.tokens:
-            raise InputError("there are no words to draw", hint="give a sentence in English words", file=svg)
-        with writing(svg):
-            svg.write_text(arcs_svg(trace.tokens), encoding="utf-8")
+            raise InputError("there are no words to draw", hint="give a sentence in English words", file=out)
+        with writing(out):
+            out.write_text(arcs_svg(trace.tokens), encoding="utf-8")
     for meaning in meanings:
         _show(meaning, as_json, explained)
     if as_json:

@@ -15,7 +15,7 @@ import typer
 from executive.cli.entry import COMMANDS, COMMANDS_GROUP, as_command
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
-from executive.cli.output import console_for, finish, show_table
+from executive.cli.output import console_for, finish, progress_bar, show_table
 from executive.mission.load import load_stack
 from executive.mission.request import Request
 from executive.store import trigger_source
@@ -55,9 +55,11 @@ def plugins(
         _load(load, limit)
         return
     entries = _of_others()
-    with ThreadPoolExecutor(_WORKERS) as pool:
-        found = list(pool.map(lambda entry: _checked(entry, limit), entries))
-    console = console_for(as_json)
+    console, found = console_for(as_json), list[Plugin]()
+    with ThreadPoolExecutor(_WORKERS) as pool, progress_bar(console, "plug-ins", len(entries)) as advance:
+        for each in pool.map(lambda entry: _checked(entry, limit), entries):
+            found.append(each)
+            advance()
     if not found:
         console.print(f"No other distribution registers anything in: {', '.join(groups())}.", markup=False)
     else:

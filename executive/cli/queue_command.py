@@ -12,13 +12,12 @@ import typer
 
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
-from executive.cli.options import AS_JSON, QUIET, STORE, takes_request
+from executive.cli.options import AS_JSON, QUIET, STORE, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.load import load_stack
 from executive.mission.request import Request
-from executive.store.missions import STORE as STORE_NAME
-from executive.store.missions import MissionState, MissionStore, StoredMission, utc_now
+from executive.store.missions import MissionState, MissionStore, StoredMission, store_in, utc_now
 from executive.store.standing_missions import StandingMission, StandingMissions
 from executive.store.trigger_source import refuse_missing_source
 from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trigger, event_of, local, schedule_of
@@ -57,7 +56,7 @@ _LONGEST_S: Final = 3.2e9  # a hundred years
 _RESUMABLE: Final = (MissionState.RUNNING, MissionState.CANCELLED, MissionState.ERROR)
 
 
-@queue.command()
+@queue.command(cls=StartCommand)
 @takes_request(without=("start", "questions"))
 def add(
     request: Request,
@@ -77,13 +76,13 @@ def add(
     load_stack(request.stack)
     prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
     out, request = request.out, prepared.request.from_anywhere()
-    with MissionStore(store or out / STORE_NAME) as missions:
+    with MissionStore(store or store_in(out)) as missions:
         if trigger is None:
             mission, standing = missions.add(request, queued=True), {}
         else:
             added = StandingMissions(missions).add(request, trigger, missed or Missed.SKIP)
             mission, standing = missions.mission(added.id), {added.id: added}
-    wake_server(store or out / STORE_NAME)
+    wake_server(store or store_in(out))
     said = "is queued" if trigger is None else f"waits for `errand queue serve` to queue it ({trigger})"
     console_for(as_json).print(f"Mission {mission.id} {said}: {request.name}", markup=False)
     finish(_mission_json(mission, standing), as_json)
@@ -92,7 +91,7 @@ def add(
 @queue.command(name="list")
 def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) -> None:
     """Lists all missions of the store with their states."""
-    with MissionStore(store or out / STORE_NAME, create=False) as missions:
+    with MissionStore(store or store_in(out), create=False) as missions:
         known = missions.missions()
         standing = {each.id: each for each in StandingMissions(missions).missions()}
     header = ("mission", "state", "name", "world", "seed", "commands", "message", "trigger")
@@ -103,7 +102,7 @@ def show(out: Out = Path("out"), store: STORE = None, as_json: AS_JSON = False) 
 @queue.command()
 def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
     """Removes a mission; a mission with a trigger can be removed while a server runs."""
-    with MissionStore(store or out / STORE_NAME, create=False) as missions:
+    with MissionStore(store or store_in(out), create=False) as missions:
         stands = missions.mission(number).state is MissionState.STANDING
         with nullcontext() if stands else missions.claim():
             missions.remove(number)
@@ -123,7 +122,7 @@ def run(
     from executive.cli.screen import ConsoleScreen
 
     console = console_for(as_json)
-    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claim():
+    with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
         ended = run_in_turn(queued_missions(missions), runs)
         resumable = resumable_line(missions)
@@ -210,7 +209,7 @@ def serve(
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with MissionStore(store or out / STORE_NAME, create=False) as missions, missions.claim():
+    with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
         with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
@@ -228,7 +227,8 @@ def serve(
 
 
 def resume(
-    store: Annotated[Path, typer.Option(help="File of the missions.")] = Path("out") / STORE_NAME,
+    out: Out = Path("out"),
+    store: STORE = None,
     mission: Annotated[
         int | None,
         quantity_option(Count, help="Number of the mission; by default the last interrupted or cancelled one."),
@@ -238,7 +238,7 @@ def resume(
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
     console = console_for(as_json)
-    with MissionStore(store, create=False) as missions, missions.claim():
+    with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
         from executive.app.runs import MissionRuns, queued_missions, run_in_turn
         from executive.cli.screen import ConsoleScreen
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from executive.app.backend import Scene
-from executive.app.kernels import compile_kernels, newly_compiled
+from executive.app.kernels import STEPS, compile_kernels, newly_compiled
 from executive.app.mission_files import save_pose
 from executive.app.page_view import scene_actions
 from executive.app.placed_robots import only_robot, refuse_blocked
@@ -21,7 +21,7 @@ from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START
-from executive.cli.output import console_for
+from executive.cli.output import console_for, progress_bar
 from executive.cli.run_keys import read_keys
 from executive.mission.request import parse_start
 from executive.run.worker import LockStepWorker
@@ -181,5 +181,6 @@ def _state(hands: Teleop) -> dict[str, Any]:
 def warm_up() -> None:
     """Compiles the numeric code for this machine, so that the first run begins at once."""
     begun_s = time.monotonic()
-    compile_kernels()
+    with progress_bar(console_for(False), "steps", STEPS) as advance:
+        compile_kernels(advance)
     typer.echo(f"{count_text(newly_compiled(), 'function')} compiled in {time.monotonic() - begun_s:.0f} s")

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from executive.cli.options import ANYWAY, AS_JSON, QUIET, STORE, VIEW, VIEW_FOR, VIEW_PORT, takes_request
+from executive.cli.options import ANYWAY, AS_JSON, QUIET, STORE, VIEW, VIEW_FOR, VIEW_PORT, grouped, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
 from executive.mission.request import Request
+from executive.words.forms import OptionGroup as Group
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml
@@ -24,14 +25,16 @@ if TYPE_CHECKING:
 @takes_request()
 def run(
     request: Request,
-    listen_to: Annotated[Path | None, typer.Option("--listen", help="A wav file with the sentence.")] = None,
+    listen_to: Annotated[Path | None, grouped(Group.REQUEST, "--listen", help="A wav file with the sentence.")] = None,
     as_json: AS_JSON = False,
     quiet: QUIET = False,
-    whole_tree: Annotated[bool, typer.Option("--tree", help="Show the whole tree at the end.")] = False,
-    profile: Annotated[bool, typer.Option("--profile", help="Print the CPU time by subsystem.")] = False,
+    whole_tree: Annotated[bool, grouped(Group.OUTPUT, "--tree", help="Show the whole tree at the end.")] = False,
+    profile: Annotated[bool, grouped(Group.OUTPUT, "--profile", help="Print the CPU time by subsystem.")] = False,
     store: STORE = None,
     anyway: ANYWAY = False,
-    aloud: Annotated[bool, typer.Option("--voice", help="Say aloud what the robot says, by espeak-ng.")] = False,
+    aloud: Annotated[
+        bool, grouped(Group.OUTPUT, "--voice", help="Say aloud what the robot says, by espeak-ng.")
+    ] = False,
     view: VIEW = False,
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
@@ -44,11 +47,10 @@ def run(
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
     from executive.record.work import Profile, lines
-    from executive.store.missions import STORE as STORE_NAME
-    from executive.store.missions import MissionStore
+    from executive.store.missions import MissionStore, store_in
 
     console = console_for(as_json)
-    kept_in = store or request.out / STORE_NAME
+    kept_in = store or store_in(request.out)
     timing = Profile() if profile else None
 
     def page_of(prepared: Prepared) -> PageView:

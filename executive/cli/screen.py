@@ -27,7 +27,6 @@ from executive.record.work import Profile
 from executive.run.control import Control
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
-from executive.store.missions import STORE
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, node_view
 from executive.view.styles import Styles, style_of
@@ -124,11 +123,28 @@ class ConsoleScreen:
             self.console.print(line)
 
     def name_files(self, out: Path) -> None:
-        """Names the files in a folder, without those of the store."""
-        names = sorted(path.name for path in out.iterdir() if not path.name.startswith(Path(STORE).stem))
-        self.tell(f"Written to {out}: {', '.join(names)}")
+        """Names the files in a folder with their content, those to open first at the top; hidden files are internal."""
+        names = {path.name for path in out.iterdir() if not path.name.startswith((".", "missions."))}
+        known = [name for name in WRITTEN if name in names]
+        width = max(map(len, names), default=0)
+        self.tell(f"Written to {out}:")
+        for name in (*known, *sorted(names.difference(known))):
+            self.tell(f"  {name:<{width}}  {WRITTEN.get(name, '')}".rstrip())
 
 
+WRITTEN: Final[Mapping[str, str]] = {
+    "report.html": "verdicts, answers with pictures, speech, steps, map; begin here",
+    "recording.html": "the whole run in 3D",
+    "map.png": "the world from above, with the path",
+    "tree.svg": "executed nodes, with the cause of each failure",
+    "answer.png": "what the robot saw for its last answer",
+    "detection.png": "the first detection",
+    "grasp.png": "the grasp",
+    "place.png": "putting it down",
+    "hand_over.png": "the hand-over",
+    "log.mcap": "the event log, for `errand log`, `errand replay` and Foxglove",
+}
+"""Files of a run, with their content, in the order in which to look at them."""
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5

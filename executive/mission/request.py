@@ -14,6 +14,7 @@ from pydantic.dataclasses import dataclass
 
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.words.forms import Option
+from executive.words.forms import OptionGroup as Group
 from executive.words.mission import QuestionPolicy
 from executive.words.robot_config import RobotConfig, parse_pose, parse_robots
 from executive.words.variation import NO_VARIATION, Variation
@@ -82,32 +83,43 @@ class Request:
     contains the answers, `text` is the file's text, and `scenario` holds the content of its files and the drawn faults.
     """
 
-    sentence: Annotated[str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say")] = None
+    sentence: Annotated[
+        str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say", group=Group.REQUEST)
+    ] = None
     file: Annotated[
         Path | None, Option("A file, or a name of `errand missions`.", metavar="MISSION", argument=True)
     ] = None
-    world: Annotated[str | None, Option("World by name or folder; flat unless said.")] = None
+    world: Annotated[str | None, Option("World by name or folder; flat unless said.", group=Group.WORLD)] = None
     require_wake: Annotated[
         bool | None,
         Option(
             "Whether the robot's name must be said; by default if spoken, or where the world asks for it.",
             "--wake/--no-wake",
+            group=Group.REQUEST,
         ),
     ] = None
     answers: Annotated[
         tuple[str, ...],
         Option(
-            "Answers a question that the sentence leaves open; repeat it for further ones, in their order.", "--answer"
+            "Answers a question that the sentence leaves open; repeat it for further ones, in their order.",
+            "--answer",
+            group=Group.REQUEST,
         ),
     ] = ()
     questions: Annotated[
         QuestionPolicy | None,
-        Option("How to answer further questions; by default as the mission file says, else at the terminal, else not."),
+        Option(
+            "How to answer further questions; by default as the mission file says, else at the terminal, else not.",
+            group=Group.REQUEST,
+        ),
     ] = None
-    seed: Annotated[Seed, Option("Sets the objects in the world and all noise.")] = 1
-    out: Annotated[Path, Option("Folder for log, tree, recording and pictures.")] = Path("out")
+    seed: Annotated[Seed, Option("Sets the objects in the world and all noise.", group=Group.WORLD)] = 1
+    out: Annotated[Path, Option("Folder for log, tree, recording and pictures.", group=Group.OUTPUT)] = Path("out")
     record: Annotated[
-        bool, Option("Leaves no recording and no pictures.", "--no-record", read=operator.not_, typed=bool)
+        bool,
+        Option(
+            "Leaves no recording and no pictures.", "--no-record", read=operator.not_, typed=bool, group=Group.OUTPUT
+        ),
     ] = True
     stack: Annotated[
         Path | None,
@@ -115,10 +127,12 @@ class Request:
             "A stack file: localiser, planners and so on; see errand stack show. 'no_map': for unknown places.",
             read=_stack_file,
             typed=Path,
+            group=Group.ROBOTS,
         ),
     ] = None
     map: Annotated[
-        Path | None, Option("The robot's map, a folder of `errand map build`; by default the world's own.")
+        Path | None,
+        Option("The robot's map, a folder of `errand map build`; by default the world's own.", group=Group.ROBOTS),
     ] = None
     start: Annotated[
         Start | None,
@@ -126,6 +140,7 @@ class Request:
             "Where the robot stands (m, rad); 'unknown' puts it anywhere, and it finds out where.",
             metavar="X Y YAW",
             read=parse_start,
+            group=Group.ROBOTS,
         ),
     ] = None
     scenario: Scenario = NO_SCENARIO
@@ -135,23 +150,35 @@ class Request:
             "Adds the faults and events of a file: people walk, doors close, objects are moved.",
             "--scenario",
             metavar="FILE",
+            group=Group.DISTURBANCES,
         ),
     ] = ()
     variation: Variation = NO_VARIATION
     given: Annotated[
         Mapping[str, Any],
         Option(
-            "A value for a parameter of the mission file.", "--set", metavar="NAME=VALUE", read=_given, typed=list[str]
+            "A value for a parameter of the mission file.",
+            "--set",
+            metavar="NAME=VALUE",
+            read=_given,
+            typed=list[str],
+            group=Group.REQUEST,
         ),
     ] = field(default_factory=dict)
     time_of_day: Annotated[
         str | None,
         Option(
-            "Time of day when the run begins; by default the time on this machine.", metavar="HH:MM", read=_time_of_day
+            "Time of day when the run begins; by default the time on this machine.",
+            metavar="HH:MM",
+            read=_time_of_day,
+            group=Group.WORLD,
         ),
     ] = None
     time_limit_s: Annotated[
-        LongDuration | None, Option('Ends the run after so long: seconds, or "2 h"; by default 20 min.', "--time-limit")
+        LongDuration | None,
+        Option(
+            'Ends the run after so long: seconds, or "2 h"; by default 20 min.', "--time-limit", group=Group.REQUEST
+        ),
     ] = None
     robots: Annotated[
         tuple[RobotConfig, ...],
@@ -159,6 +186,7 @@ class Request:
             "The robots and their kinds, as in alice=spot,bob=fetch@1.0,2.0,0.0.",
             metavar="NAME=KIND,...",
             read=_robots,
+            group=Group.ROBOTS,
         ),
     ] = ()
     name: str = ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, Any, Final
 
 from executive.words.forms import Option
+from executive.words.forms import OptionGroup as Group
 from skills.quantities import Quantity
 
 RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
@@ -24,10 +25,15 @@ class Scenario:
     faults: Annotated[
         tuple[str, ...],
         Option(
-            'Adds a fault, such as "camera.hand: dropout 5 s at 20 s"; may be repeated.', "--fault", metavar="WORDS"
+            'Adds a fault, such as "camera.hand: dropout 5 s at 20 s"; may be repeated.',
+            "--fault",
+            metavar="WORDS",
+            group=Group.DISTURBANCES,
         ),
     ] = ()
-    random: Annotated[RandomFaults, Option("Adds so many faults that the seed draws.", "--random-faults")] = 0
+    random: Annotated[
+        RandomFaults, Option("Adds so many faults that the seed draws.", "--random-faults", group=Group.DISTURBANCES)
+    ] = 0
     people: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     doors: tuple[Mapping[str, Any], ...] = ()
     moves: tuple[Mapping[str, Any], ...] = ()

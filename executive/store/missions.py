@@ -20,8 +20,14 @@ from skills.files.errors import InputError, listing
 from skills.files.json_values import from_text
 from skills.robot import Pose2D
 
-STORE: Final = "missions.sqlite"
-"""Name of a store's file unless another is given."""
+STORE: Final = Path(".errand") / "missions.sqlite"
+"""File of a store in the folder for logs, unless another is given; its folder is hidden."""
+
+
+def store_in(folder: Path) -> Path:
+    """Returns the store's file in a folder for logs; an earlier version kept it beside the logs."""
+    former = folder / STORE.name
+    return former if former.is_file() else folder / STORE
 
 
 def utc_now() -> datetime:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -74,12 +75,23 @@ class Forms:
         return fitting
 
 
+class OptionGroup(enum.StrEnum):
+    """Headings of options in the help of a command."""
+
+    REQUEST = "Request"
+    WORLD = "World"
+    ROBOTS = "Robots"
+    DISTURBANCES = "Faults and variations"
+    OUTPUT = "Output"
+    PAGE = "Live page"
+
+
 @dataclass(frozen=True)
 class Option:
     """Command-line option of a field; a number has the range of the field's quantity.
 
     `name` is the option, by default the field's name; an `argument` has none. `read` converts the typed value, of type
-    `typed`, to the field's value; it raises InputError.
+    `typed`, to the field's value; it raises InputError. `group` is its heading in the help.
     """
 
     help: str
@@ -88,3 +100,4 @@ class Option:
     argument: bool = False
     read: Callable[[Any], Any] | None = None
     typed: Any = str
+    group: OptionGroup | None = None

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Annotated, Final
 
 from executive.words.forms import Option
+from executive.words.forms import OptionGroup as Group
 from skills.files.errors import InputError, suggestion
 from skills.quantities import Quantity, QuantityError, number_in, number_of
 
@@ -69,11 +70,22 @@ class Variation:
     """
 
     light: Annotated[
-        str, Option("normal, dim, bright, evening, low sun, or a brightness (1 is day light).", metavar="NAME")
+        str,
+        Option(
+            "normal, dim, bright, evening, low sun, or a brightness (1 is day light).",
+            metavar="NAME",
+            group=Group.DISTURBANCES,
+        ),
     ] = NORMAL_LIGHT
-    clutter: Annotated[Clutter, Option("Adds so many objects; the seed chooses where they lie.")] = 0
-    people: Annotated[MorePeople, Option("Adds so many walking people; the seed chooses their routes.")] = 0
-    friction: Annotated[Friction, Option("Multiplies the friction of loose objects and robots.")] = 1.0
+    clutter: Annotated[
+        Clutter, Option("Adds so many objects; the seed chooses where they lie.", group=Group.DISTURBANCES)
+    ] = 0
+    people: Annotated[
+        MorePeople, Option("Adds so many walking people; the seed chooses their routes.", group=Group.DISTURBANCES)
+    ] = 0
+    friction: Annotated[
+        Friction, Option("Multiplies the friction of loose objects and robots.", group=Group.DISTURBANCES)
+    ] = 1.0
 
     def __post_init__(self) -> None:
         parse_light(self.light)

@@ -92,9 +92,9 @@ def run_case(case: Case, out: Path) -> dict[str, Any]:
         process = subprocess.Popen(
             _command((*case.run, *told), out), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        if not kill_at(process, out / "missions.plant", RESUMED_AT_S):
+        if not kill_at(process, out / ".errand" / "missions.plant", RESUMED_AT_S):
             raise RuntimeError(f"it was over before {RESUMED_AT_S} s")
-        ended = _errand(("resume", "--store", str(out / "missions.sqlite"), *fixed[:2]), out)
+        ended = _errand(("resume", "--out", str(out), *fixed[:2]), out)
     logs = sorted(out.rglob("log*.mcap"))
     return {
         "exit": ended.returncode,

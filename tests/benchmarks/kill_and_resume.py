@@ -58,10 +58,10 @@ def trial(number: int, sentence: str, moment_s: float, seed: int, out: Path, rob
     asked += [] if robots is None else ["--robots", robots]
     with (out / "first.txt").open("wb") as told:
         process = subprocess.Popen([*command, *asked], stdout=told, stderr=subprocess.STDOUT)
-        killed = kill_at(process, out / "missions.plant", moment_s)
+        killed = kill_at(process, out / ".errand" / "missions.plant", moment_s)
     if not killed:
         return trial(number, sentence, 0.7 * moment_s, seed, out / "earlier", robots)
-    again = [*command, "resume", "--store", str(out / "missions.sqlite"), "--quiet", "--json"]
+    again = [*command, "resume", "--out", str(out), "--quiet", "--json"]
     ended = subprocess.run(again, capture_output=True, text=True, check=False)
     text = ended.stdout + ended.stderr
     (out / "second.txt").write_text(text)

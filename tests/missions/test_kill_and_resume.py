@@ -32,7 +32,7 @@ def kill_in(leaf: str, after_s: float, process: subprocess.Popen, out: Path) -> 
 
 def clock_s(out: Path) -> float:
     try:
-        return read_snapshot(out / "missions.plant").values["engine"]["steps"] * TIME_STEP_S
+        return read_snapshot(out / ".errand" / "missions.plant").values["engine"]["steps"] * TIME_STEP_S
     except SnapshotError:
         return 0.0
 
@@ -66,7 +66,7 @@ def test_a_killed_mission_is_taken_up_and_ends_right(sentence, leaf, after_s, tm
     with (tmp_path / "told.txt").open("wb") as told:
         process = subprocess.Popen((*ERRAND, "run", "--say", sentence, *options), stdout=told, stderr=told)
         kill_in(leaf, after_s, process, tmp_path)
-    command = (*ERRAND, "resume", "--store", str(tmp_path / "missions.sqlite"), "--quiet", "--json")
+    command = (*ERRAND, "resume", "--out", str(tmp_path), "--quiet", "--json")
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
     report = json.loads(ended.stdout.splitlines()[-1])

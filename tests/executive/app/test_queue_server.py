@@ -594,7 +594,7 @@ def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
     serve = [sys.executable, "-m", "executive.cli", "queue", "serve", "--quiet", "--json", "--port", "0", *where]
     with subprocess.Popen(serve, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as server:
         port = next(int(line.split(":")[3].split("/")[0]) for line in server.stderr if line.startswith("Calls:"))
-        token = (tmp_path / "missions.sqlite-token").read_text().strip()
+        token = (tmp_path / ".errand" / "missions.sqlite-token").read_text().strip()
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
         bearer = {"Authorization": f"Bearer {token}"}
         connection.request("POST", "/missions/pose", json.dumps({"x": 6.0}), bearer)
@@ -604,6 +604,6 @@ def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
         told, _ = server.communicate(timeout=60)
     assert server.returncode == 0
     assert json.loads(told) == {"missions": [{"mission": 2, "outcome": "success", "achieved": True}]}
-    with MissionStore(tmp_path / "missions.sqlite") as store:
+    with MissionStore(tmp_path / ".errand" / "missions.sqlite") as store:
         (battery,) = store.rows("SELECT lowest_charge, last_charge, ended FROM mission WHERE ended")
         assert 0.9 < battery["lowest_charge"] <= battery["last_charge"] <= 1.0 and battery["ended"]

@@ -70,7 +70,7 @@ def test_a_table_is_shown_to_people(detect, tmp_path):
 def test_boxes_are_drawn_under_the_pictures_names(detect, tmp_path):
     (tmp_path / "other").mkdir()
     files = [picture(tmp_path / "a.png", HAMMER), picture(tmp_path / "other" / "a.png", BEER)]
-    assert detect(*files, "--draw", tmp_path / "drawn").exit_code == 0
+    assert detect(*files, "--out", tmp_path / "drawn").exit_code == 0
     assert sorted(file.name for file in (tmp_path / "drawn").iterdir()) == ["a-2.png", "a.png"]
     drawn = cv2.imread(str(tmp_path / "drawn" / "a.png"))
     assert drawn.shape == (480, 640, 3)

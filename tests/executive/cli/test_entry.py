@@ -3,11 +3,14 @@
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from executive.cli.entry import shipped_command
+from executive.cli.entry import COMMANDS, EXIT_CODES, RENAMED, app, current, shipped_command
+from executive.words.forms import OptionGroup
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 UNUSED_AT_RUN_TIME = ("errand_train", "plant.models.builder", "plant.worlds.builder")
@@ -105,3 +108,49 @@ def test_a_start_is_one_word_or_three_numbers(words, value):
     context = command.make_context("run", ["missions/go_to_pose.yaml", *words])
     assert context.params["start"] == value
     assert str(context.params["file"]) == "missions/go_to_pose.yaml"
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert CliRunner().invoke(app, ["--version"]).stdout == f"errand {version('spot-errand')}\n"
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [("errand ru", "run"), ("errand run --sa", "--say"), ("errand world fr", "from-map"), ("errand queue ", "serve")],
+)
+def test_the_shell_completes_commands_and_options(typed, offered, monkeypatch):
+    monkeypatch.setenv("_ERRAND_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", typed)
+    monkeypatch.setenv("COMP_CWORD", str(len(typed.split(" ")) - 1))
+    assert offered in CliRunner().invoke(app, [], prog_name="errand").stdout.split()
+
+
+def test_completion_is_installed_for_a_shell(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setattr("typer.completion._get_shell_name", lambda: "fish", raising=False)
+    monkeypatch.setattr("typer._completion_shared._get_shell_name", lambda: "fish", raising=False)
+    result = CliRunner().invoke(app, ["--install-completion"], prog_name="errand")
+    assert result.exit_code == 0, result.output
+    assert "_ERRAND_COMPLETE" in (tmp_path / ".config/fish/completions/errand.fish").read_text()
+
+
+@pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS), ["queue", "add"], ["world", "from-map"]])
+def test_every_help_ends_with_the_exit_codes_and_only_the_root_installs_completion(command):
+    shown = CliRunner().invoke(app, [*command, "--help"], env={"COLUMNS": "200"}).stdout
+    assert " ".join(shown.split()).endswith(EXIT_CODES)
+    assert ("--install-completion" in shown) == (not command)
+
+
+def test_the_help_of_run_has_a_heading_for_each_group_of_options():
+    shown = CliRunner().invoke(app, ["run", "--help"]).stdout
+    headings = [line.removesuffix(":") for line in shown.splitlines() if line.endswith(":") and line[:1].isupper()]
+    assert headings == ["Arguments", *OptionGroup, "Options"]
+    assert shown.index("Robots:") < shown.index("--stack") < shown.index("Faults and variations:")
+
+
+def test_former_options_stand_for_the_present_ones_and_warn(capsys):
+    assert current("log", ["a.mcap", "--map", "m.png"]) == ["a.mcap", "--format", "map", "--out", "m.png"]
+    assert current("report", ["r", "--html=p.html"]) == ["r", "--out", "p.html"]
+    assert current("run", ["--map", "m"]) == ["--map", "m"]
+    assert capsys.readouterr().err.count("is now") == 2
+    assert {option for former in RENAMED.values() for option in former} >= {"--output", "--svg", "--html", "--draw"}

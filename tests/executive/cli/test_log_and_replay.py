@@ -44,7 +44,7 @@ def test_log_prints_a_timeline(log_path):
 
 
 def test_the_map_of_a_log_without_one_is_refused_in_one_line(log_path, tmp_path):
-    result = invoke("log", log_path, "--map", tmp_path / "map.png")
+    result = invoke("log", log_path, "--format", "map", "--out", tmp_path / "map.png")
     assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
     assert not (tmp_path / "map.png").exists()
 
@@ -88,14 +88,14 @@ def test_a_file_that_is_no_log_is_refused_in_one_line(tmp_path, verb, name, word
 
 def test_replay_writes_one_html_file(log_path, tmp_path):
     html = tmp_path / "replay.html"
-    assert invoke("replay", log_path, "--html", html).exit_code == 0
+    assert invoke("replay", log_path, "--out", html).exit_code == 0
     page = html.read_text()
     assert "no room to stand" in page
     assert 'src="' not in page.split('id="recorded"')[0]
 
 
 def test_replay_into_a_folder_that_is_not_there_is_refused(log_path, tmp_path):
-    result = invoke("replay", log_path, "--html", tmp_path / "absent" / "x.html")
+    result = invoke("replay", log_path, "--out", tmp_path / "absent" / "x.html")
     assert (result.exit_code, "x.html" in result.stderr) == (2, True)
 
 
@@ -225,7 +225,7 @@ def test_a_robot_that_is_not_in_the_log_or_not_said_is_refused_in_one_line(two_r
 
 def test_a_replay_of_several_robots_holds_the_messages_of_each(two_robots, tmp_path):
     html = tmp_path / "replay.html"
-    assert invoke("replay", two_robots, "--html", html).exit_code == 0
+    assert invoke("replay", two_robots, "--out", html).exit_code == 0
     page = html.read_text()
     assert "Alice is there" in page
     assert "Bob is there" in page

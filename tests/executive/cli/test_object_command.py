@@ -43,7 +43,7 @@ def test_a_mesh_becomes_a_model_that_is_shown(mesh, tmp_path):
     result = made(mesh, tmp_path / "drill", "--class", "wrench")
     assert result.exit_code == 0, result.output
     assert "drill, class wrench, 0.200 x 0.060 x 0.040 m, 1.2 kg, 1 collision part\n" in result.stdout
-    shown = invoke("object", "show", tmp_path / "drill", "--picture", tmp_path / "drill.png")
+    shown = invoke("object", "show", tmp_path / "drill", "--out", tmp_path / "drill.png")
     assert shown.exit_code == 0, shown.output
     lines = [" ".join(line.split()) for line in shown.stdout.splitlines()]
     assert lines[:3] == ["drill: class wrench", "extents (m) 0.2 0.06 0.04", "mass (kg) 1.2"]

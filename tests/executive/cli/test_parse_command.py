@@ -65,7 +65,7 @@ def test_explain_shows_the_clauses_and_the_mission():
 
 
 def test_the_arcs_are_drawn(tmp_path: Path):
-    result = invoke(SENTENCE, "--svg", str(tmp_path / "arcs.svg"))
+    result = invoke(SENTENCE, "--format", "svg", "--out", str(tmp_path / "arcs.svg"))
     assert result.exit_code == 0
     drawing = (tmp_path / "arcs.svg").read_text(encoding="utf-8")
     assert drawing.startswith("<svg")
@@ -75,9 +75,9 @@ def test_the_arcs_are_drawn(tmp_path: Path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (("--file", "sentences.txt", "--svg", "a.svg"), "--svg draws one sentence"),
-        (("go to the hall", "--svg", "no/such/folder/a.svg"), "cannot write it"),
-        (("", "--svg", "a.svg"), "no words to draw"),
+        (("--file", "sentences.txt", "--format", "svg", "--out", "a.svg"), "--format svg draws one sentence"),
+        (("go to the hall", "--format", "svg", "--out", "no/such/folder/a.svg"), "cannot write it"),
+        (("", "--format", "svg", "--out", "a.svg"), "no words to draw"),
     ],
 )
 def test_a_drawing_that_cannot_be_made_is_one_line(arguments, says):

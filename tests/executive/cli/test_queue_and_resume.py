@@ -109,7 +109,7 @@ def mission(tmp_path: Path):
 @pytest.fixture
 def errand(tmp_path):
     def invoke(*arguments):
-        where = ("--store", str(tmp_path / "out" / "missions.sqlite"))
+        where = ("--store", str(tmp_path / "out" / ".errand" / "missions.sqlite"))
         out = () if arguments[0] == "resume" else ("--out", str(tmp_path / "out"))
         return CliRunner().invoke(entry.app, [*arguments, *where, *out])
 
@@ -119,7 +119,7 @@ def errand(tmp_path):
 @pytest.fixture
 def states(tmp_path):
     def read():
-        with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+        with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
             return [mission.state.value for mission in store.missions()]
 
     return read
@@ -154,7 +154,7 @@ def test_a_mission_with_a_broken_stack_file_is_not_queued(errand, mission, tmp_p
     stack.write_text("planer: {}\n")
     result = errand("queue", "add", mission("first"), "--stack", str(stack))
     assert (result.exit_code, f"{stack}:1" in "".join(result.output.split())) == (2, True)
-    assert not (tmp_path / "out" / "missions.sqlite").exists()
+    assert not (tmp_path / "out" / ".errand" / "missions.sqlite").exists()
 
 
 def test_a_failed_mission_does_not_keep_the_next_from_running(errand, mission, plant, states):
@@ -342,7 +342,7 @@ def test_a_tree_that_is_no_longer_the_same_is_refused(errand, mission, plant, tm
     plant.outcomes = ["killed"]
     with pytest.raises(GoneError):
         errand("run", mission("alone"), "--quiet")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         change(store, fingerprint="other")
     result = errand("resume")
     assert (result.exit_code, "begun with another version" in result.output) == (2, True)
@@ -358,7 +358,7 @@ def test_a_run_that_cannot_begin_leaves_no_mission_behind(errand, mission, monke
 
 
 def test_only_one_process_runs_missions_of_a_store(errand, mission, plant, tmp_path):
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claim():
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store, store.claim():
         result = errand("run", mission("alone"), "--quiet")
     assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)
 
@@ -409,14 +409,14 @@ def test_a_trigger_that_cannot_be_is_refused_and_nothing_is_kept(errand, mission
 
 def test_a_trigger_in_the_past_is_listed_as_over(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--at", "2999-01-01 09:00")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         store._connection.execute("UPDATE mission SET trigger = '2020-01-01 09:00'")
     assert "2020-01-01 09:00, over" in errand("queue", "list").output
 
 
 def test_serve_runs_what_is_due_and_the_list_says_where_it_came_from(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--every", "1d", "--missed", "once", "--seed", "4")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         day_before = (store.now() - timedelta(days=1.5)).isoformat()
         store._connection.execute("UPDATE mission SET since = ?, anchor = ?", (day_before, day_before))
     result = errand("queue", "serve", "--until-idle", "--quiet", "--json")
@@ -456,7 +456,7 @@ def test_serve_goes_on_with_what_was_killed(errand, mission, plant, states):
 
 def test_only_one_process_serves_a_store(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--every", "1h")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store, store.claim():
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store, store.claim():
         result = errand("queue", "serve", "--until-idle")
         assert (result.exit_code, "runs a mission of this store" in result.output) == (2, True)
         assert errand("queue", "remove", "1").exit_code == 0
@@ -538,7 +538,7 @@ def test_serve_runs_what_a_plug_in_hears(errand, mission, plant, tmp_path, monke
 
 def test_serve_names_a_plug_in_that_is_gone_and_runs_what_is_queued(errand, mission, plant, tmp_path):
     errand("queue", "add", mission("first"), "--every", "1h")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         store._connection.execute("UPDATE mission SET trigger = 'topic gone:x'")
     errand("queue", "add", mission("second"))
     result = errand("queue", "serve", "--until-idle", "--quiet")
@@ -582,7 +582,7 @@ def test_a_mission_that_cannot_begin_is_set_aside_and_the_next_one_runs(
 ):
     errand("queue", "add", mission("alone"))
     errand("queue", "add", mission("second"))
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         change(store, **{column: value})
     result = errand(*command)
     assert (states(), [run[0] for run in plant.runs]) == (["error", "success"], ["second"])
@@ -608,10 +608,10 @@ def test_a_defect_in_a_run_sets_its_mission_aside_and_keeps_the_traceback(errand
 
 def test_a_mission_set_aside_is_resumed_by_its_number(errand, mission, plant, states, tmp_path):
     errand("queue", "add", mission("first"))
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         change(store, world="nowhere")
     assert errand("queue", "run", "--quiet").exit_code == 1
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         change(store, world=None)
     assert errand("resume", "--mission", "1", "--quiet").exit_code == 0
     assert states() == ["success"]
@@ -625,7 +625,7 @@ def test_a_queued_mission_that_cannot_go_on_is_set_aside_and_the_queue_goes_on(
     errand("queue", "add", mission("second"))
     with pytest.raises(GoneError):
         errand("queue", "run", "--quiet")
-    with MissionStore(tmp_path / "out" / "missions.sqlite") as store:
+    with MissionStore(tmp_path / "out" / ".errand" / "missions.sqlite") as store:
         change(store, fingerprint="other")
     assert errand("queue", "serve", "--until-idle", "--quiet").exit_code == 0
     assert states() == ["error", "success"]

@@ -96,7 +96,7 @@ def test_an_impossible_random_mission_counts_as_refused(ran, tmp_path, monkeypat
 def test_the_report_shows_the_same_table(ran, tmp_path):
     values = evaluate("--out", str(tmp_path))[1]
     page = tmp_path / "report.html"
-    command = ["report", str(tmp_path / "results.sqlite"), "--html", str(page), "--json"]
+    command = ["report", str(tmp_path / "results.sqlite"), "--out", str(page), "--json"]
     told = json.loads(CliRunner().invoke(entry.app, command).stdout.splitlines()[-1])
     assert (told["standings"], told["to_look_at"]) == (values["standings"], values["to_look_at"])
     assert "Claims against verdicts" in page.read_text()

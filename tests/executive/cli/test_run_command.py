@@ -119,7 +119,7 @@ def test_tree_formats(tmp_path: Path):
     assert set(root) == {"id", "type", "name", "status", "cause", "source", "children"}
     assert root["id"].startswith("alice/")
     written = tmp_path / "tree.svg"
-    assert invoke("tree", sentence, "--format", "svg", "-o", str(written)).exit_code == 0
+    assert invoke("tree", sentence, "--format", "svg", "--out", str(written)).exit_code == 0
     assert written.read_text().startswith("<svg")
 
 

@@ -103,12 +103,15 @@ class WorldDiagram:
 def build_diagram(config: DiagramConfig, meshcat: Meshcat | None = None) -> WorldDiagram:
     """Builds the Diagram of a world with its models, robots and doors, and shows it in `meshcat`.
 
-    SAP contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that evaluating
-    contact results solves once more. Default positions place the models; the engine places the robots.
+    SAP with point contact at `TIME_STEP_S`; sampled outputs, which would double the cost of a step, are off, so that
+    evaluating contact results solves once more. Default positions place the models; the engine places the robots.
     """
     builder = DiagramBuilder()
     plant_config = MultibodyPlantConfig(
-        time_step=TIME_STEP_S, discrete_contact_approximation="sap", use_sampled_output_ports=False
+        time_step=TIME_STEP_S,
+        contact_model="point",
+        discrete_contact_approximation="sap",
+        use_sampled_output_ports=False,
     )
     plant, scene_graph = AddMultibodyPlant(plant_config, builder)
     plant.set_sap_near_rigid_threshold(NEAR_RIGID)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import LightParameter, MakeRenderEngineVtk, QueryObject, RenderEngineVtkParams, Rgba, SceneGraph
@@ -11,6 +14,8 @@ from pydrake.systems.framework import Diagram
 from executive.words.variation import DAY_LIGHT, Light
 
 RENDERER = "vtk"
+MESA_THREADS: Final = "LP_NUM_THREADS"
+"""Environment variable of Mesa's software renderer: the number of its threads."""
 
 
 class Scene:
@@ -39,10 +44,12 @@ class Scene:
     def query_at(self, positions: NDArray[np.float64]) -> QueryObject:
         """Returns the scene with the plant at all its `positions`; it is valid until the next call.
 
-        The first call makes the renderer, which loads all meshes.
+        The first call makes the renderer, which loads all meshes. Without a graphics card it draws in the calling
+        thread, unless the environment says otherwise: for small pictures, waking threads costs as much as drawing.
         """
         if not self._rendering:
             self._rendering = True
+            os.environ.setdefault(MESA_THREADS, "0")
             self._scene_graph.AddRenderer(self._geometry_context, RENDERER, MakeRenderEngineVtk(self._parameters))
         self._plant.SetPositions(self._context, positions)
         query = self._query_port.Eval(self._geometry_context)

@@ -70,7 +70,7 @@ class MapView:
 def render_view(
     query_object: QueryObject,
     X_WC: RigidTransform,
-    size: tuple[int, int] = (960, 720),
+    size: tuple[int, int] = (720, 540),
     *,
     fov_y_rad: float = float(np.radians(50.0)),
     renderer: str = "vtk",
@@ -130,7 +130,7 @@ def top_view(
     query_object: QueryObject,
     bounds_W: Bounds,
     *,
-    width: int = 1600,
+    width: int = 1200,
     cut_height_m: float = _CUT_HEIGHT_M,
     renderer: str = "vtk",
 ) -> MapView:

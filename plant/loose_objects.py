@@ -4,7 +4,8 @@
 contacts spends time on it: its shapes have no proximity role. It wakes when a link or a moving object is about to reach
 it, when it is put elsewhere, and when an object beside it wakes, since it may lie on that one. A person's tray wakes
 nothing. Sleep depends on positions alone, so the same run sleeps and wakes at the same times. Joints are not locked
-for this: beside a locked joint, Drake's SAP crashes on the contact of any other body with the world body.
+for this: beside a locked joint, Drake's SAP crashes on the contact of any other body with the world body. A hand far
+from everything has no proximity role either: its rubber is a grid of spheres, which overlap each other and the jaws.
 
 **Carrying.** The plant steps a free body along its velocity, but the joints of a robot along their arcs. A body at a
 distance r from an axis about which the robot turns at w would creep outwards by w^2 r dt^2 / 2 in each step: 3 mm/s at
@@ -26,13 +27,21 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import GeometryId, ProximityProperties, Role, SceneGraphInspector
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    Role,
+    SceneGraphInspector,
+)
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, JacobianWrtVariable, ModelInstanceIndex, RigidBody
 from pydrake.systems.framework import Context
 
 from plant.diagram import WorldDiagram
-from plant.sensors.ray_shapes import shape_row
+from plant.robots.robot_kind import RobotBody
+from plant.sensors.ray_shapes import ShapeArrays, shape_row
 from skills.robot import FloatArray
 
 _EXACT = 1e-9
@@ -46,7 +55,8 @@ class SleepLimits:
 
     An object is still while its pose (metres, quaternion) changes by less than `still` per second, and falls asleep
     after `still_s`. It wakes when a bounding sphere comes closer than `margin_m`, which no link crosses between two
-    updates. Objects whose spheres are closer than `beside_m` sleep and wake together.
+    updates. Objects whose spheres are closer than `beside_m` sleep and wake together. A hand falls asleep at twice the
+    margin.
     """
 
     still: float = 0.004
@@ -83,8 +93,36 @@ class _Spheres:
         return centres
 
 
+class _Hand:
+    """Hand of one robot: its collision shapes with their properties, and what it may come near."""
+
+    def __init__(self, robot: RobotBody, inspector: SceneGraphInspector, fixed: ShapeArrays) -> None:
+        plant, own = robot.plant, set(map(int, robot.instances()))
+        links = [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
+        found = [shape for link in links for shape in plant.GetCollisionGeometriesForBody(link)]
+        others = [body for body in _moving_bodies(plant) if int(body.model_instance()) not in own]
+        self.shapes = {shape: inspector.GetProximityProperties(shape) for shape in found}
+        self.apart = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(robot.geometries()))
+        self.asleep = False
+        self._spheres, self._others = _Spheres(plant, inspector, links), _Spheres(plant, inspector, others)
+        self._fixed = fixed
+        self._measured = np.full((len(links), 3), np.inf), np.zeros(len(links))
+
+    def is_near(self, context: Context, margin_m: float) -> bool:
+        """Returns whether anything but the robot itself comes within a margin of the hand."""
+        centres_W, reach_m = self._spheres.centres_W(context), self._spheres.radii_m + margin_m
+        apart_m = np.linalg.norm(centres_W[:, None] - self._others.centres_W(context), axis=-1)
+        if (apart_m < reach_m[:, None] + self._others.radii_m).any():
+            return True
+        measured_W, clear_m = self._measured
+        if (clear_m - np.linalg.norm(centres_W - measured_W, axis=1) >= reach_m).all():
+            return False
+        self._measured = centres_W, _clearance_m(self._fixed, centres_W)
+        return bool((self._measured[1] < reach_m).any())
+
+
 class Sleepers:
-    """Puts the loose objects of one plant to sleep and wakes them; call `update` regularly, before the plant steps."""
+    """Puts loose objects and hands of one plant to sleep and wakes them; call `update` regularly, before it steps."""
 
     def __init__(self, world: WorldDiagram, root_context: Context, limits: SleepLimits | None = None) -> None:
         """All objects are awake at first; `all_asleep` says whether every loose body of the plant sleeps."""
@@ -114,6 +152,8 @@ class Sleepers:
         self._lift = np.zeros(plant.num_velocities())
         self._still_s = np.zeros(len(self._objects))
         self._last: tuple[float, FloatArray, FloatArray] | None = None
+        fixed = _fixed_shapes(plant, inspector)
+        self._hands = [_Hand(robot, inspector, fixed) for robot in world.robots.values()]
 
     @property
     def asleep(self) -> frozenset[str]:
@@ -121,7 +161,11 @@ class Sleepers:
         return frozenset(each.name for each, asleep in zip(self._objects, self._asleep, strict=True) if asleep)
 
     def update(self, now_s: float) -> None:
-        """Wakes the objects that a link or another object is about to reach; puts still objects to sleep."""
+        """Wakes what a link or an object is about to reach; puts still objects and lonely hands to sleep."""
+        for hand in self._hands:
+            margin_m = self._limits.margin_m if hand.asleep else 2.0 * self._limits.margin_m
+            if hand.is_near(self._context, margin_m) == hand.asleep:
+                self._turn_hand(hand)
         if not self._objects:
             return
         poses = self._plant.GetPositions(self._context)[self._places]
@@ -142,7 +186,10 @@ class Sleepers:
             self._turn(int(number))
 
     def wake_all(self) -> None:
-        """Wakes all objects, for instance before the plant's state is replaced."""
+        """Wakes all objects and hands, for instance before the plant's state is replaced."""
+        for hand in self._hands:
+            if hand.asleep:
+                self._turn_hand(hand)
         for number in np.flatnonzero(self._asleep):
             self._turn(int(number))
         self._still_s = np.zeros(len(self._objects))
@@ -164,17 +211,29 @@ class Sleepers:
         near: NDArray[np.bool_] = (apart_m < self._bounds.radii_m[:, None] + radii_m + margin_m).any(axis=1)
         return near
 
+    def _turn_hand(self, hand: _Hand) -> None:
+        """Wakes a sleeping hand, or puts a hand that is awake to sleep."""
+        hand.asleep = not hand.asleep
+        self._give_role(hand.shapes, not hand.asleep)
+        if not hand.asleep:  # a filter forgets the shapes that lose their role
+            self._scene_graph.collision_filter_manager(self._geometry_context).Apply(hand.apart)
+
+    def _give_role(self, shapes: Mapping[GeometryId, ProximityProperties], awake: bool) -> None:
+        """Gives shapes their proximity role, or takes it away."""
+        graph, source = self._scene_graph, self._plant.get_source_id()
+        for shape, properties in shapes.items():
+            if awake:
+                graph.AssignRole(self._geometry_context, source, shape, properties)
+            else:
+                graph.RemoveRole(self._geometry_context, source, shape, Role.kProximity)
+
     def _turn(self, number: int) -> None:
         """Wakes a sleeping object, or puts an object that is awake to sleep."""
-        each, graph, plant = self._objects[number], self._scene_graph, self._plant
-        source = plant.get_source_id()
+        each, plant = self._objects[number], self._plant
+        self._give_role(each.shapes, bool(self._asleep[number]))
         if self._asleep[number]:
-            for shape, properties in each.shapes.items():
-                graph.AssignRole(self._geometry_context, source, shape, properties)
             self._lift[each.velocities] = 0.0
         else:
-            for shape in each.shapes:
-                graph.RemoveRole(self._geometry_context, source, shape, Role.kProximity)
             self._lift[each.velocities] = -plant.CalcGravityGeneralizedForces(self._context)[each.velocities]
             velocities = plant.GetVelocities(self._context)
             velocities[each.velocities] = 0.0
@@ -205,6 +264,24 @@ def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
 def _moving_bodies(plant: MultibodyPlant) -> Iterator[RigidBody]:
     bodies = (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies()))
     return (body for body in bodies if not plant.IsAnchored(body))
+
+
+def _fixed_shapes(plant: MultibodyPlant, inspector: SceneGraphInspector) -> ShapeArrays:
+    """Collision shapes of the bodies that are fixed to the world, in the world frame."""
+    context, rows = plant.CreateDefaultContext(), []
+    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
+        for shape in plant.GetCollisionGeometriesForBody(body) if plant.IsAnchored(body) else ():
+            kind, half_m, X_BG = shape_row(inspector, shape)
+            rows.append((kind, half_m, plant.EvalBodyPoseInWorld(context, body) @ X_BG))
+    return ShapeArrays.from_rows(rows)
+
+
+def _clearance_m(shapes: ShapeArrays, points_W: FloatArray) -> FloatArray:
+    """Distance (m) of each point (K, 3) from the nearest of the boxes around some shapes."""
+    off_W = points_W[:, None] - shapes.positions_m
+    off_G = np.abs(np.einsum("nji,knj->kni", shapes.rotations, off_W))
+    gaps_m = np.linalg.norm(np.maximum(off_G - shapes.half_extents_m, 0.0), axis=-1)
+    return np.asarray(gaps_m.min(axis=1, initial=np.inf))
 
 
 def _bound(inspector: SceneGraphInspector, shapes: Sequence[GeometryId]) -> tuple[FloatArray, float] | None:

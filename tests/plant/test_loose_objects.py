@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from pydrake.geometry import Role
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import MultibodyPlant
@@ -136,6 +137,38 @@ def test_the_same_run_twice_sleeps_and_moves_alike(stage):
         ends.append((engine.asleep, place(engine, "one"), place(engine, "two")))
     assert ends[0][0] == ends[1][0] == {"one", "three"}
     np.testing.assert_array_equal(ends[0][1:], ends[1][1:])
+
+
+def query(engine):
+    return engine.world.plant.get_geometry_query_input_port().Eval(engine.context)
+
+
+def hand_shapes(engine):
+    """Collision shapes of Alice's hand, all of them, and those that the search for contacts knows now."""
+    plant, robot = engine.world.plant, engine.world.robots["Alice"]
+    links = [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
+    shapes = [each for link in links for each in plant.GetCollisionGeometriesForBody(link)]
+    inspector = query(engine).inspector()
+    return shapes, [each for each in shapes if inspector.GetProperties(each, Role.kProximity) is not None]
+
+
+def test_a_hand_far_from_everything_costs_no_search_for_contacts(stage):
+    shapes, searched = hand_shapes(stage(0.1, robots={"Alice": Pose2D(0.0, 0.0, 0.0)}))
+    assert len(shapes) > 50
+    assert searched == []
+
+
+def test_a_sleeping_hand_touches_an_object_that_comes_and_never_its_own_arm(stage):
+    engine = stage(0.1, robots={"Alice": Pose2D(0.0, 0.0, 0.0)}, box=(3.0, 0.0, 0.051))
+    hand = engine.world.robots["Alice"].hand
+    put(engine, "box", engine.world.plant.EvalBodyPoseInWorld(engine.context, hand).translation() + [0.1, 0.0, 0.3])
+    engine.advance(0.3)
+    shapes, searched = hand_shapes(engine)
+    box = engine.world.plant.GetCollisionGeometriesForBody(body(engine, "box"))
+    touching = [{each.id_A, each.id_B} for each in query(engine).ComputePointPairPenetration()]
+    assert searched == shapes
+    assert any(pair & set(box) and pair & set(shapes) for pair in touching)
+    assert all(pair & set(box) for pair in touching)
 
 
 DT_S, TURN_RAD_S, REACH_M = 0.0125, 0.75, 0.9

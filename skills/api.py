@@ -202,8 +202,8 @@ class Payload:
     the skill was to take. Fields are None while they are unknown, as after a restart. The payload counts only while the
     gripper holds an object.
 
-    While the payload is `offered`, somebody may pull it out of the closed gripper; the skill that offers it checks who
-    has it.
+    While the payload is `offered`, somebody may pull it out of the closed gripper, or a skill lets it go; that skill
+    checks who has it.
     """
 
     corners_H: NDArray[np.float64] | None = None

@@ -30,9 +30,7 @@ MEANS_BIG: Final[Mapping[str, bool]] = MappingProxyType(
 class ClassForm(BaseModel):
     """One class: id in messages, form, lengths (from, to) in m of its longest and second longest side, usual length.
 
-    `mass_kg` is from the lightest to the heaviest usual object; None when unknown. `least_kg_m3` is the least mass per
-    volume of a bar about the object (its longest side times the shortest twice); None when its size says nothing about
-    its mass.
+    `mass_kg` is from the lightest to the heaviest usual object; None when unknown.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
@@ -43,18 +41,6 @@ class ClassForm(BaseModel):
     width_m: tuple[float, float]
     usual_m: float
     mass_kg: tuple[float, float] | None = None
-    least_kg_m3: float | None = None
-
-    def least_mass_kg(self, size_m: tuple[float, float, float]) -> float:
-        """Least mass of an object that was seen with a size (three sides in m); 0.0 when unknown.
-
-        A hidden part makes an object seem smaller, and so lighter, not heavier.
-        """
-        if self.mass_kg is None:
-            return 0.0
-        longest, shortest = max(size_m), min(size_m)
-        by_size_kg = 0.0 if self.least_kg_m3 is None else self.least_kg_m3 * longest * shortest**2
-        return max(self.mass_kg[0], min(by_size_kg, self.mass_kg[1]))
 
 
 ANY_FORM: Final = ClassForm(id=0, form="round", length_m=(0.01, 0.6), width_m=(0.005, 0.4), usual_m=0.15)

@@ -41,7 +41,8 @@ _CELL_PX = 4.0
 _LOW_M = 0.025
 """Height up to which an object counts as low."""
 _LOWEST_M = 0.008
-_HIGHEST_M = 0.4
+HIGHEST_M = 0.4
+"""Height (m) over a surface up to which points usually count."""
 _FEWEST_POINTS = 40
 _PLANE_BAND_M = 0.05
 _PLANE_POINTS = 6000
@@ -110,27 +111,34 @@ class SurfaceView:
     clusters: tuple[Cluster, ...]
 
 
-def segment_surface(image: Image, X_WO: RigidTransform, surface: Surface, margin_m: float = 0.03) -> SurfaceView | None:
-    """Segments one surface in a picture; None when too little of the surface is visible."""
-    return next(segment_surfaces(image, X_WO, (surface,), margin_m))
+def segment_surface(
+    image: Image, X_WO: RigidTransform, surface: Surface, margin_m: float = 0.03, highest_m: float = HIGHEST_M
+) -> SurfaceView | None:
+    """Segments one surface in a picture up to a height over it; None when too little of the surface is visible."""
+    return next(segment_surfaces(image, X_WO, (surface,), margin_m, highest_m))
 
 
 def segment_surfaces(
-    image: Image, X_WO: RigidTransform, surfaces: Sequence[Surface], margin_m: float = 0.03
+    image: Image,
+    X_WO: RigidTransform,
+    surfaces: Sequence[Surface],
+    margin_m: float = 0.03,
+    highest_m: float = HIGHEST_M,
 ) -> Iterator[SurfaceView | None]:
     """Segments each surface in a picture; None for a surface of which too little is visible."""
     levels_m = [surface.height_m for surface in surfaces]
-    band_m = (min(levels_m, default=0.0) - _PLANE_BAND_M, max(levels_m, default=0.0) + _HIGHEST_M)
+    band_m = (min(levels_m, default=0.0) - _PLANE_BAND_M, max(levels_m, default=0.0) + highest_m)
     cloud, p_WC = cloud_from_image(image, X_WO, heights_m=band_m), camera_pose_W(image, X_WO).translation()
     pixel_rad = 1.0 / image.depth_intrinsics.fx
-    return (_segment(cloud, p_WC, surface, margin_m, pixel_rad) for surface in surfaces)
+    return (_segment(cloud, p_WC, surface, (margin_m, highest_m), pixel_rad) for surface in surfaces)
 
 
 def _segment(
-    cloud: PointCloud, p_WC: FloatArray, surface: Surface, margin_m: float, pixel_rad: float
+    cloud: PointCloud, p_WC: FloatArray, surface: Surface, within_m: tuple[float, float], pixel_rad: float
 ) -> SurfaceView | None:
+    margin_m, highest_m = within_m
     above = cloud.p_W[:, 2] - surface.height_m
-    over = (above > -_PLANE_BAND_M) & (above < _HIGHEST_M)
+    over = (above > -_PLANE_BAND_M) & (above < highest_m)
     over[over] = inside_polygon(cloud.p_W[over, :2], surface.polygon_W, margin_m)
     cloud = cloud.where(over)
     plane = _fit_plane(cloud.p_W, surface.height_m)
@@ -235,25 +243,28 @@ def split_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
 
 
 def _join_detected(view: SurfaceView, detected: Detection3D) -> SurfaceView:
-    """Joins the low clusters among a detected object's pixels: where depth is lost, a wrench falls to pieces.
+    """Joins the low clusters among a detected object's pixels, and what of it is lost among the surface's points.
 
-    Higher ones are objects of their own, which a large box may hold as well.
+    Where depth is lost, a wrench falls to pieces, and its handle may be lower than the noise of single points. Higher
+    clusters are objects of their own, which a large box may hold as well.
     """
     low = [each for each in view.clusters if each.shape.height_m < _LOW_M]
-    if len(detected.pixels) == 0 or len(low) < 2:
+    if len(detected.pixels) == 0 or not low:
         return view
-    pixels = [each.points.pixels for each in low]
-    among = np.split(
+    pixels = [view.plane_points.pixels, *(each.points.pixels for each in low)]
+    flat, *among = np.split(
         _are_among(np.concatenate(pixels), detected.pixels), np.cumsum([len(each) for each in pixels])[:-1]
     )
     parts = [each for each, own in zip(low, among, strict=True) if np.mean(own) > _MOSTLY_AMONG]
-    if len(parts) < 2:
+    if not parts or (len(parts) == 1 and not np.any(flat)):
         return view
-    clouds = [(each.points.p_W, each.points.pixels, each.points.colours) for each in parts]
-    points = PointCloud(*(np.concatenate(each) for each in zip(*clouds, strict=True)))
+    clouds = [view.plane_points.where(flat), *(each.points for each in parts)]
+    points = PointCloud(
+        *(np.concatenate(each) for each in zip(*((c.p_W, c.pixels, c.colours) for c in clouds), strict=True))
+    )
     whole = _cluster(points, parts[0].surface, parts[0].plane, detected.eye_W)
     rest = tuple(each for each in view.clusters if not any(each is part for part in parts))
-    return SurfaceView(view.plane, view.plane_points, (whole, *rest))
+    return SurfaceView(view.plane, view.plane_points.where(~flat), (whole, *rest))
 
 
 def _are_among(pixels: NDArray[np.int64], of_object: NDArray[np.int64]) -> Mask:

@@ -125,7 +125,7 @@ class Holds(Condition):
     | at the start: holds an object recognised as another | PRECONDITION | PRECONDITION |
     | at the start: empty | PRECONDITION | holds |
     | the object is lost, within 0.3 s | EXECUTION | EXECUTION, but holds while the object is offered |
-    | the object begins to slip | holds; it is gripped once more firmly | the same |
+    | the object begins to slip | holds; it is gripped once more firmly | the same, but not while it is offered |
     | the object slips once more | EXECUTION | holds |
     | the gripper has opened | EXECUTION | holds |
     | at the end: empty | EXECUTION | holds |
@@ -160,6 +160,8 @@ class Holds(Condition):
         if begins and another and context.robot.gripper().holding:
             return Failed(Cause.PRECONDITION, f"the gripper holds the {held}, not the {self.item}")
         grip = watch.judge(context.robot.gripper(), context.clock.now())
+        if self.until_put_down and context.payload.offered:
+            return None
         if grip is Grip.SLIPPING:
             grip_again(context.robot, watch.force_n, clock=context.clock, lease=context.lease)
             sentence = f"the {self.item} began to slip and is gripped again, more firmly"
@@ -167,8 +169,6 @@ class Holds(Condition):
         if grip is Grip.EMPTY:
             why = f"there is no {self.item} in the gripper"
             return None if self.until_put_down else Failed(Cause.PRECONDITION, why)
-        if grip is Grip.LOST and self.until_put_down and context.payload.offered:
-            return None
         if grip is Grip.LOST or (grip is Grip.RELEASED and not self.until_put_down):
             return Failed(Cause.EXECUTION, f"the {self.item} was lost on the way{self._to}")
         if grip is Grip.SLIPS_ON and not self.until_put_down:

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, InputsT, Running, SkillContext
 from skills.manipulation.arm.collision import ArmScene, Box
-from skills.manipulation.arm.forces import HeldLoad, held_load, mean_load
+from skills.manipulation.arm.forces import held_mass_kg
 from skills.manipulation.arm.hold import Grip, HoldWatch, grip_again, hold_watch
 from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.manipulation.arm.poses import carry_configuration, hangs_below
@@ -370,19 +370,15 @@ class ArmSkill(RoutineSkill[InputsT]):
 
     def weigh(self, p_HO: FloatArray, message: str) -> Routine[float]:
         """Measures the mass (kg) of the object that a still hand holds at p_HO (3,), with the body level."""
-        return (yield from self.feel_load(p_HO, message)).mass_kg
-
-    def feel_load(self, p_HO: FloatArray, message: str) -> Routine[HeldLoad]:
-        """Measures mass and moment of the object that a still hand holds at p_HO (3,), with the body level."""
         scene = yield from self.compute(self.scene_now(), latency_s=0.05, name="prepare weighing", message=message)
         end_s, found = self.context.clock.now() + WEIGHING_S, []
         while self.context.clock.now() < end_s:
             efforts = self.context.robot.joints().effort_nm
             q = self.q_rad()
             extra = np.array([efforts[name] for name in self.model.names]) - scene.gravity_efforts(q)
-            found.append(held_load(self.model, q, p_HO, extra))
+            found.append(held_mass_kg(self.model, q, p_HO, extra))
             yield Running(message)
-        return mean_load(found)
+        return float(np.median(found))
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
         """Closes the empty gripper and folds the arm onto the body, unless it is stowed already."""

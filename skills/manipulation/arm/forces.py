@@ -1,10 +1,9 @@
-"""Forces at the hand from the efforts of the arm's joints: the load of a held object, and a pull at the hand."""
+"""Forces at the hand from the efforts of the arm's joints: the mass of a held object, and a pull at the hand."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,9 +14,6 @@ from skills.robot import FloatArray
 _GRAVITY_M_S2 = 9.81
 _STEP_RAD = 1e-4
 """Step of the numerical derivative."""
-_Y = np.array([0.0, 1.0, 0.0])
-_MOMENT_DAMPING = 0.1
-"""Damping of a moment, in levers (m/m): efforts that change less by a moment tell nothing about it."""
 _DAMPING_M = 0.12
 """Damping of the least squares: a stretched arm hardly feels a pull along itself, so its short levers count little."""
 
@@ -29,38 +25,10 @@ def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray
     return np.asarray(np.array(shifts).T / (2.0 * _STEP_RAD))
 
 
-@dataclass(frozen=True)
-class HeldLoad:
-    """Mass of a held object, and the moment of its weight about the hand's x and z axes through the grip.
-
-    The moment is positive where the centre of mass lies on the side of the hand's y axis.
-    """
-
-    mass_kg: float
-    moment_nm: float = 0.0
-
-    @property
-    def beside_m(self) -> float:
-        """Level distance of the centre of mass from the grip, along the hand's y axis."""
-        return self.moment_nm / (_GRAVITY_M_S2 * self.mass_kg) if self.mass_kg > 0.0 else 0.0
-
-
-def held_load(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> HeldLoad:
-    """Load at p_HO of the hand that explains efforts `extra_nm` (J,) best, by damped least squares.
-
-    A posture in which the efforts tell no moment gives none.
-    """
-    at_grip, beside = (levers_m(model, q_rad, p_HO + y_m * _Y)[2] for y_m in (0.0, 1.0))
-    levers = np.array([[*(_GRAVITY_M_S2 * at_grip), 0.0], [*(beside - at_grip), _MOMENT_DAMPING]])
-    mass_kg, moment_nm = np.linalg.lstsq(levers.T, np.append(extra_nm, 0.0), rcond=None)[0]
-    return HeldLoad(float(mass_kg), float(moment_nm))
-
-
-def mean_load(loads: Sequence[HeldLoad]) -> HeldLoad:
-    """Median mass and mean moment of several readings."""
-    return HeldLoad(
-        float(np.median([each.mass_kg for each in loads])), float(np.mean([each.moment_nm for each in loads]))
-    )
+def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:
+    """Mass (kg) at p_HO of the hand that explains efforts `extra_nm` (J,) best, by least squares."""
+    lever_nm = _GRAVITY_M_S2 * levers_m(model, q_rad, p_HO)[2]
+    return float(lever_nm @ extra_nm / (lever_nm @ lever_nm))
 
 
 def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> FloatArray:

@@ -56,6 +56,11 @@ class ReleasingSkill(LookingSkill[InputsT]):
             return replace(ended, cause=Cause.POSTCONDITION)
         return ended
 
+    def end(self) -> None:
+        """Withdraws the offer of the object."""
+        self.context.payload.offered = False
+        super().end()
+
     def release_opening(self) -> float:
         """Opening at which the gripper lets go of the object that it holds."""
         most = _WIDE if self.gripper.kind is GripperKind.HINGED else 1.0
@@ -64,6 +69,7 @@ class ReleasingSkill(LookingSkill[InputsT]):
 
     def open_hand(self, message: str) -> Routine[bool]:
         """Opens the gripper just far enough; returns whether it feels nothing then."""
+        self.context.payload.offered = True  # what sticks to the rubber opens so slowly that it seems to slip, or lost
         yield from self.move_gripper(self.release_opening(), GRIPPER_FORCE_N, message)
         released_W = self.X_WB() @ self.model.X_BH(self.q_rad()) @ self.p_HT
         self.checkpoint = {**self.checkpoint, "released_W": released_W.tolist()}

@@ -16,9 +16,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.manipulation.arm.poses import hand_rotation
 from skills.manipulation.grasp.placements import Placement, Target, placements
-from skills.perception.class_forms import class_forms
+from skills.perception.class_forms import class_form
 from skills.robot import FloatArray, GripperCapabilities, GripperKind
-from skills.world_model import ObjectObservation
+from skills.world_model import ObjectKind
 
 THIN_M = 0.020
 """Objects lower than this count as thin."""
@@ -40,8 +40,13 @@ _PER_HIGH_M = 60.0
 """Cost of fingers that end higher, per metre."""
 _BESIDE_THIN_M = 0.012
 """Gap between the fixed finger and a thin object."""
-_ENDING_LEVEL_M = 0.017
-"""Gap between fingers and object at the lean with which fingers of different length end level."""
+_ENDING_LEVEL_M = 0.012
+"""Gap between fingers and object at the lean with which fingers of different length end level.
+
+It is less than the gap before they close, because afterwards there is none.
+"""
+_PER_UNEVEN_M = 60.0
+"""Cost of the difference in height of the ends of closed fingers, which press an object round, per metre."""
 _BEVEL_M = 0.003
 """Distance by which the back of a fingertip ends behind its tip."""
 _SHORTER_CLOSED_M = 0.004
@@ -159,6 +164,7 @@ def _candidate(
         height = 0.5 * target.height_m
         cost = placement.cost + 0.4 * abs(tilt - 0.5 * np.pi) + 0.5 * abs(lean)
         cost += _PER_HIGH_M * max(0.0, _WELL_BEYOND_M - beyond)
+        cost += _PER_UNEVEN_M * _uneven_m(R_BH, placement.width_m, gripper)
     across_m = gripper.fixed_z_m + beside_m + 0.5 * placement.width_m if _hinged(gripper) else 0.0
     p_HT = np.array([depth, 0.0, across_m])
     p_BT = np.array([*placement.xy, target.base_m + height])
@@ -200,6 +206,12 @@ def _low_grip(
     return float((above - 0.5 * height_m - lowest + middle_z) / down), float(beyond)
 
 
+def _uneven_m(R_BH: RotationMatrix, width_m: float, gripper: GripperCapabilities) -> float:
+    """Difference in height (m) of the ends of both fingers that are closed on a width."""
+    ahead_m, across_m = _closed_tip_x_m(gripper) - gripper.fixed_tip_x_m, width_m if _hinged(gripper) else 0.0
+    return abs(float(R_BH.matrix()[2] @ [ahead_m, 0.0, across_m]))
+
+
 def _closed_tip_x_m(gripper: GripperCapabilities) -> float:
     """Position (m) of the moving finger's tip along the hand on a narrow object: it reaches farthest half open."""
     return max(gripper.fixed_tip_x_m, gripper.tip_x_m - _SHORTER_CLOSED_M)
@@ -216,18 +228,21 @@ def _above_surface(height_m: float, spare_m: float) -> float:
     return float(np.clip(spare_m - 1e-6, least, usual))
 
 
-def least_mass_kg(seen: ObjectObservation) -> float:
-    """Least mass of an object by its class and seen size, 0.0 when nothing is known of its class."""
-    form = class_forms().get(seen.kind.name)
-    return 0.0 if form is None else form.least_mass_kg(seen.size_m)
+def least_mass_kg(kind: ObjectKind) -> float:
+    """Least mass of an object by its class, 0.0 when nothing is known of its class."""
+    mass_kg = class_form(kind.name).mass_kg
+    return 0.0 if mass_kg is None else mass_kg[0]
 
 
-def why_too_heavy(seen: ObjectObservation, max_payload_kg: float) -> str | None:
-    """Returns why an object is surely too heavy for the arm; None when it is not, or only weighing can decide."""
-    mass_kg = least_mass_kg(seen)
+def why_too_heavy(kind: ObjectKind, max_payload_kg: float) -> str | None:
+    """Returns why even the lightest of a class is too heavy for the arm; None when only weighing can decide.
+
+    Sizes tell no mass: a hose widens an extinguisher, and it may be empty.
+    """
+    mass_kg = least_mass_kg(kind)
     if mass_kg <= max_payload_kg:
         return None
-    return f"the {seen.kind} weighs {mass_kg:.1f} kg at least, and the arm carries {max_payload_kg:.1f} kg at most"
+    return f"the {kind} weighs {mass_kg:.1f} kg at least, and the arm carries {max_payload_kg:.1f} kg at most"
 
 
 def why_no_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabilities, name: str) -> str:

@@ -18,6 +18,7 @@ from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.surface_segmentation import (
+    HIGHEST_M,
     LONGEST_M,
     Cluster,
     SurfaceView,
@@ -36,6 +37,9 @@ _SURFACE_YIELDS_M = 0.003
 """Depth by which the surface is taken lower than it was seen."""
 _NEIGHBOUR_GROWN_M = 0.005
 """Distance by which the boxes of neighbours are larger than what was seen of them, by the noise of the depth."""
+
+_TALLER_M = 0.05
+"""Height by which an object may be taller than it was seen from afar."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +82,8 @@ def examine(
     within_m: float,
 ) -> CloseView | None:
     """Looks for the object within a distance (m) of where it was seen; None when it is not there."""
-    view = segment_surface(image, place.X_WO, surface, margin_m=0.0)
+    highest_m = max(HIGHEST_M, seen.size_m[2] + _TALLER_M)
+    view = segment_surface(image, place.X_WO, surface, margin_m=0.0, highest_m=highest_m)
     if view is None:
         return None
     own = [each for each in found if seen.kind.name in (ANY_OBJECT, each.detection.class_name)]

@@ -23,8 +23,10 @@ _BIN_M = 0.01
 """Length of the slices of an outline."""
 _BREADTH_M = 0.036
 """Half the length of an outline within which its local width is measured."""
-_YIELD_M = 0.006
+_YIELD_M = 0.004
 """Depth by which a finger yields to an outline that it touches."""
+_ALIGNING_RAD = np.linspace(-0.28, 0.28, 15)
+"""Angles by which a part of an outline may lie oblique to the whole."""
 _LEAST_TOUCHING = 0.55
 """Least part of a finger's breadth that must touch the outline."""
 _LOOSE_COST = 1.5
@@ -245,22 +247,32 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
     """
     square, centre = target.length_m < 1.4 * target.width_m, np.array(target.centre_B)
     for yaw in (target.yaw_rad, target.yaw_rad + 0.5 * np.pi) if square else (target.yaw_rad,):
-        directions = _turned(yaw)
-        s, t = directions @ (target.points_B[:, :2] - centre).T
-        middle = _balance(s, t) if middle_B is None else float(directions[0] @ (middle_B - centre))
+        axis = _turned(yaw)[0]
+        along = (target.points_B[:, :2] - centre) @ axis
+        middle = _balance(along, (target.points_B[:, :2] - centre) @ _turned(yaw)[1])
+        middle = middle if middle_B is None else float(axis @ (middle_B - centre))
         for shift in (0.0,) if square else (0.0, 0.03, -0.03, 0.06, -0.06, 0.09, -0.09):
-            local = np.abs(s - middle - shift) < _BREADTH_M
+            local = np.abs(along - middle - shift) < _BREADTH_M
             if np.count_nonzero(local) < 8:
                 continue
-            low, high = np.percentile(t[local], [1, 99])
-            touching = _touching_both(s[local], t[local], low, high, float(np.ptp(s)))
+            near, at = target.points_B[local, :2], centre + (0.0 if square else middle + shift) * axis
+            turned = yaw if square else _aligned(near, yaw)
+            s, t = _turned(turned) @ (near - at).T
+            low, high = np.percentile(t, [1, 99])
+            touching = _touching_both(s, t, low, high, float(np.ptp(along)))
             if touching < _LEAST_TOUCHING:
                 continue
-            xy = centre + np.array([0.0 if square else middle + shift, 0.5 * (low + high)]) @ directions
-            for azimuth in (yaw, yaw + np.pi):
+            xy = at + 0.5 * (low + high) * _turned(turned)[1]
+            for azimuth in (turned, turned + np.pi):
                 off = abs(wrap(azimuth - ahead_rad))
                 cost = 4.0 * abs(shift) + _width_cost(high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
                 yield Placement(xy, azimuth, float(high - low), 0.02, cost, abs(shift))
+
+
+def _aligned(xy: FloatArray, yaw_rad: float) -> float:
+    """Direction near a yaw along which points (N, 2) are narrowest: an oblique handle lies straight in the fingers."""
+    turned = yaw_rad + _ALIGNING_RAD
+    return float(turned[np.argmin([np.ptp(np.percentile(_turned(each)[1] @ xy.T, [1, 99])) for each in turned])])
 
 
 def _turned(azimuth_rad: float) -> FloatArray:

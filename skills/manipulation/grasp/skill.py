@@ -15,7 +15,6 @@ from skills.api import Cause, ObjectObservation, PlanningError, Succeeded
 from skills.detect.viewpoints import surface_boxes
 from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N
 from skills.manipulation.arm.collision import ArmScene, box_corners
-from skills.manipulation.arm.forces import HeldLoad
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, sees_closely
@@ -27,7 +26,6 @@ from skills.manipulation.grasp.candidates import (
     why_too_heavy,
 )
 from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
-from skills.manipulation.grasp.felt_load import MOST_SET_DOWN, centre_of_mass, grip_n, hangs_out, nearest_first
 from skills.manipulation.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
 from skills.manipulation.grasp.ports import GraspInputs, GraspPorts, TriedGrasp
 from skills.manipulation.grasp.reach import (
@@ -52,6 +50,10 @@ from skills.world_model import IN_THE_WAY
 
 _CLOSED_RAD = 0.06
 """A finger that closes below this angle has gripped nothing."""
+_PER_KG_N = 12.0
+"""Additional force per kilogram of the object."""
+_MOST_OF_FORCE = 0.95
+"""Largest force of a grip, as a part of the gripper's limit."""
 _PER_LEVER_N_M = 400.0
 """Additional force per metre between the grip and the centre of mass; the tips would press a thin object out."""
 _RELAX_M = 0.002
@@ -102,16 +104,15 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     Options: ClassVar[type] = GraspOptions
     options: GraspOptions
     lost_message = "the object fell out of the gripper while it was lifted"
-    _felt_B: tuple[FloatArray, ...]  # centres of mass, felt at each lift after which the object was set down again
 
     def begin(self, inputs: GraspInputs) -> None:
         """Forgets an earlier attempt, except for the grasps that `inputs` names."""
-        self._tried, self._felt_B = inputs.avoid, ()
+        self._tried = inputs.avoid
         super().begin(inputs)
 
     def resume(self, inputs: GraspInputs) -> None:
         """Continues after a pause or a restart."""
-        self._tried, self._felt_B = inputs.avoid, ()
+        self._tried = inputs.avoid
         super().resume(inputs)
 
     def undone(self, inputs: GraspInputs) -> str | None:
@@ -124,7 +125,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if self.context.robot.gripper().holding:
             raise SkillFailure(Cause.PRECONDITION, "the gripper holds something already")
         arm = self.context.robot.capabilities().arm
-        too_heavy = None if arm is None else why_too_heavy(seen, arm.max_payload_kg)
+        too_heavy = None if arm is None else why_too_heavy(seen.kind, arm.max_payload_kg)
         if too_heavy is not None:
             raise SkillFailure(Cause.PRECONDITION, too_heavy)
         try:
@@ -179,19 +180,20 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         heights_m = yield from self._heights(seen)
         attempt = partial(self._look_and_plan, seen, inputs.avoid)
         view, plan = yield from self.attempt_at_heights(heights_m, f"standing up to the {seen.kind}", attempt)
-        tries = 1
-        while not (yield from self._take_unmoved(view, plan, inputs)):
-            if (tries := tries + 1) > 2 + len(self._felt_B):
-                raise SkillFailure(Cause.PRECONDITION, f"the {seen.kind} moves while the hand reaches for it")
+        if not (yield from self._take_unmoved(view, plan, inputs)):
             view, plan = yield from self._look_and_plan(seen, inputs.avoid)
+            if not (yield from self._take_unmoved(view, plan, inputs)):
+                raise SkillFailure(Cause.PRECONDITION, f"the {seen.kind} moves while the hand reaches for it")
         return view, plan
 
     def _take_unmoved(self, view: CloseView, plan: GraspPlan, inputs: GraspInputs) -> Routine[bool]:
-        """Reaches for the object and takes it; returns False when it has moved away or is set down again."""
+        """Reaches for the object and takes it; returns False when it has moved away."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
         aimed = yield from self._reach(view, plan, str(seen.kind))
-        return aimed is not None and (yield from self._take(*aimed, seen))
+        if aimed is not None:
+            yield from self._take(*aimed, seen)
+        return aimed is not None
 
     def _reach(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
         """Brings the hand to the pre-grasp; returns view and plan as they are aimed there (see `_aimed`)."""
@@ -305,8 +307,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """Plans a grasp and opens the gripper for it. Raises SkillFailure with cause PLANNING."""
         self.boxes = view.boxes
         candidates = self.context.stack.grasp_planner.candidates(view.target, self.model.p_BS, self.gripper)
-        untried = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
-        candidates = nearest_first(untried, self._felt_B, self.gripper)
+        candidates = others_first(candidates, avoid, view.target.centre_B, view.X_WB)
         if not candidates:
             raise SkillFailure(Cause.PLANNING, why_no_candidates(view.target, self.model.p_BS, self.gripper, name))
         *first, last = openings(candidates, self.gripper)
@@ -333,13 +334,13 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self.move_gripper(opening, GRIPPER_FORCE_N, "opening the gripper")
         return found
 
-    def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[bool]:
-        """Closes at the grasp as firmly as the least mass needs, lifts, and grips as firmly as the load needs.
+    def _take(self, view: CloseView, plan: GraspPlan, seen: ObjectObservation) -> Routine[None]:
+        """Closes at the grasp as firmly as the least mass needs, lifts, weighs, and grips as firmly as the mass needs.
 
-        Returns False when the object is set down again, to be taken nearer to its heavy end. Raises SkillFailure with
-        cause POSTCONDITION when the object is not held then, PRECONDITION when it is too heavy.
+        Raises SkillFailure with cause POSTCONDITION when the object is not held then, PRECONDITION when it is too
+        heavy.
         """
-        name, least_kg = str(seen.kind), least_mass_kg(seen)
+        name, least_kg = str(seen.kind), least_mass_kg(seen.kind)
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
         touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
@@ -349,7 +350,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         self.context.payload.kind = seen.kind
         lever_m = plan.candidate.lever_m if view.target.height_m > THIN_M else 0.0
         force_n = self.options.force_n + _PER_LEVER_N_M * lever_m
-        yield from self.move_gripper(0.0, grip_n(force_n, HeldLoad(least_kg), self.gripper), f"closing on the {name}")
+        yield from self.move_gripper(0.0, self._grip_n(force_n, least_kg), f"closing on the {name}")
         yield from self.pause(_FEEL_S, f"closing on the {name}")
         opening = self._check_held(name, None)
         turns = view.target.upright and self.gripper.kind is GripperKind.HINGED
@@ -361,23 +362,14 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         if not (yield from self._lift([plan.lift_B], f"lifting the {name}")):
             raise SkillFailure(Cause.PLANNING, "the arm cannot lift the object from where it has hold of it")
         self._watch = None
-        load = yield from self.feel_load(self.held[0].X_FG.translation() * [1.0, 0.0, 1.0], f"lifting the {name}")
+        mass_kg = yield from self.weigh(self.held[0].X_FG.translation(), f"lifting the {name}")
         self._check_held(name, opening)
-        yield from self._refuse_heavy(load.mass_kg, plan.lift_B, name)
-        if hangs_out(load, self.gripper) and len(self._felt_B) < MOST_SET_DOWN:
-            return (yield from self._set_down_again(plan, load, name))
-        yield from self.move_gripper(0.0, grip_n(force_n, load, self.gripper, least_kg), f"lifting the {name}")
-        return True
+        yield from self._refuse_heavy(mass_kg, plan.lift_B, name)
+        yield from self.move_gripper(0.0, self._grip_n(force_n, max(mass_kg, least_kg)), f"lifting the {name}")
 
-    def _set_down_again(self, plan: GraspPlan, load: HeldLoad, name: str) -> Routine[bool]:
-        """Sets down an object whose heavy end would turn it out of the gripper, and draws back; returns False."""
-        self._felt_B = (*self._felt_B, centre_of_mass(load, plan.candidate.X_BH, self.gripper))
-        with suppress(PlanningError):
-            yield from self.press(-plan.lift_B, -up_B(self.X_WB()), _FEEL_RAD_S, f"setting the {name} down again")
-        self.held = ()
-        yield from self._open()
-        yield from self._draw_back()
-        return False
+    def _grip_n(self, least_n: float, mass_kg: float) -> float:
+        """Returns the force (N) of a grip of an object of a mass, as far as the gripper has it."""
+        return min(least_n + _PER_KG_N * mass_kg, _MOST_OF_FORCE * self.gripper.max_force_n)
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, name: str) -> Routine[None]:
         """Sets down an object that is heavier than the arm may carry. Raises SkillFailure with cause PRECONDITION."""

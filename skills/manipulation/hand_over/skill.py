@@ -78,11 +78,6 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         self.checkpoint = {}
         super().begin(inputs)
 
-    def end(self) -> None:
-        """Withdraws the offer."""
-        self.context.payload.offered = False
-        super().end()
-
     def run(self, inputs: HandOverInputs) -> Routine[Succeeded]:
         """Finds the person, goes there, holds the object out and lets go; tries again when that fails."""
         if not self.context.robot.gripper().holding:

@@ -233,6 +233,17 @@ def test_the_pieces_of_a_detected_object_are_joined():
     assert matching_cluster(joined.clusters, detected).shape.length_m == pytest.approx(0.2, abs=0.02)
 
 
+def test_a_handle_lower_than_the_noise_of_single_points_belongs_to_a_detected_wrench():
+    head = [Can(1.0, y, 0.012, 0.014, GREEN) for y in (-0.09, -0.08, -0.07)]
+    handle = [Can(1.0, y, 0.012, 0.006, GREEN) for y in np.arange(-0.06, 0.1, 0.01)]
+    image = scene([*head, *handle])
+    (alone,) = viewed(image).clusters
+    (detected,) = detections_3d(image, PLACE, [seen_as("wrench", image, GREEN)], [TABLE])
+    (whole,) = split_detected(viewed(image), detected).clusters
+    assert alone.shape.length_m < 0.07
+    assert whole.shape.length_m == pytest.approx(0.2, abs=0.02)
+
+
 def test_a_neighbour_within_the_box_of_a_large_detected_object_stays_one_of_its_own():
     image = scene([Can(0.95, 0.0, 0.05, 0.25, RED), Can(1.12, 0.13, 0.033, 0.115, RED)])
     (detected,) = detections_3d(image, PLACE, [seen_as("extinguisher", image)], [TABLE])

@@ -291,6 +291,16 @@ def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(context,
     assert (F in tick(root, 12, clock)) is breaks
 
 
+def test_the_guard_does_not_grip_again_what_a_skill_lets_go(context, clock, robot):
+    robot.holding = True
+    condition = Holds("coke", "home", until_put_down=True)
+    root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)
+    assert tick(root, 1, clock) == [R]
+    robot.clamp_force_n, context.payload.offered = 0.0, True  # the fingers open slowly
+    assert F not in tick(root, 12, clock)
+    assert robot.clamp_force_n == 0.0
+
+
 def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
     robot.holding, context.payload.kind = True, ObjectKind("hammer")
     root = Guard(

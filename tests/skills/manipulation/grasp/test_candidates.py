@@ -82,6 +82,23 @@ def test_a_hammer_is_taken_across_its_handle(yaw):
     assert best.X_BH.rotation().matrix()[2, 0] < -0.9
 
 
+@pytest.mark.parametrize("oblique_rad", [0.1, -0.17])
+def test_fingers_close_square_to_a_handle_that_lies_oblique_to_the_box_about_the_object(oblique_rad):
+    turn = np.array([[np.cos(oblique_rad), np.sin(oblique_rad)], [-np.sin(oblique_rad), np.cos(oblique_rad)]])
+    s, t = np.meshgrid(np.linspace(-0.15, 0.1, 150), np.linspace(-0.015, 0.015, 15))
+    best = _found(_target(0.3, 0.07, 0.03, points=np.column_stack([s.ravel(), t.ravel()]) @ turn))[0]
+    assert best.width_m < 0.033
+    assert abs(best.X_BH.rotation().matrix()[:, 2] @ [np.cos(oblique_rad), np.sin(oblique_rad), 0.0]) < 0.05
+
+
+def test_fingers_do_not_close_on_the_round_jaws_of_a_wrench():
+    angle = np.linspace(0.0, 2.0 * np.pi, 200)
+    jaws = np.concatenate([r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (0.028, 0.02, 0.01)])
+    handle = np.stack(np.meshgrid(np.linspace(0.02, 0.15, 90), np.linspace(-0.01, 0.01, 12)), -1).reshape(-1, 2)
+    best = _found(_target(0.18, 0.056, 0.013, points=np.concatenate([jaws, handle]) - [0.06, 0.0]))[0]
+    assert best.width_m < 0.03
+
+
 def _tips_m(candidate: GraspCandidate, base_m: float, beside_m: float) -> list[float]:
     """How high over the surface the ends of the fixed finger and of the moving one at the object are."""
     fixed = (GRIPPER.fixed_tip_x_m, GRIPPER.fixed_z_m)

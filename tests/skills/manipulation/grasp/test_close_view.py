@@ -6,6 +6,7 @@ from pydrake.math import RigidTransform
 from table_scene import GREEN, TABLE, Can, scene
 
 from skills.api import LocalisationEstimate, ObjectKind, ObjectObservation
+from skills.manipulation.arm.poses import camera_pose
 from skills.manipulation.grasp.close_view import examine
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
@@ -25,6 +26,13 @@ def test_of_two_touching_objects_the_seen_one_is_the_target_and_the_other_an_obs
     assert len(view.boxes) == 2  # the table and the other can
     (other,) = view.others
     assert (str(other.seen.kind), other.seen.surface, len(other.boxes)) == ("thing", "table", 1)
+
+
+def test_a_tall_object_is_seen_up_to_its_top():
+    seen = ObjectObservation(0.0, ObjectKind("thing"), (1.0, 0.0, 1.05), (0.16, 0.16, 0.6), 0.0, 0.7, "table")
+    image = scene([Can(1.0, 0.0, 0.04, 0.6, GREEN)], X_WC=camera_pose(np.array([0.1, 0.0, 1.5]), [1.0, 0.0, 1.0]))
+    view = examine(image, RigidTransform(), TABLE, seen, PLACE, (), 0.12)
+    assert view.target.height_m > 0.55
 
 
 def test_a_neighbour_is_reported_with_its_position_and_size():

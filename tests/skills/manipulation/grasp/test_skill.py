@@ -1,17 +1,12 @@
 """Tests of failures of the grasp skill."""
 
 import numpy as np
-import pytest
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningError, Running, Succeeded
-from skills.manipulation.arm.forces import HeldLoad
-from skills.manipulation.grasp.candidates import GraspCandidate
-from skills.manipulation.grasp.planning import GraspPlan
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
 from skills.robot import CommandState, CommandStatus
 
-UP = np.array([0.0, 0.0, 1.0])
 SEEN = GraspInputs(
     ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
 )
@@ -82,67 +77,6 @@ def test_an_object_that_the_arm_can_carry_is_not_set_down():
     skill.begin(SEEN)
     assert isinstance(skill.step(), Succeeded)
     assert robot.arm_commands == []
-
-
-class FarOut(Grasp):
-    """Sets an object down again some times, and misses it some times, before it takes it."""
-
-    def __init__(self, context, set_down, missed):
-        super().__init__(context)
-        self._outcomes = [*["set down"] * set_down, *["missed"] * missed, "taken"]
-        self.looks = 0
-
-    def run(self, inputs):
-        yield from self._take_where_it_is(inputs)
-        return Succeeded("taken")
-
-    def attempt_at_heights(self, heights_m, message, attempt):
-        return (yield from attempt())
-
-    def _heights(self, seen):
-        yield from ()
-        return [0.5]
-
-    def _look_and_plan(self, seen, avoid):
-        self.looks += 1
-        yield Running("looking")
-        return None, None
-
-    def _take_unmoved(self, view, plan, inputs):
-        yield Running("taking")
-        outcome = self._outcomes.pop(0)
-        if outcome == "set down":
-            self._felt_B = (*self._felt_B, np.zeros(3))
-        return outcome == "taken"
-
-
-def test_robot_looks_again_after_each_time_that_it_set_the_object_down():
-    skill = FarOut(context_of(ScriptedRobot()), set_down=2, missed=1)
-    assert isinstance(outcome(skill, SEEN), Succeeded)
-    assert skill.looks == 4
-
-
-def test_robot_gives_up_an_object_that_it_misses_twice():
-    failed(FarOut(context_of(ScriptedRobot()), 1, 2), SEEN, Cause.PRECONDITION, "moves while the hand reaches for it")
-
-
-class SetsDown(Grasp):
-    """Holds something whose heavy end is too far out."""
-
-    def run(self, inputs):
-        lifted = GraspPlan(GraspCandidate(MODEL.X_BH(self.q_rad()), 0.03, 0.0, 0.0), None, None, None, 0.1 * UP)
-        yield from self._set_down_again(lifted, HeldLoad(2.0, 2.0), "hammer")
-        return Succeeded("set down")
-
-
-def test_object_that_hangs_out_is_set_down_and_released_and_its_heavy_side_is_noted():
-    robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening=0.3)
-    gripped = MODEL.X_BH(robot.q)
-    skill = SetsDown(context_of(robot))
-    assert isinstance(outcome(skill, SEEN), Succeeded)
-    (felt_B,) = skill._felt_B
-    assert (gripped.inverse() @ felt_B)[1] == pytest.approx(2.0 / (9.81 * 2.0))
-    assert not skill.held
 
 
 def resumed(skill, inputs):

@@ -83,6 +83,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     def run(self, inputs: DetectInputs) -> Routine[Succeeded]:
         """Searches each surface in turn; an object counts when a view from another side confirms it."""
         models = models_of(self.context.detector)
+        self._height_m = 0.0 if inputs.seen_before is None else inputs.seen_before.size_m[2]
         self._own = models if any(name in models for name in inputs.classes) else {}
         self._check(inputs)
         self.context.publish("object_to_detect", object_to_detect_message(self.context, inputs.classes))
@@ -234,7 +235,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera positions p_BC to view p_BT, turned by shift_rad about the shoulder; near ones first if close."""
-        far = overview_viewpoints(self.model, p_BT, shift_rad)
+        far = overview_viewpoints(self.model, p_BT, shift_rad, self._height_m)
         if abs(shift_rad) >= max(map(abs, self.options.around_rad)):
             far = sorted(far, key=lambda p_BC: -float(np.linalg.norm((p_BC - self.model.p_BS)[:2])))
         return [*close_viewpoints(self.model.p_BS, p_BT, shift_rad), *far] if close else far

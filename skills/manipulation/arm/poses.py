@@ -25,6 +25,10 @@ _CLOSE_BELOW_RAD = tuple(np.radians([42.0, 35.0, 50.0, 58.0, 28.0]))
 """Angles below level at which a close view looks down, the best first."""
 _CLOSE_M = (0.42, 0.36, 0.48)
 """Distances of a close view, the best first."""
+TALL_M = 0.4
+"""Height from which on an object does not fit into a picture from the usual viewpoints."""
+_BACK_M = 0.18
+"""Distance by which a taller object is seen from further back."""
 _NEAR_M = (0.33, 0.5)
 """Range of distances of a view that counts as close."""
 _BELOW_RAD = (0.45, 1.05)
@@ -56,13 +60,19 @@ def look_configuration(
     raise PlanningError(f"no arm pose looks at the point {np.round(p_BT, 2).tolist()} ahead of the body")
 
 
-def overview_viewpoints(model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0) -> list[FloatArray]:
-    """Camera positions above the shoulder towards p_BT, high ones first, turned about the shoulder by shift_rad."""
+def overview_viewpoints(
+    model: ArmModel, p_BT: FloatArray, shift_rad: float = 0.0, height_m: float = 0.0
+) -> list[FloatArray]:
+    """Camera positions above the shoulder towards p_BT, high ones first, turned about the shoulder by shift_rad.
+
+    An object of a height that does not fit into the picture is seen from further back first.
+    """
+    backs_m = (_BACK_M, 0.0) if height_m > TALL_M else (0.0,)
     direction = np.arctan2(p_BT[1] - model.p_BS[1], p_BT[0] - model.p_BS[0]) + shift_rad
     heading = np.array([np.cos(direction), np.sin(direction), 0.0])
     return [
-        model.p_BS + radius * heading + height * UP_B
-        for height, radius in itertools.product((0.5, 0.44, 0.36), (0.22, 0.32, 0.42))
+        model.p_BS + (radius - back_m) * heading + height * UP_B
+        for back_m, height, radius in itertools.product(backs_m, (0.5, 0.44, 0.36), (0.22, 0.32, 0.42))
     ]
 
 

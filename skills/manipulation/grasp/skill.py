@@ -17,7 +17,7 @@ from skills.manipulation.arm.arm_skill import CARRY_SPEED_RAD_S, GRIPPER_FORCE_N
 from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.looking_skill import LookingSkill
-from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, sees_closely
+from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
 from skills.manipulation.grasp.candidates import (
     THIN_M,
     GraspCandidate,
@@ -283,8 +283,10 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         surface = square(seen.position_W, base_m, seen.surface or "surface")
         p_BT = self.X_WB().inverse() @ np.array(seen.position_W)
         if aside_rad != 0.0 or not self._looks_closely(p_BT):
-            near = close_viewpoints(self.model.p_BS, p_BT, aside_rad)
-            yield from self.look_at(p_BT, [*near, *overview_viewpoints(self.model, p_BT, aside_rad)], message)
+            height_m = seen.size_m[2]
+            near = close_viewpoints(self.model.p_BS, p_BT, aside_rad) if height_m < TALL_M else []
+            far = overview_viewpoints(self.model, p_BT, aside_rad, height_m)
+            yield from self.look_at(p_BT, [*near, *far], message)
         image = yield from self.picture(message)
         place, X_WB, detector = self.context.localiser.estimate(), self.X_WB(), self.context.detector
 

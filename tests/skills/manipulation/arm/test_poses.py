@@ -9,7 +9,13 @@ from plant.robots.spot.kind import spot_capabilities
 from skills.api import PlanningError
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.arm.poses import carry_configuration, hand_rotation, tucked_configuration, viewpoints_beside
+from skills.manipulation.arm.poses import (
+    carry_configuration,
+    hand_rotation,
+    overview_viewpoints,
+    tucked_configuration,
+    viewpoints_beside,
+)
 
 SHOULDER, TARGET = np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.3])
 
@@ -73,3 +79,11 @@ def test_an_object_that_cannot_be_drawn_in_is_refused():
     scene.set_boxes([Box(RigidTransform([0.4, 0.0, 0.6]), (0.3, 1.5, 0.8))])
     with pytest.raises(PlanningError, match="cannot be drawn in"):
         tucked_configuration(scene, fetch.arm, hand_rotation(0.0, 0.0, 1.0), model.stowed_rad)
+
+
+def test_a_tall_object_is_seen_from_further_back_first():
+    model = arm_model(spot_capabilities())
+    p_BT = model.p_BS + np.array([0.7, 0.0, 0.0])
+    low, tall = (overview_viewpoints(model, p_BT, height_m=height_m) for height_m in (0.3, 0.6))
+    assert tall[0][0] < min(p_BC[0] for p_BC in low)
+    assert np.allclose(tall[len(low) :], low)

@@ -5,6 +5,7 @@ python docs/run_notebook.py          # docs/notebooks/*.ipynb
 
 from __future__ import annotations
 
+import ast
 import base64
 import contextlib
 import io
@@ -33,13 +34,21 @@ def _run(source: str, name: str, namespace: dict[str, Any]) -> list[dict[str, An
     from matplotlib import pyplot
 
     pyplot.switch_backend("Agg")
-    printed = io.StringIO()
+    printed, body = io.StringIO(), ast.parse(source)
+    last = body.body.pop() if body.body and isinstance(body.body[-1], ast.Expr) else None
     with contextlib.redirect_stdout(printed):
-        exec(compile(source, name, "exec"), namespace)
+        exec(compile(body, name, "exec"), namespace)
+        value = None if last is None else eval(compile(ast.Expression(last.value), name, "eval"), namespace)
+    shown = [_shown(value)] if hasattr(value, "_repr_html_") else []
     texts = [{"output_type": "stream", "name": "stdout", "text": printed.getvalue().splitlines(keepends=True)}]
     figures = [_drawn(pyplot.figure(number)) for number in pyplot.get_fignums()]
     pyplot.close("all")
-    return [*(texts if printed.getvalue() else []), *figures]
+    return [*(texts if printed.getvalue() else []), *figures, *shown]
+
+
+def _shown(value: Any) -> dict[str, Any]:
+    data = {"text/html": value._repr_html_().splitlines(keepends=True), "text/plain": [type(value).__name__]}
+    return {"output_type": "execute_result", "execution_count": None, "data": data, "metadata": {}}
 
 
 def _drawn(figure: Any) -> dict[str, Any]:

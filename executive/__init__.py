@@ -3,10 +3,12 @@
     import executive
 
     executive.parse("fetch me a drink").commands
-    executive.check(executive.Request("fetch me a drink")).errors
-    executive.run_mission(executive.Request("fetch me a drink", seed=3)).achieved
+    executive.check("fetch me a drink", world="shop").errors
+    executive.run_mission("fetch me a drink", seed=3).achieved
+    executive.evaluate("fetch_drink", seeds="1-5")
 
-Each name is loaded when it is first used.
+A mission is a sentence, a mission file, the name of a shipped mission, or a `Request`. Keyword arguments are fields of
+`Request`. The results show themselves in a notebook. Each name is loaded when it is first used.
 """
 
 from __future__ import annotations
@@ -14,14 +16,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from pathlib import Path
+    from typing import Unpack
 
     from executive.app.checker import Checked
-    from executive.app.evaluate.results import Case
+    from executive.app.evaluate.results import Cases
     from executive.app.report import RunReport
     from executive.language.understand import Understanding
-    from executive.mission.request import Request
+    from executive.mission.request import Request, RequestFields
     from executive.run.control import Control
     from executive.words.knowledge import Knowledge
     from plant.worlds.world import World
@@ -60,38 +62,63 @@ def parse(
     return understand(sentence, parser=load_parser(), knowledge=known, require_wake=require_wake)
 
 
-def check(request: Request) -> Checked:
-    """Checks a request without running it: errors, warnings, and an estimate of its duration (s). Never raises."""
+def check(mission: Request | str | Path, **fields: Unpack[RequestFields]) -> Checked:
+    """Checks a mission without running it: errors, warnings, and an estimate of its duration (s).
+
+    Raises:
+        InputError: a keyword argument cannot be used. Errors of the mission are in the result.
+    """
     from executive.app.checker import Checker
+    from executive.app.mission_files import request_of
 
-    return Checker().check(request)
+    return Checker().check(request_of(mission, **fields))
 
 
-def run_mission(request: Request, *, control: Control | None = None) -> RunReport:
-    """Runs a request in the simulated world and returns its report; writes log and pictures into its folder `out`.
+def run_mission(
+    mission: Request | str | Path, *, control: Control | None = None, **fields: Unpack[RequestFields]
+) -> RunReport:
+    """Runs a mission in the simulated world and returns its report; writes log and pictures into its folder `out`.
 
     `control` pauses or cancels the run from another thread.
 
     Raises:
-        InputError: the request is not understood, or `check` finds an error in it.
+        InputError: the mission is not understood, `check` finds an error in it, or a keyword argument cannot be used.
     """
     from executive.app.checker import prepare_checked
+    from executive.app.mission_files import request_of
     from executive.app.mission_run import run_request
 
-    return run_request(prepare_checked(request), control=control).report
+    return run_request(prepare_checked(request_of(mission, **fields)), control=control).report
 
 
-def evaluate(scenario: Path, *, out: Path, jobs: int = 2) -> Sequence[Case]:
-    """Runs an evaluation file in `jobs` processes and returns its runs with their results.
+def evaluate(
+    mission: Request | str | Path,
+    *,
+    seeds: str = "1-20",
+    jobs: int = 2,
+    **fields: Unpack[RequestFields],
+) -> Cases:
+    """Runs an evaluation file, or a mission at many seeds, in `jobs` processes; returns the runs with their results.
 
-    Writes results to `results.sqlite` in the folder `out`; the same call continues an interrupted evaluation.
+    An evaluation file takes no `seeds`, and no field but `out`. Writes results to `results.sqlite` in the folder `out`,
+    by default `out/evaluate`; the same call continues an interrupted evaluation.
 
     Raises:
         InputError: the file or a mission in it cannot be used, or the folder holds other results.
     """
-    from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
-    from executive.app.evaluate.evaluation_file import load_evaluation
-    from executive.app.evaluate.workers import Pool
+    from dataclasses import replace
+    from pathlib import Path
 
-    results, before = out / "results.sqlite", refuse_impossible_runs
-    return evaluate_runs(load_evaluation(scenario), Pool(jobs), results, out=out, before=before).cases
+    from executive.app.evaluate.evaluation import evaluate_runs, refuse_impossible_runs
+    from executive.app.evaluate.evaluation_file import evaluation_at_seeds, is_evaluation, load_evaluation, seed_range
+    from executive.app.evaluate.results import Cases
+    from executive.app.evaluate.workers import Pool
+    from executive.app.mission_files import mission_file, request_of
+
+    asked, out = request_of(mission, **fields), Path(fields.get("out", "out/evaluate"))
+    asked = asked if asked.file is None else replace(asked, file=mission_file(asked.file))
+    if asked.file is not None and is_evaluation(asked.file):
+        runs = load_evaluation(asked.file)
+    else:
+        runs = evaluation_at_seeds(asked, seed_range(seeds), each_fault=False)
+    return Cases(evaluate_runs(runs, Pool(jobs), out / "results.sqlite", out=out, before=refuse_impossible_runs).cases)

@@ -24,7 +24,7 @@ from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
 from skills.perception.doorway import Doorway
-from skills.robot import Clock, Image, Lease, Pose2D, Robot
+from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.traffic import NO_TRAFFIC, Traffic
 from skills.world_model import FLOOR as FLOOR
@@ -194,6 +194,10 @@ class Publish(Protocol):
         """Logs `message` (JSON-like values; numpy images allowed under key "image") under `topic`."""
 
 
+PICTURES: Final = "pictures"
+"""Topic of the pictures of `SkillContext.show_picture`."""
+
+
 @dataclass
 class Payload:
     """Object in the gripper, noted by the skill that took it: its size as corners (N, 3) in the hand frame (m).
@@ -261,6 +265,10 @@ class SkillContext:
     def X_WB(self) -> RigidTransform:
         """Returns the body's estimated pose in the world."""
         return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB
+
+    def show_picture(self, picture: Picture, caption: str) -> None:
+        """Puts a picture (RGB or grey, uint8) with its caption into the log and into the report of the run."""
+        self.publish(PICTURES, {"caption": caption, "image": picture})
 
     def pose(self) -> Pose2D:
         """Returns the planar part of X_WB, computed once for each estimate and reading."""

@@ -31,10 +31,13 @@ from plant.scene_pictures import (
     top_view,
 )
 from plant.simulation import Simulation
+from skills.api import PICTURES
 from skills.robot import Picture
 
 DETECTIONS: Final = "detections"
 MOST_BYTES: Final = 1_500_000
+MOST_SHOWN: Final = 12
+"""Number of pictures of skills in the report of a robot."""
 _MARGIN_M: Final = 0.3
 _WIDEST_PX: Final = 720
 _JPEG_QUALITY: Final = 78
@@ -48,13 +51,14 @@ _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 
 @dataclass
 class RobotArtifacts:
-    """Detections of one robot, and the times (s) of its hand-over and placement, for pictures."""
+    """Detections of one robot, the times (s) of its hand-over and placement, and pictures of skills, with captions."""
 
     seen: Mapping[str, Any] | None = None
     confirmed: Mapping[str, Any] | None = None
     looked: deque[Mapping[str, Any]] = field(default_factory=lambda: deque(maxlen=_MOST_LOOKS))
     detection: Mapping[str, Any] | None = None
     moments: dict[str, float] = field(default_factory=dict)
+    shown: list[tuple[str, bytes]] = field(default_factory=list)
 
 
 class Artifacts(RunVisitor):
@@ -81,6 +85,8 @@ class Artifacts(RunVisitor):
         if topic == DETECTIONS:
             own.looked.append(message)
             own.seen = message if message["detections"] else own.seen
+        if topic == PICTURES and len(own.shown) < MOST_SHOWN:
+            own.shown.append((str(message["caption"]), to_jpeg(message["image"])))
         if topic == DESTINATION:
             own.confirmed = own.seen
             own.detection = own.detection or own.seen

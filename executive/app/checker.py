@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import TopologicalSorter
+from html import escape
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +17,9 @@ from executive.language.questions import Answerer
 from executive.mission.request import Request
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
+from executive.tree.node_view import node_view
+from executive.view.formats import to_svg
+from executive.view.text import DRAWN_NODES, fold_to
 from skills.files.errors import InputError
 
 MOST_LETTERS: Final = 300
@@ -38,6 +42,15 @@ class Checked:
     def ok(self) -> bool:
         """True if the mission has no errors."""
         return not self.errors
+
+    def _repr_html_(self) -> str:
+        """Returns the errors, warnings and commands, or the estimate, and the tree of each robot."""
+        taken = self.estimate
+        lines = [f"error: {error}" for error in self.errors] + [f"warning: {warning}" for warning in self.warnings]
+        lines += [str(command) for tree in self.trees for command in tree.commands]
+        lines += [f"about {taken.duration_s:.0f} s, {taken.distance_m:.0f} m of driving"] if self.ok else []
+        pictures = (to_svg(fold_to(node_view(tree.root), DRAWN_NODES)) for tree in self.trees)
+        return "".join(f"<p>{escape(line)}</p>" for line in lines) + "".join(pictures)
 
 
 def prepare_checked(request: Request, *, ask: Answerer | None = None, anyway: bool = False) -> Prepared:

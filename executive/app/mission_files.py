@@ -11,6 +11,9 @@ from skills.files.outside import is_there
 from skills.files.yaml_source import yaml_of
 
 if TYPE_CHECKING:
+    from typing import Unpack
+
+    from executive.mission.request import Request, RequestFields
     from skills.teleop.driver import SavedPose
 
 
@@ -20,6 +23,16 @@ FOLDER: Final = Path(__file__).resolve().parents[2] / "missions"
 def shipped_missions() -> dict[str, Path]:
     """Returns the files of the shipped missions by name."""
     return {file.stem: file for file in sorted(FOLDER.glob("*.yaml"))}
+
+
+def request_of(mission: Request | str | Path, **fields: Unpack[RequestFields]) -> Request:
+    """Returns the request of a mission: a sentence, a file, or the name of a shipped mission. Raises InputError."""
+    from executive.mission.request import Request, with_fields
+
+    if isinstance(mission, Request):
+        return with_fields(mission, fields)
+    is_file = isinstance(mission, Path) or mission.endswith((".yaml", ".yml")) or mission in shipped_missions()
+    return with_fields(Request(file=Path(mission)) if is_file else Request(str(mission)), fields)
 
 
 def mission_file(named: Path) -> Path:

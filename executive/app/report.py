@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from html import escape as html_text
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from rich.markup import escape
@@ -147,6 +149,16 @@ class RunReport(Ending):
         plain = replace(self, work=dict(self.work), robots=dict(self.robots))
         values: dict[str, Any] = _adapter().dump_python(plain, mode="json", exclude=without)
         return values
+
+    def _repr_html_(self) -> str:
+        """Returns the verdicts, and the page of the report in a frame if it lies beside the log."""
+        verdicts = [verdict for robot in self.robots.values() or (self,) for verdict in robot.verdicts()]
+        lines = "".join(f"<p>{html_text(f'{each.who}: {each.word}: {each.text}')}</p>" for each in verdicts)
+        page = Path(self.log).with_name("report.html")
+        if not self.log or not page.is_file():
+            return lines
+        shown = html_text(page.read_text(encoding="utf-8"))
+        return f'{lines}<iframe srcdoc="{shown}" width="100%" height="700" style="border:0"></iframe>'
 
     @staticmethod
     def from_json(values: Mapping[str, Any]) -> RunReport:

@@ -266,13 +266,14 @@ def map_of(artifacts: Artifacts, events: Sequence[Event], *, several: bool) -> P
 
 
 def _pictures(artifacts: Artifacts, robot: str, robots: Sequence[str]) -> Iterator[Picture]:
-    """Yields the pictures of a robot in a recorded run, else the picture of its first detection."""
+    """Yields the pictures of a robot in a recorded run, else its first detection; then the pictures of its skills."""
     detection = artifacts.of_robot(robot).detection
     for name, caption in _CAPTIONS.items():
         if (drawn := _drawn(artifacts, file_name(name, robot, robots))) is not None:
             yield caption, drawn
         elif name == "detection" and detection is not None and not artifacts.pictures:
             yield caption, to_jpeg(detection_picture(detection))
+    yield from artifacts.of_robot(robot).shown
 
 
 def _drawn(artifacts: Artifacts, name: str) -> bytes | None:

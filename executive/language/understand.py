@@ -6,6 +6,7 @@ import enum
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from typing import TYPE_CHECKING, Any, Final
 
 from executive.language.cleaning import clean, foreign_reason, placeholder, strip_wake
@@ -18,7 +19,7 @@ from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
-from executive.words.yaml_steps import steps_to_data
+from executive.words.yaml_steps import steps_to_data, steps_to_yaml
 
 if TYPE_CHECKING:
     from executive.language.addressees import RobotChoice
@@ -66,6 +67,11 @@ class Understanding:
     def refused_as(self) -> RefusalKind | None:
         """Kind of the refusal; None for commands, or for a sentence to another robot."""
         return None if self.trace is None or self.trace.refusal is None else self.trace.refusal.kind
+
+    def _repr_html_(self) -> str:
+        """Returns the commands, or the reason why there are none."""
+        lines = [*map(str, self.commands), *steps_to_yaml(self.steps), *self.notes, *filter(None, [self.reason])]
+        return "".join(f"<p>{escape(line)}</p>" for line in lines)
 
     def to_json(self) -> dict[str, Any]:
         """Returns the answer as JSON values."""

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal, TypedDict
 
-from pydantic import ConfigDict, TypeAdapter
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 
 from executive.mission.scenario import NO_SCENARIO, Scenario
@@ -21,6 +21,7 @@ from executive.words.variation import NO_VARIATION, Variation
 from skills.files.errors import InputError
 from skills.files.outside import is_there
 from skills.files.plugins import installed_plugins
+from skills.files.schema import first_error
 from skills.quantities import LongDuration, QuantityError, Seed, clock_text
 from skills.robot import Pose2D
 
@@ -62,6 +63,55 @@ def _stack_file(path: Path) -> Path:
 def _robots(text: str) -> tuple[RobotConfig, ...]:
     """Parses robots such as "alice=spot,bob=fetch". Raises InputError."""
     return parse_robots(text, [kind.name for kind in installed_plugins("errand.robots")])
+
+
+class RequestFields(TypedDict, total=False):
+    """Fields of a request as keyword arguments, in the form in which they are typed at the command line.
+
+    `faults` are those of the scenario; `light`, `clutter`, `people` and `friction` those of the variation.
+    """
+
+    world: str
+    seed: int
+    out: Path | str
+    record: bool
+    robots: str
+    stack: Path | str
+    map: Path | str
+    start: Pose2D | str
+    answers: Sequence[str]
+    require_wake: bool
+    given: Mapping[str, Any]
+    time_limit_s: float
+    faults: Sequence[str]
+    light: str
+    clutter: int
+    people: int
+    friction: float
+
+
+_READERS: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "robots": lambda value: _robots(value) if isinstance(value, str) else value,
+    "start": lambda value: parse_start(value) if isinstance(value, str) else value,
+    "stack": lambda value: _stack_file(Path(value)),
+}
+
+
+def with_fields(request: Request, fields: RequestFields) -> Request:
+    """Copies a request with other fields. Raises InputError for a value or a name that cannot be used."""
+    changed: dict[str, Any] = {}
+    for name, value in fields.items():
+        part = next((each for each in ("variation", "scenario") if hasattr(getattr(request, each), name)), None)
+        read = _READERS.get(name, lambda plain: plain)(value)
+        if part is None:
+            changed[name] = read
+        else:
+            changed[part] = {**changed.get(part, vars(getattr(request, part))), name: read}
+    try:
+        return Request(**{**vars(request), **changed})
+    except ValidationError as error:
+        where, what, hint = first_error(error.errors())
+        raise InputError(f"{'.'.join(map(str, where))}: {what}", hint=hint) from error
 
 
 @dataclass(frozen=True, config=ConfigDict(extra="forbid", defer_build=True))

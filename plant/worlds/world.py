@@ -244,6 +244,18 @@ class World:
         _check_models(changed, self.imports)
         return replace(self, seed_rules=changed)
 
+    def _repr_html_(self) -> str:
+        """Returns a plan of the rooms as SVG, with the start; y points up."""
+        (x0, y0), (x1, y1) = (tuple(map(pick, zip(*self.corners, strict=True))) for pick in (min, max))
+        room = '<polygon points="{}" fill="#dde8f0" stroke="#456" stroke-width="0.05"/><text x="{}" y="{}">{}</text>'
+        drawn = "".join(
+            room.format(" ".join(f"{x},{-y}" for x, y in outline), outline[0][0] + 0.2, -outline[0][1] - 0.2, name)
+            for name, outline in self.rooms.items()
+        )
+        start = f'<circle cx="{self.start.x_m}" cy="{-self.start.y_m}" r="0.2" fill="#2a7"/>'
+        size = f'viewBox="{x0} {-y1} {x1 - x0} {y1 - y0}" width="600" font-size="0.4"'
+        return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{drawn}{start}</svg>'
+
     def without_people(self) -> World:
         """Returns the world without people."""
         return replace(self, seed_rules=self.seed_rules.model_copy(update={"people": ()}))

@@ -34,7 +34,11 @@ def words_and_times(texts):
 
 
 def pictures(notebook):
-    return sum("image/png" in out.get("data", {}) for cell in notebook["cells"] for out in cell.get("outputs", ()))
+    return sum(
+        bool({"image/png", "text/html"} & out.get("data", {}).keys())
+        for cell in notebook["cells"]
+        for out in cell.get("outputs", ())
+    )
 
 
 def notebook_of(*sources):
@@ -59,6 +63,12 @@ def test_a_notebook_runs_and_shows_what_comes(path):
 
 def test_cells_share_their_names_and_keep_what_they_print():
     assert printed(run_notebook.executed(notebook_of("a = 1\nprint('one')", "print(a + 1)"))) == ["one\n", "2\n"]
+
+
+def test_the_last_value_of_a_cell_shows_itself():
+    source = "class Shown:\n    def _repr_html_(self):\n        return '<b>here</b>'\nShown()"
+    (cell,) = run_notebook.executed(notebook_of(source))["cells"]
+    assert [out["data"]["text/html"] for out in cell["outputs"]] == [["<b>here</b>"]]
 
 
 def test_a_cell_that_raises_is_noticed():

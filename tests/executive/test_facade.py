@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 
 import executive
+from executive.app.evaluate.results import Case, Cases, RunSpec
+from executive.app.mission_files import request_of
+from executive.app.report import RunReport
 from executive.testing.small_room import room_knowledge
 from skills.files.errors import InputError
 
@@ -66,10 +69,12 @@ def test_an_impossible_request_is_not_run(tmp_path):
 
 
 @pytest.mark.mission
-def test_a_sentence_is_run_and_judged(tmp_path):
-    report = executive.run_mission(executive.Request("go to the kitchen", out=tmp_path / "out", record=False))
+def test_a_sentence_is_run_and_judged_and_its_report_shows_itself(tmp_path):
+    report = executive.run_mission("go to the kitchen", out=tmp_path / "out", record=False)
     assert (report.achieved, report.seen.success) == (True, True)
     assert (tmp_path / "out" / "log.mcap").is_file()
+    shown = report._repr_html_()
+    assert "The referee saw: fulfilled" in shown and 'srcdoc="&lt;!' in shown
 
 
 def test_a_scenario_that_names_an_unknown_world_is_refused_before_any_run(tmp_path):
@@ -86,6 +91,44 @@ def test_the_runs_of_a_scenario_are_judged_and_kept(tmp_path):
     (case,) = executive.evaluate(scenario, out=tmp_path / "out", jobs=1)
     assert (case.report.achieved, case.run.request.seed) == (True, 1)
     assert executive.evaluate(scenario, out=tmp_path / "out", jobs=1)[0] == case
+
+
+@pytest.mark.parametrize(
+    ("mission", "expected"),
+    [("go to the hall", ("go to the hall", None)), ("patrol", (None, Path("patrol"))), (Path("a"), (None, Path("a")))],
+)
+def test_a_mission_is_a_sentence_a_file_or_the_name_of_a_shipped_one(mission, expected):
+    asked = request_of(mission)
+    assert (asked.sentence, asked.file) == expected
+
+
+def test_keyword_arguments_are_the_fields_of_a_request_as_they_are_typed():
+    asked = request_of("go", robots="bob=fetch", start="unknown", faults=["arm refuses at 3 s"], people=2, out="runs")
+    assert [(robot.name, robot.kind) for robot in asked.robots] == [("Bob", "fetch")]
+    assert (asked.start, asked.scenario.faults, asked.variation.people) == ("unknown", ("arm refuses at 3 s",), 2)
+    assert (request_of(asked, seed=4).seed, request_of(asked, seed=4).variation.people) == (4, 2)
+
+
+@pytest.mark.parametrize(("field", "value"), [("colour", "red"), ("seed", -1), ("light", 3), ("people", 99)])
+def test_a_keyword_argument_that_cannot_be_used_is_refused_by_name(field, value):
+    with pytest.raises(InputError, match=field):
+        request_of("go", **{field: value})
+
+
+def test_results_show_themselves_in_a_notebook():
+    checked = executive.check("go to the kitchen", world="flat")
+    assert all(each in checked._repr_html_() for each in ("Take [Nothing] to [kitchen]", "m of driving", "<svg"))
+    assert "error: " in executive.check("go to the moon")._repr_html_()
+    assert GO in executive.parse("go to the kitchen")._repr_html_()
+    assert "moon" in executive.parse("go to the moon")._repr_html_()
+    plan = executive.load_world()._repr_html_()
+    assert plan.startswith("<svg") and plan.count("<polygon") == 7 and ">kitchen<" in plan
+    case = Case(RunSpec(executive.Request("go <there>", seed=3), "go"), report_of(3))
+    assert "<td>3</td><td>go &lt;there&gt;</td><td>claimed, not judged</td>" in Cases([case])._repr_html_()
+
+
+def report_of(seed):
+    return RunReport("success", None, "done", None, (), "flat", seed, 9.0, 1.0, 9.0, 90, "")
 
 
 def test_there_is_nothing_else():

@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Final
 
@@ -153,6 +154,16 @@ class Case:
         report["work"] = {name: count for name, count in report["work"].items() if name not in _COUNTERS_OF_THE_MACHINE}
         text = json.dumps([report, dict(self.steps_s)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:_ID_LETTERS]
+
+
+class Cases(tuple[Case, ...]):
+    """Results of an evaluation, which show themselves in a notebook as a table."""
+
+    def _repr_html_(self) -> str:
+        cells = ((each.run.request.seed, each.asked, each.label, each.why) for each in self)
+        rows = ("".join(f"<td>{escape(str(cell))}</td>" for cell in row) for row in cells)
+        head = "".join(f"<th>{name}</th>" for name in ("seed", "mission", "claim against verdict", "why"))
+        return f"<table><tr>{head}</tr>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
 
 RESULTS_FILE: Final = FileKind(

@@ -1,8 +1,13 @@
 """Which pictures of a run are kept for an answer."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from executive.app.artifacts import Artifacts, draw_answer
+from executive.app.artifacts import MOST_SHOWN, Artifacts, draw_answer
+from executive.app.report_file import _pictures
+from executive.testing.bench import scripted_bench
+from plant.robots.spot.kind import spot_capabilities
 
 
 def looked(*boxes, grey=False):
@@ -45,3 +50,18 @@ def test_only_the_last_views_before_an_answer_are_kept():
     for _ in range(100):
         artifacts.message("detections", looked())
     assert len(artifacts.of_robot("").looked) == 12
+
+
+def test_pictures_that_a_skill_shows_go_into_the_report_with_their_captions():
+    artifacts = Artifacts()
+    context = replace(
+        scripted_bench(spot_capabilities())[0].context, publish=lambda topic, message: logged.append((topic, message))
+    )
+    logged = []
+    for number in range(MOST_SHOWN + 2):
+        context.show_picture(np.full((48, 64, 3), 90, np.uint8), f"gauge {number}")
+    for topic, message in logged:
+        artifacts.message(topic, {"robot": "Alice", **message})
+    pictures = list(_pictures(artifacts, "Alice", ["Alice"]))
+    assert [caption for caption, _ in pictures] == [f"gauge {number}" for number in range(MOST_SHOWN)]
+    assert all(data.startswith(b"\xff\xd8") for _, data in pictures)

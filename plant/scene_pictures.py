@@ -28,20 +28,17 @@ from pydrake.math import RigidTransform, RotationMatrix
 from plant.rendering import lights
 from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
 from plant.worlds.world import Point, World
+from skills.files.map_drawing import INK, PLATE, Colour, Names, label, text_size, with_legend
 from skills.robot import FloatArray, Intrinsics, Picture, Pose2D
 
-Colour = tuple[int, int, int]
 Bounds = tuple[float, float, float, float]
 
 PATH_COLOUR: Colour = (225, 60, 30)
 START_COLOUR: Colour = (30, 140, 60)
 BOX_COLOUR: Colour = (255, 190, 0)
-INK: Colour = (25, 25, 25)
-PLATE: Colour = (255, 255, 255)
 
 _CAMERA_ABOVE_M = 60.0
 _CUT_HEIGHT_M = 1.9
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
 _SUBPIXEL_BITS = 4
 
 
@@ -152,23 +149,33 @@ def top_view(
 
 def draw_map(
     view: MapView,
-    path_W: FloatArray,
+    paths_W: Mapping[str, tuple[FloatArray, Colour]],
     *,
     labels: Mapping[str, tuple[float, float]] | None = None,
     marks: Mapping[str, tuple[float, float]] | None = None,
 ) -> Picture:
-    """Draws a path (N, 2 or more columns: x, y), labels, marked points and a scale bar on a copy of a map."""
+    """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
+
+    Each path has the text of its legend and a colour. No name covers another one or a mark.
+    """
     picture = view.picture.copy()
-    for text, centre in (labels or {}).items():
-        (x, y), (width, height) = view.pixels(np.array([centre]))[0], _text_size(text, picture)
-        label(picture, text, (round(float(x) - width / 2), round(float(y) + height / 2)))
-    draw_path(picture, view.pixels(path_W) if len(path_W) else np.zeros((0, 2)))
-    for text, point in (marks or {}).items():
-        pixel = view.pixels(np.array([point]))[0]
+    paths = {text: (view.pixels(path), ink) for text, (path, ink) in paths_W.items() if len(path)}
+    names = Names(picture, [pixels for pixels, _ in paths.values()])
+    for pixels, ink in paths.values():
+        draw_path(picture, pixels, ink)
+        names.keep_clear(pixels[0], 12.0)
+        names.keep_clear(pixels[-1], 16.0)
+    dots = {text: view.pixels(np.array([point]))[0] for text, point in (marks or {}).items()}
+    for pixel in dots.values():
         _dot(picture, pixel, BOX_COLOUR)
-        label(picture, text, (int(pixel[0]) + 14, int(pixel[1]) - 14), ground=BOX_COLOUR)
-    _scale_bar(picture, view.pixels_per_m)
-    return picture
+        names.keep_clear(pixel, 12.0)
+    for text, pixel in dots.items():
+        names.write(text, pixel, ground=BOX_COLOUR)
+    for text, centre in (labels or {}).items():
+        names.write(text, view.pixels(np.array([centre]))[0])
+    entries = [(text, ink) for text, (_, ink) in paths.items()]
+    entries += [("begin of a path", START_COLOUR)] if paths else []
+    return with_legend(picture, view.pixels_per_m, entries)
 
 
 def draw_path(picture: Picture, pixels: FloatArray, ink: Colour = PATH_COLOUR) -> None:
@@ -190,20 +197,10 @@ def draw_detection(picture: Picture, box: tuple[float, float, float, float], nam
     for colour, width in ((INK, 5), (BOX_COLOUR, 2)):
         cv2.polylines(drawn, [_fixed_point(corners)], True, colour, width, cv2.LINE_AA, _SUBPIXEL_BITS)
     text = f"{name} {score:.2f}"
-    height = _text_size(text, drawn)[1]
+    height = text_size(text, drawn)[1]
     above = box[1] - 8 if box[1] - height - 16 > 0 else box[3] + height + 10
     label(drawn, text, (int(box[0]), int(above)), ground=BOX_COLOUR)
     return drawn
-
-
-def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colour = PLATE) -> None:
-    """Writes text on a plate with its lower left corner at a pixel, moved inside the picture if needed."""
-    width, height = _text_size(text, picture)
-    pad = 5
-    x = int(np.clip(origin[0], pad, max(pad, picture.shape[1] - width - pad)))
-    y = int(np.clip(origin[1], height + pad, max(height + pad, picture.shape[0] - 2 * pad)))
-    cv2.rectangle(picture, (x - pad, y - height - pad), (x + width + pad, y + pad + 2), ground, cv2.FILLED, cv2.LINE_AA)
-    cv2.putText(picture, text, (x, y), _FONT, _font_scale(picture), INK, _stroke(picture), cv2.LINE_AA)
 
 
 def png_bytes(picture: Picture, compression: int = 1) -> bytes:
@@ -263,35 +260,6 @@ def _dot(picture: Picture, pixel: FloatArray, colour: Colour) -> None:
     centre = (round(float(pixel[0])), round(float(pixel[1])))
     cv2.circle(picture, centre, radius + 2, PLATE, cv2.FILLED, cv2.LINE_AA)
     cv2.circle(picture, centre, radius, colour, cv2.FILLED, cv2.LINE_AA)
-
-
-def _scale_bar(picture: Picture, pixels_per_m: float) -> None:
-    """Draws a scale bar of a round length at the lower left, at most a quarter of the picture wide."""
-    longest = picture.shape[1] / 4.0 / pixels_per_m
-    length_m = max([step for step in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if step <= longest], default=0.1)
-    left, bottom = 24, picture.shape[0] - 24
-    right = left + round(length_m * pixels_per_m)
-    cv2.rectangle(picture, (left - 14, bottom - 44), (right + 14, bottom + 14), PLATE, cv2.FILLED)
-    cv2.line(picture, (left, bottom), (right, bottom), INK, 3, cv2.LINE_AA)
-    for x in (left, right):
-        cv2.line(picture, (x, bottom - 7), (x, bottom + 7), INK, 3, cv2.LINE_AA)
-    text = f"{length_m:g} m"
-    width = _text_size(text, picture)[0]
-    origin = (left + (right - left - width) // 2, bottom - 14)
-    cv2.putText(picture, text, origin, _FONT, _font_scale(picture), INK, _stroke(picture), cv2.LINE_AA)
-
-
-def _font_scale(picture: Picture) -> float:
-    return float(np.clip(picture.shape[1] / 1600.0, 0.5, 1.2))
-
-
-def _stroke(picture: Picture) -> int:
-    return 2 if picture.shape[1] >= 1000 else 1
-
-
-def _text_size(text: str, picture: Picture) -> tuple[int, int]:
-    (width, height), _ = cv2.getTextSize(text, _FONT, _font_scale(picture), _stroke(picture))
-    return int(width), int(height)
 
 
 GROUND = (0.86, 0.87, 0.88)
@@ -363,7 +331,8 @@ def draw_world(
         radius = max(3, round(width / 2.0 * view.pixels_per_m))
         x, y = _pixels(view, [at])[0]
         cv2.circle(picture, (int(x), int(y)), radius, INK, 2, cv2.LINE_AA)
-    return draw_map(MapView(picture, view.X_WC, view.intrinsics), _arrow(world.start), labels=labels)
+    start = {"start and its direction": (_arrow(world.start), PATH_COLOUR)}
+    return draw_map(MapView(picture, view.X_WC, view.intrinsics), start, labels=labels)
 
 
 def _view(picture: Picture, origin_m: tuple[float, float], pixels_per_m: float) -> MapView:

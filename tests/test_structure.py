@@ -18,19 +18,19 @@ LINES = {
     "executive/language": 7682,
     "executive/speech": 1588,
     "executive/mission": 1596,
-    "executive/tree": 7590,
+    "executive/tree": 7671,
     "executive/run": 3083,
-    "executive/record": 943,
+    "executive/record": 944,
     "executive/store": 1681,
     "executive/conversation": 581,
-    "executive/view": 1368,
+    "executive/view": 1442,
     "executive/testing": 810,
     "executive/app": 7535,
-    "executive/cli": 4123,
-    "skills": 27090,
-    "plant": 11900,
+    "executive/cli": 4125,
+    "skills": 27218,
+    "plant": 11869,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 462, 73, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 463, 72, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -21,11 +21,10 @@ from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
 from plant.scene_pictures import (
+    PATH_COLOUR,
     best_view,
     draw_detection,
     draw_map,
-    draw_path,
-    label,
     render_view,
     save_png,
     top_view,
@@ -99,13 +98,15 @@ class Artifacts(RunVisitor):
         return message
 
     def _with_picture(self, message: Mapping[str, Any], own: RobotArtifacts) -> Mapping[str, Any]:
-        """Adds a picture to an answer: the found object, or all views if nothing was found."""
+        """Adds a picture to an answer: the found object or person, or all views if nothing was found."""
         looked = list(own.looked)
         own.looked.clear()
         if not looked:
             return message
-        if message["answer"] and own.confirmed is not None:
-            self.answer = detection_picture(own.confirmed)
+        with_finds = [each for each in looked if each["detections"]]
+        confirmed = [each for each in with_finds if each is own.confirmed]
+        if message["answer"] and with_finds:
+            self.answer = detection_picture((confirmed or with_finds)[-1])
         else:
             self.answer = _sheet([detection_picture(each) for each in looked])
         self._keep(message, self.answer)
@@ -196,21 +197,20 @@ def detection_picture(message: Mapping[str, Any]) -> Picture:
 
 
 def _map(simulation: Simulation, robots: Sequence[str]) -> Picture:
-    """Draws the world from above with the path of each robot; several robots have a colour and a name each."""
+    """Draws the world from above with the path of each robot; several robots have a colour each."""
     world, corners = simulation.world, np.array(simulation.world.corners)
     (x0, y0), (x1, y1) = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     view = top_view(simulation.query_at(simulation.clock.now()), (float(x0), float(y0), float(x1), float(y1)))
     centres = {name: tuple(np.mean(polygon, axis=0)) for name, polygon in world.rooms.items()}
-    paths = {name: simulation.referee.path(name) for name in robots}
-    if len(paths) == 1:
-        return draw_map(view, paths[robots[0]], labels=centres, marks={"start": (world.start.x_m, world.start.y_m)})
-    picture = draw_map(view, np.zeros((0, 2)), labels=centres)
-    for number, (name, path) in enumerate(sorted(paths.items())):
-        if len(path):
-            pixels = view.pixels(path)
-            draw_path(picture, pixels, rgb_of(ROBOT_COLOURS[number % len(ROBOT_COLOURS)]))
-            label(picture, name, (int(pixels[-1][0]) + 14, int(pixels[-1][1]) - 14))
-    return picture
+    marks = {"start": (world.start.x_m, world.start.y_m)} if len(robots) == 1 else {}
+    if world.dock is not None:
+        marks["dock"] = (world.dock.x_m, world.dock.y_m)
+    colours = [PATH_COLOUR] if len(robots) == 1 else [rgb_of(colour) for colour in ROBOT_COLOURS]
+    paths = {
+        f"path of {name}": (simulation.referee.path(name), colours[number % len(colours)])
+        for number, name in enumerate(sorted(robots))
+    }
+    return draw_map(view, paths, labels=centres, marks=marks)
 
 
 def _view(simulation: Simulation, robot_name: str, time_s: float, ahead_m: float) -> Picture:

@@ -25,7 +25,7 @@ from executive.view.formats import to_svg
 from executive.view.html import render
 from executive.view.map_picture import map_picture
 from executive.view.styles import ROBOT_COLOURS, NodeStyle, Styles, style_of
-from executive.view.text import DRAWN_NODES, executed_tree, fold_to
+from executive.view.text import DRAWN_NODES, executed_tree, readable
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
 from skills.api import ObjectObservation
@@ -122,7 +122,7 @@ class EndedTree:
     @property
     def picture(self) -> str:
         """Executed nodes of the tree as SVG."""
-        return to_svg(fold_to(executed_tree(self.view), DRAWN_NODES), title=self.tree.mission_name)
+        return to_svg(readable(executed_tree(self.view), DRAWN_NODES), title=self.tree.mission_name)
 
     def steps(self, events: Sequence[Event]) -> tuple[StepRow, ...]:
         """Returns the steps of the mission, with their times from the events of a log."""

@@ -20,7 +20,7 @@ from executive.cli.output import BAD_INPUT, console_for, finish, progress_bar
 from executive.mission.request import Request
 from executive.tree.estimate import Estimate
 from executive.tree.node_view import node_view
-from executive.view.text import fold_to, to_rich
+from executive.view.text import readable, to_rich
 from skills.files.errors import InputError, count_text, one_line
 
 SHOWN_NODES: Final = 40
@@ -98,7 +98,7 @@ def _show(one: Checked, console: Console, *, verbose: bool) -> None:
     for tree in one.trees if verbose else ():
         for command in tree.commands:
             console.print(f"  {command}", markup=False)
-        console.print(to_rich(fold_to(node_view(tree.root), SHOWN_NODES), collapsed=False))
+        console.print(to_rich(readable(node_view(tree.root), SHOWN_NODES), collapsed=False))
 
 
 def _in_words(estimate: Estimate) -> str:

@@ -24,7 +24,7 @@ from executive.record.schemas import ERRORS
 from executive.tree.node_view import NodeView, node_view, to_json
 from executive.view.formats import to_btcpp, to_mermaid, to_svg
 from executive.view.styles import style_of
-from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, to_text
+from executive.view.text import DRAWN_NODES, MANY_NODES, fold_below, fold_to, printable, readable, to_text
 from skills.files.errors import InputError
 from skills.files.outside import is_file
 from skills.quantities import Count, Delay, Port, Tries, Wait
@@ -184,8 +184,10 @@ def tree(
     """Shows the tree of a sentence or a mission file before it runs, or the last state of the tree in a log."""
     whole = _view(file, request, at, robot)
     shown = whole if depth is None else fold_below(whole, depth)
-    few = most or _MOST.get(form)
-    shown = shown if few is None else fold_to(shown, few)
+    if most is not None:
+        shown = fold_to(shown, most)
+    elif form in _MOST:
+        shown = readable(shown, _MOST[form]) if depth is None else fold_to(shown, _MOST[form])
     text = _FORMS[form](shown) if form in _FORMS else to_text(shown, ascii_only=ascii_only) + "\n"
     if out is None:
         sys.stdout.write(text)

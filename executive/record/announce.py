@@ -108,7 +108,7 @@ def versions(packages: Sequence[str]) -> dict[str, str]:
 
 
 def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[str, Any]:
-    """Encodes the map: a grey PNG (first row: largest y), its origin in the world frame (m), labels of the rooms."""
+    """Encodes the map: a grey PNG (first row: largest y), its origin in the world (m), names of rooms, the dock."""
     grey = grid.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED)
     png = cv2.imencode(".png", np.ascontiguousarray(grey[::-1]), [cv2.IMWRITE_PNG_COMPRESSION, 9])[1].tobytes()
     width_m, height_m = grid.size_m
@@ -124,4 +124,5 @@ def map_message(grid: GridMap, knowledge: Knowledge, *, world: str) -> Mapping[s
         "places": [
             {"name": name, "x": round(float(x), 3), "y": round(float(y), 3)} for name, (x, y) in middles.items()
         ],
+        "dock": None if knowledge.dock is None else {"x": knowledge.dock.x, "y": knowledge.dock.y},
     }

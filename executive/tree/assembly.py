@@ -173,7 +173,7 @@ class Assembler:
                     builder = replace(builder, command=item.command, following=following)
                 planned = self.plans[type(step)](self, step, builder)
                 done = item.number + planned.used - 1
-                made += planned
+                made += replace(planned, nodes=tuple(replace(node, step=True) for node in planned.nodes))
         problems.raise_any()
         return made
 

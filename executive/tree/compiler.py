@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, Final
@@ -97,7 +97,7 @@ def compile_mission(
     pick_ups = PICK_UPS if mission.pick_ups is None else mission.pick_ups
     assembler = Assembler(knowledge, registry, PLANS, start, pick_ups, mission.move_aside or 0, last_known=last_known)
     builder, steps = assembler.builder(base, mission.source), mission_plan(assembler, mission, base)
-    root = watch_plan(builder, _whole(mission, builder, steps.nodes))
+    root = watch_plan(builder, replace(_whole(mission, builder, steps.nodes), step=True))
     check_wiring(root)
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
     tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.surfaces))

@@ -22,7 +22,10 @@ __all__ = ["Change", "NodeSpec", "NodeState", "Snapshot", "TreeObserver"]
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """A node's kind, path id, displayed name, options, children, and the line of the mission file behind it."""
+    """A node's kind, path id, displayed name, options, children, and the line of the mission file behind it.
+
+    `step` is set for the nodes that the author of the mission knows: the mission and its steps.
+    """
 
     kind: str
     path_id: str
@@ -30,6 +33,7 @@ class NodeSpec:
     options: Mapping[str, Any] = field(default_factory=dict)
     children: tuple[NodeSpec, ...] = ()
     source: SourceLine | None = None
+    step: bool = False
 
     def walk(self) -> Iterator[NodeSpec]:
         """Iterates over the node and all its descendants, parents first."""

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec, NodeState
@@ -23,6 +23,12 @@ class Port:
     type: str = ""
     output: bool = False
     on_board: bool = False
+
+
+_NAMED: Final = frozenset({"skill", "step", "mission"})
+_SPOKEN: Final = frozenset({"repeat", "choose"})
+_CONTAINERS: Final = frozenset({"sequence", "selector", "interrupts", "summary"})
+_UNNAMED: Final = frozenset({"round", "steps", "group"})
 
 
 def _ports_of(spec: NodeSpec) -> Iterator[Port]:
@@ -74,7 +80,11 @@ def _record(value: Any) -> str:
 
 @dataclass(frozen=True)
 class NodeView:
-    """View of one node. INVALID without a cause means that it has not run yet; `hidden` counts omitted descendants."""
+    """View of one node. INVALID without a cause means that it has not run yet; `hidden` counts omitted descendants.
+
+    `step` is that of the node's spec. A row of an outline has the `policy` of its step in words, and `hidden` has all
+    nodes that it does not show.
+    """
 
     path_id: str
     kind: str
@@ -84,6 +94,14 @@ class NodeView:
     children: tuple[NodeView, ...] = ()
     ports: tuple[Port, ...] = ()
     hidden: int = 0
+    step: bool = False
+    policy: str = ""
+
+    @property
+    def label(self) -> str:
+        """Kind and name; the name alone for a skill and a row of steps; a row's policy stands behind them."""
+        policy = f" ({self.policy})" if self.policy else ""
+        return f"{'' if self.kind in _NAMED else f'{self.kind} '}{self.name}{policy}"
 
     @property
     def below(self) -> int:
@@ -109,17 +127,74 @@ class NodeView:
         texts = [port.value for port in given if _is_telling(port)]
         return self.name.replace("_", " ") + (f" ({'; '.join(texts)})" if texts else "")
 
-    def structure(self, above: NodeView | None = None) -> dict[str, Any]:
-        """Returns the tree without states, as it is logged; `above` is its parent."""
-        return {
-            "id": self.path_id,
-            "type": self.kind,
-            "name": self.name,
-            "title": self.title(above),
-            "source": _place(self.source),
-            "ports": [asdict(port) for port in self.ports],
-            "children": [child.structure(self) for child in self.children],
-        }
+    def structure(self) -> dict[str, Any]:
+        """Returns the tree without states, as it is logged.
+
+        The first node of each row of the outline has the `row`; the nodes that share it have none.
+        """
+        return _structure(self, None, {row.path_id: row for _, row in outline(self).walk()})
+
+
+def _structure(node: NodeView, above: NodeView | None, rows: Mapping[str, NodeView]) -> dict[str, Any]:
+    row = rows.get(node.path_id)
+    return {
+        "id": node.path_id,
+        "type": node.kind,
+        "name": node.name,
+        "title": node.title(above),
+        "source": _place(node.source),
+        "ports": [asdict(port) for port in node.ports],
+        **({"step": True} if node.step else {}),
+        "row": None if row is None else {"kind": row.kind, "name": row.name, "policy": row.policy, "step": row.step},
+        "children": [_structure(child, node, rows) for child in node.children],
+    }
+
+
+def outline(root: NodeView) -> NodeView:
+    """Returns the mission as its author wrote it: each step is one row with its policy, and so is each chain of nodes
+    with a single child. A row has the path id and state of its first node, and the name of its step.
+    """
+    authored = {row.path_id for _, row in root.walk() if any(below.step for _, below in row.walk())}
+    return _outline_row(root, authored)
+
+
+def _outline_row(node: NodeView, authored: set[str]) -> NodeView:
+    chain = [node]
+    while (following := _same_row(chain, authored)) is not None:
+        chain.append(following)
+    within = {each.path_id for each in chain}
+    below = [child for each in chain for child in each.children if child.path_id not in within]
+    main = next((each for each in chain if each.step), next((n for n in chain if n.kind == "sequence"), chain[-1]))
+    row = replace(main, path_id=node.path_id, state=node.state, hidden=sum(each.hidden for each in chain))
+    row = replace(row, children=tuple(_outline_row(child, authored) for child in below), step=node.path_id in authored)
+    if not row.step:
+        names = " › ".join((*(each.label for each in chain[:-1]), chain[-1].title()))
+        return replace(row, kind=chain[0].kind, name=names.removeprefix(f"{chain[0].kind} "))
+    before = [each.name for each in chain[: chain.index(main)] if each.kind == "sequence"]
+    parts = [name for name in before if not (name in _UNNAMED or name.startswith("branch "))]
+    others = [each for each in chain if each is not main and each.path_id in authored]
+    policy = [each.name for each in others if each.kind not in _CONTAINERS and each.name not in parts]
+    name = ": ".join((*parts, f"{main.kind} {main.name}" if main.kind in _SPOKEN else main.title()))
+    kind = "mission" if main.path_id.count("/") == 1 else "step"
+    return replace(row, kind=kind, name=name, policy=", ".join(policy))
+
+
+def _same_row(chain: Sequence[NodeView], authored: set[str]) -> NodeView | None:
+    """Returns the child that shares the row of a chain of nodes, if there is one: each row has one step at most."""
+    inner = chain[-1]
+    below = [child for child in inner.children if child.path_id in authored]
+    if not below:
+        below = list(inner.children) if inner.path_id not in authored or inner.step else []
+        return below[0] if len(below) == 1 and inner.kind != "skill" else None
+    if len(below) > 1 or (any(each.step for each in chain) and _leads_to_step(below[0], authored)):
+        return None
+    return below[0]
+
+
+def _leads_to_step(node: NodeView, authored: set[str]) -> bool:
+    """Returns whether a node, or the only child with steps below it, is a step."""
+    below = [child for child in node.children if child.path_id in authored]
+    return node.step or (len(below) == 1 and _leads_to_step(below[0], authored))
 
 
 def _is_telling(port: Port) -> bool:
@@ -138,6 +213,7 @@ def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> 
         source=spec.source,
         children=tuple(node_view(child, known) for child in spec.children),
         ports=tuple(_ports_of(spec)),
+        step=spec.step,
     )
 
 
@@ -152,6 +228,7 @@ def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -
         source=None if source is None else SourceLine(Path(source["file"]), int(source["line"])),
         children=tuple(logged_view(child, states) for child in structure["children"]),
         ports=tuple(Port(**port) for port in structure.get("ports", ())),
+        step=bool(structure.get("step")),
     )
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import textwrap
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,26 +14,52 @@ from executive.view.html import render
 from executive.view.styles import NodeStyle, Styles, style_of
 from executive.view.text import note_of, printable
 
-BOX_W: Final = 232
+BOX_W: Final = 430
 BOX_H: Final = 40
-NOTE_LINE_H: Final = 13
-COLUMN_GAP: Final = 34
-ROW_GAP: Final = 10
+NOTE_LINE_H: Final = 14
+INDENT: Final = 26
+ROW_GAP: Final = 8
 MARGIN: Final = 20
 TITLE_H: Final = 34
 LEGEND_H: Final = 34
 LEGEND_W: Final = 105
-NOTE_CHARS: Final = 33
+NAME_EM: Final = (BOX_W - 48) / 12.5
+NOTE_EM: Final = (BOX_W - 48) / 10.5
 NOTE_LINES: Final = 3
-NAME_CHARS: Final = 30
 _SIZES: Final = {
     "box_w": BOX_W,
     "box_h": BOX_H,
     "note_h": NOTE_LINE_H,
-    "gap": COLUMN_GAP,
+    "indent": INDENT,
     "margin": MARGIN,
     "legend_w": LEGEND_W,
 }
+_NARROW: Final = frozenset(" !'(),-./:;I[]fijlrt|›")
+_BROAD: Final = frozenset("%+<=>@MWmw~—…")
+
+
+def fit_text(text: str, width_em: float, most: int = 1) -> tuple[str, ...]:
+    """Wraps a text to at most `most` lines of `width_em` (in units of the font's size) of a common sans-serif font."""
+    lines, words = [""], re.findall(r"\S+\s*", printable(text))
+    for word in words:
+        for piece in [word] if _width_em(word) <= width_em else list(word):
+            if lines[-1] and _width_em(lines[-1] + piece.rstrip()) > width_em:
+                lines.append("")
+            lines[-1] += piece
+    if len(lines) <= most:
+        return tuple(line.rstrip() for line in lines if line)
+    last = lines[most - 1].rstrip()
+    while last and _width_em(f"{last} …") > width_em:
+        last = last[:-1]
+    return (*(line.rstrip() for line in lines[: most - 1]), f"{last.rstrip()} …")
+
+
+def _width_em(text: str) -> float:
+    """Upper bound of the width of a text, in units of the font's size."""
+    return sum(
+        0.42 if char in _NARROW else 1.0 if char in _BROAD or ord(char) > 0x2E7F else 0.8 if char.isupper() else 0.65
+        for char in text
+    )
 
 
 @dataclass(frozen=True)
@@ -58,11 +83,11 @@ class _Box:
 
     @property
     def name(self) -> str:
-        return textwrap.shorten(printable(self.node.name), NAME_CHARS, placeholder="…")
+        return next(iter(fit_text(self.node.name, NAME_EM)), "")
 
     @property
     def tooltip(self) -> list[str]:
-        return [text for text in (self.node.path_id, self.style.word, note_of(self.node)) if text]
+        return [text for text in (self.node.path_id, self.node.label, self.style.word, note_of(self.node)) if text]
 
     def walk(self) -> Iterator[_Box]:
         yield self
@@ -74,33 +99,29 @@ def to_svg(root: NodeView, *, title: str = "") -> str:
     """Draws the tree as an SVG document with a legend; notes have three lines, and tooltips have the whole note."""
     box, bottom = _laid_out(root, MARGIN, MARGIN + TITLE_H)
     boxes = list(box.walk())
+    width = max(MARGIN + len(Styles) * LEGEND_W, *(each.x + BOX_W + MARGIN for each in boxes))
     return render(
         "tree.svg",
         boxes=boxes,
         height=bottom + LEGEND_H + MARGIN,
-        width=max(MARGIN + len(Styles) * LEGEND_W, *(each.x + BOX_W + MARGIN for each in boxes)),
-        title=title or root.name,
+        width=width,
+        title=next(iter(fit_text(title or root.name, (width - 2 * MARGIN) / 18)), ""),
         styles=[style.value for style in Styles],
         size=_SIZES,
     )
 
 
 def _laid_out(node: NodeView, x: float, y: float) -> tuple[_Box, float]:
-    """Lays out a node and the nodes below it from height y on; returns its box, and the height for the next box."""
-    note = tuple(
-        textwrap.wrap(printable(note_of(node)), NOTE_CHARS, max_lines=NOTE_LINES, placeholder=" …"),
-    )
-    height = BOX_H + NOTE_LINE_H * len(note) + (4 if note else 0)
+    """Lays out a node, and the nodes below it indented under it; returns its box, and the height for the next box."""
+    told = ". ".join(filter(None, (node.policy, note_of(node))))
+    note = fit_text(told, NOTE_EM, NOTE_LINES) if told else ()
+    height = BOX_H + NOTE_LINE_H * len(note)
     children: list[_Box] = []
-    below = y
+    below = y + height + ROW_GAP
     for child in node.children:
-        box, below = _laid_out(child, x + BOX_W + COLUMN_GAP, below)
+        box, below = _laid_out(child, x + INDENT, below)
         children.append(box)
-    if not children:
-        return _Box(node, x, y, height, note, ()), y + height + ROW_GAP
-    middle = (children[0].middle + children[-1].middle) / 2
-    top = max(y, middle - height / 2)
-    return _Box(node, x, top, height, note, tuple(children)), max(below, top + height + ROW_GAP)
+    return _Box(node, x, y, height, note, tuple(children)), below
 
 
 _SAFE: Final = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 .,:()-_/+'")
@@ -118,9 +139,8 @@ def to_mermaid(root: NodeView) -> str:
 
 
 def _label(node: NodeView) -> str:
-    title = node.name if node.kind == "skill" else f"{node.kind} {node.name}"
     folded = f"({node.hidden} nodes below)" if node.hidden else ""
-    rows = filter(None, (f"{style_of(node.state).symbol} {title}", note_of(node), folded))
+    rows = filter(None, (f"{style_of(node.state).symbol} {node.label}", note_of(node), folded))
     return "<br/>".join(map(mermaid_text, rows))
 
 

@@ -16,17 +16,25 @@ from executive.record.history import Event
 from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from skills.files.errors import InputError
+from skills.files.map_drawing import Names, with_legend
 
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)
 _CELL_M: Final = 0.05
-_TRAIL, _PLAN, _PARTICLE, _OBSTACLE, _ROBOT, _INK = (  # blue, green, red
+_TRAIL, _PLAN, _PARTICLE, _OBSTACLE, _ROBOT, _INK, _DOCK = (  # blue, green, red
     (120, 158, 0),
     (178, 114, 0),
     (167, 121, 204),
     (0, 94, 213),
     (233, 180, 86),
     (40, 40, 40),
+    (0, 190, 255),
+)
+_LEGEND: Final = (
+    ("path driven", _TRAIL),
+    ("path planned", _PLAN),
+    ("where it may be", _PARTICLE),
+    ("obstacle that the map lacks", _OBSTACLE),
 )
 Colour = tuple[int, int, int]
 
@@ -51,7 +59,8 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     """Draws the map (height, width, 3; blue, green, red) at a time on the robot's clock.
 
     It shows the trajectory, the planned and the reserved path, the particles of the localiser, the cells of the
-    obstacle layer, and the footprint. Several robots have a colour each. Raises InputError if the log has no map.
+    obstacle layer, the footprint, and the dock, with a legend and a scale below. Several robots have a colour each.
+    Raises InputError if the log has no map.
     """
     known = [event for event in events if event.stamp_s <= at_s]
     maps = [event.data for event in events if event.topic == MAP]
@@ -59,14 +68,46 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
         raise InputError("the log has no map", hint="give the log.mcap of a run with a world that has one")
     picture, frame = _ground(maps[-1])
     robots = sorted({event.data["robot"] for event in known if event.topic == POSE})
-    for number, robot in enumerate(robots):
-        colour = rgb_of(ROBOT_COLOURS[number % len(ROBOT_COLOURS)])[::-1] if len(robots) > 1 else None
-        _draw_robot(picture, frame, robot, [event for event in known if event.data.get("robot") == robot], colour)
-    return picture
+    colours = {name: rgb_of(ROBOT_COLOURS[n % len(ROBOT_COLOURS)])[::-1] for n, name in enumerate(robots)}
+    one = len(robots) < 2
+    for robot in robots:
+        own = [event for event in known if event.data.get("robot") == robot]
+        _draw_robot(picture, frame, own, None if one else colours[robot])
+    _write_names(picture, frame, maps[-1], [event.data for event in known if event.topic == POSE])
+    entries = _LEGEND if one else [*((f"path of {name}", colours[name]) for name in robots), *_LEGEND[2:]]
+    return with_legend(picture, frame.pixels_per_m, entries)
+
+
+def _write_names(
+    picture: NDArray[np.uint8], frame: _Frame, data: Mapping[str, Any], poses: Sequence[Mapping[str, Any]]
+) -> None:
+    """Draws the dock, and the names of robots, dock and places above all else."""
+    driven: dict[str, list[tuple[float, float]]] = {}
+    for pose in poses:
+        driven.setdefault(pose["robot"], []).append(_position(pose))
+    lines = {name: frame.pixels(places) for name, places in driven.items()}
+    names = Names(picture, [line.astype(np.float64) for line in lines.values()])
+    for line in lines.values():
+        names.keep_clear(line[-1].tolist(), 0.6 * frame.pixels_per_m)
+    if (dock := data.get("dock")) is not None:
+        pixel = frame.pixels([(dock["x"], dock["y"])])[0]
+        column, row = pixel.tolist()
+        for colour, thick in ((_DOCK, cv2.FILLED), (_INK, 2)):
+            cv2.rectangle(picture, (column - 9, row - 9), (column + 9, row + 9), colour, thick)
+        names.keep_clear(pixel.tolist(), 12.0)
+        names.write("dock", pixel.tolist())
+    for name, line in lines.items():
+        names.write(name, line[-1].tolist())
+    for place in data.get("places", ()):
+        names.write(place["name"], frame.pixels([(place["x"], place["y"])])[0].tolist())
+
+
+def _position(pose: Mapping[str, Any]) -> tuple[float, float]:
+    return pose["pose"]["position"]["x"], pose["pose"]["position"]["y"]
 
 
 def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
-    """Draws the enlarged grid with the names of places; returns it with its frame."""
+    """Draws the enlarged grid; returns it with its frame."""
     grey = cv2.imdecode(np.frombuffer(base64.b64decode(data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
     if grey is None:
         raise InputError("the log's map is no picture")
@@ -75,15 +116,10 @@ def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
     enlarged = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
     picture = np.asarray(cv2.cvtColor(enlarged, cv2.COLOR_GRAY2BGR), np.uint8)
     origin = (float(data["origin_m"]["x"]), float(data["origin_m"]["y"]))
-    frame = _Frame(origin, size[1], scale / float(data["resolution_m"]))
-    for place in data.get("places", ()):
-        _write(picture, place["name"], frame.pixels([(place["x"], place["y"])])[0])
-    return picture, frame
+    return picture, _Frame(origin, size[1], scale / float(data["resolution_m"]))
 
 
-def _draw_robot(
-    picture: NDArray[np.uint8], frame: _Frame, name: str, events: Sequence[Event], colour: Colour | None
-) -> None:
+def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, events: Sequence[Event], colour: Colour | None) -> None:
     """Draws one robot from its events; `colour` (blue, green, red) is given for several robots."""
     poses = [event.data for event in events if event.topic == POSE]
     paths = [event.data["poses"] for event in events if event.topic == PATH]
@@ -95,7 +131,7 @@ def _draw_robot(
     reserved = [event.data for event in events if event.topic == RESERVED_PATH]
     if reserved and reserved[-1]["turn"] is not None:
         _draw_reserved(picture, frame.pixels(_pairs(reserved[-1], "")), colour or _PLAN)
-    places = [(pose["pose"]["position"]["x"], pose["pose"]["position"]["y"]) for pose in poses]
+    places = [_position(pose) for pose in poses]
     cv2.polylines(picture, [frame.pixels(places)], False, colour or _TRAIL, 2, cv2.LINE_AA)
     if paths:
         plan = [(pose["position"]["x"], pose["position"]["y"]) for pose in paths[-1]]
@@ -110,7 +146,6 @@ def _draw_robot(
     if views:
         for column, row in frame.pixels(_pairs(views[-1], "particle")).tolist():
             cv2.circle(picture, (column, row), 2, _PARTICLE, -1, cv2.LINE_AA)
-    _write(picture, name, frame.pixels([places[-1]])[0] + [0, -round(0.6 * frame.pixels_per_m)])
 
 
 def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour: Colour) -> None:
@@ -123,11 +158,3 @@ def _draw_reserved(picture: NDArray[np.uint8], pixels: NDArray[np.int32], colour
 def _pairs(data: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
     x, y = (data[f"{name}_{axis}" if name else axis] for axis in "xy")
     return list(zip(x, y, strict=True))
-
-
-def _write(picture: NDArray[np.uint8], text: str, middle: NDArray[np.int32]) -> None:
-    """Draws dark letters with a light outline, centred."""
-    width = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.6, 1)[0][0]
-    corner = (int(middle[0]) - width // 2, int(middle[1]) + 6)
-    for colour, thick in (((255, 255, 255), 5), (_INK, 1)):
-        cv2.putText(picture, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, thick, cv2.LINE_AA)

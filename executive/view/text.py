@@ -8,13 +8,14 @@ from dataclasses import replace
 from py_trees.common import Status
 from rich.text import Text
 
-from executive.tree.node_view import NodeView
+from executive.tree.node_view import NodeView, outline
 from executive.view.styles import NodeStyle, style_of
 
 MANY_NODES = 80
 DRAWN_NODES = 40
 _BRANCHES, _ASCII_BRANCHES = ("├─ ", "└─ ", "│  ", "   "), ("|-- ", "`-- ", "|   ", "    ")
 _PLUMBING = frozenset({"monitor", "remember"})
+_GUARDS = _PLUMBING | {"interrupt"}
 
 
 def to_text(root: NodeView, *, ascii_only: bool = False) -> str:
@@ -46,9 +47,9 @@ def _lines(
     branch, last_branch, bar, blank = pieces
     hidden = collapsed and is_closed(node)
     unseen = node.below if hidden else node.hidden
-    note = " ".join(filter(None, (note_of(node), f"({unseen} nodes)" if unseen else "")))
-    label = printable(node.name if node.kind == "skill" else f"{node.kind} {node.name}")
-    yield own, style_of(node.state), label, f" - {printable(note)}" if note else ""
+    more = "more " if node.children and not hidden else ""
+    note = " ".join(filter(None, (note_of(node), f"({unseen} {more}nodes)" if unseen else "")))
+    yield own, style_of(node.state), printable(node.label), f" - {printable(note)}" if note else ""
     for child in () if hidden else node.children:
         last = child is node.children[-1]
         yield from _lines(
@@ -103,15 +104,41 @@ def fold_to(root: NodeView, most: int = MANY_NODES) -> NodeView:
     return shown
 
 
+def readable(root: NodeView, most: int = MANY_NODES) -> NodeView:
+    """Returns the outline of a tree with at most about `most` rows.
+
+    The guards of the mission are folded. What runs a step is folded, the deepest nodes first, before any step is.
+    Running, failed and cancelled nodes stay visible.
+    """
+    shown = outline(root)
+    deepest = max(depth for depth, _ in shown.walk())
+    for level in range(deepest, -1, -1):
+        shown = _fold_below_steps(shown, level, level)
+        if sum(1 for _ in shown.walk()) <= most:
+            return shown
+    return fold_to(shown, most)
+
+
+def _fold_below_steps(row: NodeView, level: int, left: int) -> NodeView:
+    """Folds guards, and other closed rows more than `level` levels below their step; `left` of them are left here."""
+    shown, hidden = [], row.hidden
+    for child in row.children:
+        if not child.step and (left == 0 or child.kind in _GUARDS) and all(is_closed(n) for _, n in child.walk()):
+            hidden += 1 + child.below
+        else:
+            shown.append(_fold_below_steps(child, level, level if child.step else max(0, left - 1)))
+    return replace(row, children=tuple(shown), hidden=hidden)
+
+
 def executed_tree(node: NodeView, above: NodeView | None = None) -> NodeView:
     """Returns the executed nodes, named by their actions, without nodes that only pass on one child's result.
 
     It also leaves out conditions that held and stored poses, but no failed or cancelled node. `above` is the parent.
     """
     below = tuple(executed_tree(child, node) for child in node.children if not _is_plumbing(child))
-    if len(below) == 1 and (node.state.cause is None or node.state.message == below[0].state.message):
+    if len(below) == 1 and not node.step and (node.state.cause is None or node.state.message == below[0].state.message):
         return below[0]
-    return replace(node, name=node.title(above), children=below)
+    return replace(node, name=node.title(above), children=below, ports=())
 
 
 def _is_plumbing(node: NodeView) -> bool:

@@ -11,6 +11,7 @@ import shapely
 
 from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
 from skills.detect.descriptions import count_sentence
+from skills.detect.messages import detections_message
 from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
@@ -19,7 +20,7 @@ from skills.patience import Patience
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
 from skills.perception.people import SeenPerson, add_person, people_in_scan
-from skills.perception.people_watch import people_in_images
+from skills.perception.people_watch import located_people, people_detections
 from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
 from skills.routine import Routine, SkillFailure
@@ -92,7 +93,9 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         return Succeeded(said, {"observation": found[0], "observations": found})
 
     def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:
-        """Detects people in pictures of the body cameras; None if the detector has no class of people.
+        """Detects people in pictures of the body cameras, and publishes each picture with people, or else the first.
+
+        Returns None if the detector has no class of people.
 
         Raises SkillFailure in the dark.
         """
@@ -109,14 +112,16 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         )
         if all(map(is_dark, images)):
             raise SkillFailure(Cause.EXECUTION, "it is too dark to see anybody")
-        return (
-            yield from self.compute(
-                lambda: people_in_images(detector, images, X_WO, here_W, options.least_score, options.reach_m),
-                latency_s=DETECTION_LATENCY_S,
-                name="look for people",
-                message=message,
-            )
+        detected = yield from self.compute(
+            lambda: people_detections(detector, images, options.least_score),
+            latency_s=DETECTION_LATENCY_S,
+            name="look for people",
+            message=message,
         )
+        for shown in [each for each in images if any(image is each for image, _ in detected)] or images[:1]:
+            found = [one for image, one in detected if image is shown]
+            self.context.publish("detections", detections_message(shown, found, ()))
+        return located_people(detected, X_WO, here_W, options.reach_m)
 
     def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:
         """Detects people in the newest scan. Raises SkillFailure when there is no new scan."""

@@ -140,9 +140,10 @@ class PeopleWatch:
         """Detects people in one picture of each camera; without depth, only whether there are any."""
         detector, options = self._context.detector, self._options
         if not with_depth:
-            suspected = bool(_detected(detector, images, options.least_score))
+            suspected = bool(people_detections(detector, images, options.least_score))
             return _Look((), tuple(images), X_WO, here_W, suspected=suspected)
-        found = people_in_images(detector, images, X_WO, here_W, options.least_score, options.reach_m)
+        detected = people_detections(detector, images, options.least_score)
+        found = located_people(detected, X_WO, here_W, options.reach_m)
         return _Look(tuple(found), tuple(images), X_WO, here_W)
 
     def _update(self, look: _Look) -> None:
@@ -189,25 +190,19 @@ class PeopleWatch:
         }
 
 
-def people_in_images(
-    detector: Detector,
-    images: Sequence[Image],
-    X_WO: RigidTransform,
-    here_W: Pose2D,
-    least_score: float,
-    reach_m: float,
-) -> list[SeenPerson]:
-    """Locates the people in pictures with depth, except those beyond reach_m from the camera, or without depth."""
-    found = _detected(detector, images, least_score)
-    seen = (_located(image, one, X_WO, here_W, reach_m) for image, one in found)
-    return [one for one in seen if one is not None]
-
-
-def _detected(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
+def people_detections(detector: Detector, images: Sequence[Image], least_score: float) -> list[tuple[Image, Detection]]:
     """Detects people in pictures; pairs each with its picture."""
     found = detect_class_in_grey(detector, images, PERSON)
     pairs = ((image, one) for image, ones in zip(images, found, strict=True) for one in ones)
     return [(image, one) for image, one in pairs if one.class_name == PERSON and one.score >= least_score]
+
+
+def located_people(
+    detected: Sequence[tuple[Image, Detection]], X_WO: RigidTransform, here_W: Pose2D, reach_m: float
+) -> list[SeenPerson]:
+    """Locates detected people, except those beyond reach_m from the camera, or without depth."""
+    seen = (_located(image, one, X_WO, here_W, reach_m) for image, one in detected)
+    return [one for one in seen if one is not None]
 
 
 def _located(image: Image, one: Detection, X_WO: RigidTransform, here_W: Pose2D, reach_m: float) -> SeenPerson | None:

@@ -8,7 +8,16 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.scene_pictures import best_view, draw_detection, draw_map, look_at, render_view, save_png, top_view
+from plant.scene_pictures import (
+    PATH_COLOUR,
+    best_view,
+    draw_detection,
+    draw_map,
+    look_at,
+    render_view,
+    save_png,
+    top_view,
+)
 
 RED, GREY, BLUE = (np.array(rgba) for rgba in ([0.9, 0.05, 0.05, 1], [0.6, 0.6, 0.6, 1], [0.1, 0.1, 0.9, 1]))
 
@@ -53,18 +62,22 @@ def test_the_map_is_cut_below_the_ceiling_and_to_scale(scene):
 def test_the_path_is_drawn_at_its_place_on_the_map(scene):
     view = top_view(scene[2], (-4, -3, 4, 3), width=800)
     path = np.array([[-3.0, -2.0], [0.0, -2.0], [0.0, 2.0]])
-    picture = draw_map(view, path, labels={"hall": (-2, 1)}, marks={"coke": (1.0, -1.0)})
+    picture = draw_map(
+        view, {"path of Alice": (path, PATH_COLOUR)}, labels={"hall": (-2, 1)}, marks={"coke": (1.0, -1.0)}
+    )
     x, y = np.round(view.pixels(np.array([[-1.5, -2.0]]))[0]).astype(int)
     assert picture[y, x, 0] > 200
     assert picture[y, x, 1] < 100
-    assert (picture != view.picture).any()
+    assert picture.shape[0] > view.picture.shape[0]
+    assert (picture[: view.picture.shape[0]] != view.picture).any()
     assert (view.picture == top_view(scene[2], (-4, -3, 4, 3), width=800).picture).all()
 
 
 @pytest.mark.parametrize("points", [0, 1])
 def test_short_paths_are_drawn_too(scene, points):
     view = top_view(scene[2], (-4, -3, 4, 3), width=200)
-    assert draw_map(view, np.zeros((points, 3))).shape == view.picture.shape
+    drawn = draw_map(view, {"path of Alice": (np.zeros((points, 3)), PATH_COLOUR)})
+    assert drawn.shape[1:] == view.picture.shape[1:]
 
 
 def test_flat_bounds_are_refused(scene):

@@ -14,11 +14,11 @@
   const control = new ControlPanel(token);
   const teleop = new TeleopPanel(control);
   const header = new Header();
-  const parts = Object.fromEntries(["tree", "follow", "mode", "why", "state", "steps", "camera", "seen", "questions", "doing"].map((id) => [id, byId(id)]));
+  const parts = Object.fromEntries(["tree", "follow", "nodes", "mode", "why", "state", "camera", "seen", "questions", "doing"].map((id) => [id, byId(id)]));
   const one = new RobotPanel(parts, null, control, addressOf), all = new ModePanel(parts.mode, parts.why);
   const panels = new Map(); // of each robot, where there are several
   const missions = new MissionsPanel(byId("missions-panel"), byId("missions"));
-  const map = new MapPanel(byId("map"), byId("where"));
+  const map = new MapPanel(byId("map"), byId("where"), byId("legend"));
   const scene = new ScenePanel(byId("scene"), byId("beside"));
   const timeline = new Timeline(store, () => schedule());
   const events = new EventPanel(byId("events"), byId("events-shown"), store, (t) => { timeline.hold(); timeline.go(t); });

@@ -4,15 +4,45 @@
   const LENGTH_M = 1.1, WIDTH_M = 0.5; // a standing Spot
   const SEEN_M = 0.05; // a cell
   const DASHES = [[5, 4], [2, 3], [9, 4], [9, 3, 2, 3], [1, 4], [14, 4]]; // one for each colour of a robot
-  const RESERVED_PX = 9;
+  const RESERVED_PX = 9, FOOT_PX = 30; // the scale stands below the map
+  const LENGTHS_M = [0.5, 1, 2, 5, 10, 20, 50];
   const OCCUPIED_BELOW = 100, FREE_ABOVE = 230;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
+  // Names on the map: each near its point, where it covers no other name and no mark.
+  class Names {
+    constructor(brush, width, height) { Object.assign(this, { brush, width, height, taken: [], later: [] }); }
+
+    keepClear(u, v, radius) { this.taken.push([u - radius, v - radius, u + radius, v + radius]); }
+
+    add(text, u, v, colour, font) { this.later.push({ text, u, v, colour, font }); }
+
+    draw(halo) {
+      const { brush, width, height } = this;
+      brush.textAlign = "left";
+      for (const { text, u, v, colour, font } of this.later) {
+        brush.font = font;
+        const wide = brush.measureText(text).width + 4, high = 16, keep = (x, most) => Math.min(Math.max(x, 0), Math.max(0, most));
+        const shifts = [0, -1, 1, -2, 2, -3, 3].flatMap((dv) => [0, -0.6, 0.6, -1.1, 1.1].map((du) => [du * wide, dv * high]));
+        const boxes = shifts.map(([du, dv]) => { const left = keep(u + du - wide / 2, width - wide), top = keep(v + dv - high / 2, height - high); return [left, top, left + wide, top + high]; });
+        const cost = ([l, t, r, b]) => Math.hypot((l + r) / 2 - u, (t + b) / 2 - v) + this.taken.reduce((sum, [l2, t2, r2, b2]) => sum + 100 * Math.max(0, Math.min(r, r2) - Math.max(l, l2)) * Math.max(0, Math.min(b, b2) - Math.max(t, t2)), 0);
+        const best = boxes.reduce((one, other) => (cost(other) < cost(one) ? other : one));
+        this.taken.push(best);
+        brush.lineWidth = 3;
+        brush.strokeStyle = halo;
+        brush.strokeText(text, best[0] + 2, best[3] - 4);
+        brush.fillStyle = colour;
+        brush.fillText(text, best[0] + 2, best[3] - 4);
+      }
+    }
+  }
+
   class MapPanel {
-    constructor(canvas, where) {
+    constructor(canvas, where, legend) {
       this.canvas = canvas;
       this.where = where;
+      this.legend = legend;
       this.image = null;
       this.robots = [];
       new ResizeObserver(() => this.redraw()).observe(canvas);
@@ -59,8 +89,8 @@
     // World metres to canvas points.
     frame(width, height) {
       const { origin_m: origin, size_m: size } = this.map || this.around();
-      const scale = Math.min(width / size.x, height / size.y) * 0.97;
-      const left = (width - size.x * scale) / 2, bottom = (height + size.y * scale) / 2;
+      const room = height - FOOT_PX, scale = Math.min(width / size.x, room / size.y) * 0.97;
+      const left = (width - size.x * scale) / 2, bottom = (room + size.y * scale) / 2;
       return { scale, left, bottom, size, at: (x, y) => [left + (x - origin.x) * scale, bottom - (y - origin.y) * scale] };
     }
 
@@ -80,7 +110,7 @@
       brush.setTransform(ratio, 0, 0, ratio, 0, 0);
       brush.fillStyle = css("--unknown");
       brush.fillRect(0, 0, width, height);
-      const frame = this.frame(width, height);
+      const frame = this.frame(width, height), names = (this.names = new Names(brush, width, height - FOOT_PX));
       this.drawGrid(brush, frame);
       for (const [name, robot] of this.view.robots) {
         const style = this.styleOf(name);
@@ -93,6 +123,10 @@
       this.drawThings(brush, frame);
       const said = [];
       for (const [name, robot] of this.view.robots) if (robot.pose) said.push(this.drawRobot(brush, frame, name, robot));
+      this.drawPlaces(brush, frame);
+      names.draw(css("--floor"));
+      this.drawScale(brush, frame, height);
+      this.explain();
       this.where.textContent = said.join("; ");
       this.canvas.setAttribute("aria-label", `Map. ${said.join("; ")}`);
     }
@@ -101,16 +135,57 @@
       if (!this.coloured || !this.map) return;
       brush.imageSmoothingQuality = "high";
       brush.drawImage(this.coloured, left, bottom - size.y * scale, size.x * scale, size.y * scale);
-      brush.font = `11px ${css("--font")}`;
-      brush.textAlign = "center";
-      brush.fillStyle = css("--dim");
-      for (const place of this.map.places) {
-        const [u, v] = at(place.x, place.y);
-        brush.lineWidth = 3;
-        brush.strokeStyle = css("--floor");
-        brush.strokeText(place.name, u, v + 4);
-        brush.fillText(place.name, u, v + 4);
+    }
+
+    // The dock, and the names of dock and places, which give way to those of robots and objects.
+    drawPlaces(brush, { at }) {
+      if (!this.map) return;
+      if (this.map.dock) {
+        const [u, v] = at(this.map.dock.x, this.map.dock.y);
+        brush.fillStyle = css("--dock");
+        brush.strokeStyle = css("--text");
+        brush.lineWidth = 1;
+        brush.fillRect(u - 5, v - 5, 10, 10);
+        brush.strokeRect(u - 5, v - 5, 10, 10);
+        this.names.keepClear(u, v, 8);
+        this.names.add("dock", u, v, css("--text"), `11px ${css("--font")}`);
       }
+      for (const { name, x, y } of this.map.places) this.names.add(name, ...at(x, y), css("--dim"), `11px ${css("--font")}`);
+    }
+
+    drawScale(brush, { scale }, height) {
+      const length = [...LENGTHS_M].reverse().find((each) => each * scale < 160) || LENGTHS_M[0], y = height - 10;
+      brush.strokeStyle = brush.fillStyle = css("--text");
+      brush.lineWidth = 1.5;
+      brush.beginPath();
+      brush.moveTo(10, y - 4); brush.lineTo(10, y + 4); brush.moveTo(10, y); brush.lineTo(10 + length * scale, y);
+      brush.moveTo(10 + length * scale, y - 4); brush.lineTo(10 + length * scale, y + 4);
+      brush.stroke();
+      brush.font = `11px ${css("--font")}`;
+      brush.fillText(`${length} m`, 18 + length * scale, y + 4);
+    }
+
+    // The legend: what there is on the map now.
+    explain() {
+      const robots = [...this.view.robots], any = (has) => robots.some(([, robot]) => has(robot)), one = robots.length < 2;
+      const driven = one ? [["--success", "path driven"]] : robots.map(([name]) => [window.errand.colourOf(this.robots, name), `path of ${name}`]);
+      const rows = [
+        ...(any((each) => each.trail.length > 1) ? driven : []),
+        ...(any((each) => each.path) && one ? [["--accent", "path planned"]] : []),
+        ...(any((each) => each.particles.length) ? [["--cancelled", "where it may be"]] : []),
+        ...(any((each) => each.seen.length) ? [["--failure", "obstacle that the map lacks"]] : []),
+        ...(this.view.destinations.length || any((each) => each.held) ? [["--object", "object found"]] : []),
+        ...(this.map && this.map.dock ? [["--dock", "dock"]] : []),
+      ];
+      const key = JSON.stringify(rows);
+      if (key === this.explained) return;
+      this.explained = key;
+      this.legend.replaceChildren(...rows.map(([colour, text]) => {
+        const item = window.errand.element("li", "", text), swatch = window.errand.element("span", "swatch");
+        swatch.style.background = `var(${colour})`;
+        item.prepend(swatch);
+        return item;
+      }));
     }
 
     line(brush, { at }, points, colour, dashes) {
@@ -155,13 +230,12 @@
     }
 
     drawThings(brush, { at }) {
-      brush.font = `600 11px ${css("--font")}`;
-      brush.textAlign = "left";
       const latest = new Map(this.view.destinations.map((each) => [each.name, each]));
       for (const { name, x, y } of latest.values()) {
         const [u, v] = at(x, y);
         this.mark(brush, u, v);
-        this.halo(brush, name, u + 9, v + 4);
+        this.names.keepClear(u, v, 7);
+        this.names.add(name, u, v, css("--text"), `600 11px ${css("--font")}`);
       }
     }
 
@@ -169,18 +243,10 @@
     mark(brush, u, v) {
       brush.beginPath();
       brush.moveTo(u, v - 6); brush.lineTo(u + 6, v); brush.lineTo(u, v + 6); brush.lineTo(u - 6, v); brush.closePath();
-      brush.fillStyle = "#e69f00";
+      brush.fillStyle = css("--object");
       brush.strokeStyle = css("--text");
       brush.lineWidth = 1;
       brush.fill(); brush.stroke();
-    }
-
-    halo(brush, text, u, v) {
-      brush.lineWidth = 3;
-      brush.strokeStyle = css("--floor");
-      brush.strokeText(text, u, v);
-      brush.fillStyle = css("--text");
-      brush.fillText(text, u, v);
     }
 
     drawRobot(brush, { at, scale }, name, { pose: { x, y, yaw }, held, reserved }) {
@@ -196,9 +262,8 @@
       brush.lineWidth = 1.5;
       brush.fill(); brush.stroke();
       brush.restore();
-      brush.font = `600 11px ${css("--font")}`;
-      brush.textAlign = "left";
-      this.halo(brush, held ? `${name}, holding ${held}` : name, u + 12, v - 10);
+      this.names.keepClear(u, v, 0.6 * length);
+      this.names.add(held ? `${name}, holding ${held}` : name, u, v, css("--text"), `600 11px ${css("--font")}`);
       if (held) this.mark(brush, ...at(x + (LENGTH_M / 2) * Math.cos(yaw), y + (LENGTH_M / 2) * Math.sin(yaw)));
       const degrees = Math.round((yaw * 180) / Math.PI);
       return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}${reserved ? `, its way to x ${reserved[reserved.length - 1][0].toFixed(2)} m, y ${reserved[reserved.length - 1][1].toFixed(2)} m reserved` : ""}`;

@@ -85,37 +85,6 @@
     }
   }
 
-  // The mission's own steps: done, under way, to come; a click shows one in the tree.
-  class StepsPanel {
-    constructor(box, onChoose) { Object.assign(this, { box, onChoose, shown: "" }); }
-
-    draw(store, view, now) {
-      const tree = view.trees[view.trees.length - 1], mission = tree && missionOf(tree.root);
-      const steps = !mission ? [] : mission.type === "sequence" ? mission.children : [mission];
-      const rows = steps.filter((step) => step.type !== "remember").map((step) => {
-        const span = view.spans.get(step.id), look = lookOf(view.states.get(step.id));
-        const took = span && look !== "idle" ? (span.over ? span.to : now) - span.from : null;
-        return { id: step.id, name: step.name, look, took: took === null ? "" : `${took.toFixed(0)} s` };
-      });
-      const key = JSON.stringify(rows);
-      if (key === this.shown) return;
-      this.shown = key;
-      this.box.replaceChildren(...rows.map((row) => this.item(row)));
-    }
-
-    item({ id, name, look, took }) {
-      const li = element("li"), button = element("button");
-      li.dataset.look = look;
-      button.type = "button";
-      button.title = `${name}: ${LOOKS[look].word}`;
-      button.setAttribute("aria-label", `${name}, ${LOOKS[look].word}`);
-      button.append(element("span", "symbol", LOOKS[look].symbol), element("span", "name", name), element("span", "t", took));
-      button.addEventListener("click", () => this.onChoose(id));
-      li.append(button);
-      return li;
-    }
-  }
-
   class Header {
     draw(store, view, replaying) {
       const tree = view.trees[view.trees.length - 1], several = store.robots.length > 1;
@@ -221,6 +190,7 @@
     put(properties) {
       const frame = Object.assign(element("iframe"), properties), loading = element("p", "nothing loading", "Loading the 3D scene …");
       if (!this.recorded) frame.addEventListener("load", () => loading.remove());
+      this.box.closest("section").hidden = false;
       this.box.replaceChildren(frame, loading);
       Object.assign(this, { frame, loading, before: null });
     }
@@ -299,5 +269,5 @@
     }
   }
 
-  Object.assign(window.errand, { Header, ModePanel, modeOf, modeOfAll, missionOf, StatePanel, StepsPanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
+  Object.assign(window.errand, { Header, ModePanel, modeOf, modeOfAll, missionOf, StatePanel, decisive, CameraPanel, ScenePanel, QuestionPanel, drawsSlowly, byId });
 })();

@@ -1,7 +1,7 @@
 "use strict";
 // What is shown of one robot, the buttons that are for it alone, and the missions that are given out among several.
 (() => {
-  const { LOOKS, TreePanel, StatePanel, StepsPanel, CameraPanel, QuestionPanel, ModePanel, modeOf, missionOf, decisive, element, byId } = window.errand;
+  const { LOOKS, TreePanel, StatePanel, CameraPanel, QuestionPanel, ModePanel, modeOf, missionOf, decisive, element, byId } = window.errand;
   const COLOURS = 6;
 
   // A robot's colour and dashes by its place among the names; the name always stands beside them.
@@ -25,10 +25,9 @@
     // `parts` are the elements that it draws into. Without a name it is that of the only robot.
     constructor(parts, name, control, addressOf) {
       Object.assign(this, { parts, name, control });
-      this.tree = new TreePanel(parts.tree, { follow: parts.follow, onBreakpoint: (node, wanted) => control.do(wanted ? "break" : "unbreak", { node }) });
+      this.tree = new TreePanel(parts.tree, { follow: parts.follow, shown: parts.nodes, onBreakpoint: (node, wanted) => control.do(wanted ? "break" : "unbreak", { node }) });
       this.mode = new ModePanel(parts.mode, parts.why);
       this.state = new StatePanel(parts.state);
-      this.steps = new StepsPanel(parts.steps, (node) => this.tree.goTo(node));
       this.camera = new CameraPanel(parts.camera, parts.seen, addressOf);
       this.questions = new QuestionPanel(parts.questions, (id, text) => (id === null ? control.answer(text, name) : control.do("answer", { id, text })));
     }
@@ -36,7 +35,7 @@
     // A panel made for one of several robots.
     static made(name, robots, control, addressOf) {
       const section = byId("robot-panel").content.firstElementChild.cloneNode(true), part = (cls) => section.querySelector(`.${cls}`);
-      const parts = Object.fromEntries(["tree", "follow", "mode", "why", "state", "steps", "camera", "seen", "questions", "doing", "mission", "pause", "cancel", "stop"].map((cls) => [cls, part(cls)]));
+      const parts = Object.fromEntries(["tree", "follow", "mode", "why", "nodes", "state", "camera", "seen", "questions", "doing", "mission", "pause", "cancel", "stop"].map((cls) => [cls, part(cls)]));
       const panel = new RobotPanel(parts, name, control, addressOf);
       Object.assign(panel, { section });
       section.setAttribute("aria-label", name);
@@ -58,13 +57,12 @@
       this.tree.breakpoints = controlState && controlState.mode !== "ended" && this.control.actions.has("break") ? new Set(controlState.breakpoints) : null;
       this.tree.at = controlState ? controlState.at : null;
       this.tree.decisive = decisive(store, view);
-      this.steps.draw(store, view, replaying ? view.t : store.end);
       this.state.draw(view);
       this.mode.draw(modeOf(replaying ? null : own, view), over, this.name || "");
       this.parts.doing.textContent = progress ? progress.message : "";
       this.questions.draw(controlState ? this.asked(store, controlState) : [], store.end);
       if (this.name !== null) this.drawOwn(controlState, own, tree, over);
-      this.tree.draw(view); // it scrolls, so all else has its place before
+      this.tree.draw(view, replaying ? view.t : store.end); // it scrolls, so all else has its place before
     }
 
     progress(store, tree) {

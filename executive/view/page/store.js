@@ -5,6 +5,7 @@
     idle: { symbol: "○", word: "not run" },
     running: { symbol: "▶", word: "running" },
     success: { symbol: "✓", word: "success" },
+    skipped: { symbol: "⊘", word: "skipped" },
     failure: { symbol: "✗", word: "failure" },
     cancelled: { symbol: "⊘", word: "cancelled" },
   };

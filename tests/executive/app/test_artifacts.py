@@ -38,6 +38,17 @@ def test_a_negative_answer_shows_all_views():
     assert answered(artifacts, False)["image"].shape == (480, 1280, 3)
 
 
+def test_an_answer_about_a_person_shows_the_person_and_not_an_object_of_an_earlier_answer():
+    # a hammer is found and confirmed, then a person is seen: no object is confirmed
+    artifacts = Artifacts()
+    artifacts.message("detections", looked((10, 10, 40, 30)))
+    artifacts.message("object_destination", {"class_name": "hammer"})
+    hammer = answered(artifacts, True)["image"]
+    artifacts.message("detections", looked())
+    artifacts.message("detections", looked((30, 20, 60, 44)))
+    assert np.any(answered(artifacts, True)["image"] != hammer)
+
+
 def test_without_a_question_there_is_no_picture(tmp_path):
     artifacts = Artifacts()
     artifacts.message("detections", looked((10, 10, 40, 30)))

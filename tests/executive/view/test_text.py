@@ -5,11 +5,13 @@ import re
 import pytest
 from py_trees.common import Status
 
+from executive.tree.compiler import compile_mission
 from executive.tree.node import NodeState
-from executive.tree.node_view import NodeView, node_view
+from executive.tree.node_view import NodeView, node_view, outline
 from executive.view.formats import to_svg
-from executive.view.text import executed_tree, fold_below, fold_to, to_text
-from skills.api import Cause
+from executive.view.text import executed_tree, fold_below, fold_to, readable, to_text
+from executive.words.mission import Mission
+from skills.api import Cause, Failed
 
 DONE, IDLE = NodeState(Status.SUCCESS), NodeState()
 RUNS, FAILED = NodeState(Status.RUNNING), NodeState(Status.FAILURE, Cause.PLANNING, "no way")
@@ -117,3 +119,45 @@ def test_the_legend_fits_beside_a_single_node():
     width = float(svg.split('width="', 1)[1].split('"', 1)[0])
     rightmost = max(map(float, re.findall(r'<text x="([0-9.]+)"', svg)))
     assert width - rightmost > 60
+
+
+def author_rows(tree: NodeView) -> list[tuple[int, str, str]]:
+    return [(depth, row.name, row.policy) for depth, row in tree.walk() if row.step]
+
+
+def test_the_outline_has_one_row_for_each_step_of_the_author(knowledge, registry):
+    # skip, retries and the containers of rounds and branches share the row of their step
+    group = {"group": [{"to": "kitchen"}, {"wait": {"seconds": 5}}], "timeout": 60, "on_failure": "skip"}
+    choice = {"if": {"object": "coke", "at": "kitchen"}, "then": [group]}
+    steps = [{"repeat": {"times": 2}, "steps": [choice]}, {"to": "counter"}]
+    mission = Mission.model_validate({"name": "round", "robot": "Alice", "guards": {"time": 90}, "steps": steps})
+    tree = compile_mission(mission, knowledge=knowledge, registry=registry)
+    policy = "skip it if it fails, within 60 s"
+    assert author_rows(outline(node_view(tree.root))) == [
+        (0, "round", "not after 90 s"),
+        (1, "repeat 2 times", ""),
+        (2, "choose coke at kitchen?", ""),
+        (3, "then: group", policy),
+        (4, "go to the kitchen", ""),
+        (4, "wait 5 s", ""),
+        (1, "go to the counter", ""),
+    ]
+
+
+def test_a_readable_tree_folds_guards_and_what_carries_steps_out_but_no_step(compiled, make):
+    whole = node_view(compiled(*make.FETCH).root)
+    folded = readable(whole, 3)
+    assert [row.step for _, row in folded.walk()] == [True, True, True]
+    assert sum(1 + row.hidden for _, row in folded.walk()) < sum(1 for _ in whole.walk())
+    assert not any(row.kind in ("monitor", "interrupt") for _, row in readable(whole, 80).walk())
+
+
+def test_a_readable_tree_shows_what_failed_below_a_step(compiled, run_tree, make, script):
+    script.ends["grasp"] = lambda skill: Failed(Cause.EXECUTION, "it slipped")
+    tree = compiled(*make.FETCH)
+    folded = readable(node_view(tree.root, run_tree(tree).worst.states), 3)
+    assert any(row.name == "grasp" and row.state.message == "it slipped" for _, row in folded.walk())
+
+
+def test_a_tree_without_steps_is_read_as_it_is():
+    assert [row.name for _, row in readable(mission(DONE, IDLE), 100).walk()][:2] == ["mission", "step 0"]

@@ -1,8 +1,11 @@
 """The find_people skill: turns and observations."""
 
 import math
+from dataclasses import replace
 
-from planar_robot import TWO_ROOMS, Bench, Box
+import numpy as np
+from planar_people import PeopleDetector, person_at
+from planar_robot import LENS, TWO_ROOMS, Bench, Box
 
 from skills.api import Running, Succeeded
 from skills.find_people.skill import FindPeople, FindPeopleInputs
@@ -39,3 +42,22 @@ def test_the_observation_is_at_the_persons_position():
     skill.end()
     assert isinstance(step, Succeeded)
     assert math.dist(step.outputs["observation"].position_W[:2], (3.0, 2.0)) < 0.3
+
+
+def test_the_pictures_with_a_person_are_published_with_their_boxes(monkeypatch):
+    # a person 2 m ahead in the room; the first look has both cameras' pictures
+    person = person_at(3.5, 2.0)
+    bench = Bench(Pose2D(1.5, 2.0, 0.0), unmapped=(person,), surveyed=TWO_ROOMS)
+    take = bench.robot.image
+    lit = lambda source: replace(take(source), grey=np.full((LENS.height, LENS.width), 120, np.uint8))  # noqa: E731
+    monkeypatch.setattr(bench.robot, "image", lit)
+    for _ in range(10):
+        bench.tick()
+    skill = FindPeople(replace(bench.context(), detector=PeopleDetector(bench, [person])))
+    skill.begin(FindPeopleInputs(ROOM, "room"))
+    while isinstance(skill.step(), Running):
+        bench.tick()
+    skill.end()
+    shown = [message for topic, message in bench.published if topic == "detections"]
+    assert all(message["detections"][0]["class_name"] == "person" for message in shown)
+    assert shown

@@ -1,0 +1,128 @@
+"""Drawing on maps: names where they cover no other name and little else, and a legend with a scale below the map.
+
+Pictures are (H, W, 3) uint8 arrays; colours have the order of the picture's channels.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable, Sequence
+from itertools import product
+from typing import Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skills.robot import FloatArray, Picture
+
+Colour = tuple[int, int, int]
+INK: Final[Colour] = (25, 25, 25)
+PLATE: Final[Colour] = (255, 255, 255)
+_FONT: Final = cv2.FONT_HERSHEY_SIMPLEX
+_PAD_PX: Final = 5
+_STEP_PX: Final = 4.0
+_SHIFTS: Final = (0.0, -1.0, 1.0, -2.0, 2.0, -3.5, 3.5)
+_LENGTHS_M: Final = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+
+
+class Names:
+    """Writer of names on a picture: each near its point, off the other names, off marks and off `lines` (N, 2 each)."""
+
+    def __init__(self, picture: Picture, lines: Iterable[FloatArray]) -> None:
+        self._picture, self._lines = picture, np.vstack([np.zeros((0, 2)), *map(_dense, lines)])
+        self._taken: list[NDArray[np.float64]] = []
+
+    def keep_clear(self, centre: Sequence[float], radius_px: float) -> None:
+        """Keeps names off a mark."""
+        self._taken.append(np.array([*np.subtract(centre, radius_px), *np.add(centre, radius_px)], dtype=np.float64))
+
+    def write(self, name: str, centre: Sequence[float], *, ground: Colour = PLATE) -> None:
+        """Writes a name as near to a pixel (column, row) as there is room."""
+        size = np.array(text_size(name, self._picture), dtype=np.float64) + 2 * _PAD_PX
+        most = np.maximum(np.array(self._picture.shape[1::-1]) - size, 0.0)
+        shifts = (np.array(shift) * (0.6 * size[0], size[1]) for shift in product(_SHIFTS, _SHIFTS))
+        corners = (np.clip(np.array(centre) + shift - size / 2.0, 0.0, most) for shift in shifts)
+        boxes = [np.concatenate([corner, corner + size]) for corner in corners]
+        best = min(boxes, key=lambda box: self._cost(box, np.array(centre), size[1]))
+        self._taken.append(best)
+        label(self._picture, name, (round(best[0]) + _PAD_PX, round(best[3]) - _PAD_PX), ground=ground)
+
+    def _cost(self, box: NDArray[np.float64], centre: NDArray[np.float64], height: float) -> float:
+        """Cost of a place for a name: what it covers, and its distance from its point."""
+        overlaps = (np.maximum(np.minimum(box[2:], one[2:]) - np.maximum(box[:2], one[:2]), 0.0) for one in self._taken)
+        covered = sum(float(np.prod(overlap)) for overlap in overlaps)
+        on_lines = np.all((self._lines >= box[:2]) & (self._lines <= box[2:]), axis=1).sum() if len(self._lines) else 0
+        away = float(np.linalg.norm((box[:2] + box[2:]) / 2.0 - centre))
+        return 100.0 * covered + 0.3 * float(min(on_lines, 20)) * height + away
+
+
+def _dense(line: FloatArray) -> FloatArray:
+    """Returns points of a line, a few pixels apart."""
+    if len(line) < 2:
+        return line
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    at = np.arange(0.0, along[-1], _STEP_PX)
+    return np.column_stack([np.interp(at, along, line[:, axis]) for axis in (0, 1)])
+
+
+def with_legend(picture: Picture, pixels_per_m: float, entries: Sequence[tuple[str, Colour]]) -> Picture:
+    """Returns the picture with a strip below it: a scale bar of a round length, and the meaning of each colour."""
+    width = picture.shape[1]
+    line_h, gap = round(2.6 * text_size("X", picture)[1]) + 4, max(8, width // 60)
+    length_m = max((step for step in _LENGTHS_M if step * pixels_per_m <= width / 4.0), default=_LENGTHS_M[0])
+    bar = round(length_m * pixels_per_m)
+    spots, x, row = [], gap + bar + text_size(f"{length_m:g} m", picture)[0] + 3 * gap, 0
+    for text, _ in entries:
+        wide = 2 * gap + text_size(text, picture)[0]
+        if x + wide > width - gap and x > gap:
+            x, row = gap, row + 1
+        spots.append((x, round((row + 0.5) * line_h)))
+        x += wide + 2 * gap
+    strip = np.full((line_h * (row + 1) + 4, width, 3), 255, dtype=np.uint8)
+    middle = line_h // 2
+    for start, end in (
+        ((gap, middle), (gap + bar, middle)),
+        *(((x, middle - 6), (x, middle + 6)) for x in (gap, gap + bar)),
+    ):
+        cv2.line(strip, start, end, INK, 2, cv2.LINE_AA)
+    _text(strip, f"{length_m:g} m", (2 * gap + bar, middle), picture)
+    for (text, colour), (left, y) in zip(entries, spots, strict=True):
+        cv2.rectangle(strip, (left, y - 4), (left + gap, y + 4), colour, cv2.FILLED)
+        cv2.rectangle(strip, (left, y - 4), (left + gap, y + 4), INK, 1)
+        _text(strip, text, (left + 2 * gap, y), picture)
+    return np.asarray(np.vstack([picture, strip]), np.uint8)
+
+
+def _text(strip: Picture, text: str, left_middle: tuple[int, int], like: Picture) -> None:
+    """Writes a text in the size that belongs to the picture `like`."""
+    origin = (left_middle[0], left_middle[1] + text_size("X", like)[1] // 2)
+    cv2.putText(strip, drawable(text), origin, _FONT, _font_scale(like), INK, _stroke(like), cv2.LINE_AA)
+
+
+def label(picture: Picture, text: str, origin: tuple[int, int], *, ground: Colour = PLATE) -> None:
+    """Writes text on a plate with its lower left corner at a pixel, moved inside the picture if needed."""
+    (width, height), pad = text_size(text, picture), _PAD_PX
+    x = int(np.clip(origin[0], pad, max(pad, picture.shape[1] - width - pad)))
+    y = int(np.clip(origin[1], height + pad, max(height + pad, picture.shape[0] - 2 * pad)))
+    cv2.rectangle(picture, (x - pad, y - height - pad), (x + width + pad, y + pad + 2), ground, cv2.FILLED, cv2.LINE_AA)
+    cv2.putText(picture, drawable(text), (x, y), _FONT, _font_scale(picture), INK, _stroke(picture), cv2.LINE_AA)
+
+
+def text_size(text: str, picture: Picture) -> tuple[int, int]:
+    """Width and height (pixels) of a text in the size that belongs to a picture."""
+    (width, height), _ = cv2.getTextSize(drawable(text), _FONT, _font_scale(picture), _stroke(picture))
+    return int(width), int(height)
+
+
+def drawable(text: str) -> str:
+    """Returns the text in the letters that OpenCV can draw: accents are left out."""
+    return unicodedata.normalize("NFKD", text.replace("ß", "ss")).encode("ascii", "ignore").decode() or "?"
+
+
+def _font_scale(picture: Picture) -> float:
+    return float(np.clip(picture.shape[1] / 1600.0, 0.5, 1.2))
+
+
+def _stroke(picture: Picture) -> int:
+    return 2 if picture.shape[1] >= 1000 else 1

@@ -1,0 +1,156 @@
+"""Sizes and overflow of the page and the report in a browser, on a desk and on a telephone, light and dark."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from executive.app.report import ReportedAnswer, ReportedObject, RobotReport
+from executive.app.report_file import ReportPage, ReportPart, StepRow
+from executive.run.outcome import Said
+from executive.tree.compiler import compile_mission
+from executive.tree.node_view import node_view
+from executive.view.feed import Feed
+from executive.view.formats import to_svg
+from executive.view.html import render
+from executive.view.server import PageContent, PageServer
+from executive.view.styles import Styles
+from executive.view.text import readable
+from executive.words.goal import RefereeReport
+from executive.words.mission import Mission
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+FLAGS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
+SIZES = [(1400, 900), (390, 844)]
+LONG = (
+    "waits until sixty seconds are over, as the mission says, and then goes on with the rest of the round " + "x" * 60
+)
+
+playwright_api = pytest.importorskip(
+    "playwright.sync_api", reason="playwright is not installed: pip install playwright"
+)
+pytestmark = [
+    pytest.mark.browser,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium was found: apt-get install chromium"),
+]
+
+OVERFLOWING = """() => [...document.querySelectorAll('body *')].filter((each) => {
+  const box = each.getBoundingClientRect();
+  if (!box.width || !box.height || getComputedStyle(each).position === 'absolute') return false;
+  for (let up = each.parentElement; up; up = up.parentElement)
+    if (['auto', 'scroll'].includes(getComputedStyle(up).overflowX) && up.clientWidth < innerWidth) return false;
+  return box.right > innerWidth + 1 || box.left < -1;
+}).map((each) => `${each.tagName}.${each.className}: ${each.textContent.trim().slice(0, 60)}`)"""
+"""Elements that stick out of the page, and do not scroll inside another one."""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright_api.sync_playwright() as playwright:
+        running = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield running
+        running.close()
+
+
+@pytest.fixture(params=[(*size, scheme) for size in SIZES for scheme in ("light", "dark")], ids=str)
+def page(browser, request):
+    width, height, scheme = request.param
+    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+    yield context.new_page()
+    context.close()
+
+
+@pytest.fixture
+def nested(knowledge, registry):
+    """The tree of a mission in which steps stand four levels below others."""
+    wait = {"wait": {"seconds": 60}}
+    inner = {"repeat": {"times": 3}, "steps": [wait, {"to": "counter"}]}
+    choice = {"if": {"object": "coke", "at": "kitchen"}, "then": [inner], "else": [wait]}
+    group = {"group": [{"to": "kitchen"}, choice], "timeout": 600, "retries": 2, "on_failure": "skip"}
+    steps = [{"to": "kitchen"}, {"repeat": {"times": 2}, "steps": [group]}, wait]
+    mission = Mission.model_validate({"name": "evening round", "robot": "Alice", "steps": steps})
+    return compile_mission(mission, knowledge=knowledge, registry=registry)
+
+
+@pytest.fixture
+def running(nested):
+    """The address of the page of the nested mission, in which the innermost wait has a long message."""
+    feed = Feed()
+    feed("tree", 0.0, {"robot": "Alice", "root": node_view(nested.root).structure()})
+    wait = next(node.path_id for node in nested.root.walk() if node.kind == "pause")
+    for node in nested.root.walk():
+        if any(below.path_id == wait for below in node.walk()):
+            change = {"t": 1.0, "robot": "Alice", "node": node.path_id, "to": "RUNNING", "cause": None, "message": ""}
+            feed("transitions", 1.0, change)
+    feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": wait, "message": LONG})
+    state = {"holding": True, "charge": 0.9, "localised": True, "position_sigma_m": 0.02, "speed_m_s": 0.4}
+    feed("state", 2.0, {"robot": "Alice", **state})
+    with PageServer(PageContent(feed, {name: lambda values: "" for name in ("pause", "say", "queue")})) as server:
+        yield server.url
+
+
+def test_the_page_of_a_nested_mission_is_readable(page, running):
+    page.goto(running)
+    note = page.locator(".row.leaf[data-look=running] .note")
+    playwright_api.expect(note).to_contain_text(LONG)
+    assert page.evaluate(OVERFLOWING) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    widths = page.locator(".tree li:not([hidden]) > .row .name").evaluate_all("rows => rows.map((r) => r.clientWidth)")
+    assert min(width for width in widths if width) > 150
+    assert page.locator(".tree").evaluate("tree => tree.scrollHeight") < 900
+
+
+def test_no_empty_panel_is_shown_for_a_scene_that_is_not_there(page, running):
+    page.goto(running)
+    page.locator("#map-panel").wait_for()
+    assert page.locator("#scene-panel").is_hidden()
+    assert page.locator("#map-panel").bounding_box()["height"] > 300
+
+
+def test_the_picture_of_a_nested_mission_has_the_size_of_a_page(page, nested, tmp_path):
+    # a tree with long names and messages; no text leaves its box
+    svg = to_svg(readable(node_view(nested.root), 40), title="evening round " + "m" * 90)
+    (tmp_path / "tree.svg").write_text(svg, encoding="utf-8")
+    page.goto((tmp_path / "tree.svg").as_uri())
+    width, height = page.evaluate("['width', 'height'].map((each) => document.documentElement[each].baseVal.value)")
+    assert (width < 700, height < 2100) == (True, True), (width, height)
+    beyond = """() => [...document.querySelectorAll('g > text')].filter((text) => {
+      const box = text.parentElement.querySelector('rect');
+      return box && text.getBoundingClientRect().right > box.getBoundingClientRect().right;
+    }).map((text) => text.textContent)"""
+    assert page.evaluate(beyond) == []
+
+
+@pytest.fixture
+def report_page(tmp_path, nested):
+    """The report of a run with everything that a report may have, with long texts."""
+    whole = "x" * 120
+    why = f"the coke stands on the counter; Robin has no coke; {whole}"
+    referee = RefereeReport(False, why, 1, 2, events=("1.0 s: it fell",))
+    done = Styles.SUCCESS.value
+    steps = tuple(
+        StepRow(f"go to the hall {whole if n == 2 else ''}", done, "success", n, (0.0, 9.0), why) for n in range(4)
+    )
+    report = RobotReport("failure", "EXECUTION", why, referee, (), "spot")
+    svg = to_svg(readable(node_view(nested.root), 40))
+    page = ReportPage(
+        title="evening round",
+        request="patrol.yaml",
+        facts=(("world", "flat, seed 3"), ("contacts", "1 collision, 2 drops")),
+        alone=ReportPart("Alice", "#0072b2", report, steps, tree_svg=svg),
+        answers=(ReportedAnswer("hammer in the office", False, f"no hammer {whole}", 1.0, "office"),),
+        said=(Said(1.0, f"Dinner is ready {whole}"),),
+        seen=(ReportedObject(f"coke {whole}", "counter", "kitchen", (1.0, 2.0, 0.9), 3.0),),
+    )
+    path = tmp_path / "report.html"
+    path.write_text(render("run.html", page=page), encoding="utf-8")
+    return path
+
+
+def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, report_page: Path):
+    page.goto(report_page.as_uri())
+    page.locator("details.tree summary").click()
+    assert page.evaluate(OVERFLOWING) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]

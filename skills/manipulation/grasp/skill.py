@@ -60,6 +60,8 @@ _RELAX_M = 0.002
 """Distance by which fingers that touch the surface are raised before they close."""
 _RELAX_THIN_M = 0.0005
 """The same for an object that is thinner than `THIN_M`."""
+_SHORT_M = 0.025
+"""Distance from its grasp at which a hand that touches something has not met the surface below the object."""
 _FEEL_M = 0.014
 """Distance by which fingers go on downwards to feel the surface."""
 _FEEL_RAD_S = 0.12
@@ -346,6 +348,8 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         yield from self.follow(plan.to_grasp, f"reaching for the {name}")
         ahead = plan.candidate.X_BH.rotation().matrix()[:, 0]
         touched = yield from self.follow(plan.last_bit, f"reaching for the {name}", self.contact_guard(ahead))
+        if touched:
+            self._check_reached(plan.candidate.X_BH, name)
         relax_m = _RELAX_M if view.target.height_m > THIN_M else _RELAX_THIN_M
         yield from self._to_the_ground(ahead, touched, relax_m, f"reaching for the {name}")
         X_BH = self.model.X_BH(self.q_rad())
@@ -372,6 +376,18 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     def _grip_n(self, least_n: float, mass_kg: float) -> float:
         """Returns the force (N) of a grip of an object of a mass, as far as the gripper has it."""
         return min(least_n + _PER_KG_N * mass_kg, _MOST_OF_FORCE * self.gripper.max_force_n)
+
+    def _check_reached(self, X_BH: RigidTransform, name: str) -> None:
+        """Checks that a hand that touched something is at the grasp X_BH, about the object.
+
+        Fingers that end before an object's middle press it out as they close. Raises SkillFailure with cause EXECUTION.
+        """
+        hand = self.model.X_BH(self.q_rad())
+        short_m = float((X_BH.translation() - hand.translation()) @ X_BH.rotation().matrix()[:, 0])
+        if short_m > _SHORT_M:
+            raise SkillFailure(
+                Cause.EXECUTION, f"the hand touched something {100.0 * short_m:.0f} cm before it was about the {name}"
+            )
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, name: str) -> Routine[None]:
         """Sets down an object that is heavier than the arm may carry. Raises SkillFailure with cause PRECONDITION."""

@@ -1,6 +1,7 @@
 """Tests of failures of the grasp skill."""
 
 import numpy as np
+from pydrake.math import RigidTransform
 from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningError, Running, Succeeded
@@ -77,6 +78,30 @@ def test_an_object_that_the_arm_can_carry_is_not_set_down():
     skill.begin(SEEN)
     assert isinstance(skill.step(), Succeeded)
     assert robot.arm_commands == []
+
+
+class Touching(Grasp):
+    """Has touched something at some distance before its grasp."""
+
+    def __init__(self, context, short_m):
+        super().__init__(context)
+        self._short_m = short_m
+
+    def run(self, inputs):
+        hand = MODEL.X_BH(self.q_rad())
+        planned = RigidTransform(hand.rotation(), hand.translation() + self._short_m * hand.rotation().matrix()[:, 0])
+        self._check_reached(planned, str(inputs.observation.kind))
+        yield Running("closing")
+        return Succeeded("closed")
+
+
+def test_fingers_do_not_close_where_something_stopped_them_well_before_the_object():
+    why = "the hand touched something 6 cm before it was about the coke"
+    failed(Touching(context_of(ScriptedRobot()), 0.06), SEEN, Cause.EXECUTION, why)
+
+
+def test_fingers_close_where_they_touch_the_surface_a_little_early():
+    assert isinstance(outcome(Touching(context_of(ScriptedRobot()), 0.01), SEEN), Succeeded)
 
 
 def resumed(skill, inputs):

@@ -146,6 +146,28 @@ def test_neighbouring_columns_are_judged_alone():
     assert may_rest(xy, np.array([0.39, 0.02, 0.4, 0.06])).tolist() == [False, True, False, True]
 
 
+def columns(*pieces):
+    """Points of pieces of columns at (x, y), from a height to another, every centimetre."""
+    points = [(x, y, z) for x, y, low, high in pieces for z in np.arange(low, high, 0.01)]
+    return np.array(points)[:, :2], np.array(points)[:, 2]
+
+
+TANK = [(0.5, 0.3, 0.0, 0.35)]
+LEVER = [(0.5 - d, 0.3, 0.31, 0.34) for d in (0.04, 0.08, 0.12)]
+BOARD = [(0.5 - d, 0.3, 0.31, 0.34) for d in np.arange(0.04, 0.4, 0.04)]
+HIGHER = [(0.46, 0.3, 0.38, 0.39)]
+
+
+# What hangs beside a tank of 35 cm, and whether it belongs to what rests:
+# a lever of 12 cm: yes; a board of 36 cm: no; a lamp 3 cm above the tank: no.
+@pytest.mark.parametrize(("hanging", "rests"), [(LEVER, True), (BOARD, False), (HIGHER, False)])
+def test_a_small_part_that_sticks_out_of_an_object_rests_with_it(hanging, rests):
+    xy, height_m = columns(*TANK, *hanging)
+    found = may_rest(xy, height_m)
+    assert np.all(found[xy[:, 0] == 0.5])
+    assert np.all(found[xy[:, 0] != 0.5] == rests)
+
+
 RNG_SEED = 4
 
 

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 7682,
     "executive/speech": 1588,
     "executive/mission": 1596,
-    "executive/tree": 7671,
+    "executive/tree": 7710,
     "executive/run": 3083,
     "executive/record": 944,
     "executive/store": 1681,
@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7535,
     "executive/cli": 4125,
-    "skills": 27218,
+    "skills": 27267,
     "plant": 11869,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 463, 72, 8

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
@@ -100,6 +101,25 @@ class BesideBoard(FromBoard):
     def read(self, board: Board) -> Pose2D:
         """Returns the shifted pose. Raises KeyError when there is none yet."""
         return pose_beside(board.get(self.key), self.forward_m, self.left_m)
+
+
+@dataclass(frozen=True)
+class BeforePerson(FromBoard):
+    """Binding of a port to a pose that faces the person seen under a blackboard key, at a distance (m) on a side.
+
+    The side is that of the point `from_W`; someone who is nearer to it is met there.
+    """
+
+    gives: ClassVar[Any] = Pose2D
+    from_W: tuple[float, float]
+    apart_m: float
+
+    def read(self, board: Board) -> Pose2D:
+        """Returns the pose. Raises KeyError when nobody was seen yet."""
+        seen: ObjectObservation = board.get(self.key)
+        x_m, y_m = seen.position_W[0] - self.from_W[0], seen.position_W[1] - self.from_W[1]
+        on_m, yaw_rad = max(0.0, math.hypot(x_m, y_m) - self.apart_m), math.atan2(y_m, x_m)
+        return Pose2D(self.from_W[0] + on_m * math.cos(yaw_rad), self.from_W[1] + on_m * math.sin(yaw_rad), yaw_rad)
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from executive.mission.gripper import held_after, is_same
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.goals import clearing_goals, command_goal, surfaces_to_search
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_words, goal_pose
+from executive.tree.nodes.carry import carried_along_plan, carry_plan, go_to_goal_plan, goal_in_words
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
-from executive.tree.nodes.pick_up import go_near_plan, held_plan, known_held_plan, pick_up_plan
+from executive.tree.nodes.pick_up import held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
     find_plan,
     last_known_floor,
@@ -154,8 +154,8 @@ def go_plan(builder: PlanBuilder) -> NodeSpec:
     if command.goal is None:
         raise builder.error("the command asks for nothing", "name a place to go to, or an object")
     to = goal_in_words(builder, command.goal)
-    drive = go_near_plan(builder, goal_pose(builder, command.goal), to)
-    return builder.sequence(f"go to {to}", carried_along_plan(builder, drive, f"to {to}"))
+    drive = carried_along_plan(builder, go_to_goal_plan(builder, command.goal), f"to {to}")
+    return builder.sequence(f"go to {to}", drive)
 
 
 def wait_plan(builder: PlanBuilder) -> NodeSpec:
@@ -173,8 +173,8 @@ def wait_plan(builder: PlanBuilder) -> NodeSpec:
     pause = builder.pause("wait", f"wait {duration_s:g} s", duration_s)
     if command.goal is None:
         return builder.sequence("wait here", pause)
-    goal, to = goal_pose(builder, command.goal), goal_in_words(builder, command.goal)
-    drive = carried_along_plan(builder, go_near_plan(builder, goal, to), f"to {to}")
+    to = goal_in_words(builder, command.goal)
+    drive = carried_along_plan(builder, go_to_goal_plan(builder, command.goal), f"to {to}")
     return builder.sequence(f"wait at {to}", drive, pause)
 
 

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7535,
     "executive/cli": 4125,
-    "skills": 27267,
+    "skills": 27263,
     "plant": 11869,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 463, 72, 8

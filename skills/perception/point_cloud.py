@@ -1,10 +1,11 @@
-"""Depth images as point clouds, points as pixels, and clusters of points."""
+"""Depth images as point clouds, points as pixels, clusters of points, and points that rest on a surface."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final
 
 import cv2
 import numpy as np
@@ -15,6 +16,14 @@ from skills.robot import FloatArray, Image, Intrinsics
 
 MIN_DEPTH_M = 0.15
 MAX_DEPTH_M = 4.0
+_COLUMN_M = 0.04
+_UNDER_HANGING_M = 0.12
+_LOWEST_HIDDEN_M = 0.28
+_STUCK_OUT_GAP_M: Final = 0.02
+"""Difference of heights within which pieces of neighbouring columns touch."""
+_MOST_STUCK_OUT_M: Final = 0.16
+"""Length from which on what hangs over a surface is no part that sticks out of an object, but a board."""
+_COLUMN_STRIDES = np.array([1 << 20, 1])
 _GAP_PX = 11
 
 Mask = NDArray[np.bool_]
@@ -114,3 +123,49 @@ def cell_labels(cells: NDArray[np.int64], *, fewest: int = 1, reach: int = 0) ->
     joined = cv2.dilate(occupied, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) if reach else occupied
     count, grid = cv2.connectedComponents(joined, connectivity=8)
     return np.asarray(np.where(occupied > 0, grid, 0)[cells[:, 0], cells[:, 1]]), int(count)
+
+
+def may_rest(xy: FloatArray, height_m: FloatArray) -> Mask:
+    """Returns which points at (N, 2) and heights (N,) over a surface may belong to an object that rests on it.
+
+    Points above a gap do not: they hang over the surface, as the next board of a shelf does. A small part that sticks
+    out of what rests does, such as the lever of an extinguisher.
+    """
+    if len(xy) == 0:
+        return np.zeros(0, dtype=np.bool_)
+    cells = np.floor(xy / _COLUMN_M).astype(np.int64)
+    columns = cells @ _COLUMN_STRIDES
+    order = np.lexsort((height_m, columns))
+    column, height = columns[order], height_m[order]
+    first = np.ones(len(order), dtype=np.bool_)
+    first[1:] = column[1:] != column[:-1]
+    gap = np.where(first, height > _LOWEST_HIDDEN_M, np.diff(height, prepend=0.0) > _UNDER_HANGING_M)
+    gaps = np.cumsum(gap)
+    before = np.maximum.accumulate(np.where(first, gaps - gap, 0))
+    starts = np.flatnonzero(first | gap)
+    rests = _with_parts_that_stick_out(
+        cells[order][starts],
+        height[starts],
+        np.maximum.reduceat(height, starts),
+        (gaps == before)[starts],
+    )
+    found = np.empty(len(order), dtype=np.bool_)
+    found[order] = np.repeat(rests, np.diff(starts, append=len(order)))
+    return found
+
+
+def _with_parts_that_stick_out(cells: NDArray[np.int64], low_m: FloatArray, high_m: FloatArray, rests: Mask) -> Mask:
+    """Adds small groups of hanging pieces of columns (cells (M, 2), heights from low_m to high_m) that touch others."""
+    hanging, resting = np.flatnonzero(~rests), np.flatnonzero(rests)
+    if len(hanging) == 0:
+        return rests
+    beside = np.max(np.abs(cells[hanging, None] - cells[resting]), axis=2) <= 1
+    level = (low_m[hanging, None] < high_m[resting] + _STUCK_OUT_GAP_M) & (
+        low_m[resting] < high_m[hanging, None] + _STUCK_OUT_GAP_M
+    )
+    labels, _ = cell_labels(cells[hanging])
+    found = rests.copy()
+    for label in np.unique(labels[np.any(beside & level, axis=1)]):
+        group = hanging[labels == label]
+        found[group] = np.all(np.ptp(cells[group], axis=0) < _MOST_STUCK_OUT_M / _COLUMN_M)
+    return found

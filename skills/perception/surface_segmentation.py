@@ -29,10 +29,10 @@ from skills.perception.point_cloud import (
     Mask,
     PointCloud,
     camera_pose_W,
-    cell_labels,
     closed_mask,
     cloud_from_image,
     grid_labels,
+    may_rest,
 )
 from skills.robot import FloatArray, Image
 
@@ -54,14 +54,6 @@ _LEAST_PART = 0.15
 _APART_M = 0.035
 _MOSTLY_AMONG = 0.8
 """Share of a cluster's pixels from which on it counts as a part of a detected object."""
-_COLUMN_M = 0.04
-_UNDER_HANGING_M = 0.12
-_LOWEST_HIDDEN_M = 0.28
-_STUCK_OUT_GAP_M: Final = 0.02
-"""Difference of heights within which pieces of neighbouring columns touch."""
-_MOST_STUCK_OUT_M: Final = 0.16
-"""Length from which on what hangs over a surface is no part that sticks out of an object, but a board."""
-_COLUMN_STRIDES = np.array([1 << 20, 1])
 
 _OUTLINE_CELL_M: Final = 0.003
 _BORDER_CELLS: Final = 4
@@ -155,52 +147,6 @@ def _segment(
     groups = _split_on_grid(cloud.where(standing), height[standing], p_WC, pixel_rad)
     clusters = tuple(_cluster(points, surface.name, plane, p_WC) for points in groups)
     return SurfaceView(plane, cloud.where(np.abs(height) < max(_LOWEST_M, 3.0 * plane.noise_m)), clusters)
-
-
-def may_rest(xy: FloatArray, height_m: FloatArray) -> Mask:
-    """Returns which points at (N, 2) and heights (N,) over a surface may belong to an object that rests on it.
-
-    Points above a gap do not: they hang over the surface, as the next board of a shelf does. A small part that sticks
-    out of what rests does, such as the lever of an extinguisher.
-    """
-    if len(xy) == 0:
-        return np.zeros(0, dtype=np.bool_)
-    cells = np.floor(xy / _COLUMN_M).astype(np.int64)
-    columns = cells @ _COLUMN_STRIDES
-    order = np.lexsort((height_m, columns))
-    column, height = columns[order], height_m[order]
-    first = np.ones(len(order), dtype=np.bool_)
-    first[1:] = column[1:] != column[:-1]
-    gap = np.where(first, height > _LOWEST_HIDDEN_M, np.diff(height, prepend=0.0) > _UNDER_HANGING_M)
-    gaps = np.cumsum(gap)
-    before = np.maximum.accumulate(np.where(first, gaps - gap, 0))
-    starts = np.flatnonzero(first | gap)
-    rests = _with_parts_that_stick_out(
-        cells[order][starts],
-        height[starts],
-        np.maximum.reduceat(height, starts),
-        (gaps == before)[starts],
-    )
-    found = np.empty(len(order), dtype=np.bool_)
-    found[order] = np.repeat(rests, np.diff(starts, append=len(order)))
-    return found
-
-
-def _with_parts_that_stick_out(cells: NDArray[np.int64], low_m: FloatArray, high_m: FloatArray, rests: Mask) -> Mask:
-    """Adds small groups of hanging pieces of columns (cells (M, 2), heights from low_m to high_m) that touch others."""
-    hanging, resting = np.flatnonzero(~rests), np.flatnonzero(rests)
-    if len(hanging) == 0:
-        return rests
-    beside = np.max(np.abs(cells[hanging, None] - cells[resting]), axis=2) <= 1
-    level = (low_m[hanging, None] < high_m[resting] + _STUCK_OUT_GAP_M) & (
-        low_m[resting] < high_m[hanging, None] + _STUCK_OUT_GAP_M
-    )
-    labels, _ = cell_labels(cells[hanging])
-    found = rests.copy()
-    for label in np.unique(labels[np.any(beside & level, axis=1)]):
-        group = hanging[labels == label]
-        found[group] = np.all(np.ptp(cells[group], axis=0) < _MOST_STUCK_OUT_M / _COLUMN_M)
-    return found
 
 
 def _fit_plane(points_W: FloatArray, height_m: float) -> LevelPlane | None:

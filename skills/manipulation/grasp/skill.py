@@ -378,16 +378,11 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return min(least_n + _PER_KG_N * mass_kg, _MOST_OF_FORCE * self.gripper.max_force_n)
 
     def _check_reached(self, X_BH: RigidTransform, name: str) -> None:
-        """Checks that a hand that touched something is at the grasp X_BH, about the object.
-
-        Fingers that end before an object's middle press it out as they close. Raises SkillFailure with cause EXECUTION.
-        """
-        hand = self.model.X_BH(self.q_rad())
-        short_m = float((X_BH.translation() - hand.translation()) @ X_BH.rotation().matrix()[:, 0])
+        """Raises SkillFailure with cause EXECUTION for fingers that would press the object out: they end before it."""
+        short_m = float((self.model.X_BH(self.q_rad()).inverse() @ X_BH).translation()[0])
         if short_m > _SHORT_M:
-            raise SkillFailure(
-                Cause.EXECUTION, f"the hand touched something {100.0 * short_m:.0f} cm before it was about the {name}"
-            )
+            where = f"{100.0 * short_m:.0f} cm before it was about the {name}"
+            raise SkillFailure(Cause.EXECUTION, f"the hand touched something {where}")
 
     def _refuse_heavy(self, mass_kg: float, lift_B: FloatArray, name: str) -> Routine[None]:
         """Sets down an object that is heavier than the arm may carry. Raises SkillFailure with cause PRECONDITION."""

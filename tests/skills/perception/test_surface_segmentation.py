@@ -9,9 +9,9 @@ from table_scene import BLUE, CAMERA, COKE, GREEN, GREY, RED, TABLE, Can, scene,
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.perception.detection_3d import detections_3d
+from skills.perception.point_cloud import may_rest
 from skills.perception.surface_segmentation import (
     matching_cluster,
-    may_rest,
     segment_surface,
     split_detected,
     touching_parts,

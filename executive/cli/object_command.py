@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +11,7 @@ import typer
 
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
-from executive.cli.output import new_folder, print_json, writing
+from executive.cli.output import console_for, new_folder, print_json, writing
 from plant.models.catalogue import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
@@ -30,7 +30,7 @@ def _group() -> None:
 @object_group.command(name="import")
 def import_command(
     mesh: Annotated[
-        Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB or COLLADA.")
+        Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB, COLLADA or 3MF.")
     ],
     name: Annotated[str, typer.Option(help="Name of the model in worlds: letters, digits and _.")],
     mass: Annotated[float | None, quantity_option(Mass, help="Mass, kg; by default by its volume.")] = None,
@@ -41,7 +41,12 @@ def import_command(
             "--class", help="The class that the detector reports for it; by default the robot knows its model."
         ),
     ] = None,
-    scale: Annotated[float, quantity_option(Factor, help="Metres per unit of the file; 0.001 for millimetres.")] = 1.0,
+    scale: Annotated[
+        float,
+        quantity_option(
+            Factor, help="Metres per unit of the file; 0.001 for millimetres. COLLADA and 3MF name theirs."
+        ),
+    ] = 1.0,
     up: Annotated[
         str | None,
         typer.Option(
@@ -52,14 +57,17 @@ def import_command(
     as_json: AS_JSON = False,
 ) -> None:
     """Imports a mesh as a model: visual geometry, convex collision parts, and inertia from volume and mass."""
-    from plant.models.builder.importing import ImportOptions, import_object
+    from plant.models.builder.importing import ImportOptions, ImportReports, import_object
 
     wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
         wanted.check()
     out = Path(name) if out is None else out
-    with _refused(mesh), new_folder(out) as folder:
-        made = import_object(mesh, wanted, folder)
+    notes = list[str]()
+    with _refused(mesh), new_folder(out) as folder, _bar() as step:
+        made = import_object(mesh, wanted, folder, ImportReports(step, notes.append))
+    for note in notes:
+        typer.echo(f"errand: warning: {mesh}: {note}", err=True)
     if (doubt := _unlike_its_class(made)) is not None:
         typer.echo(f"errand: warning: {doubt}", err=True)
     if as_json:
@@ -114,6 +122,20 @@ def tag(
             write_plate(folder, number, size)
     carrier = f"on: {read_imported(on).class_name}" if on is not None else "at: [x, y, z], yaw: 0.0"
     typer.echo(f"{out}: for knowledge.yaml, under 'tags': {{id: {number}, size: {size:g}, {carrier}}}")
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[str], None]]:
+    """Shows a progress bar over the steps of an import, at a terminal."""
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    from plant.models.builder.importing import STEPS
+
+    console = console_for(as_json=True)
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(STEPS[0], total=len(STEPS))
+        yield lambda step: bar.update(task, description=step, completed=STEPS.index(step))
 
 
 @contextmanager

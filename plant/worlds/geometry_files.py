@@ -16,7 +16,7 @@ from typing import Any, Final
 from xml.parsers import expat
 
 from skills.files.errors import InputError
-from skills.files.outside import file_beside, plain_file, read_text
+from skills.files.outside import file_beside, is_there, plain_file, read_text
 from skills.files.yaml_source import read_yaml
 
 OURS: Final = Path(__file__).resolve().parent.parent
@@ -38,6 +38,8 @@ _PACKAGES: Final = (OWN_PACKAGE, "errand", "drake")
 _IN_PACKAGE: Final = re.compile(r"(?:package|model)://([^/]*)/?(.*)", re.DOTALL)
 _NAMING: Final = frozenset({"uri", "filename", "albedo_map", "normal_map", "diffuse_map"})
 """Elements whose text names a file."""
+_NAMING_IN_IMAGE: Final = frozenset({"init_from", "ref"})
+"""Elements of COLLADA whose text names a file if they stand in an image."""
 _ATTRIBUTES: Final = frozenset({"filename", "file"})
 _PICTURES: Final = frozenset({".png", ".jpg", ".jpeg", ".bmp"})
 _MAP: Final = re.compile(
@@ -55,9 +57,12 @@ def check_directives(file: Path, home: Path) -> None:
     _Walk(home.resolve()).directives(file, ())
 
 
-def check_model(file: Path, home: Path) -> None:
-    """Checks the file of a model and all files that it names, in the folder `home`; raises like `check_directives`."""
-    _Walk(home.resolve()).model(file, ())
+def check_model(file: Path, home: Path, lacking: list[str] | None = None) -> None:
+    """Checks the file of a model and all files that it names, in the folder `home`; raises like `check_directives`.
+
+    With a list `lacking`, names of missing files are added to it instead.
+    """
+    _Walk(home.resolve(), lacking).model(file, ())
 
 
 @dataclass
@@ -65,6 +70,7 @@ class _Walk:
     """Walk from file to file; each file is checked once, directives as often as they are named."""
 
     home: Path
+    lacking: list[str] | None = None
     done: set[Path] = field(default_factory=set)
     files: int = 0
 
@@ -103,6 +109,9 @@ class _Walk:
         def error(what: str, hint: str) -> InputError:
             return InputError(what, hint=hint, file=file, line=line)
 
+        if self.lacking is not None and not is_there(file.parent / str(name)):
+            self.lacking.append(str(name)[:100])
+            return
         try:
             found = self._found(file, str(name))
         except InputError as wrong:
@@ -151,8 +160,9 @@ def _is_ours(path: Path) -> bool:
 
 
 def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
-    """Lines and names of the files in an SDF, URDF or MJCF."""
-    text = read_text(file, most_bytes=MOST_MODEL_BYTES, hint=_BESIDE)
+    """Lines and names of the files in an SDF, URDF, MJCF or COLLADA file."""
+    most_bytes = MOST_MESH_BYTES if file.suffix.lower() == ".dae" else MOST_MODEL_BYTES
+    text = read_text(file, most_bytes=most_bytes, hint=_BESIDE)
     found, open_elements, letters = list[tuple[int, str]](), list[str](), list[str]()
     parser = expat.ParserCreate()
 
@@ -168,7 +178,9 @@ def _named_in_xml(file: Path) -> Iterator[tuple[int, str]]:
 
     def end(name: str) -> None:
         open_elements.pop()
-        if name.rpartition(":")[2] in _NAMING and (text := "".join(letters).strip()):
+        plain = name.rpartition(":")[2]
+        naming = plain in _NAMING or (plain in _NAMING_IN_IMAGE and "image" in open_elements)
+        if naming and (text := "".join(letters).strip()):
             found.append((parser.CurrentLineNumber, text))
         letters.clear()
 
@@ -212,6 +224,7 @@ _NAMED: Final[Mapping[str, Callable[[Path], Iterator[tuple[int | None, str]]]]] 
         ".sdf": _named_in_xml,
         ".urdf": _named_in_xml,
         ".xml": _named_in_xml,
+        ".dae": _named_in_xml,
         ".obj": _named_in_obj,
         ".mtl": _named_in_mtl,
         ".gltf": _named_in_gltf,

@@ -31,7 +31,7 @@ from executive.tree.compiler import compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import load_knowledge
 from plant.models.builder.importing import ObjectImportError
-from plant.models.builder.importing.mesh_files import read_patches
+from plant.models.builder.importing.mesh_files import read_mesh
 from plant.models.builder.importing.solid import solid_of
 from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
@@ -123,11 +123,10 @@ def scenarios() -> Callable[[Path], None]:
     return read
 
 
-def read_mesh(path: Path) -> None:
+def read_body(path: Path) -> None:
     """Read a mesh file as far as its solid. Raises InputError, which names the file."""
     try:
-        patches, _ = read_patches(path)
-        solid_of(np.concatenate([patch.triangles for patch in patches]))
+        solid_of(np.concatenate([patch.triangles for patch in read_mesh(path).patches]))
     except ObjectImportError as error:
         raise InputError(error.message, hint=error.hint, file=path) from error
 
@@ -190,8 +189,8 @@ def kinds(folder: Path) -> dict[str, Kind]:
             lambda path: load_skill_tests(path, skills),
         ),
         "object": Kind({"o": IMPORTED.encode()}, "object.yaml", lambda path: read_imported(path.parent)),
-        "obj": Kind({"m": MESH.encode()}, "m.obj", read_mesh, raw=True),
-        "dae": Kind({"m": COLLADA.encode()}, "m.dae", read_mesh, raw=True),
+        "obj": Kind({"m": MESH.encode()}, "m.obj", read_body, raw=True),
+        "dae": Kind({"m": COLLADA.encode()}, "m.dae", read_body, raw=True),
     }
 
 

@@ -103,21 +103,21 @@ def test_bad_input_is_refused_in_one_line_with_status_2(mesh, tmp_path, argument
         (
             "notes.txt",
             "hello",
-            "'.txt' is the ending of no mesh format; give one of dae, glb, gltf, obj",
+            "files *.txt are not read; export it as one of obj, stl, ply",
         ),
-        ("notes", "hello", "it has no ending"),
+        ("notes", "hello", "its name has no ending"),
         ("notes.stl", "hello", "notes.stl: it is no mesh: there are no triangles in it"),
         ("notes.obj", "hello", "notes.obj: it is no mesh: there are no triangles in it"),
-        ("notes.glb", "hello", "notes.glb: it cannot be read as a mesh"),
-        ("plane.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "plane.obj: it cannot be read as a mesh"),
+        ("notes.glb", "hello", "notes.glb: it is damaged"),
+        ("plane.obj", "v 0 0\nv 1 0\nv 0 1\nf 1 2 3\n", "plane.obj: it is damaged"),
         (
             "parts.gltf",
             '{"asset": {"version": "2.0"}, "buffers": [{"uri": "no.bin", "byteLength": 1}], "scenes": [{}]}',
-            "parts.gltf: no.bin: there is no such file; put it beside the file that names it",
+            "parts.gltf: no.bin, which it names, is missing; put it beside the mesh",
         ),
-        ("empty.obj", "", "empty.obj: it is no mesh: there are no triangles in it"),
-        ("empty.ply", "", "empty.ply: it cannot be read as a mesh"),
-        ("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "sheet.obj: it is open (not watertight), at 3 edges"),
+        ("empty.obj", "", "empty.obj: it is empty"),
+        ("empty.ply", "", "empty.ply: it is empty"),
+        ("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "sheet.obj: it encloses no volume"),
         ("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n", "flat.obj: it encloses no volume"),
     ],
 )
@@ -129,6 +129,14 @@ def test_a_file_that_is_no_mesh_is_refused(tmp_path, name, text, why):
     (line,) = result.stderr.splitlines()
     assert why in line
     assert not (tmp_path / "made").exists()
+
+
+def test_a_missing_picture_is_warned_of(tmp_path):
+    box = trimesh.creation.box((0.1, 0.08, 0.06)).export(file_type="obj", include_color=False)
+    (tmp_path / "grey.obj").write_text(f"mtllib none.mtl\n{box}")
+    result = made(tmp_path / "grey.obj", tmp_path / "made")
+    assert result.exit_code == 0, result.output
+    assert "grey.obj: none.mtl, which it names, is missing, so it is grey there" in result.stderr
 
 
 def test_an_open_mesh_offers_to_be_closed_and_is(tmp_path):

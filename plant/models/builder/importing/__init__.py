@@ -1,6 +1,13 @@
 """Import of mesh files as models: `import_object` writes a folder that worlds and missions name under `imports`."""
 
-from plant.models.builder.importing.import_object import ImportOptions, import_object
+from plant.models.builder.importing.import_object import STEPS, ImportOptions, ImportReports, import_object
 from plant.models.catalogue import ObjectImportError, ObjectsExtraMissingError
 
-__all__ = ["ImportOptions", "ObjectImportError", "ObjectsExtraMissingError", "import_object"]
+__all__ = [
+    "STEPS",
+    "ImportOptions",
+    "ImportReports",
+    "ObjectImportError",
+    "ObjectsExtraMissingError",
+    "import_object",
+]

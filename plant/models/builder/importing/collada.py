@@ -1,4 +1,4 @@
-"""Reads COLLADA files (.dae): triangles with colours, in metres by the unit of the file."""
+"""Reads COLLADA files (.dae): triangles with colours and pictures, in metres by the unit of the file."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
+from urllib.parse import unquote
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.typing import NDArray
 
 from plant.models.builder.mesh import Colour
 from plant.models.catalogue import ObjectImportError
@@ -21,34 +23,48 @@ MOST_NODES: Final = 10_000
 MOST_DEPTH: Final = 50
 _UP: Final = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
 _AGAIN: Final = "export it once more, for example as GLB"
+_LINKS: Final = frozenset({"source", "init_from", "instance_image"})
+_FILES: Final = frozenset({"init_from", "ref"})
+MOST_LINKS: Final = 4
 _SEVERAL: Final = ("triangles", "polylist", "polygons")
 
 
 @dataclass(frozen=True)
-class Collada:
-    """Triangles (T, 3, 3) in metres with their colours (None: without a colour), and the axis that is up."""
+class Surface:
+    """Appearance of triangles: a colour or the file of a picture, None without one."""
 
-    parts: tuple[tuple[FloatArray, Colour | None], ...]
+    colour: Colour | None = None
+    picture: str | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """Triangles (T, 3, 3) in metres with texture coordinates (T, 3, 2) and their colour or picture."""
+
+    triangles: FloatArray
+    uvs: FloatArray
+    colour: Colour | None = None
+    picture: str | None = None
+
+
+@dataclass(frozen=True)
+class Collada:
+    """Parts of a file, and the axis that is up."""
+
+    parts: tuple[Part, ...]
     up: str
 
 
 def read_collada(path: Path) -> Collada:
-    """Reads a COLLADA file.
+    """Reads a COLLADA file whose XML is checked already.
 
     Raises:
         ObjectImportError: the file is no COLLADA, or damaged.
         InputError: the file cannot be read.
     """
-    text = read_text(path, most_bytes=MOST_BYTES)
-    if not text.strip():
-        raise ObjectImportError("it is empty", "export it once more")
-    if "<!DOCTYPE" in text:
-        raise ObjectImportError("it declares document types", "remove <!DOCTYPE ...>")
     try:
-        return _Document(ElementTree.fromstring(text)).read()
-    except ElementTree.ParseError as error:
-        raise ObjectImportError(f"broken XML in line {error.position[0]}", _AGAIN) from error
-    except (ValueError, IndexError, KeyError, RecursionError, OverflowError) as error:
+        return _Document(ElementTree.fromstring(read_text(path, most_bytes=MOST_BYTES))).read()
+    except (ValueError, IndexError, KeyError, RecursionError, OverflowError, ElementTree.ParseError) as error:
         raise ObjectImportError(f"it is damaged ({type(error).__name__})", _AGAIN) from error
 
 
@@ -109,7 +125,7 @@ class _Document:
     def _found(self, url: str) -> Element:
         return self.by_id[url.removeprefix("#")]
 
-    def _node(self, node: Element, X: FloatArray, depth: int) -> Iterator[tuple[FloatArray, Colour | None]]:
+    def _node(self, node: Element, X: FloatArray, depth: int) -> Iterator[Part]:
         """Triangles of a node and the nodes below it, transformed by X."""
         self.nodes += 1
         if self.nodes > MOST_NODES or depth > MOST_DEPTH:
@@ -120,67 +136,90 @@ class _Document:
             X = X @ _transform(child)
         for child in node:
             if _name(child) == "instance_geometry":
-                colours = dict(self._colours(child))
-                for triangles, symbol in self._geometry(self._found(child.get("url", ""))):
-                    moved = triangles @ X[:3, :3].T + X[:3, 3]
-                    turned = np.linalg.det(X[:3, :3]) < 0.0
-                    yield (moved[:, ::-1] if turned else moved), colours.get(symbol)
+                surfaces = dict(self._surfaces(child))
+                step = -1 if np.linalg.det(X[:3, :3]) < 0.0 else 1
+                for triangles, uvs, symbol in self._geometry(self._found(child.get("url", ""))):
+                    moved, surface = triangles @ X[:3, :3].T + X[:3, 3], surfaces.get(symbol, Surface())
+                    yield Part(moved[:, ::step], uvs[:, ::step], surface.colour, surface.picture)
             elif _name(child) == "instance_node":
                 yield from self._node(self._found(child.get("url", "")), X, depth + 1)
             elif _name(child) == "node":
                 yield from self._node(child, X, depth + 1)
 
-    def _geometry(self, geometry: Element) -> Iterator[tuple[FloatArray, str]]:
-        """Triangles (T, 3, 3) of a geometry, with the name of their material."""
+    def _geometry(self, geometry: Element) -> Iterator[tuple[FloatArray, FloatArray, str]]:
+        """Triangles (T, 3, 3) of a geometry, their texture coordinates, and the name of their material."""
         for mesh in _children(geometry, "mesh"):
             for group in _children(mesh, *_SEVERAL):
-                faces = _corners(group)
-                if len(faces):
-                    yield self._positions(group)[faces], group.get("material", "")
+                corners, places = _corners(group)
+                if len(corners):
+                    vertices = self._found(_input(group, "VERTEX").get("source", ""))
+                    points = self._values(_input(vertices, "POSITION"), 3)[corners[..., places["VERTEX"]]]
+                    uvs = np.zeros((len(corners), 3, 2))
+                    if "TEXCOORD" in places:
+                        uvs = self._values(_input(group, "TEXCOORD"), 2)[corners[..., places["TEXCOORD"]]]
+                    yield points, uvs, group.get("material", "")
 
-    def _positions(self, group: Element) -> FloatArray:
-        """Points (N, 3) that a group of triangles indexes."""
-        vertices = self._found(_input(group, "VERTEX").get("source", ""))
-        source = self._found(_input(vertices, "POSITION").get("source", ""))
+    def _values(self, named: Element, width: int) -> FloatArray:
+        """Rows (N, width) of the source that an input names."""
+        source = self._found(named.get("source", ""))
         accessor = next((each for each in source.iter() if _name(each) == "accessor"), None)
-        stride = 3 if accessor is None else int(accessor.get("stride", "3"))
-        return _numbers(_child(source, "float_array")).reshape(-1, stride)[:, :3]
+        stride = width if accessor is None else int(accessor.get("stride", str(width)))
+        return _numbers(_child(source, "float_array")).reshape(-1, stride)[:, :width]
 
-    def _colours(self, instance: Element) -> Iterator[tuple[str, Colour]]:
-        """Diffuse colours of the materials that an instance binds, by their names there."""
+    def _surfaces(self, instance: Element) -> Iterator[tuple[str, Surface]]:
+        """Diffuse surfaces of the materials that an instance binds, by their names there."""
         for bound in (each for each in instance.iter() if _name(each) == "instance_material"):
             material = self.by_id.get(bound.get("target", "").removeprefix("#"))
             effect = None if material is None else next(_children(material, "instance_effect"), None)
             found = None if effect is None else self.by_id.get(effect.get("url", "").removeprefix("#"))
             diffuse = None if found is None else next((each for each in found.iter() if _name(each) == "diffuse"), None)
-            colour = None if diffuse is None else next(_children(diffuse, "color"), None)
-            if colour is not None:
-                r, g, b = np.clip(_numbers(colour)[:3], 0.0, 1.0)
-                yield bound.get("symbol", ""), (float(r), float(g), float(b))
+            if found is not None and diffuse is not None:
+                yield bound.get("symbol", ""), self._surface(found, diffuse)
+
+    def _surface(self, effect: Element, diffuse: Element) -> Surface:
+        texture, colour = next(_children(diffuse, "texture"), None), next(_children(diffuse, "color"), None)
+        if texture is not None:
+            return Surface(picture=self._picture(effect, texture.get("texture", "")))
+        if colour is None:
+            return Surface()
+        r, g, b = np.clip(_numbers(colour)[:3], 0.0, 1.0)
+        return Surface((float(r), float(g), float(b)))
+
+    def _picture(self, effect: Element, name: str) -> str | None:
+        """File of the picture that a texture names: by a sampler, its surface and the image, or by the image."""
+        parameters = {each.get("sid", ""): each for each in effect.iter() if _name(each) == "newparam"}
+        for _ in range(MOST_LINKS):
+            if name not in parameters:
+                break
+            linked = (each for each in parameters[name].iter() if _name(each) in _LINKS)
+            name = next(((each.get("url") or each.text or "").strip().removeprefix("#") for each in linked), "")
+        image = self.by_id.get(name)
+        texts = () if image is None else ((each.text or "").strip() for each in image.iter() if _name(each) in _FILES)
+        return next((unquote(text).removeprefix("file://") for text in texts if text), None)
 
 
-def _corners(group: Element) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
-    """Indices (T, 3) of the corners of a group's triangles; polygons become fans."""
+def _corners(group: Element) -> tuple[NDArray[np.int64], dict[str, int]]:
+    """Indices (T, 3, inputs) of the corners of a group's triangles, and the column of each input; polygons are fans."""
     inputs = list(_children(group, "input"))
+    places = {each.get("semantic", ""): int(each.get("offset", "0")) for each in reversed(inputs)}
     stride = 1 + max(int(each.get("offset", "0")) for each in inputs)
-    offset = int(_input(group, "VERTEX").get("offset", "0"))
     counts = next(_children(group, "vcount"), None)
-    indices = [_numbers(each).astype(np.int64).reshape(-1, stride)[:, offset] for each in _children(group, "p")]
+    indices = [_numbers(each).astype(np.int64).reshape(-1, stride) for each in _children(group, "p")]
     if _name(group) == "polygons":
         sizes = [len(each) for each in indices]
     elif counts is not None:
         sizes = [int(size) for size in _numbers(counts)]
     else:
         sizes = [3] * (sum(map(len, indices)) // 3)
-    every, starts = np.concatenate([*indices, np.empty(0, np.int64)]), np.cumsum([0, *sizes])
+    every, starts = np.concatenate([*indices, np.empty((0, stride), np.int64)]), np.cumsum([0, *sizes])
     if starts[-1] != len(every) or any(size < 3 for size in sizes):
         raise ValueError("corners are missing")
     fans = [
-        (every[start], every[start + step], every[start + step + 1])
+        (start, start + step, start + step + 1)
         for start, size in zip(starts, sizes, strict=False)
         for step in range(1, size - 1)
     ]
-    return np.array(fans, dtype=np.int64).reshape(-1, 3)
+    return every[np.array(fans, dtype=np.int64).reshape(-1, 3)], places
 
 
 def _transform(element: Element) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.models.builder.importing.mesh_files import Patch, read_patches
+from plant.models.builder.importing.mesh_files import MeshContent, Patch, read_mesh
 from plant.models.builder.importing.recognition import recognition_model
 from plant.models.builder.importing.resting_pose import feet, resting_rotation
 from plant.models.builder.importing.solid import Solid, convex_parts, hull_of, solid_of, unique_points
@@ -100,7 +100,27 @@ class _Body:
         return _Body(patches, Solid(self.solid.points @ R.T + p, self.solid.faces))
 
 
-def import_object(mesh: Path, options: ImportOptions, folder: Path) -> ImportedObject:
+def _ignore(text: str) -> None:
+    """Ignores a text."""
+
+
+STEPS: Final = ("reading the mesh", "closing its surface", "fitting convex parts", "writing the model")
+
+
+@dataclass(frozen=True)
+class ImportReports:
+    """Receivers of the `STEPS` of an import, as each begins, and of remarks on the file."""
+
+    step: Callable[[str], None] = _ignore
+    note: Callable[[str], None] = _ignore
+
+
+_NO_REPORTS: Final = ImportReports()
+
+
+def import_object(
+    mesh: Path, options: ImportOptions, folder: Path, reports: ImportReports = _NO_REPORTS
+) -> ImportedObject:
     """Writes the model of a mesh file into an existing folder: SDF, OBJ, pictures, and its facts.
 
     The object keeps its bottom side if it can rest on it; else it lies on the side with the lowest centre of mass.
@@ -111,11 +131,19 @@ def import_object(mesh: Path, options: ImportOptions, folder: Path) -> ImportedO
         OSError: the folder cannot be written.
     """
     options.check()
-    body = _at_rest(_placed(mesh, options))
+    reading, closing, fitting, writing = STEPS
+    reports.step(reading)
+    content = read_mesh(mesh)
+    for note in content.notes:
+        reports.note(note)
+    reports.step(closing)
+    body = _at_rest(_placed(content, options))
     mass_kg = body.solid.volume_m3 * USUAL_KG_M3 if options.mass_kg is None else options.mass_kg
     mass = scale_mass(_mass(body.solid), mass_kg)
     _refuse_impossible(mass)
+    reports.step(fitting)
     parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
+    reports.step(writing)
     bearing = feet(body.solid.points, mass.com)
     files = [f"{options.name}_part_{number}.obj" for number in range(len(parts))]
     for file, part in zip(files, parts, strict=True):
@@ -136,10 +164,10 @@ def import_object(mesh: Path, options: ImportOptions, folder: Path) -> ImportedO
     return made
 
 
-def _placed(mesh: Path, options: ImportOptions) -> _Body:
-    """Reads the mesh in metres, z up. Raises ObjectImportError."""
-    read, own_up = read_patches(mesh)
-    patches = tuple(patch.transform(options.scale * _UP[options.up or own_up], np.zeros(3)) for patch in read)
+def _placed(content: MeshContent, options: ImportOptions) -> _Body:
+    """The mesh in metres, z up, as a body. Raises ObjectImportError."""
+    R = options.scale * _UP[options.up or content.up]
+    patches = tuple(patch.transform(R, np.zeros(3)) for patch in content.patches)
     triangles = np.concatenate([patch.triangles for patch in patches])
     _refuse_size(np.ptp(triangles.reshape(-1, 3), axis=0), options.scale)
     solid, turned = solid_of(triangles, close_holes=options.close_holes)

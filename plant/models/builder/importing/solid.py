@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from plant.models.catalogue import ObjectImportError, objects_module
 from skills.robot import FloatArray
@@ -19,40 +22,114 @@ MOST_PIECES: Final = 1_000
 Faces = NDArray[np.int64]
 
 
-def connected_pieces(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.bool_]] | None:
-    """Connected piece of each triangle (T,), and the mask of triangles to flip so that neighbours agree.
+@dataclass(frozen=True)
+class _Patches:
+    """Patches of triangles (T,): joined over edges of two triangles each, and turned so that neighbours agree."""
 
-    None when three triangles meet at an edge, the surface has only one side, or there are too many pieces.
-    """
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, index, count = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
-    if len(count) == 0 or count.max() > 2:
-        return None
-    order = np.argsort(index.reshape(-1), kind="stable")
-    order = order[count[index.reshape(-1)[order]] == 2]
-    first, second = order[::2], order[1::2]
-    agrees = (edges[first] == edges[second][:, ::-1]).all(axis=1)
-    around: list[list[tuple[int, bool]]] = [[] for _ in faces]
+    number: NDArray[np.int64]
+    turned: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, faces: Faces) -> _Patches:
+        """Finds the patches. Raises ObjectImportError when one has only one side."""
+        first, second, edges = _neighbours(faces)
+        alike = (edges[first] != edges[second]).all(axis=1)
+        count = len(faces)
+        one, other = first % count, second % count
+        # each triangle stands twice, as it is and turned; what is joined must be wound alike
+        ends = np.where(alike, other, other + count), np.where(alike, other + count, other)
+        label = _components(np.concatenate([one, one + count]), np.concatenate(ends), 2 * count)
+        as_it_is, turned = label[:count], label[count:]
+        if (as_it_is == turned).any():
+            hint = "calculate its normals again in the program that made it"
+            raise ObjectImportError("its surface has one side only, like a Moebius strip", hint)
+        number = np.unique(np.minimum(as_it_is, turned), return_inverse=True)[1].reshape(-1)
+        return cls(number, as_it_is > turned)
+
+
+def _neighbours(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64], Faces]:
+    """Indices of the two edges where exactly two triangles meet, and all edges (3 T, 2), by corner after corner."""
+    index, count = _equal_edges(faces)
+    order = np.argsort(index, kind="stable")
+    order = order[count[index[order]] == 2]
+    return order[::2], order[1::2], _edges(faces)
+
+
+def _equal_edges(faces: Faces) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Number of each edge (3 T,), equal for both directions, and how many triangles have the edge of a number."""
+    low, high = np.sort(_edges(faces), axis=1).T
+    _, index, count = np.unique(low * (faces.max() + 1) + high, return_inverse=True, return_counts=True)
+    return index.reshape(-1), count
+
+
+def _components(rows: NDArray[np.int64], columns: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """Component of each of `count` nodes that pairs of nodes join."""
+    joined = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(count, count))
+    return np.asarray(connected_components(joined, directed=False)[1], dtype=np.int64)
+
+
+def _pieces(faces: Faces) -> NDArray[np.int64]:
+    """Connected piece of each triangle (T,), joined over all edges."""
+    index, count = _equal_edges(faces)
     triangle = np.tile(np.arange(len(faces)), 3)
-    for one, other, same in zip(triangle[first].tolist(), triangle[second].tolist(), agrees.tolist(), strict=True):
-        around[one].append((other, same))
-        around[other].append((one, same))
-    piece, turned = np.full(len(faces), -1), np.zeros(len(faces), dtype=np.bool_)
-    number = 0
-    for start in range(len(faces)):
-        if piece[start] >= 0:
-            continue
-        piece[start], waiting = number, [start]
-        number += 1
-        while waiting:
-            here = waiting.pop()
-            for there, same in around[here]:
-                if piece[there] < 0:
-                    piece[there], turned[there] = piece[start], turned[here] == same
-                    waiting.append(there)
-                elif (turned[there] == turned[here]) != same:
-                    return None
-    return None if number > MOST_PIECES else (piece, turned)
+    return _components(triangle, len(faces) + index, len(faces) + len(count))[: len(faces)]
+
+
+def _bounding(points: FloatArray, faces: Faces) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Masks (T,) of triangles to flip so that neighbours agree, and of triangles that bound the body.
+
+    Where more than two triangles meet at an edge, rays from both sides of each patch tell the side that is inside. A
+    patch between two parts of the body, or outside, bounds nothing.
+    """
+    patches = _Patches.of(faces)
+    turned, bounding = patches.turned.copy(), np.ones(len(faces), dtype=np.bool_)
+    index, count = _equal_edges(faces)
+    meeting = (count[index] > 2).reshape(3, -1).any(axis=0)
+    if not meeting.any():
+        return turned, bounding
+    numbers = np.unique(patches.number[meeting])
+    if len(numbers) * len(faces) > _MOST_RAY_TESTS:
+        hint = "unite its bodies to one in the program that made it"
+        raise ObjectImportError(
+            f"its surface is too tangled: at {int((count > 2).sum())} edges many triangles meet", hint
+        )
+    piece, corners = _pieces(faces), points[_turned(faces, turned)]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.linalg.norm(across, axis=1)
+    for number in numbers.tolist():
+        own = np.flatnonzero(patches.number == number)
+        start = own[np.argmax(areas[own])]
+        others = corners[(piece == piece[start]) & (np.arange(len(faces)) != start)]
+        before, behind = (
+            _is_enclosed(corners[start].mean(axis=0), side * across[start] / areas[start], others) for side in (1, -1)
+        )
+        bounding[own] = before != behind
+        turned[own] ^= before and not behind
+    return turned, bounding
+
+
+_RAYS: Final = np.array(
+    [(0.0, 0.0, 0.0), (0.31, 0.17, -0.11), (-0.23, 0.29, 0.19), (0.13, -0.37, 0.07), (0.05, 0.11, 0.41)]
+)
+"""Deviations of rays from a normal."""
+
+
+def _is_enclosed(origin: FloatArray, normal: FloatArray, triangles: FloatArray) -> bool:
+    """Returns whether most rays into the half space of a normal cross triangles (T, 3, 3) an odd number of times."""
+    votes = [_crossings(origin, normal + deviation, triangles) % 2 for deviation in _RAYS]
+    return sum(votes) > len(votes) / 2
+
+
+def _crossings(origin: FloatArray, ray: FloatArray, triangles: FloatArray) -> int:
+    """Number of triangles that a ray crosses, by the method of Moeller and Trumbore."""
+    a, along, aside = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    over = np.cross(ray, aside)
+    size = np.einsum("ij,ij->i", along, over)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = np.einsum("ij,ij->i", origin - a, over) / size
+        under = np.cross(origin - a, along)
+        v, distance = under @ ray / size, np.einsum("ij,ij->i", aside, under) / size
+        return int(np.sum((u >= 0.0) & (v >= 0.0) & (u + v <= 1.0) & (distance > 0.0)))
 
 
 def outward_flips(points: FloatArray, faces: Faces, piece: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -92,6 +169,9 @@ AS_GOOD_AS_CONVEX: Final = 0.97
 _EFFORT: Final = MappingProxyType({"mcts_iterations": 60, "mcts_nodes": 10, "resolution": 1000})
 """Half of CoACD's default search, which takes a quarter of the time and finds equally good parts."""
 _SAME_POINT: Final = 1e-6
+_SEAMS: Final = (1e-5, 1e-4)
+"""Gaps that are closed in an open mesh, as shares of its size: single precision leaves them."""
+_MOST_RAY_TESTS: Final = 50_000_000
 _LEAST_VOLUME: Final = 1e-6
 
 
@@ -116,36 +196,111 @@ class Solid:
 def solid_of(triangles: FloatArray, *, close_holes: bool = False) -> tuple[Solid, NDArray[np.bool_]]:
     """Solid that triangles (T, 3, 3) enclose, and the mask (T,) of the triangles that are flipped to face outward.
 
-    In a closed surface every edge of a triangle has a partner in the opposite direction. With `close_holes`, a fan
-    about its centre closes each ring of edges without partners.
+    Joins points that lie close together, leaves doubled triangles out and triangles inside of the body, and turns
+    those that face inward. With `close_holes`, a fan about its centre closes each ring of edges without partners.
 
     Raises:
-        ObjectImportError: the surface is open, its triangles cannot be wound alike, or it is flat.
+        ObjectImportError: the surface is open, has one side only, meets itself, or is flat.
     """
-    points, faces, kept = _welded(triangles)
-    alike = connected_pieces(faces)
-    turned = np.zeros(len(faces), dtype=np.bool_) if alike is None else alike[1]
-    faces = _turned(faces, turned)
-    rims = _unpaired(faces)
-    if len(np.unique(rims, axis=0)) < len(rims):
-        hint = "let its normals be calculated again in the program that made it"
-        raise ObjectImportError("its triangles do not all look outward", hint)
-    if len(rims) and not close_holes:
+    _refuse_flat(triangles)
+    surface = _least_open(triangles)
+    if len(surface.rims) and not close_holes:
         hint = "close it in the program that made it, or add --close-holes"
-        raise ObjectImportError(f"it is open (not watertight), at {len(rims)} edges", hint)
-    points, faces = _closed(points, faces, rims)
-    closed = connected_pieces(faces)
-    if closed is not None:
-        inward = outward_flips(points, faces, closed[0])
-    else:
-        inward = np.full(len(faces), _volume(np.asarray(points[faces])) < 0.0)
+        raise ObjectImportError(f"it is open (not watertight), at {len(surface.rims)} edges", hint)
+    points, faces = _closed(surface.points, surface.faces, surface.rims)
+    inward = _inward(points, faces)
     solid = Solid(points, _turned(faces, inward))
-    box = float(np.prod(np.ptp(points, axis=0)))
-    if abs(solid.volume_m3) <= _LEAST_VOLUME * box or box == 0.0:
-        raise ObjectImportError("it encloses no volume", "give a body with a thickness instead of a sheet")
-    changed = np.zeros(len(triangles), dtype=np.bool_)
-    changed[kept] = turned ^ inward[: len(turned)]
-    return solid, changed
+    if abs(solid.volume_m3) <= _LEAST_VOLUME * float(np.prod(np.ptp(points, axis=0))):
+        raise ObjectImportError(*_FLAT)
+    outward = _normals(solid.triangles[: len(surface.faces)])[surface.origin]
+    return solid, (surface.origin >= 0) & (np.einsum("ij,ij->i", _normals(triangles), outward) < 0.0)
+
+
+_FLAT: Final = ("it encloses no volume", "give a body with a thickness instead of a sheet")
+
+
+def _refuse_flat(triangles: FloatArray) -> None:
+    """Refuses triangles in one plane. Raises ObjectImportError."""
+    points = triangles.reshape(-1, 3) - triangles.reshape(-1, 3).mean(axis=0)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(points.T @ points), 0.0))
+    if spread[0] <= _LEAST_VOLUME * spread[2]:
+        raise ObjectImportError(*_FLAT)
+
+
+def _least_open(triangles: FloatArray) -> _Surface:
+    """Surface of triangles (T, 3, 3): closed over small gaps, if that closes all of it."""
+    exact = _surface(triangles, _SAME_POINT)
+    for gap in _SEAMS if len(exact.rims) else ():
+        with suppress(ObjectImportError):
+            if not len((joined := _surface(triangles, gap)).rims):
+                return joined
+    return exact
+
+
+@dataclass(frozen=True)
+class _Surface:
+    """A surface whose triangles agree: points, indices, edges (E, 2) without a partner, and its own triangles.
+
+    `origin` is the index of the triangle that stands for each of the given ones (T,), -1 for none.
+    """
+
+    points: FloatArray
+    faces: Faces
+    rims: Faces
+    origin: NDArray[np.int64]
+
+
+def _surface(triangles: FloatArray, gap: float) -> _Surface:
+    """Surface of triangles (T, 3, 3), whose points are joined over gaps that are a share of its size.
+
+    Raises ObjectImportError when triangles meet at an edge in a way that bounds no body.
+    """
+    points, corners = _joined(triangles, gap)
+    apart = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
+    _, first, index = np.unique(np.sort(corners[apart], axis=1), axis=0, return_index=True, return_inverse=True)
+    faces = corners[apart][first]
+    if len(faces) == 0:
+        raise ObjectImportError(*_FLAT)
+    turned, bounding = _bounding(points, faces)
+    if not bounding.any():
+        raise ObjectImportError(*_FLAT)
+    kept = np.where(bounding, np.cumsum(bounding) - 1, -1)
+    origin = np.full(len(triangles), -1)
+    origin[apart] = kept[index.reshape(-1)]
+    used, faces = np.unique(_turned(faces, turned)[bounding], return_inverse=True)
+    points, faces = points[used], faces.reshape(-1, 3)
+    rims = _unpaired(faces)
+    edges, times = np.unique(rims, axis=0, return_counts=True)
+    if (times > 1).any():
+        x, y, z = points[edges[np.argmax(times)]].mean(axis=0)
+        what = f"its triangles face apart at {int((times > 1).sum())} edges, as at ({x:.3g}, {y:.3g}, {z:.3g}) m"
+        hint = "unite its bodies to one, or calculate its normals again, in the program that made it"
+        raise ObjectImportError(what, hint)
+    return _Surface(points, faces, rims, origin)
+
+
+def _joined(triangles: FloatArray, gap: float) -> tuple[FloatArray, Faces]:
+    """Points (N, 3) and indices of the triangles (T, 3); points with a gap below a share of the size are one."""
+    points, faces = unique_points(triangles)
+    if gap <= _SAME_POINT:
+        return points, faces
+    pairs = cKDTree(points).query_pairs(gap * float(np.ptp(points, axis=0).max()), output_type="ndarray")
+    label = _components(pairs[:, 0], pairs[:, 1], len(points))
+    _, first = np.unique(label, return_index=True)
+    return points[first], label[faces]
+
+
+def _inward(points: FloatArray, faces: Faces) -> NDArray[np.bool_]:
+    """Mask (T,) of the triangles to flip so that the pieces of a closed surface bound a body."""
+    pieces = _pieces(faces)
+    if pieces.max() < MOST_PIECES:
+        return outward_flips(points, faces, pieces)
+    return np.full(len(faces), _volume(np.asarray(points[faces])) < 0.0)
+
+
+def _normals(triangles: FloatArray) -> FloatArray:
+    """Normals (T, 3) of triangles, as long as twice their areas."""
+    return np.asarray(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]))
 
 
 def _turned(faces: Faces, which: NDArray[np.bool_]) -> Faces:
@@ -167,26 +322,18 @@ def unique_points(triangles: FloatArray) -> tuple[FloatArray, Faces]:
     return corners[first], index.reshape(-1, 3)
 
 
-def _welded(triangles: FloatArray) -> tuple[FloatArray, Faces, NDArray[np.bool_]]:
-    """Points, indices of the triangles that are not degenerate, and the mask (T,) of these."""
-    points, faces = unique_points(triangles)
-    apart = (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    return points, faces[apart], apart
-
-
 def _edges(faces: Faces) -> Faces:
     return np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
 
 
 def _unpaired(faces: Faces) -> Faces:
     """Edges (E, 2) of triangles without a partner in the opposite direction, each as often as it lacks one."""
-    edges = _edges(faces)
-    low, sign = np.sort(edges, axis=1), np.where(edges[:, 0] < edges[:, 1], 1, -1)
-    unique, index = np.unique(low, axis=0, return_inverse=True)
-    surplus = np.zeros(len(unique), np.int64)
-    np.add.at(surplus, index.reshape(-1), sign)
-    open_ = np.flatnonzero(surplus)
-    ends = np.where((surplus[open_] > 0)[:, None], unique[open_], unique[open_][:, ::-1])
+    edges, (index, count) = _edges(faces), _equal_edges(faces)
+    forward = edges[:, 0] < edges[:, 1]
+    surplus = np.bincount(index[forward], minlength=len(count)) - np.bincount(index[~forward], minlength=len(count))
+    open_, ends = np.flatnonzero(surplus), np.empty((len(count), 2), np.int64)
+    ends[index] = np.sort(edges, axis=1)
+    ends = np.where((surplus[open_] > 0)[:, None], ends[open_], ends[open_][:, ::-1])
     return np.repeat(ends, np.abs(surplus[open_]), axis=0)
 
 

@@ -19,18 +19,18 @@ LINES = {
     "executive/speech": 1588,
     "executive/mission": 1596,
     "executive/tree": 7710,
-    "executive/run": 3083,
-    "executive/record": 944,
+    "executive/run": 3094,
+    "executive/record": 1319,
     "executive/store": 1681,
     "executive/conversation": 581,
     "executive/view": 1442,
     "executive/testing": 810,
     "executive/app": 7535,
-    "executive/cli": 4125,
+    "executive/cli": 4157,
     "skills": 27263,
-    "plant": 11869,
+    "plant": 12195,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 463, 72, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 464, 72, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

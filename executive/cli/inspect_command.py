@@ -17,7 +17,7 @@ from rich.text import Text
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import takes_request
-from executive.cli.output import console_for, show_table, terminal_answerer, writing
+from executive.cli.output import console_for, new_folder, show_table, terminal_answerer, writing
 from executive.mission.request import Request
 from executive.record.history import Entry, History, read_history, timeline
 from executive.record.schemas import ERRORS
@@ -48,7 +48,9 @@ def log(
         LogFormat,
         typer.Option("--format", help="map draws map, trajectory, path and particles as PNG; ros2 writes a bag."),
     ] = LogFormat.TEXT,
-    out: Annotated[Path | None, typer.Option("-o", "--out", help="The picture, or the folder of the bag.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="The picture; the folder of the bag, or its file *.mcap.")
+    ] = None,
     at: Annotated[float, quantity_option(Delay, help="Time of the map (s); by default the end.")] = math.inf,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
     every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
@@ -60,9 +62,7 @@ def log(
         what = "--out is for --format map and ros2" if out is not None else f"--format {form.value} writes a file"
         raise InputError(what, hint="name both: --format map --out map.png")
     if form is LogFormat.ROS2 and out is not None:
-        from executive.record.ros2 import write_ros2
-
-        typer.echo(f"{write_ros2(history.events, out)} messages in {out}", err=True)
+        typer.echo(f"{_to_ros2(history, out)} messages in {out}", err=True)
         return
     if out is not None:
         import cv2
@@ -78,6 +78,16 @@ def log(
         sys.stdout.write(json.dumps(list(history.transitions()), ensure_ascii=False) + "\n")
         return
     _show(history, console_for(as_json=False), every_node=every_node)
+
+
+def _to_ros2(history: History, out: Path) -> int:
+    """Writes a bag, or one file; returns the number of messages."""
+    from executive.record.ros2 import write_bag, write_ros2
+
+    if out.suffix == LOG_SUFFIX:
+        return write_ros2(history.events, out)
+    with new_folder(out) as folder:
+        return write_bag(history.events, folder, out.name)
 
 
 def _show(history: History, console: Console, *, every_node: bool) -> None:

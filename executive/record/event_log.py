@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import json
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
@@ -19,12 +20,29 @@ import numpy as np
 from mcap.writer import Writer
 from pydantic_core import to_jsonable_python
 
-from executive.record.schemas import BOXES, DETECTIONS, PATH, TOPIC, WALL, Schema, schema_of, stamp
+from executive.record.other_tools import grid_of, joints_message, scan_message, transform_of
+from executive.record.schemas import (
+    BOXES,
+    DETECTIONS,
+    GRID,
+    JOINTS,
+    LIBRARY,
+    MAP,
+    PATH,
+    POSE,
+    SCAN,
+    TOPIC,
+    TRANSFORM,
+    WALL,
+    Schema,
+    schema_of,
+    stamp,
+)
 from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunSettings, RunVisitor
 from executive.words.slug import slug
 from skills.api import Worker
-from skills.robot import Clock
+from skills.robot import Clock, Joints, Scan
 
 FLUSH_EVERY_S: Final = 1.0
 TICKS_EVERY_S: Final = 1.0
@@ -57,7 +75,7 @@ class EventLog(RunVisitor):
         self._clock, self._apart = clock, apart
         self._file: BinaryIO = path.open("wb")
         self._writer: Any = Writer(self._file)
-        self._writer.start(profile="", library="errand")
+        self._writer.start(profile="", library=LIBRARY)
         self._channels: dict[tuple[str, str, str], int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_s = -math.inf
@@ -66,13 +84,14 @@ class EventLog(RunVisitor):
         self._closed = False
         self._failure: OSError | None = None
         self._listeners: list[Listener] = []
-        self._tick_limit_s = 0.0
+        self._tick_limit_s, self._start_s = 0.0, 0.0
         self._ticks_s: list[float] = []
         self._ticks_logged_s = -math.inf
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
-        """Notes the tick period; a tick that takes longer overruns."""
+        """Notes the wall time, and the tick period; a tick that takes longer overruns."""
         self._tick_limit_s = settings.tick_period_s
+        self._start_s = round(time.time() - self._clock.now(), 3)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Logs the message."""
@@ -93,7 +112,7 @@ class EventLog(RunVisitor):
 
     def _log_ticks(self, more: Mapping[str, float]) -> None:
         ticks, self._ticks_s = [round(tick_s, 6) for tick_s in self._ticks_s], []
-        self(WALL, {"tick_s": ticks, "limit_s": self._tick_limit_s, **more})
+        self(WALL, {"start_s": self._start_s, "tick_s": ticks, "limit_s": self._tick_limit_s, **more})
 
     def listen(self, listener: Listener) -> None:
         """Passes every message to `listener` from now on: topic, the robot's clock (s), and JSON values."""
@@ -165,10 +184,26 @@ def _plain(value: Any) -> Any:
 
 
 def viewer_messages(topic: str, message: Message, now_s: float) -> Iterator[tuple[str, Message]]:
-    """Iterates over the message as it is logged, and additional messages for viewers, each with its topic."""
-    yield topic, compress_picture(_path(message, now_s) if topic == PATH else message, now_s)
+    """Iterates over the message as it is logged, and messages that repeat it for viewers, each with its topic."""
+    yield topic, compress_picture(_foxglove_form(topic, message, now_s), now_s)
     if topic == DETECTIONS and isinstance(message.get("image"), np.ndarray):
         yield BOXES, box_annotations(message.get("detections", ()), now_s)
+    elif topic == POSE and "pose" in message:
+        yield TRANSFORM, transform_of(message)
+    elif topic == MAP and "data" in message:
+        yield GRID, grid_of(message, now_s)
+
+
+def _foxglove_form(topic: str, message: Message, now_s: float) -> Message:
+    """Converts paths, scans and joint states to the form of their schema."""
+    robot, scan, joints = str(message.get("robot", "")), message.get("scan"), message.get("joints")
+    if topic == PATH:
+        return _path(message, now_s)
+    if topic == SCAN and isinstance(scan, Scan):
+        return scan_message(scan, robot)
+    if topic == JOINTS and isinstance(joints, Joints):
+        return joints_message(joints, robot)
+    return message
 
 
 def compress_picture(message: Message, now_s: float) -> Message:

@@ -20,6 +20,7 @@ from executive.record.schemas import (
     CONTROL,
     DESTINATION,
     ERRORS,
+    LIBRARY,
     MISSIONS,
     OUTCOME,
     RUN,
@@ -42,6 +43,9 @@ from skills.files.outside import plain_file
 from skills.perception.class_forms import ANY_OBJECT
 
 MOST_BYTES = 100_000_000_000
+_EXISTS: Final = "name a log that exists"
+_WRITTEN: Final = "name a log.mcap that a run has written"
+_ROS_1, _SQLITE = b"#ROSBAG V2", b"SQLite format 3"
 _DAMAGE = (McapError, struct.error, ZstdError, ValueError)
 
 
@@ -59,14 +63,30 @@ def read_events(path: Path) -> tuple[Event, ...]:
 
     Raises InputError if there is no such file, or it is no event log.
     """
-    plain_file(path, most_bytes=MOST_BYTES, hint="name a log that exists")
+    plain_file(path, most_bytes=MOST_BYTES, hint=_EXISTS)
     try:
+        _refuse_other_logs(path)
         with path.open("rb") as file:
             return tuple(_events(NonSeekingReader(file)))
     except OSError as error:
-        raise InputError(f"cannot read it ({error.strerror})", hint="name a log that exists", file=path) from error
+        raise InputError(f"cannot read it ({error.strerror})", hint=_EXISTS, file=path) from error
     except _DAMAGE as error:
-        raise InputError("it is no event log", hint="name a log.mcap that a run has written", file=path) from error
+        raise InputError("it is no event log", hint=_WRITTEN, file=path) from error
+
+
+def _refuse_other_logs(path: Path) -> None:
+    """Refuses logs of other programs by name. Raises InputError, and what the readers of damaged files raise."""
+    with path.open("rb") as file:
+        start = file.read(len(_ROS_1))
+    kind = {_ROS_1: "a bag of ROS 1", _SQLITE[: len(_ROS_1)]: "a database, perhaps a bag of ROS 2"}.get(start)
+    if kind is None:
+        with path.open("rb") as file:
+            header = NonSeekingReader(file).get_header()
+        if header.library == LIBRARY:
+            return
+        profile = f", of the profile {header.profile[:20]}" if header.profile else ""
+        kind = f"a log of another program ({header.library[:60] or 'which gives no name'}{profile})"
+    raise InputError(f"it is {kind}", hint=_WRITTEN, file=path)
 
 
 def _events(reader: NonSeekingReader) -> Iterator[Event]:

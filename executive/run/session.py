@@ -9,7 +9,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from executive.record.schemas import NAVIGATION, OUTCOME, POSE, STATE, stamp
+from executive.record.schemas import JOINTS, NAVIGATION, OUTCOME, POSE, SCAN, STATE, stamp
 from executive.run.control_state import MissionRequest, Turn
 from executive.run.outcome import Ending, Outcome, RobotResult, ending_of
 from executive.run.run_robot import RunRobot
@@ -26,6 +26,7 @@ from skills.files.errors import disk_is_full
 from skills.robot import Pose2D
 
 POSE_PERIOD_S: Final = 0.5
+SENSORS_PERIOD_S: Final = 1.0
 MOST_PARTICLES: Final = 30
 LEASE_PATIENCE_S: Final = 60.0
 _EPSILON_S: Final = 1e-9
@@ -64,7 +65,7 @@ class Session(RunRobot):
         self.gone: str | None = None
         self.note: TickNote | None = None
         self._asked_at: Pose2D | None = None
-        self._pose_due_s = shared.clock.now()
+        self._pose_due_s = self._sensors_due_s = shared.clock.now()
         self._matched_s = -math.inf
         self._navigation: Mapping[str, object] = {}
 
@@ -129,6 +130,9 @@ class Session(RunRobot):
             self._publish_pose(estimate)
             self._publish_state(estimate)
             self._publish_navigation()
+        if context.clock.now() >= self._sensors_due_s - _EPSILON_S:
+            self._sensors_due_s += SENSORS_PERIOD_S
+            self._publish_sensors()
 
     def may_move(self) -> bool:
         """Returns whether the robot has its lease; a lost lease suspends the mission until the robot has it again.
@@ -335,6 +339,13 @@ class Session(RunRobot):
                 "position_sigma_m": round(math.sqrt(estimate.covariance[0, 0] + estimate.covariance[1, 1]), 4),
             },
         )
+
+    def _publish_sensors(self) -> None:
+        """Logs the joints and the latest LiDAR scan."""
+        robot = self.context.robot
+        self.context.publish(JOINTS, {"robot": self.name, "joints": robot.joints()})
+        if (scan := robot.scan()) is not None:
+            self.context.publish(SCAN, {"robot": self.name, "scan": scan})
 
     def _publish_navigation(self) -> None:
         """Logs particles of the localiser and obstacles that the map lacks (x, y in m), when either is new."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Final
 
-from executive.record.schemas import BOXES
+from executive.record.schemas import DERIVED, JOINTS, SCAN
 
-_UNSEEN: Final = frozenset({BOXES})  # the page draws boxes from the detections themselves
+_UNSEEN: Final = DERIVED | {JOINTS, SCAN}  # the page draws boxes from the detections themselves
 _PICTURES: Final = frozenset({"jpeg", "png"})
 MOST_MESSAGES: Final = 20_000
 MOST_PICTURES: Final = 500

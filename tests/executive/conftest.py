@@ -41,10 +41,12 @@ from skills.robot import (
     CommandState,
     CommandStatus,
     Gripper,
+    Joints,
     Lease,
     LeaseError,
     Odometry,
     Pose2D,
+    Scan,
 )
 from skills.testing.robot import BASE_ONLY
 from tests.visitors import OnMessage, OnTick
@@ -98,6 +100,16 @@ class ScriptedRobot:
     def gripper(self) -> Gripper:
         opening = self.opening if self.holding else self.empty_rad
         return Gripper(self.clock.now(), opening, 10.0 * self.holding, self.holding)
+
+    def joints(self) -> Joints:
+        return Joints(self.clock.now(), {"elbow": 0.5}, {"elbow": 0.1}, {"elbow": 2.0})
+
+    def scan(self) -> Scan:
+        """A wall 2 m away on all sides, without a return straight behind."""
+        ranges, azimuths = np.full((2, 8), 2.0, np.float32), np.linspace(-np.pi, np.pi, 8, endpoint=False)
+        ranges[:, 0] = np.nan
+        X_BL = RigidTransform([0.1, 0.0, 0.4])
+        return Scan(self.clock.now(), ranges, np.array([-0.3, 0.0]), azimuths, X_BL, self.standing.transform())
 
     def let_go(self) -> None:
         """Open the gripper, as a skill that puts something down does."""

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from executive.record.event_log import EventLog, plain_values
 from executive.record.history import read_events
@@ -152,6 +153,28 @@ def test_closing_twice_is_fine_and_writing_afterwards_is_not(tmp_path, clock):
     log.close()
     with pytest.raises(ValueError, match="closed"):
         log("pose", {})
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"#ROSBAG V2.0\n", "a bag of ROS 1"),
+        (b"SQLite format 3\0", "a bag of ROS 2"),
+    ],
+)
+def test_a_log_of_another_form_is_named(tmp_path, content, said):
+    (tmp_path / "other.mcap").write_bytes(content + bytes(200))
+    with pytest.raises(InputError, match=said):
+        read_events(tmp_path / "other.mcap")
+
+
+def test_a_log_of_another_program_is_named(tmp_path):
+    with (tmp_path / "other.mcap").open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="rosbag2 of Humble")
+        writer.finish()
+    with pytest.raises(InputError, match=r"a log of another program \(rosbag2 of Humble, of the profile ros2\)"):
+        read_events(tmp_path / "other.mcap")
 
 
 def test_a_file_that_is_no_log_is_refused(tmp_path):

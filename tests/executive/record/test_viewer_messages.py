@@ -52,12 +52,14 @@ def test_a_map_comes_back_the_right_way_up(knowledge, tmp_path, clock):
     log = EventLog(tmp_path / "log.mcap", clock)
     log("map", map_message(GridMap(occupied, 0.5, (-1.0, -2.0)), knowledge, world="flat"))
     log.close()
-    (event,) = read_events(log.path)
+    event, grid = read_events(log.path)
     assert (event.data["origin_m"], event.data["size_m"]) == ({"x": -1.0, "y": -2.0}, {"x": 3.0, "y": 2.0})
     assert {place["name"] for place in event.data["places"]} == {"kitchen", "bedroom", "hall", "bathroom"}
     picture = cv2.imdecode(np.frombuffer(base64.b64decode(event.data["data"]), np.uint8), cv2.IMREAD_GRAYSCALE)
     assert picture.shape == (4, 6)
     assert (picture[3, 0], picture[0, 0]) == (0, 255)
+    cells = np.frombuffer(base64.b64decode(grid.data["data"]), np.uint8).reshape(4, 6)
+    assert (grid.topic, grid.data["column_count"], cells[0, 0], cells[1, 1]) == ("map/grid", 6, 100, 0)
 
 
 def test_every_topic_of_a_mission_has_a_schema_of_its_own(tmp_path, compiled, run_tree, make, clock):
@@ -67,4 +69,6 @@ def test_every_topic_of_a_mission_has_a_schema_of_its_own(tmp_path, compiled, ru
     with log.path.open("rb") as file:
         named = {channel.topic: schema.name for schema, channel, _ in make_reader(file).iter_messages() if schema}
     assert named["pose"] == "foxglove.PoseInFrame"
+    assert named["transform"] == "foxglove.FrameTransform"
+    assert (named["scan"], named["joints"]) == ("foxglove.LaserScan", "foxglove.JointStates")
     assert "errand.Message" not in named.values()

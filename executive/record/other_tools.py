@@ -1,0 +1,113 @@
+"""Messages that other tools expect: laser scans, joint states, transforms of the body, and the map as a grid.
+
+Scans and joint states are measured; transforms and the grid follow from the messages of pose and map.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from typing import Any, Final
+
+import cv2
+import numpy as np
+
+from executive.record.schemas import stamp
+from executive.words.slug import slug
+from skills.robot import Joints, Scan
+
+_UINT8: Final = 1
+_STEP: Final = 2
+"""Only one of so many beams of a scan is logged."""
+
+Message = Mapping[str, Any]
+
+
+def ros_name(robot: str) -> str:
+    """Name of a robot in topics and frames: "Alice" is "alice"."""
+    return slug(robot).replace("-", "_")
+
+
+def body_frame(robot: str) -> str:
+    """Name of the frame of a robot's body."""
+    return f"{ros_name(robot)}/body"
+
+
+def scan_message(scan: Scan, robot: str) -> Message:
+    """Encodes the ring of a LiDAR scan that is nearest to the horizontal; a range of 0 is a beam without a return."""
+    ring = int(np.argmin(np.abs(scan.elevations_rad)))
+    ranges = scan.ranges_m[ring, ::_STEP] * np.cos(scan.elevations_rad[ring])
+    p, q = scan.X_BL.translation(), scan.X_BL.rotation().ToQuaternion()
+    return {
+        "timestamp": stamp(scan.stamp_s),
+        "frame_id": body_frame(robot),
+        "robot": robot,
+        "pose": {
+            "position": {"x": p[0], "y": p[1], "z": p[2]},
+            "orientation": {"x": q.x(), "y": q.y(), "z": q.z(), "w": q.w()},
+        },
+        "start_angle": float(scan.azimuths_rad[0]),
+        "end_angle": float(scan.azimuths_rad[::_STEP][-1]),
+        "ranges": [round(value, 2) for value in np.nan_to_num(ranges, nan=0.0).tolist()],
+        "intensities": [],
+    }
+
+
+def joints_message(joints: Joints, robot: str) -> Message:
+    """Encodes positions, velocities and efforts of the joints."""
+    states = [
+        {
+            "name": name,
+            "position": round(position, 4),
+            "velocity": round(joints.velocity_rad_s.get(name, 0.0), 3),
+            "effort": round(joints.effort_nm.get(name, 0.0), 2),
+        }
+        for name, position in joints.position_rad.items()
+    ]
+    return {"timestamp": stamp(joints.stamp_s), "robot": robot, "joints": states}
+
+
+def transform_of(pose: Message) -> Message:
+    """Transform from the world to the body, of a message of the robot's pose."""
+    return {
+        "timestamp": pose["timestamp"],
+        "parent_frame_id": pose["frame_id"],
+        "child_frame_id": body_frame(str(pose.get("robot", ""))),
+        "translation": pose["pose"]["position"],
+        "rotation": pose["pose"]["orientation"],
+    }
+
+
+def grid_of(data: Message, now_s: float) -> Message:
+    """Map as a grid of occupancies from 0 to 100, 255 where unknown; row 0 is at the smallest y."""
+    grey = grey_map(data)
+    cells = occupancies(grey).astype(np.uint8)
+    cell = data["resolution_m"]
+    return {
+        "timestamp": stamp(now_s),
+        "frame_id": data["frame_id"],
+        "pose": origin_pose(data),
+        "column_count": grey.shape[1],
+        "cell_size": {"x": cell, "y": cell},
+        "row_stride": grey.shape[1],
+        "cell_stride": 1,
+        "fields": [{"name": "occupancy", "offset": 0, "type": _UINT8}],
+        "data": base64.b64encode(cells.tobytes()).decode(),
+    }
+
+
+def grey_map(data: Message) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """Grey picture of a message of the map, row 0 at the smallest y."""
+    content = np.frombuffer(base64.b64decode(data["data"]), np.uint8)
+    return np.asarray(cv2.imdecode(content, cv2.IMREAD_GRAYSCALE), dtype=np.uint8)[::-1]
+
+
+def occupancies(grey: np.ndarray[Any, np.dtype[np.uint8]]) -> np.ndarray[Any, np.dtype[np.int8]]:
+    """Occupancies of a map's picture as ROS has them: 0 free, 100 occupied, -1 unknown."""
+    return np.select([grey == 0, grey == 255], [100, 0], -1).astype(np.int8)
+
+
+def origin_pose(data: Message) -> Message:
+    """Pose of the outer corner of the map's first cell."""
+    origin = data["origin_m"]
+    return {"position": {"x": origin["x"], "y": origin["y"], "z": 0.0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}

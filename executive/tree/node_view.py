@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
@@ -35,7 +36,12 @@ def _ports_of(spec: NodeSpec) -> Iterator[Port]:
     """Iterates over the ports of a skill, or the options of any other node."""
     options = spec.options
     if spec.kind != "skill":
-        yield from (Port(name, plain(value)) for name, value in options.items())
+        parts = spec.path_id.split("/")
+        for name, value in options.items():
+            text = plain(value)
+            for length in (len(parts), len(parts) - 1, 2):
+                text = text.replace("".join(f"{part}/" for part in parts[:length]), "") if length > 1 else text
+            yield Port(name, text)
         return
     skill, bound = options["skill"], options.get("inputs", {})
     types = field_types(skill.Inputs)
@@ -52,8 +58,14 @@ def _ports_of(spec: NodeSpec) -> Iterator[Port]:
         yield Port(name, key, describe_type(skill.outputs.get(name, Any)), output=True, on_board=True)
 
 
+_UNITS: Final = {"m_s": "m/s", "rad_s": "rad/s", "m": "m", "s": "s", "kg": "kg", "rad": "°"}
+
+
 def plain(value: Any) -> str:
-    """Formats a value as short text: enum members by value, objects and surfaces by their own text or name."""
+    """Formats a value as a person would write it: enum members by value, objects and surfaces by their own text or
+    name, other records by their fields with units, and angles in degrees."""
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
     if isinstance(value, enum.Enum):
@@ -61,12 +73,16 @@ def plain(value: Any) -> str:
     if isinstance(value, frozenset | set):
         return ", ".join(sorted(map(plain, value)))
     if isinstance(value, Mapping):
-        return ", ".join(f"{plain(key)}: {plain(item)}" for key, item in value.items())
+        return ", ".join(f"{plain(key)}: {_item(item)}" for key, item in value.items())
     if isinstance(value, tuple | list):
-        return ", ".join(map(plain, value))
+        return ", ".join(map(_item, value))
     if is_dataclass(value) and not isinstance(value, type):
         return _record(value)
     return "" if value is None else str(value)
+
+
+def _item(value: Any) -> str:
+    return f"({plain(value)})" if isinstance(value, tuple | list) and value else plain(value)
 
 
 def _record(value: Any) -> str:
@@ -75,7 +91,18 @@ def _record(value: Any) -> str:
         return str(value)
     if "name" in names:
         return str(value.name)
-    return " ".join(f"{name}={plain(getattr(value, name))}" for name in names)
+    return ", ".join(filter(None, (_fact(name, getattr(value, name)) for name in names)))
+
+
+def _fact(name: str, value: Any) -> str:
+    """Formats a field with its unit: "x 5.5 m"; nothing for one that is not set."""
+    if value is None or value is False or (text := plain(value)) == "":
+        return ""
+    unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), "")
+    words = name.removesuffix(f"_{unit}").replace("_", " ")
+    if unit == "rad":
+        return f"{words} {math.degrees(value):.0f}°"
+    return words if value is True else f"{words} {text} {_UNITS[unit]}" if unit else f"{words} {text}"
 
 
 @dataclass(frozen=True)

@@ -222,7 +222,7 @@ def _tree(document: Element, tree_id: str, node: NodeView, steps: Mapping[int, s
 def _element(node: NodeView, steps: Mapping[int, str]) -> Element:
     category, model = _category(node), _model_id(node)
     own = {} if node.kind in _BUILT_IN else {"ID": model}
-    ports = {name: _value(port) for name, port in _named(node.ports)} if own else {}
+    ports = {name: _value(port) for name, port in _named(node.ports) if port.value} if own else {}
     element = Element(category, {**own, "name": printable(node.name), **ports, "_description": _description(node)})
     for child in node.children:
         if id(child) in steps:
@@ -274,7 +274,7 @@ def _value(port: Port) -> str:
 
 
 def _description(node: NodeView) -> str:
-    place = "" if node.source is None else f"{node.source.file}:{node.source.line}"
+    place = "" if node.source is None else f"{node.source.file.name}:{node.source.line}"
     state = ": ".join(filter(None, (style_of(node.state).word, note_of(node))))
     folded = f"{node.hidden} nodes below are left out" if node.hidden else ""
     return printable(" | ".join(filter(None, (state, node.path_id, place, folded))))

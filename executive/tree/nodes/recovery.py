@@ -32,6 +32,10 @@ class Trigger:
     node: str | None = None
     own: bool = False
 
+    def __str__(self) -> str:
+        causes = " or ".join(sorted(cause.value for cause in self.causes))
+        return f"{causes} of {self.node}" if self.node else causes
+
     def fits(self, attempt: Behaviour) -> bool:
         """Returns whether an attempt has such a failure."""
         return any(self._fits(node, attempt) for node in attempt.iterate())
@@ -59,6 +63,10 @@ class Recovery:
     given: str | None = None
     final: bool = False
     completes: bool = False
+
+    def __str__(self) -> str:
+        times = f", at most {self.uses} times" if self.uses > 1 else ""
+        return f"after {' or '.join(map(str, self.triggers))}{times}"
 
     def bind(self, paths: Mapping[str, str]) -> Recovery:
         """Replaces the names of steps in its triggers by the path ids of their nodes."""

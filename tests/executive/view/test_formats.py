@@ -1,14 +1,17 @@
 """The XML follows the rules that BehaviorTree.CPP 4 checks when it loads a file, and tells states and ports."""
 
+import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
-from executive.tree.node_view import node_view
+from executive.tree.node_view import NodeView, node_view
 from executive.view.formats import to_btcpp
 from executive.view.text import fold_below
 from skills.api import Cause, Failed
+from skills.files.errors import SourceLine
 
 CONTROLS = {"Sequence", "Fallback", "Control"}
 
@@ -70,6 +73,24 @@ def test_every_path_id_stands_in_one_description(compiled, make, document):
     told = " ".join(node.get("_description", "") + " |" for node in nodes_of(document) if node.tag != "SubTree")
     for path_id in compiled(*make.FETCH).path_ids:
         assert told.count(f"| {path_id} |") == 1
+
+
+def test_values_are_written_as_a_person_would_write_them(document):
+    # records have words and units, truth values are lower case, path ids are relative, nothing is empty
+    values = [(name, value) for node in nodes_of(document) for name, value in node.attrib.items()]
+    ports = [value for name, value in values if name not in ("ID", "name") and not name.startswith("_")]
+    goals = [node.get("goal") for node in nodes_of(document) if node.get("ID") == "Navigate"]
+    assert any(re.fullmatch(r"x -?[\d.]+ m, y -?[\d.]+ m, yaw -?\d+°", goal or "") for goal in goals)
+    assert "after EXECUTION or PLANNING of navigate, after EXECUTION or PLANNING of navigate" in ports
+    assert not [value for value in ports if value in ("", "True", "False", "None") or "=" in value]
+    assert not [value for value in ports if "alice/" in value and not value.startswith("{")]
+
+
+def test_the_source_of_a_node_is_its_file_without_the_folder():
+    node = NodeView("a/b", "sequence", "b", source=SourceLine(Path("/home/me/missions/round.yaml"), 3))
+    document = to_btcpp(node)
+    assert "round.yaml:3" in document
+    assert "/home" not in document
 
 
 def test_a_failed_node_shows_its_cause_and_message(compiled, run_tree, make, script):

@@ -50,6 +50,9 @@ class Scene(Protocol):
     def url(self) -> str:
         """Address of the picture."""
 
+    def publish(self) -> None:
+        """Refreshes it now. Browsers draw a texture only with the first refresh after it has arrived."""
+
     def refresh_seldom(self) -> None:
         """Refreshes it less often."""
 

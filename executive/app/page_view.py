@@ -60,12 +60,14 @@ class PageView(RunVisitor):
             self.conversations.listen(lambda name, waiting: self._feed.tell(f"asked/{name}", asked_json(waiting, name)))
         self._server: PageServer | None = None
         self._watch: ControlWatch | None = None
+        self._scene: Scene | None = None
 
     def serve(self, log: EventLog, scene: Scene | None) -> None:
         """Serves the page and shows its address. Raises InputError if the port is taken."""
         from executive.view.server import PageContent, serve
 
         log.listen(self._feed)
+        self._scene = scene
         sentences: dict[str, Action] = {}
         if self.conversations is not None:
             load_ahead()
@@ -102,9 +104,14 @@ class PageView(RunVisitor):
         try:
             if self._server is not None:
                 self._tell("The page stays until Ctrl-C." if limit_s is None else f"The page: {limit_s:g} s more.")
-                wait(limit_s)
+                wait(limit_s, self._refresh)
         finally:
             self.close()
+
+    def _refresh(self) -> None:
+        """Refreshes the scene of the ended run, so that a page opened late shows its textures and follows."""
+        if self._scene is not None:
+            self._scene.publish()
 
     def close(self) -> None:
         """Stops serving; idempotent."""

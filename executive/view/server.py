@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import math
 import secrets
 import socket
-import threading
+import time
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from http import HTTPStatus
@@ -210,9 +211,12 @@ def serve(content: PageContent, port: int) -> PageServer:
         raise InputError(f"cannot serve at port {port} ({error.strerror})", hint="name another --port") from error
 
 
-def wait(limit_s: float | None) -> None:
-    """Waits until Ctrl-C or the limit (s, wall time)."""
+def wait(limit_s: float | None, refresh: Callable[[], None] = lambda: None) -> None:
+    """Waits until Ctrl-C or the limit (s, wall time); calls `refresh` each second."""
+    end_s = time.monotonic() + (math.inf if limit_s is None else limit_s)
     try:
-        threading.Event().wait(limit_s)
+        while (left_s := end_s - time.monotonic()) > 0.0:
+            refresh()
+            time.sleep(min(1.0, left_s))
     except KeyboardInterrupt:
         return

@@ -4,7 +4,7 @@ import json
 import re
 import subprocess
 import sys
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import pytest
 from websockets.exceptions import WebSocketException
@@ -13,6 +13,7 @@ from websockets.sync.client import connect
 from executive.app.page_view import PageView, queue_function, sentence_action
 from executive.app.prepare import prepare
 from executive.mission.request import Request
+from executive.record.event_log import EventLog
 from executive.run.control_state import Mode
 from executive.store.missions import MissionState, MissionStore
 from executive.view.page_control import RefusedError
@@ -122,3 +123,28 @@ def test_a_mission_is_told_to_the_page_while_it_runs_and_after(tmp_path):
         "outcome",
     } <= topics
     assert next(message["data"]["outcome"] for message in told if message.get("topic") == "outcome") == "success"
+
+
+class CountedScene:
+    """A scene that counts its refreshes."""
+
+    url = "http://localhost:1"
+    refreshes = 0
+
+    def publish(self) -> None:
+        self.refreshes += 1
+
+    def refresh_seldom(self) -> None:
+        """Does nothing."""
+
+    def follow(self, wanted: bool) -> None:
+        """Does nothing."""
+
+
+def test_the_scene_of_an_ended_run_is_refreshed_as_long_as_the_page_stays(page, tmp_path, clock):
+    # browsers draw textures that arrive after the last refresh only with the next one
+    scene = CountedScene()
+    with closing(EventLog(tmp_path / "log.mcap", clock)) as log:
+        page.serve(log, scene)
+    page.stay(1.2)
+    assert scene.refreshes == 2

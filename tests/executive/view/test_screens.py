@@ -154,3 +154,4 @@ def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, 
     page.locator("details.tree summary").click()
     assert page.evaluate(OVERFLOWING) == []
     assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    assert min(page.locator("td.why").evaluate_all("cells => cells.map((cell) => cell.clientWidth)")) > 200

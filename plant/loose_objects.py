@@ -21,7 +21,7 @@ bodies spin no faster, after any step, than the next step can follow.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -96,11 +96,15 @@ class _Spheres:
 class _Hand:
     """Hand of one robot: its collision shapes with their properties, and what it may come near."""
 
-    def __init__(self, robot: RobotBody, inspector: SceneGraphInspector, fixed: ShapeArrays) -> None:
+    def __init__(
+        self, robot: RobotBody, inspector: SceneGraphInspector, fixed: ShapeArrays, objects: Collection[int]
+    ) -> None:
+        """`fixed` are the shapes that never move, `objects` the loose objects, whose places `is_near` is given."""
         plant, own = robot.plant, set(map(int, robot.instances()))
         links = [plant.GetBodyByName(link, robot.instance) for link in robot.kind.gripper_links]
         found = [shape for link in links for shape in plant.GetCollisionGeometriesForBody(link)]
-        others = [body for body in _moving_bodies(plant) if int(body.model_instance()) not in own]
+        moving = (body for body in _moving_bodies(plant) if int(body.index()) not in objects)
+        others = [body for body in moving if int(body.model_instance()) not in own]
         self.shapes = {shape: inspector.GetProximityProperties(shape) for shape in found}
         self.apart = CollisionFilterDeclaration().ExcludeWithin(GeometrySet(robot.geometries()))
         self.asleep = False
@@ -108,12 +112,16 @@ class _Hand:
         self._fixed = fixed
         self._measured = np.full((len(links), 3), np.inf), np.zeros(len(links))
 
-    def is_near(self, context: Context, margin_m: float) -> bool:
-        """Returns whether anything but the robot itself comes within a margin of the hand."""
+    def is_near(self, context: Context, margin_m: float, objects_W: FloatArray, radii_m: FloatArray) -> bool:
+        """Returns whether anything but the robot itself comes within a margin of the hand.
+
+        `objects_W` (N, 3) and `radii_m` are the spheres around the loose objects.
+        """
         centres_W, reach_m = self._spheres.centres_W(context), self._spheres.radii_m + margin_m
-        apart_m = np.linalg.norm(centres_W[:, None] - self._others.centres_W(context), axis=-1)
-        if (apart_m < reach_m[:, None] + self._others.radii_m).any():
-            return True
+        for others_W, sizes_m in ((objects_W, radii_m), (self._others.centres_W(context), self._others.radii_m)):
+            apart_m = np.linalg.norm(centres_W[:, None] - others_W, axis=-1)
+            if (apart_m < reach_m[:, None] + sizes_m).any():
+                return True
         measured_W, clear_m = self._measured
         if (clear_m - np.linalg.norm(centres_W - measured_W, axis=1) >= reach_m).all():
             return False
@@ -153,7 +161,8 @@ class Sleepers:
         self._still_s = np.zeros(len(self._objects))
         self._last: tuple[float, FloatArray, FloatArray] | None = None
         fixed = _fixed_shapes(plant, inspector)
-        self._hands = [_Hand(robot, inspector, fixed) for robot in world.robots.values()]
+        indices = {int(each.body.index()) for each in self._objects}
+        self._hands = [_Hand(robot, inspector, fixed, indices) for robot in world.robots.values()]
 
     @property
     def asleep(self) -> frozenset[str]:
@@ -162,12 +171,14 @@ class Sleepers:
 
     def update(self, now_s: float) -> None:
         """Wakes what a link or an object is about to reach; puts still objects and lonely hands to sleep."""
+        centres_W = self._update_objects(now_s) if self._objects else np.zeros((0, 3))
         for hand in self._hands:
             margin_m = self._limits.margin_m if hand.asleep else 2.0 * self._limits.margin_m
-            if hand.is_near(self._context, margin_m) == hand.asleep:
+            if hand.is_near(self._context, margin_m, centres_W, self._bounds.radii_m) == hand.asleep:
                 self._turn_hand(hand)
-        if not self._objects:
-            return
+
+    def _update_objects(self, now_s: float) -> FloatArray:
+        """Wakes objects and puts them to sleep; returns the centres (N, 3) of their bounding spheres."""
         poses = self._plant.GetPositions(self._context)[self._places]
         last_s, last_poses, last_centres_W = self._last or (now_s, poses, self._bounds.centres_W(self._context))
         elapsed_s, change = now_s - last_s, np.abs(poses - last_poses).max(axis=1)
@@ -184,6 +195,7 @@ class Sleepers:
         tired = self._still_s > self._limits.still_s
         for number in np.flatnonzero((self._asleep & disturbed) | (~self._asleep & tired)):
             self._turn(int(number))
+        return centres_W
 
     def wake_all(self) -> None:
         """Wakes all objects and hands, for instance before the plant's state is replaced."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ from pydrake.systems.framework import Context
 
 from plant.diagram import X_PT_HOME, WorldDiagram
 from plant.saved_state import Stateful
-from plant.sensors.ray_shapes import ShapeKind, shape_row
+from plant.sensors.ray_shapes import Row, ShapeKind, shape_row
 from plant.worlds.seeding import Receiving
 from skills.robot import FloatArray
 
@@ -32,6 +32,23 @@ LEAST_HEIGHT_M = 0.5
 STILL_M_S, MOVES_M_S = 0.03, 0.15
 BEYOND_OUTLINE_M = 0.05
 _AT_HAND_M = 0.5
+_ROUNDING_M = 1e-9
+
+
+class _Shapes:
+    """Rows of a body's shapes; a gripper's rubber is many balls, of which only the lowest are of interest."""
+
+    def __init__(self, rows: Sequence[Row]) -> None:
+        self._balls = [row for row in rows if row[0] is ShapeKind.ELLIPSOID and np.ptp(row[1]) == 0.0]
+        self._others = [row for row in rows if row[0] is not ShapeKind.ELLIPSOID or np.ptp(row[1]) > 0.0]
+        self._centres_B = np.array([X_BG.translation() for _, _, X_BG in self._balls]).reshape(-1, 3)
+        self._radii_m = np.array([half_m[0] for _, half_m, _ in self._balls])
+
+    def lowest(self, X_WB: RigidTransform) -> Sequence[Row]:
+        """Rows that may have the lowest point with the body at a pose: the lowest balls, and all other shapes."""
+        lows_m = self._centres_B @ X_WB.rotation().matrix()[2] - self._radii_m
+        chosen = np.flatnonzero(lows_m <= lows_m.min(initial=np.inf) + _ROUNDING_M)
+        return [*self._others, *(self._balls[number] for number in chosen)]
 
 
 @dataclass(frozen=True)
@@ -64,7 +81,9 @@ class Offers(Stateful, saved=("_still_since_s",)):
         self.loose = {name: body for name, body in models if body.is_floating_base_body()}
         bodies = (*self.loose.values(), *(link for links in self._links.values() for link in links))
         geometries = {int(body.index()): plant.GetCollisionGeometriesForBody(body) for body in bodies}
-        self._shapes = {body: [shape_row(inspector, each) for each in found] for body, found in geometries.items()}
+        self._shapes = {
+            body: _Shapes([shape_row(inspector, each) for each in found]) for body, found in geometries.items()
+        }
         self._owners: Mapping[GeometryId, int] = {each: body for body, found in geometries.items() for each in found}
         self._still_since_s: dict[str, float] = {}
 
@@ -107,20 +126,17 @@ class Offers(Stateful, saved=("_still_since_s",)):
     def lowest_m(self, offer: Offer) -> float:
         """Height (m) of the lowest point of an offered object and of the gripper that holds it."""
         bodies = (self.loose[offer.object], *self._links[offer.robot])
-        return min(z for body in bodies for z in self._lows_m(body))
+        return min(self._low_m(body) for body in bodies)
 
     def place_W(self, offer: Offer) -> FloatArray:
         """Position (3,) of the offered object's centre of mass in the world."""
         body = self.loose[offer.object]
         return np.asarray(self._plant.EvalBodyPoseInWorld(self._context, body) @ body.default_com())
 
-    def _lows_m(self, body: RigidBody) -> Iterator[float]:
-        """Heights (m) of the lowest points of a body's shapes."""
+    def _low_m(self, body: RigidBody) -> float:
+        """Height (m) of the lowest point of a body's shapes; infinite for a body without shapes."""
         X_WB = self._plant.EvalBodyPoseInWorld(self._context, body)
-        for kind, half_m, X_BG in self._shapes[int(body.index())]:
-            X_WG = X_WB @ X_BG
-            down = np.abs(X_WG.rotation().matrix()[2])
-            yield float(X_WG.translation()[2]) - _reach_m(kind, half_m, down)
+        return min((_lowest_m(X_WB, row) for row in self._shapes[int(body.index())].lowest(X_WB)), default=math.inf)
 
     def _holds_still(self, robot: str) -> bool:
         """Returns whether a robot keeps its hand still, outside its outline and high enough for a person."""
@@ -150,6 +166,13 @@ class Offers(Stateful, saved=("_still_since_s",)):
         if len(held) != 1 or touching[int(self.loose[held[0]].index())] - links:
             return None
         return held[0]
+
+
+def _lowest_m(X_WB: RigidTransform, row: Row) -> float:
+    """Height (m) of the lowest point of a body's shape."""
+    kind, half_m, X_BG = row
+    X_WG = X_WB @ X_BG
+    return float(X_WG.translation()[2]) - _reach_m(kind, half_m, np.abs(X_WG.rotation().matrix()[2]))
 
 
 def _reach_m(kind: ShapeKind, half_m: FloatArray, down: FloatArray) -> float:

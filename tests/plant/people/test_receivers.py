@@ -10,7 +10,8 @@ from pydrake.multibody.math import SpatialVelocity
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
-from plant.people.receivers import Phase
+from plant.people import receivers
+from plant.people.receivers import Offer, Offers, Phase
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
@@ -112,6 +113,22 @@ def test_the_tray_moves_down_at_the_body_before_it_nears_the_object(tmp_path):
         under = math.dist((x, 0.0), hall.place_W(hall.can)[:2]) < 0.05
         assert under or x > 1.4 or z < lowest_m - 0.1
         hall.engine.advance(0.05)
+
+
+def test_the_lowest_point_of_a_gripper_is_found_from_a_few_of_its_balls(tmp_path, monkeypatch):
+    hall, computed = Hall(tmp_path), []
+    offers, plant, lowest_m = Offers(hall.world, hall.engine.context), hall.world.plant, receivers._lowest_m
+    monkeypatch.setattr(receivers, "_lowest_m", lambda X_WB, row: computed.append(1) or lowest_m(X_WB, row))
+    found_m = offers.lowest_m(Offer("Alice", "coke"))
+    bodies = [plant.GetBodyByName(name) for name in ("coke", "arm_wr1", "arm_f1x")]
+    shapes = [(body, each) for body in bodies for each in plant.GetCollisionGeometriesForBody(body)]
+    inspector = hall.world.scene_graph.model_inspector()
+    lows_m = [
+        lowest_m(plant.EvalBodyPoseInWorld(hall.engine.context, body), receivers.shape_row(inspector, each))
+        for body, each in shapes
+    ]
+    assert found_m == min(lows_m)
+    assert len(computed) < len(shapes) // 3
 
 
 def test_the_tray_moves_below_an_offered_object_without_contact(tmp_path):

@@ -26,11 +26,11 @@ LINES = {
     "executive/view": 1446,
     "executive/testing": 810,
     "executive/app": 7545,
-    "executive/cli": 4157,
+    "executive/cli": 4353,
     "skills": 27263,
-    "plant": 12230,
+    "plant": 12562,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 464, 72, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -172,7 +172,7 @@ class MissionRuns:
             cause = f"{error.filename}: {error.strerror}" if error.filename else str(error)
         except Exception as defect:
             cause = f"a defect of errand or of a plug-in ended it ({type(defect).__name__}: {defect})"
-            file = self._missions.path.with_name(f"mission-{mission.id}-traceback.txt")
+            file = mission.request.out / f"mission-{mission.id}-traceback.txt"
             with suppress(OSError):
                 file.write_text(traceback.format_exc(), encoding="utf-8")
             self._screen.tell(f"The traceback is in {file}")

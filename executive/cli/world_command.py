@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
@@ -14,13 +19,18 @@ from executive.app.worlds import knowledge_of, open_world
 from executive.cli.number_options import quantity_option
 from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import new_folder, writing
-from plant.worlds.world import WorldError
+from executive.words.knowledge import Knowledge
+from executive.words.outlines import inside
+from plant.worlds.world import World, WorldError
 from skills.estimate.grid_map import load_grid_map
-from skills.files.errors import InputError, count_text
+from skills.files.errors import InputError, count_text, listing, suggestion
 from skills.files.outside import read_text
 from skills.files.schema import first_error
 from skills.quantities import Angle, Coordinate, Opening, Quantity
 from skills.robot import Pose2D
+
+if TYPE_CHECKING:
+    from plant.worlds.builder.rooms import Grid
 
 MAX_BYTES: Final = 20_000_000
 WallHeight = Annotated[float, Quantity(ge=1.3, le=10.0, unit="m")]
@@ -50,8 +60,10 @@ def from_map(
     out: Out,
     start: START = None,
     wall_height: Annotated[float, quantity_option(WallHeight, help="Height of the walls, m.")] = 2.5,
+    person: Annotated[str, typer.Option(help="Name of a person beside the robot's start; '' for nobody.")] = "Robin",
+    dock: Annotated[bool, typer.Option(help="Whether the robot gets a dock, at a wall near its start.")] = True,
 ) -> None:
-    """Builds a world from a map: walls, both grids, and rooms and doors without names."""
+    """Builds a world from a map: walls, both grids, rooms and doors without names, a person and a dock."""
     from plant.worlds.builder.own import world_from_grid
     from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
 
@@ -61,6 +73,190 @@ def from_map(
     cells = read.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED)
     grid, pose = Grid(cells, read.origin_m, read.resolution_m), start_pose(start)
     _made(map_file, out, lambda folder: world_from_grid(folder, grid, start=pose, wall_height_m=wall_height))
+    for what, name, wanted in ((Addition.DOCK, None, dock), (Addition.PERSON, person, bool(person))):
+        try:
+            if wanted:
+                add(what, out, name)
+        except InputError as error:
+            typer.echo(f"errand: warning: no {what.value}: {error}", err=True)
+
+
+class Addition(StrEnum):
+    """Parts that `errand world add` adds to a world."""
+
+    TABLE = "table"
+    DESK = "desk"
+    SHELF = "shelf"
+    OBJECT = "object"
+    PERSON = "person"
+    DOCK = "dock"
+    ROOM = "room"
+
+
+@world.command()
+def add(
+    what: Annotated[Addition, typer.Argument(help="room gives a found room its name.")],
+    folder: Annotated[Path, typer.Argument(metavar="WORLD", help="Folder of the world.")],
+    name: Annotated[
+        str | None, typer.Argument(help="Name of the table, person or room; of an object, its class or model.")
+    ] = None,
+    room: Annotated[str | None, typer.Option("--in", help="The room; of 'room', its former name.")] = None,
+    at: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option(metavar="X Y YAW", help="Middle (m) and direction of the front (rad); by default at a wall."),
+    ] = None,
+    size: Annotated[
+        tuple[float, float, float] | None, typer.Option(metavar="W D H", help="Width, depth and height, m.")
+    ] = None,
+    surface: Annotated[str | None, typer.Option("--on", help="The surface on which the object lies.")] = None,
+) -> None:
+    """Adds furniture, an object, a person, a dock, or the name of a room to a world of your own."""
+    if not folder.is_dir():
+        raise InputError("there is no such folder", hint="`errand world from-map` makes a world", file=folder)
+    if name is None and what is not Addition.DOCK:
+        raise InputError(f"a {what.value} needs a name", hint=f"write errand world add {what.value} {folder} NAME")
+    if not all(map(math.isfinite, (*(at or ()), *(size or ())))):
+        raise InputError("--at and --size are numbers", hint="write them in metres and radians")
+    site = _Site(folder, open_world(str(folder)))
+    try:
+        with _restored(folder):
+            said = _ADDED.get(what, _add_furniture)(site, _Wanted(what, name or "", room, at, size, surface))
+            knowledge_of(open_world(str(folder)))
+    except WorldError as error:
+        raise InputError(str(error), hint="see `errand world show`", file=folder) from error
+    typer.echo(f"{folder}: {said}")
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """Options of `errand world add`."""
+
+    what: Addition
+    name: str
+    room: str | None
+    at: tuple[float, float, float] | None
+    size: tuple[float, float, float] | None
+    surface: str | None
+
+
+@dataclass(frozen=True)
+class _Site:
+    """World that gets an addition, with its folder."""
+
+    folder: Path
+    world: World
+
+    @cached_property
+    def facts(self) -> Knowledge:
+        """Knowledge of the world."""
+        return knowledge_of(self.world)
+
+    @property
+    def doors(self) -> list[tuple[float, float]]:
+        """Middles of the doors, m."""
+        return [door.at for door in self.facts.doors]
+
+    def grid(self, name: str = "keepout") -> Grid:
+        """Reads a grid of the robot's map."""
+        from plant.worlds.builder.rooms import FREE, OCCUPIED, UNKNOWN, Grid
+
+        read = load_grid_map(self.folder / "map" / f"{name}.yaml")
+        return Grid(read.grey(free=FREE, unknown=UNKNOWN, occupied=OCCUPIED), read.origin_m, read.resolution_m)
+
+    def room(self, said: str | None) -> str:
+        """Returns the room of a name; without one, the room of the start. Raises InputError."""
+        places, start = self.facts.places, (self.world.start.x_m, self.world.start.y_m)
+        if said is None:
+            return next((name for name, each in places.items() if inside(each.polygon, start)), next(iter(places), ""))
+        if (found := self.facts.place(said)) in places:
+            return str(found)
+        raise InputError(f"there is no room '{said}'", hint=suggestion(said, places), file=self.folder)
+
+
+def _add_furniture(site: _Site, wanted: _Wanted) -> str:
+    """Adds a piece of furniture; returns a sentence. Raises WorldError."""
+    from plant.worlds.builder.furnish import SIZES, Furniture, add_furniture, place_in, refusal
+    from plant.worlds.builder.rooms import BANDS_M
+
+    grid, facts = site.grid(), site.facts
+    rooms = {name: Pose2D(each.pose.x, each.pose.y, each.pose.yaw) for name, each in facts.places.items()}
+    room = site.room(wanted.room)
+    pose = Pose2D(*(wanted.at or (0.0, 0.0, 0.0)))
+    piece = Furniture(wanted.what.value, wanted.name, wanted.size or SIZES[wanted.what.value], pose)
+    if not (min(piece.size) >= 0.3 and max(piece.size) <= 3.0 and piece.size[2] <= 1.2):
+        raise WorldError("width and depth are 0.3 to 3 m, and the height is 0.3 to 1.2 m")
+    if wanted.at is None:
+        piece = place_in(site.world, grid, piece, facts.places[room].polygon, site.doors, rooms)
+    elif (why := refusal(site.world, grid, piece, rooms)) is not None:
+        raise WorldError(f"{wanted.name} cannot stand at ({pose.x_m:g}, {pose.y_m:g}, {pose.yaw_rad:g}): {why}")
+    else:
+        room = next((name for name, each in facts.places.items() if inside(each.polygon, (pose.x_m, pose.y_m))), room)
+    grids = {name: site.grid(name) for name in BANDS_M if (site.folder / "map" / f"{name}.yaml").is_file()}
+    add_furniture(site.folder, piece, room, grids)
+    at = f"({piece.pose.x_m:.2f}, {piece.pose.y_m:.2f}, {piece.pose.yaw_rad:.2f})"
+    return f"{wanted.name} in the {room} at {at}, {piece.size[2]:g} m high"
+
+
+def _add_object(site: _Site, wanted: _Wanted) -> str:
+    from plant.worlds.builder.furnish import add_object
+
+    surfaces = site.facts.surfaces
+    found = site.facts.place(wanted.surface or "")
+    if found not in surfaces:
+        what = f"there is no surface '{wanted.surface}'" if wanted.surface else "an object lies on a surface"
+        raise InputError(what, hint=f"name it by --on: {listing(surfaces)}" if surfaces else "add a table first")
+    add_object(site.folder, wanted.name, wanted.name, str(found))
+    return f"{wanted.name} on the {found}"
+
+
+def _add_person(site: _Site, wanted: _Wanted) -> str:
+    from plant.worlds.builder.furnish import add_person
+
+    add_person(site.folder, site.world, site.grid(), wanted.name, site.room(None))
+    return f"{wanted.name} stands beside the robot's start"
+
+
+def _add_dock(site: _Site, wanted: _Wanted) -> str:
+    from plant.worlds.builder.furnish import add_dock, dock_pose
+
+    pose = Pose2D(*wanted.at) if wanted.at else dock_pose(site.world, site.grid(), site.doors)
+    add_dock(site.folder, pose)
+    return f"a dock at ({pose.x_m:.2f}, {pose.y_m:.2f}, {pose.yaw_rad:.2f})"
+
+
+def _name_room(site: _Site, wanted: _Wanted) -> str:
+    from plant.worlds.builder.furnish import with_room_name
+
+    if wanted.room is None:
+        raise InputError("the former name is missing", hint=f"name it by --in: {listing(site.facts.places)}")
+    if site.facts.place(wanted.name) is not None:
+        raise InputError(f"there is a '{wanted.name}' already", hint="choose another name", file=site.folder)
+    former, file = site.room(wanted.room), site.folder / "knowledge.yaml"
+    file.write_text(with_room_name(file, former, wanted.name), encoding="utf-8")
+    return f"{former} is now {wanted.name}"
+
+
+_ADDED: Final[Mapping[Addition, Callable[[_Site, _Wanted], str]]] = {
+    Addition.OBJECT: _add_object,
+    Addition.PERSON: _add_person,
+    Addition.DOCK: _add_dock,
+    Addition.ROOM: _name_room,
+}
+"""Additions other than furniture."""
+
+
+@contextmanager
+def _restored(folder: Path) -> Iterator[None]:
+    """Restores the text files of a world if the block raises."""
+    kept = {file: file.read_bytes() for pattern in ("*.yaml", "map/*") for file in folder.glob(pattern)}
+    try:
+        yield
+    except BaseException:
+        for file in {*folder.glob("*.yaml")} - kept.keys():
+            file.unlink()
+        for file, data in kept.items():
+            file.write_bytes(data)
+        raise
 
 
 @world.command(cls=StartCommand)

@@ -45,6 +45,8 @@ def links(page: Path) -> list[tuple[str, str]]:
 def unknown_command(line: str) -> str | None:
     """What is wrong with a command line of ours, or None."""
     words = shlex.split(line, comments=True)
+    if words[1] in ("--version", "--install-completion"):  # of no command
+        return None
     if words[1] not in _COMMANDS:
         return f"no command {words[1]}"
     command, rest = _COMMANDS[words[1]], words[2:]

@@ -116,7 +116,7 @@ def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door,
     """Finds the rooms that can be reached from the start, the largest first, and the doors between them."""
     clearance = clearance_m(grid)
     labels, saddles = _segmented(grid, clearance)
-    reached = _reached(clearance, grid, start)
+    reached = reached_cells(clearance, grid, start)
     sizes = np.bincount(labels[reached], minlength=int(labels.max()) + 1)
     sizes[0] = 0
     rooms: dict[int, Room] = {}
@@ -132,7 +132,7 @@ def find_rooms(grid: Grid, start: Pose2D) -> tuple[tuple[Room, ...], tuple[Door,
     return tuple(rooms.values()), tuple(doors)
 
 
-def _reached(clearance: FloatArray, grid: Grid, start: Pose2D) -> Bools:
+def reached_cells(clearance: FloatArray, grid: Grid, start: Pose2D) -> Bools:
     """Mask of the cells that the body's centre can reach from the start."""
     _, parts = cv2.connectedComponents((clearance >= BODY_M[1] / 2.0).astype(np.uint8))
     row, column = (

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import executive
 from executive.cli import entry
 from executive.cli.options import join_start
+from executive.words.knowledge import load_knowledge
+from plant.worlds.seeding import place_objects
+from plant.worlds.world import load_world
 
 MAP = """image: room.pgm
 resolution: 0.05
@@ -101,3 +105,102 @@ def test_a_value_that_the_file_does_not_take_is_refused(setting, why):
 def test_three_numbers_after_start_are_one_value():
     assert join_start(["run", "--start", "1", "-2", "0.5", "m.yaml"]) == ["run", "--start=1 -2 0.5", "m.yaml"]
     assert join_start(["run", "--start", "unknown", "m.yaml"]) == ["run", "--start", "unknown", "m.yaml"]
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """Folder of a world of two rooms with a door of 0.9 m, a dock and Robin."""
+    rooms = np.full((120, 240), 0, np.uint8)
+    rooms[4:-4, 4:118] = rooms[4:-4, 122:-4] = 254
+    rooms[51:69, 118:122] = 254
+    cv2.imwrite(str(tmp_path / "room.pgm"), rooms)
+    (tmp_path / "room.yaml").write_text(MAP.format(yaw=0.0))
+    made = invoke("world", "from-map", tmp_path / "room.yaml", "--out", tmp_path / "own")
+    assert made.exit_code == 0, made.output
+    return tmp_path / "own"
+
+
+def add(*words: object) -> str:
+    added = invoke("world", "add", *words)
+    assert added.exit_code == 0, added.output
+    return added.stdout
+
+
+def test_a_world_of_a_map_has_a_person_and_a_dock_unless_they_are_not_wanted(own, tmp_path):
+    facts = load_world(own)
+    assert (facts.dock is not None, [person.name for person in facts.seed_rules.people]) == (True, ["Robin"])
+    bare = ("world", "from-map", tmp_path / "room.yaml", "--out", tmp_path / "bare", "--no-dock", "--person", "")
+    assert invoke(*bare).exit_code == 0
+    assert (load_world(tmp_path / "bare").dock, (tmp_path / "bare" / "objects.yaml").exists()) == (None, False)
+
+
+def test_a_room_gets_its_name_in_all_facts(own):
+    add("room", own, "den", "--in", "room 1")
+    knowledge = load_knowledge(own / "knowledge.yaml")
+    assert "den" in knowledge.places and "room 1" not in (own / "knowledge.yaml").read_text()
+    assert "den" in knowledge.doors[0].between
+    refused = invoke("world", "add", "room", own, "den", "--in", "room 2")
+    assert (refused.exit_code, "there is a 'den' already" in refused.stderr) == (2, True)
+
+
+@pytest.mark.parametrize("kind", ["table", "desk", "shelf"])
+def test_furniture_stands_at_a_wall_and_the_robot_finds_an_object_on_it(own, kind):
+    add(kind, own, "big one", "--in", "room 1")
+    add("object", own, "coke", "--on", "big one")
+    knowledge, world = load_knowledge(own / "knowledge.yaml"), load_world(own)
+    top = knowledge.surfaces["big one"]
+    assert (top.place, len(top.viewpoints)) == ("room 1", 1)
+    assert knowledge.usual_surfaces("drink") == ("big one",)
+    placed = [each for each in place_objects(world, 3) if each.surface == "big one"]
+    assert len(placed) == 1
+    for sentence in ("fetch me a coke", "go to the big one"):
+        assert executive.check(sentence, world=str(own)).ok
+
+
+def test_furniture_is_on_the_map_at_the_heights_of_its_parts(own):
+    add("table", own, "table", "--at", 5.0, 3.8, -1.5708, "--size", 1.2, 0.6, 0.6)
+    keepout, scan = (cv2.imread(str(own / "map" / f"{name}.pgm"), cv2.IMREAD_GRAYSCALE) for name in ("keepout", "scan"))
+    row, column = 120 - round((3.8 + 1.0) / 0.05), round((5.0 - 2.0) / 0.05)
+    assert (keepout[row, column], scan[row, column]) == (0, 254)  # the top is below the band of the LiDAR
+
+
+def test_two_pieces_two_people_and_comments_stand_together_in_the_files(own):
+    file = own / "knowledge.yaml"
+    file.write_text("# mine\n" + file.read_text())
+    for words in (("table", own, "one"), ("desk", own, "two", "--in", "room 2"), ("person", own, "Kim")):
+        add(*words)
+    knowledge = load_knowledge(file)
+    assert (set(knowledge.surfaces), set(knowledge.people)) == ({"one", "two"}, {"Robin", "Kim"})
+    assert file.read_text().startswith("# mine\n")
+    assert len(load_world(own).seed_rules.fronts) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("table", "{own}", "t", "--at", 2.0, -1.0, 0.0), "touches a wall or lies outside"),
+        (("table", "{own}", "t", "--at", 7.5, 2.0, 3.1416), "the robot could no longer reach"),
+        (("table", "{own}", "t", "--in", "attic"), "there is no room 'attic'"),
+        (("table", "{own}", "t", "--size", 9, 1, 1), "0.3 to 3 m"),
+        (("table", "{own}"), "a table needs a name"),
+        (("object", "{own}", "coke", "--on", "shelf"), "there is no surface 'shelf'"),
+        (("object", "{own}", "coke"), "lies on a surface"),
+        (("dock", "{own}"), "there is a dock"),
+        (("person", "{own}", "Robin"), "'Robin' is in knowledge.yaml already"),
+        (("room", "{own}", "den"), "the former name is missing"),
+        (("table", "nowhere", "t"), "there is no such folder"),
+    ],
+)
+def test_an_addition_that_does_not_fit_is_refused_and_changes_nothing(own, words, why):
+    before = {file: file.read_bytes() for file in own.rglob("*") if file.is_file()}
+    refused = invoke("world", "add", *(str(word).replace("{own}", str(own)) for word in words))
+    assert (refused.exit_code, why in refused.stderr) == (2, True), refused.output
+    assert {file: file.read_bytes() for file in own.rglob("*") if file.is_file()} == before
+
+
+def test_an_unknown_class_is_refused_and_the_files_are_restored(own):
+    add("table", own, "table")
+    before = (own / "knowledge.yaml").read_text()
+    refused = invoke("world", "add", "object", own, "unicorn", "--on", "table")
+    assert (refused.exit_code, "unicorn" in refused.stderr) == (2, True), refused.output
+    assert (own / "knowledge.yaml").read_text() == before

@@ -25,9 +25,9 @@ LINES = {
     "executive/conversation": 581,
     "executive/view": 1446,
     "executive/testing": 810,
-    "executive/app": 7545,
+    "executive/app": 7560,
     "executive/cli": 4353,
-    "skills": 27263,
+    "skills": 27279,
     "plant": 12562,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8

@@ -43,6 +43,8 @@ _JPEG_QUALITY: Final = 78
 _MOST_LOOKS: Final = 12
 _SMALL_PX: Final = (320, 240)
 _ROW: Final = 4
+_EMPTY: Final = 225
+"""Grey of the places in a grid of pictures that no picture fills."""
 _MOMENTS: Final[Mapping[str, str]] = MappingProxyType({"hand-over": "hand_over", "place": "place"})
 _AHEAD_M: Final[Mapping[str, float]] = MappingProxyType({"hand_over": 0.4})
 """Distance of a picture's subject ahead of the hand, which is retracted by then."""
@@ -179,11 +181,24 @@ def to_jpeg(picture: Picture) -> bytes:
 
 
 def _sheet(pictures: Sequence[Picture]) -> Picture:
-    """Arranges pictures in a grid, at a smaller size."""
-    small = [np.asarray(cv2.resize(each, _SMALL_PX, interpolation=cv2.INTER_AREA), np.uint8) for each in pictures]
-    columns = min(len(small), _ROW)
-    small += [np.zeros_like(small[0])] * (-len(small) % columns)
+    """Arranges pictures in a grid with few empty places, each within the same smaller size."""
+    columns = min(
+        range(min(len(pictures), _ROW - 1), min(len(pictures), _ROW) + 1), key=lambda n: (-len(pictures) % n, -n)
+    )
+    small = [_within(each, _SMALL_PX) for each in pictures]
+    small += [np.full_like(small[0], _EMPTY)] * (-len(small) % columns)
     return np.vstack([np.hstack(small[k : k + columns]) for k in range(0, len(small), columns)])
+
+
+def _within(picture: Picture, size: tuple[int, int]) -> Picture:
+    """Shrinks a picture to fit into a tile of a size (width, height)."""
+    height, width = picture.shape[:2]
+    scale = min(size[0] / width, size[1] / height)
+    inner = (max(1, round(width * scale)), max(1, round(height * scale)))
+    tile = np.full((size[1], size[0], 3), _EMPTY, np.uint8)
+    left, top = (size[0] - inner[0]) // 2, (size[1] - inner[1]) // 2
+    tile[top : top + inner[1], left : left + inner[0]] = cv2.resize(picture, inner, interpolation=cv2.INTER_AREA)
+    return tile
 
 
 def detection_picture(message: Mapping[str, Any]) -> Picture:

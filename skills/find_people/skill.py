@@ -18,7 +18,7 @@ from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.patience import Patience
 from skills.perception.class_forms import PERSON
-from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark
+from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
 from skills.perception.people import SeenPerson, add_person, people_in_scan
 from skills.perception.people_watch import located_people, people_detections
 from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
@@ -119,8 +119,8 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             message=message,
         )
         for shown in [each for each in images if any(image is each for image, _ in detected)] or images[:1]:
-            found = [one for image, one in detected if image is shown]
-            self.context.publish("detections", detections_message(shown, found, ()))
+            picture, found = turn_upright(shown, [one for image, one in detected if image is shown])
+            self.context.publish("detections", {**detections_message(shown, found, ()), "image": picture})
         return located_people(detected, X_WO, here_W, options.reach_m)
 
     def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:

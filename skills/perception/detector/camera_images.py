@@ -70,6 +70,22 @@ def rotate_boxes_180(found: Sequence[Detection], width_px: int, height_px: int) 
     return tuple(rotated(one) for one in found)
 
 
+def turn_upright(image: Image, found: Sequence[Detection]) -> tuple[Picture, Detections]:
+    """Turns the picture of an image by quarter turns until its top is up, with the boxes of its detections."""
+    picture = image.grey if image.colour is None else image.colour
+    up_C = image.frames.pose(image.camera_frame).rotation().matrix()[2]
+    for _ in range(round(float(np.arctan2(up_C[0], -up_C[1])) / (np.pi / 2.0)) % 4):
+        width, picture = picture.shape[1], np.rot90(picture)
+        found = [replace(one, box=_turned(one.box, width)) for one in found]
+    return np.ascontiguousarray(picture), tuple(found)
+
+
+def _turned(box: tuple[float, float, float, float], width_px: int) -> tuple[float, float, float, float]:
+    """Turns a box with a picture by a quarter turn to the left."""
+    u0, v0, u1, v1 = box
+    return v0, width_px - u1, v1, width_px - u0
+
+
 def brighten(picture: Picture) -> Picture:
     """Brightens a dim picture (H, W) or (H, W, 3) by up to eight times; returns any other unchanged."""
     mean = float(picture.mean())

@@ -35,7 +35,16 @@ def test_a_negative_answer_shows_all_views():
     artifacts = Artifacts()
     for grey in (False, True, False, False, False):
         artifacts.message("detections", looked(grey=grey))
-    assert answered(artifacts, False)["image"].shape == (480, 1280, 3)
+    assert answered(artifacts, False)["image"].shape == (480, 960, 3)
+
+
+def test_a_picture_that_stands_on_end_keeps_its_shape_among_the_views():
+    # 48 x 64 upright in a tile of 320 x 240: 180 wide, with empty sides
+    artifacts = Artifacts()
+    artifacts.message("detections", {"detections": [], "image": np.full((64, 48, 3), 90, np.uint8)})
+    sheet = answered(artifacts, False)["image"]
+    assert sheet.shape == (240, 320, 3)
+    assert int(np.all(sheet[120] == 90, axis=1).sum()) == 180
 
 
 def test_an_answer_about_a_person_shows_the_person_and_not_an_object_of_an_earlier_answer():
@@ -66,7 +75,7 @@ def test_only_the_last_views_before_an_answer_are_kept():
 def test_pictures_that_a_skill_shows_go_into_the_report_with_their_captions():
     artifacts = Artifacts()
     context = replace(
-        scripted_bench(spot_capabilities())[0].context, publish=lambda topic, message: logged.append((topic, message))
+        scripted_bench(spot_capabilities())[0].context(), publish=lambda topic, message: logged.append((topic, message))
     )
     logged = []
     for number in range(MOST_SHOWN + 2):

@@ -17,6 +17,7 @@ from skills.perception.detector.camera_images import (
     is_upside_down,
     rotate_180,
     rotate_boxes_180,
+    turn_upright,
 )
 from skills.robot import FrameTree
 from skills.testing.estimators import PlainColours
@@ -63,6 +64,16 @@ def test_a_picture_that_looks_straight_down_is_not_rotated():
     down = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [1.05, 0.0, 1.6])
     image = rolled(0.0)
     assert not is_upside_down(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
+
+
+@pytest.mark.parametrize("roll_deg", [0, 78, -102, 172])
+def test_a_picture_is_turned_so_that_its_top_is_up_with_its_boxes(roll_deg):
+    # whatever the roll, the box of the upright can is higher than wide, above the table, and where the can is drawn
+    image = rolled(np.radians(roll_deg))
+    picture, (found,) = turn_upright(image, COKES.detect([image.colour])[0])
+    (again,) = COKES.detect([picture])[0]
+    assert found.box == pytest.approx(again.box, abs=1.0)
+    assert found.box[3] - found.box[1] > found.box[2] - found.box[0]
 
 
 def test_boxes_of_a_rotated_picture_fit_the_original_picture():

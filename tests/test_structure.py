@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7560,
     "executive/cli": 4353,
-    "skills": 27279,
+    "skills": 27277,
     "plant": 12562,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8

@@ -48,8 +48,6 @@ from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
 from skills.world_model import IN_THE_WAY
 
-_CLOSED_RAD = 0.06
-"""A finger that closes below this angle has gripped nothing."""
 _PER_KG_N = 12.0
 """Additional force per kilogram of the object."""
 _MOST_OF_FORCE = 0.95
@@ -410,7 +408,7 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
     def _check_held(self, name: str, opening_before: float | None) -> float:
         """Returns the gripper's opening. Raises SkillFailure with cause POSTCONDITION when the object is not held."""
         gripper = self.context.robot.gripper()
-        if gripper.opening < self.gripper.like_turn(_CLOSED_RAD) or not gripper.holding:
+        if not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {name} was seen")
         slip = self.gripper.like_turn(self.options.slip_rad)
         if opening_before is not None and abs(gripper.opening - opening_before) > slip:

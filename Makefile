@@ -5,6 +5,7 @@
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
 # make nightly  further missions, tutorials, seeds and worlds, and the smallest case of each measure
+# make wheels  whether wheels of all dependencies exist for each Python
 # make docs   the documentation as a site: open out/site/index.html
 
 PYTHON ?= $(shell command -v python3.11 || echo python3)
@@ -25,7 +26,7 @@ define install
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
 
-.PHONY: env train demo test fast nightly check bench docs format debian voices clean
+.PHONY: env train demo test fast nightly check bench docs wheels format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -36,8 +37,8 @@ $(VENV)/.ready: $(VENV)/.run
 	@touch $@
 
 $(VENV)/.run: pyproject.toml training/pyproject.toml constraints.txt | debian
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' \
-	  || { echo "Errand needs Python 3.11; set PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
+	  || { echo "Errand needs Python 3.11, 3.12 or 3.13; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals]'
 	@touch $@
@@ -75,6 +76,9 @@ check: env
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+wheels: $(VENV)/.run
+	.ci/wheels
 
 format: env
 	$(BIN)/ruff check --fix .

@@ -1,0 +1,59 @@
+"""Dependencies are ranges, and constraints.txt pins a version in each; the code runs on each declared Python."""
+
+import ast
+import re
+import sys
+import tomllib
+from itertools import chain
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+ROOT = Path(__file__).resolve().parent.parent
+VERSIONS = ("3.11", "3.12", "3.13")
+PROJECTS = [
+    tomllib.loads((ROOT / name).read_text())["project"] for name in ("pyproject.toml", "training/pyproject.toml")
+]
+REQUIRED = [
+    Requirement(words)
+    for project in PROJECTS
+    for words in chain(project["dependencies"], *project.get("optional-dependencies", {}).values())
+    if not words.startswith("spot-errand")
+]
+PINS = dict(line.split("==") for line in (ROOT / "constraints.txt").read_text().splitlines())
+GONE = {"asynchat", "asyncore", "audioop", "cgi", "crypt", "distutils", "imghdr", "imp", "pipes", "smtpd", "telnetlib"}
+"""Modules that Python 3.12 or 3.13 lacks."""
+
+
+def normal(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+@pytest.mark.parametrize("required", REQUIRED, ids=lambda each: each.name)
+def test_a_dependency_is_a_range_with_a_pin_in_it(required):
+    pins = {normal(name): version for name, version in PINS.items()}
+    assert not any(each.operator in ("==", "===") for each in required.specifier)
+    assert required.specifier.contains(pins[normal(required.name)], prereleases=True)
+
+
+def test_the_three_versions_of_python_are_declared_and_no_other():
+    for project in PROJECTS:
+        allowed = SpecifierSet(project["requires-python"])
+        assert [minor for minor in range(9, 17) if f"3.{minor}" in allowed] == [11, 12, 13]
+        declared = [each.rpartition(" ")[2] for each in project["classifiers"] if "Python ::" in each]
+        assert declared == list(VERSIONS)
+
+
+def test_no_module_imports_what_a_later_python_lacks():
+    files = [path for folder in ("executive", "skills", "plant", "training") for path in (ROOT / folder).rglob("*.py")]
+    imported = {
+        alias.name.partition(".")[0]
+        for path in files
+        for node in ast.walk(ast.parse(path.read_text(), feature_version=(3, 11)))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in (node.names if isinstance(node, ast.Import) else [ast.alias(node.module or "")])
+    }
+    assert len(files) > 500 and "numpy" in imported
+    assert not imported & (GONE - set(sys.builtin_module_names))

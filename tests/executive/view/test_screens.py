@@ -5,10 +5,15 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from executive.app.report import ReportedAnswer, ReportedObject, RobotReport
+from executive.app.evaluate.results import Case, Evidence, Results, RunSpec
+from executive.app.evaluate.summary import to_page
+from executive.app.report import ReportedAnswer, ReportedObject, RobotReport, RunReport
 from executive.app.report_file import ReportPage, ReportPart, StepRow
+from executive.mission.request import Request
+from executive.record.announce import map_message
 from executive.run.outcome import Said
 from executive.tree.compiler import compile_mission
 from executive.tree.node_view import node_view
@@ -19,7 +24,9 @@ from executive.view.server import PageContent, PageServer
 from executive.view.styles import Styles
 from executive.view.text import readable
 from executive.words.goal import RefereeReport
+from executive.words.knowledge import Pose
 from executive.words.mission import Mission
+from skills.estimate.grid_map import GridMap
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 FLAGS = ["--no-sandbox", "--disable-background-networking", "--disable-component-update", "--disable-sync"]
@@ -102,6 +109,40 @@ def test_the_page_of_a_nested_mission_is_readable(page, running):
     assert page.locator(".tree").evaluate("tree => tree.scrollHeight") < 900
 
 
+@pytest.fixture
+def several(nested, knowledge):
+    """The address of the page of three robots at one place, with their missions, on a map with rooms and a dock."""
+    feed, names = Feed(), ("Alice", "Bob", "Carol")
+    known = knowledge.model_copy(update={"dock": Pose(x=0.5, y=0.5, yaw=0.0)})
+    feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), known, world="test"))
+    feed("run", 0.0, {"world": "t", "seed": 3, "commands": [], "versions": {}, "robots": dict.fromkeys(names, "spot")})
+    for name in names:
+        feed("tree", 0.0, {"robot": name, "root": node_view(nested.root).structure()})
+        turn, position = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, {"x": 0.4, "y": 0.4, "z": 0.0}
+        feed("pose", 0.5, {"robot": name, "pose": {"position": position, "orientation": turn}})
+        feed("object_destination", 0.6, {"robot": name, "class_name": "coke", "goal_x": 0.8, "goal_y": 0.6})
+        state = {"holding": True, "charge": 0.1, "localised": False, "position_sigma_m": 0.02, "speed_m_s": 0.4}
+        feed("state", 0.7, {"robot": name, **state})
+    row = {"sentence": f"fetch it {LONG}", "robot": "Alice", "outcome": "running", "message": LONG, "reassigned": 2}
+    feed("missions", 1.0, {"missions": [{"id": number, **row} for number in range(3)]})
+    with PageServer(PageContent(feed, {name: lambda values: "" for name in ("pause", "cancel", "say")})) as server:
+        yield server.url
+
+
+def test_the_page_of_several_robots_fits_and_no_name_on_the_map_covers_another(page, several):
+    page.goto(several)
+    playwright_api.expect(page.locator("#legend li")).to_have_text(["object found", "dock"])
+    assert page.evaluate(OVERFLOWING) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    covered = """() => {
+      const { taken, later } = window.errand.page.map.names, names = taken.slice(-later.length);
+      const side = (a, b, k) => Math.max(0, Math.min(a[k + 2], b[k + 2]) - Math.max(a[k], b[k]));
+      return names.flatMap((a, n) => names.slice(n + 1).map((b) => side(a, b, 0) * side(a, b, 1)))
+        .filter((area) => area > 1).length;
+    }"""
+    assert page.evaluate(covered) == 0
+
+
 def test_no_empty_panel_is_shown_for_a_scene_that_is_not_there(page, running):
     page.goto(running)
     page.locator("#map-panel").wait_for()
@@ -155,3 +196,20 @@ def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, 
     assert page.evaluate(OVERFLOWING) == []
     assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
     assert min(page.locator("td.why").evaluate_all("cells => cells.map((cell) => cell.clientWidth)")) > 200
+
+
+def test_the_report_of_an_evaluation_fits_its_page(page, tmp_path):
+    runs = [(1, "success", True, None), (2, "success", False, None), (3, "failure", False, "PLANNING")]
+    cases = []
+    for seed, outcome, success, cause in runs:
+        referee = RefereeReport(success, LONG, 0, 0)
+        report = RunReport(outcome, cause, LONG, referee, (), "flat", seed, 9.0, 1.0, 9.0, 90, "", work={"steps": 9})
+        cases.append(Case(RunSpec(Request("fetch me the hammer", world="flat", seed=seed), "fetch"), report))
+    found = Results(tuple(cases), {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
+    told = Evidence(timeline=((1.0, "navigate", LONG),))
+    html = to_page(found, lambda _: told, lambda _: f"errand run {LONG}", against=cases[:2], other="before.json")
+    (tmp_path / "results.html").write_text(html, encoding="utf-8")
+    page.goto((tmp_path / "results.html").as_uri())
+    page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+    assert page.evaluate(OVERFLOWING) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]

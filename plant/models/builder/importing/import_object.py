@@ -39,6 +39,8 @@ PROUD_M: Final = 0.0003
 PLACES: Final = 6
 USUAL_KG_M3: Final = 600.0
 """Density of an object of unknown mass: between wood and a plastic bottle that is full."""
+LIGHTEST_KG, HEAVIEST_KG = 1e-4, 100.0
+"""Limits of the mass that follows from the volume."""
 PERSON: Final = "person"
 _UNITS: Final = (("millimetres", 0.001), ("centimetres", 0.01), ("inches", 0.0254), ("feet", 0.3048), ("km", 1000.0))
 _PLAUSIBLE_M: Final = (0.02, 1.5)
@@ -134,12 +136,11 @@ def import_object(
     reading, closing, fitting, writing = STEPS
     reports.step(reading)
     content = read_mesh(mesh)
-    for note in content.notes:
-        reports.note(note)
     reports.step(closing)
     body = _at_rest(_placed(content, options))
-    mass_kg = body.solid.volume_m3 * USUAL_KG_M3 if options.mass_kg is None else options.mass_kg
-    mass = scale_mass(_mass(body.solid), mass_kg)
+    for note in (*content.notes, *_size_doubts(np.ptp(body.solid.points, axis=0), options.scale)):
+        reports.note(note)
+    mass = scale_mass(_mass(body.solid), _mass_kg(body.solid, options))
     _refuse_impossible(mass)
     reports.step(fitting)
     parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
@@ -162,6 +163,17 @@ def import_object(
     recognition_model(made.class_name, body.patches, body.solid.points, mass.com).write(folder)
     write_imported(folder, made)
     return made
+
+
+def _mass_kg(solid: Solid, options: ImportOptions) -> float:
+    """Mass that the user gives, else that of the volume. Raises ObjectImportError for an implausible volume."""
+    if options.mass_kg is not None:
+        return options.mass_kg
+    mass_kg = solid.volume_m3 * USUAL_KG_M3
+    if not LIGHTEST_KG <= mass_kg <= HEAVIEST_KG:
+        hint = _scale_hint(float(np.ptp(solid.points, axis=0).max()), options.scale)
+        raise ObjectImportError(f"by its volume it weighs {mass_kg:.3g} kg", f"{hint}; or give --mass")
+    return mass_kg
 
 
 def _placed(content: MeshContent, options: ImportOptions) -> _Body:
@@ -190,6 +202,14 @@ def _refuse_size(size_m: FloatArray, scale: float) -> None:
         raise ObjectImportError(f"it is {size} m large", _scale_hint(float(size_m.max()), scale))
     if size_m.max() < SMALLEST_M:
         raise ObjectImportError(f"it is {size} m small", _scale_hint(float(size_m.max()), scale))
+
+
+def _size_doubts(size_m: FloatArray, scale: float) -> tuple[str, ...]:
+    """Remark on an object of a possible, but unusual size, whose scale the user has not given."""
+    largest_m = float(size_m.max())
+    if scale != 1.0 or _PLAUSIBLE_M[0] <= largest_m <= _PLAUSIBLE_M[1]:
+        return ()
+    return (f"it is {largest_m:.3g} m long; if that is wrong, {_scale_hint(largest_m, scale)}",)
 
 
 def _scale_hint(largest_m: float, scale: float) -> str:

@@ -166,8 +166,8 @@ MOST_CORNERS: Final = 64
 CONCAVITY: Final = 0.05
 """CoACD's `threshold`: the allowed difference of a convex part from the body."""
 AS_GOOD_AS_CONVEX: Final = 0.97
-_EFFORT: Final = MappingProxyType({"mcts_iterations": 60, "mcts_nodes": 10, "resolution": 1000})
-"""Half of CoACD's default search, which takes a quarter of the time and finds equally good parts."""
+_EFFORT: Final = MappingProxyType({"mcts_iterations": 10, "mcts_max_depth": 2, "mcts_nodes": 10, "resolution": 500})
+"""Part of CoACD's default search: a mug of 2400 triangles takes less than half the time of a deeper search."""
 _SAME_POINT: Final = 1e-6
 _SEAMS: Final = (1e-5, 1e-4)
 """Gaps that are closed in an open mesh, as shares of its size: single precision leaves them."""

@@ -18,7 +18,7 @@ from plant.models.builder.importing import (
     ObjectImportError,
     import_object,
 )
-from tests.plant.models.builder.importing.mesh_forms import FORMS, SIZE_M
+from tests.plant.models.builder.importing.mesh_forms import FORMS, SIZE_M, exported
 
 
 @pytest.mark.parametrize("name", [name for name, form in FORMS.items() if form.refused is None])
@@ -59,3 +59,22 @@ def test_an_import_reports_its_steps(tmp_path):
     steps = list[str]()
     import_object(tmp_path / "m.stl", ImportOptions("gadget"), tmp_path, ImportReports(step=steps.append))
     assert tuple(steps) == STEPS
+
+
+def test_an_unusual_size_is_doubted_with_the_units_that_fit(tmp_path):
+    notes = list[str]()
+    exported(scale=25.0)(tmp_path / "m.stl")
+    options = ImportOptions("gadget", mass_kg=5.0)
+    import_object(tmp_path / "m.stl", options, tmp_path, ImportReports(note=notes.append))
+    (note,) = notes
+    assert note.startswith("it is 3 m long") and "0.0254 if its unit is inches (0.0762 m long)" in note
+
+
+@pytest.mark.parametrize(
+    ("scale", "said"), [(25.0, "weighs 5.4e.03 kg.*0.0254 if its unit"), (0.05, "weighs 4.32e-05 kg")]
+)
+def test_a_volume_that_no_object_has_is_refused_with_the_units_that_fit(tmp_path, scale, said):
+    exported(scale=scale)(tmp_path / "m.stl")
+    with pytest.raises(ObjectImportError) as error:
+        import_object(tmp_path / "m.stl", ImportOptions("gadget"), tmp_path)
+    assert re.search(said, f"{error.value.message}; {error.value.hint}")

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 7682,
     "executive/speech": 1588,
     "executive/mission": 1596,
-    "executive/tree": 7745,
+    "executive/tree": 7748,
     "executive/run": 3094,
     "executive/record": 1319,
     "executive/store": 1681,
@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 810,
     "executive/app": 7560,
     "executive/cli": 4353,
-    "skills": 27277,
+    "skills": 27280,
     "plant": 12582,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8

@@ -171,6 +171,9 @@ def faults_of(skill: Any, *, registered_as: str) -> Iterator[tuple[str, str]]:
         yield "it has no docstring", "say in one sentence what it does"
     yield from _port_faults(skill)
     yield from _cause_faults(skill)
+    if "image" in skill.max_data_age_s:
+        hint = "give an output port whose value has the picture's stamp_s, and declare the age of that port"
+        yield "its max_data_age_s names 'image', which has no latest reading", hint
     limit_s = skill.default_timeout_s
     if not (isinstance(limit_s, int | float) and math.isfinite(limit_s) and limit_s > 0.0):
         yield f"its default_timeout_s is {limit_s!r}", "give a number of seconds above 0"

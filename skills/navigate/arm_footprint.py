@@ -32,7 +32,7 @@ class ArmFootprint:
     def __init__(self, context: SkillContext) -> None:
         capabilities = context.robot.capabilities()
         self._context, self._body = context, Footprint.of(capabilities)
-        has_arm = capabilities.arm is not None and capabilities.gripper is not None and capabilities.description
+        has_arm = capabilities.arm is not None and capabilities.description
         self._model = arm_model(capabilities) if has_arm else None
         self._gripper = capabilities.gripper
         self._box = np.array([np.min(capabilities.footprint_m, axis=0), np.max(capabilities.footprint_m, axis=0)])

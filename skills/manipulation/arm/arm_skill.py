@@ -184,7 +184,8 @@ class ArmSkill(RoutineSkill[InputsT]):
         return self._arm_points_B(self.q_rad())
 
     def _arm_points_B(self, q_rad: FloatArray) -> FloatArray:
-        tip_B = self.model.X_BH(q_rad) @ np.array([self.gripper.length_m, 0.0, 0.0])
+        gripper = self.context.robot.capabilities().gripper
+        tip_B = self.model.X_BH(q_rad) @ np.array([0.0 if gripper is None else gripper.length_m, 0.0, 0.0])
         return np.vstack([self.model.points_B(q_rad), tip_B])
 
     def is_hand_near(self, p_W: FloatArray, within_m: float) -> bool:
@@ -381,10 +382,11 @@ class ArmSkill(RoutineSkill[InputsT]):
         return float(np.median(found))
 
     def stow(self, message: str = "stowing the arm") -> Routine[None]:
-        """Closes the empty gripper and folds the arm onto the body, unless it is stowed already."""
-        stowed = self.model.stowed_rad
-        gripper = self.context.robot.gripper()
-        closing = 0.0 if not gripper.holding and gripper.opening > self.gripper.like_turn(_OPEN_RAD) else None
+        """Closes the empty gripper, if there is one, and folds the arm onto the body, unless it is stowed already."""
+        stowed, reading = self.model.stowed_rad, self.context.robot.gripper()
+        gripper = self.context.robot.capabilities().gripper
+        is_open = gripper is not None and not reading.holding and reading.opening > gripper.like_turn(_OPEN_RAD)
+        closing = 0.0 if is_open else None
         if self.model.off_rad(self.q_rad(), stowed) > _STOWED_RAD:
             yield from self.move_to(lambda scene, q: stowed, message, opening=closing)
         elif closing is not None:

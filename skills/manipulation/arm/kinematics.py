@@ -279,8 +279,8 @@ def arm_model(capabilities: Capabilities) -> ArmModel:
 
     Raises ValueError when there is none, or one of another structure without a solver of its own.
     """
-    if capabilities.arm is None or capabilities.gripper is None:
-        raise ValueError("the robot has no arm with a gripper")
+    if capabilities.arm is None:
+        raise ValueError("the robot has no arm")
     names, stowed, solver = capabilities.arm.joint_names, capabilities.arm.stowed_rad, capabilities.arm.inverse
     model = _read_model(capabilities.description, names, stowed[: len(names)], solver is None)
     return model if solver is None else replace(model, solver=solver)

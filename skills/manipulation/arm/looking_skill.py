@@ -96,9 +96,10 @@ class LookingSkill(ArmSkill[InputsT]):
 
     def look_from(self, goal: Goal, message: str, speed_rad_s: float | None = None) -> Routine[None]:
         """Moves the hand camera to the configuration of `goal`; opens an empty gripper that would hide the view."""
-        gripper, widest = self.context.robot.gripper(), self.gripper.widest
-        opens = not gripper.holding and gripper.opening < _OPEN_ENOUGH * widest
-        yield from self.move_to(goal, message, speed_rad_s, opening=_OPEN_WIDE * widest if opens else None)
+        reading, gripper = self.context.robot.gripper(), self.context.robot.capabilities().gripper
+        opens = gripper is not None and not reading.holding and reading.opening < _OPEN_ENOUGH * gripper.widest
+        opening = _OPEN_WIDE * gripper.widest if gripper is not None and opens else None
+        yield from self.move_to(goal, message, speed_rad_s, opening=opening)
 
     def picture(self, message: str, settle_s: float = SETTLE_S, *, near: bool = False) -> Routine[Image]:
         """Takes a picture with the object camera at rest; a head camera's picture has no depth on the robot's own arm.

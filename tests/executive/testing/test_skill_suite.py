@@ -16,6 +16,7 @@ from executive.testing.skill_suite import (
     exception_in_every_verb,
     stale_sensors,
 )
+from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.testing.robot import BASE_ONLY
 
@@ -127,6 +128,25 @@ def test_a_swallowed_exception_is_found():
 
 def test_a_skill_that_senses_must_declare_how_old_its_data_may_be():
     assert list(stale_sensors(case_of(Blind))) == ["it uses odometry and declares no max_data_age_s"]
+
+
+class Looks(Blind):
+    """Reads pictures only, which carry their own stamps."""
+
+    def begin(self, inputs):
+        self._looked = 0
+
+    def step(self):
+        self._looked += 1
+        picture = self.context.robot.image("hand")
+        return Succeeded(f"seen at {picture.stamp_s}") if self._looked > 5 else Running("looking")
+
+    def end(self, outcome):
+        """Moves nothing."""
+
+
+def test_a_skill_that_reads_only_pictures_need_not_declare_an_age():
+    assert list(stale_sensors(SuiteCase(Looks, CreepInputs(), partial(scripted_bench, spot_capabilities())))) == []
 
 
 def test_a_success_on_frozen_sensors_is_found_when_the_leaf_does_not_catch_it(monkeypatch):

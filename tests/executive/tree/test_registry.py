@@ -7,9 +7,11 @@ import pkgutil
 import sys
 import textwrap
 import tomllib
+from collections.abc import Mapping
 from importlib.metadata import distributions
 from inspect import get_annotations
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
@@ -213,3 +215,26 @@ def test_ports_that_name_a_class_of_another_skill_are_refused(declared):
     found.done_by = "skills.manipulation.stow.skill:Stow"
     with pytest.raises(TypeError, match=r"skills\.manipulation\.stow\.skill:Stow does not derive from WavePorts"):
         found.loaded()
+
+
+def test_an_age_of_pictures_is_refused_with_what_to_declare_instead():
+    class Gaze(Skill[WaveInputs]):
+        """Looks."""
+
+        name = "gaze"
+        Inputs = WaveInputs
+        max_data_age_s: ClassVar[Mapping[str, float]] = {"image": 1.0}
+
+        def begin(self, inputs):
+            pass
+
+        def step(self):
+            raise NotImplementedError
+
+    found = dict(faults_of(Gaze, registered_as="gaze"))
+    assert "the picture's stamp_s" in found["its max_data_age_s names 'image', which has no latest reading"]
+
+
+@dataclasses.dataclass(frozen=True)
+class WaveInputs:
+    """None."""

@@ -9,6 +9,7 @@ from table_scene import BLUE, COKE, GREY, PINK, RED, TABLE, Can
 
 from skills.api import Cause, Succeeded, Surface
 from skills.detect.skill import Detect, DetectInputs
+from skills.manipulation.stow.skill import Stow, StowInputs
 
 FAR = Surface("shelf", ((8.0, -0.6), (8.4, -0.6), (8.4, 0.6), (8.0, 0.6)), 0.75)
 SECOND = Can(1.1, 0.25, 0.033, 0.115, RED)
@@ -243,3 +244,19 @@ def test_the_same_scene_gives_the_same_log():
     logs = [found([COKE, BEER], DetectInputs(("coke",), (TABLE,)))[1] for _ in range(2)]
     plain = [[(topic, {k: v for k, v in m.items() if k != "image"}) for topic, m in log] for log in logs]
     assert plain[0] == plain[1]
+
+
+class WithoutGripper(ScriptedRobot):
+    """A robot with an arm that carries a camera and no gripper."""
+
+    def capabilities(self):
+        return replace(super().capabilities(), gripper=None)
+
+
+def test_an_arm_without_a_gripper_looks_and_is_stowed():
+    robot = WithoutGripper(things=[COKE])
+    seen = outcome(Detect(context_of(robot)), DetectInputs(("coke",), (TABLE,)))
+    assert isinstance(seen, Succeeded), seen
+    assert seen.outputs["observation"].kind.name == "coke"
+    assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
+    assert np.allclose(robot.q, MODEL.stowed_rad, atol=0.02)

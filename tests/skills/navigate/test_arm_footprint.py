@@ -157,3 +157,13 @@ def test_a_stowed_arm_causes_no_new_plan():
     step, plans = drive_along_the_corridor(raised_from_x_m=math.inf)
     assert isinstance(step, Succeeded), step.message
     assert plans == 1
+
+
+def test_an_arm_without_a_gripper_widens_the_footprint_too():
+    class WithoutGripper(ScriptedRobot):
+        def capabilities(self):
+            return replace(super().capabilities(), gripper=None)
+
+    ahead = ArmFootprint(context_of(WithoutGripper(q=np.array(AHEAD)))).now()
+    stowed = ArmFootprint(context_of(WithoutGripper())).now()
+    assert len(ahead.discs) > len(stowed.discs)

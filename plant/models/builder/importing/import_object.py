@@ -143,9 +143,10 @@ def import_object(
     mass = scale_mass(_mass(body.solid), _mass_kg(body.solid, options))
     _refuse_impossible(mass)
     reports.step(fitting)
-    parts = [_shrunk(part, body.solid.points) for part in convex_parts(body.solid)]
+    convex = convex_parts(body.solid)
+    parts = [_shrunk(part, body.solid.points) for part in convex]
     reports.step(writing)
-    bearing = feet(body.solid.points, mass.com)
+    bearing = feet(body.solid.points, mass.com, convex)
     files = [f"{options.name}_part_{number}.obj" for number in range(len(parts))]
     for file, part in zip(files, parts, strict=True):
         write_text(folder / file, _hull_text(part))

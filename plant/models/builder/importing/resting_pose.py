@@ -6,6 +6,7 @@ gets spheres at its corners, which touch the side's plane from inside.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,6 +20,7 @@ from skills.robot import FloatArray
 FOOT_M: Final = 0.003
 CORNERS: Final = 6
 MOST_SIDES: Final = 6
+_FEWEST_FEET: Final = 3
 _THICKNESS: Final = 0.01
 _LEAST_M: Final = 0.0003
 """Greatest distance of a side's points from its plane: a share of the body's height above it, or metres."""
@@ -26,6 +28,9 @@ _LEAST_TIPPING_RAD: Final = 0.05
 _LEAST_AREA: Final = 0.04
 _MOST_CANDIDATES: Final = 60
 _OTHER_SIDE: Final = 0.97
+_WALL: Final = 0.9
+_SLACK: Final = 0.5
+"""Share of its radius by which a foot may stand out of faces less than 26 degrees from its side: of a round handle."""
 MOST_RESTS: Final = 10
 _OTHER_REST: Final = 0.85
 _PROJECTIONS, _EXACT = 200, 0.02
@@ -106,10 +111,11 @@ def side_towards(points: FloatArray, com: FloatArray, normal: FloatArray) -> Sid
     return Side(normal, corners, float(outline.area), height, float(np.arctan2(lever, height)))
 
 
-def feet(points: FloatArray, com: FloatArray) -> list[Sphere]:
+def feet(points: FloatArray, com: FloatArray, parts: Sequence[FloatArray]) -> list[Sphere]:
     """Small spheres at the corners of the sides on which a body can rest, first of the side on which it stands.
 
-    They touch the planes of the sides from inside; they do not stand out of a body with plane sides.
+    They touch the planes of the sides from inside, each within one of the body's convex `parts` (N, 3): between a
+    hammer's claw and its handle they would catch the fingers of a gripper.
     """
     hull = ConvexHull(points)
     radius = min(FOOT_M, float(np.ptp(points, axis=0).min()) / 6.0)
@@ -119,7 +125,8 @@ def feet(points: FloatArray, com: FloatArray) -> list[Sphere]:
         new = all(float(side.normal @ other.normal) < _OTHER_SIDE for other in sides)
         if new and side.area_m2 > _LEAST_AREA * hull.area and len(sides) < MOST_SIDES:
             sides.append(side)
-    found = [_feet_of(side, hull.equations, radius) for side in sides]
+    hulls = [ConvexHull(part).equations for part in parts]
+    found = [_feet_of(side, hulls, radius) for side in sides]
     if standing is not None and not found[0]:
         found[0] = _rounded_feet(standing, radius)
     return [foot for each in found for foot in each]
@@ -132,15 +139,20 @@ def _rounded_feet(side: Side, radius: float) -> list[Sphere]:
     return [Sphere(radius=radius, p=(x, y, z)) for x, y, z in centres.tolist()]
 
 
-def _feet_of(side: Side, hull: FloatArray, radius: float) -> list[Sphere]:
-    """Feet of one side, smaller where it is narrow; none where even small ones do not fit."""
-    corners = _spread(side.corners)
-    for small in (radius, radius / 2.0, radius / 4.0):
-        centres = [_inside(corner - small * side.normal, side.normal, hull, small) for corner in corners]
-        found = [centre.tolist() for centre in centres if centre is not None]
-        if len(found) == len(corners):
-            return [Sphere(radius=small, p=(x, y, z)) for x, y, z in found]
-    return []
+def _feet_of(side: Side, hulls: Sequence[FloatArray], radius: float) -> list[Sphere]:
+    """Feet of one side, each in the part at its corner, smaller where that is narrow; none where too few fit."""
+    slack_m = _SLACK * radius
+    walls = [hull - np.outer(hull[:, :3] @ side.normal > _WALL, [0.0, 0.0, 0.0, slack_m]) for hull in hulls]
+    found = list[Sphere]()
+    for corner in _spread(side.corners):
+        own = min(walls, key=lambda wall: float(np.max(wall @ [*corner, 1.0])))
+        for small in (radius, radius / 2.0, radius / 4.0):
+            centre = _inside(corner - small * side.normal, side.normal, own, small)
+            if centre is not None:
+                x, y, z = centre.tolist()
+                found.append(Sphere(radius=small, p=(x, y, z)))
+                break
+    return found if len(found) >= _FEWEST_FEET else []
 
 
 def _inside(start: FloatArray, normal: FloatArray, hull: FloatArray, radius: float) -> FloatArray | None:

@@ -22,6 +22,7 @@ from executive.language.items import (
 from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
+from executive.language.questions import RefusalError
 from executive.language.roles import HERE, THERE, Location, Roles, read_roles
 from executive.language.tokens import Token
 from executive.words.command import TIME_UNITS_S
@@ -91,10 +92,23 @@ def read_actions(
             found.append(action)
         end = takewhile(lambda item: isinstance(item, Separator), reversed(clause.items))
         follows = any(isinstance(item, Separator) and item.word in _THEN for item in end)
+    found = _without_idle_waits(found)
     last = [replace(action, unknown=(action.said,)) if action.departs else action for action in found[-1:]]
     # The "go" of "go and find" is left out.
     bare = [one for one in found[:-1] if one.kind is VerbKind.GO and one.goal is None and one.unknown == (one.verb,)]
     return (*(action for action in found[:-1] if action not in bare), *last)
+
+
+def _without_idle_waits(actions: list[Action]) -> list[Action]:
+    """Removes a wait without a time behind the last drive: the robot stays there. Raises RefusalError for others."""
+    waits = [action for action in actions if action.verb in lexicon().wait and action.time is None]
+    idle = [action for action in waits if action.kind is VerbKind.WAIT and action.unknown == (action.verb,)]
+    if idle and idle[-1] is actions[-1] and len(actions) > 1 and actions[-2].kind is VerbKind.GO:
+        return _without_idle_waits(actions[:-1])
+    if idle or any(action.kind is VerbKind.GO for action in waits if action is not actions[-1]):
+        said = (idle or waits)[0].said
+        raise RefusalError(f"say for how long I am to wait in '{said}', or until what", [said])
+    return actions
 
 
 def _actions(clause: Predicate) -> Iterator[Action]:
@@ -245,13 +259,15 @@ def _finding(blank: Action, roles: Roles) -> Iterator[Action]:
 
 
 def _waiting(blank: Action, roles: Roles) -> Action:
-    """Waits for a time, here or in a place."""
+    """Waits for a time, here or in a place; without a time it only goes there."""
     times = [phrase for phrase in (roles.searched, *roles.objects) if phrase is not None]
     places = [place for place in (*roles.ats, *roles.goals) if place not in (HERE, THERE)]
     fits = len(times) == 1 and times[0].head.word in TIME_UNITS_S and times[0].count > 0
     extra = [phrase.spoken for phrase in (times[1:] if fits else times)] + ([] if fits else [blank.verb])
     extra += [place.text for place in (*places[1:], *_beyond(roles))]
     goal, time = next(iter(places), None), times[0] if fits else None
+    if not times and goal is not None:
+        return replace(blank, kind=VerbKind.GO, goal=goal, unknown=(*blank.unknown, *extra[1:]))
     return replace(blank, goal=goal, time=time, unknown=(*blank.unknown, *extra))
 
 

@@ -133,7 +133,9 @@ def _kind(text: str) -> tuple[Cue, str] | None:
     for kind, form in _kinds():
         match = form.match(text)
         behind_it = None if match is None or kind not in _WHOLE else _NEXT.match(text, match.end())
-        if match is not None and (behind_it is None or behind_it[1].lower() in _verbs() | _SMALL):
+        object_follows = match is not None and _WHOLE_WORDS.search(match[0]) is not None
+        begins = _verbs() | _SMALL | (_ARTICLES if object_follows else frozenset())
+        if match is not None and (behind_it is None or behind_it[1].lower() in begins):
             return kind, match[0]
     return None
 
@@ -181,6 +183,12 @@ def _kinds() -> tuple[tuple[Cue, re.Pattern[str]], ...]:
 _WHOLE: Final = frozenset({Cue.FAILED, Cue.SO, Cue.NOT})
 _NEXT: Final = re.compile(r"\s*([^\s,;:]\w*)")
 _SMALL: Final = frozenset({"then", "please", "just"})
+_ARTICLES: Final = frozenset({"a", "an", "the", "some", "another"})
+_WHOLE_WORDS: Final = re.compile(
+    r"(?:\b(?:none|one|any|it|them|that|this|failed|fails?|works?|out|(?:im)?possible|wrong|left|available)|^if not)$",
+    re.IGNORECASE,
+)
+"""Ends of cues after which an object may follow at once: "if there is none a beer"."""
 _ONE_VERB: Final = re.compile(r"(?:^|[\s,])(?:go|come|run|say)$", re.IGNORECASE)
 """Verbs after which "and" and "please" join no other clause: "go and charge"."""
 _ELSE: Final = re.compile(r"(?:or )?(?:else|otherwise)\b", re.IGNORECASE)

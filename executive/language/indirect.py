@@ -12,6 +12,7 @@ from executive.language.lexicon import PrepositionRole, VerbKind, lexicon
 from executive.language.nouns import NounKind
 from executive.language.phrases import Phrase
 from executive.language.tokens import Token
+from skills.detect.descriptions import plural
 
 _BELONGS: Final = frozenset({"go", "goes", "belong", "belongs"})
 _WHERE: Final = frozenset({"in", "on", "into", "onto", "inside", "under", "next"})
@@ -69,7 +70,8 @@ def how_many(row: Row, items: list[Item]) -> Item | None:
     while row.at < len(row.tokens) and row.tokens[row.at].word in ("there", "left"):
         row.at += 1
     items += [Separator(""), Being(be[0].text, existential=True, asked=True)]
-    return Chunk(Phrase(phrase.tokens[2:]))
+    head = phrase.head if phrase.plural else replace(phrase.head, text=plural(phrase.head.text), tag="NNS")
+    return Chunk(Phrase((*phrase.tokens[2:-1], head)))
 
 
 def do_we_have(row: Row, items: list[Item]) -> Item | None:

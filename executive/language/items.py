@@ -118,6 +118,21 @@ def spoken_words(items: Iterable[Item]) -> str:
     return " ".join(filter(None, words))
 
 
+def without_objects(items: Sequence[Item]) -> tuple[Item, ...]:
+    """Verb with its recipient and goal, for another object; nothing when there are several verbs."""
+    verbs = [item for item in items if isinstance(item, Verb | Being | Outside | Negation | Correction)]
+    if len(verbs) != 1 or not isinstance(verbs[0], Verb):
+        return ()
+    at = {VerbKind.PLACE, VerbKind.FIND} & verbs[0].kinds or verbs[0].text in lexicon().at_is_goal
+    roles = (PrepositionRole.GOAL, *((PrepositionRole.AT, PrepositionRole.BESIDE) if at else ()))
+    return tuple(
+        item
+        for item in items
+        if isinstance(item, Verb | Adverb)
+        or (isinstance(item, Chunk) and (item.role in roles or item.phrase.person or item.phrase.speaker))
+    )
+
+
 LONGEST: Final = 6
 """Number of words of the longest phrase in the dictionaries."""
 

@@ -12,6 +12,7 @@ from executive.language.lexicon import lexicon
 from executive.language.nouns import NounKind
 from executive.language.tokens import Token
 from skills.api import ObjectKind
+from skills.detect.descriptions import plural
 
 _LEFT: Final = frozenset(
     {"det", "amod", "compound", "nummod", "poss", "nmod", "predet", "quantmod", "advmod", "case", "npadvmod", "punct"}
@@ -172,6 +173,18 @@ class Phrase:
         """Returns whether the phrase is only a number ("two", "a couple")."""
         return _number(self.head) is not None
 
+    @property
+    def distributed(self) -> Phrase:
+        """All objects of the kind for "each cube"; the phrase itself for other words, as for "every second cube"."""
+        each, *between = self.tokens[:-1] or self.tokens
+        counted = any(t.tag == "CD" or t.word in _SOME_OF_THEM for t in between)
+        objects = self.kind is None or (self.kind.within_reach and self.head.lemma not in lexicon().fixtures)
+        noun = len(self.tokens) > 1 and self.head.word not in lexicon().pronouns and not (self.person or self.plural)
+        if each.word not in _EACH or counted or not (objects and noun):
+            return self
+        head = replace(self.head, text=plural(self.head.text), tag="NNS")
+        return replace(self, tokens=(replace(each, text=_ALL, lemma=_ALL), *between, head))
+
     def with_extra(self, *words: str) -> Phrase:
         """Adds words after the noun."""
         return replace(self, extra=(*self.extra, *words))
@@ -222,6 +235,8 @@ class Phrase:
 _ENDS: Final = frozenset({"end", "start", "beginning", "middle"})
 _POINTING: Final = frozenset({"that", "this", "these", "those"})
 _ALL: Final = "all"
+_EACH: Final = frozenset({"each", "every"})
+_SOME_OF_THEM: Final = frozenset({"other", "second", "third", "fourth", "fifth", "few", "next"})
 _ONE: Final = frozenset({"one", "ones"})
 _DIGITS: Final = re.compile(r"-?\d+(?:[.,]\d+)?")
 _DOZEN: Final = "dozen"

@@ -126,7 +126,7 @@ class Reader(Row):
         self.at = start + len(phrase.tokens)
         if len(phrase.tokens) > 1 and phrase.tokens[0].word == "no":
             return Unknown(phrase.spoken)
-        phrase = self._numbered(self._of(phrase))
+        phrase = self._numbered(self._of(phrase.distributed if not preposition and _handles(items, phrase) else phrase))
         while (end := self._description_end(phrase)) > self.at:
             phrase = phrase.with_extra(*(t.text for t in self.tokens[self.at : end] if t.tag != "DT"))
             self.at = end
@@ -239,10 +239,17 @@ class Reader(Row):
         if token.word in ("if", "whether"):
             self.at += 1
             return Whether()
-        if token.word == "but" and self.at > 0 and _OF_ALL.fullmatch(self.tokens[self.at - 1].word):
+        if token.word == "but" and self.at > 0 and self._excepts(items):
             return None
         filler = self._particle(items) or self.match(lexicon().fillers)
         return None if filler is None else Separator(self.take_words(filler))
+
+    def _excepts(self, items: Sequence[Item]) -> bool:
+        """Returns whether "but" means "except": behind "everything", or "all the drinks" with a noun after it."""
+        last = items[-1] if items else None
+        words = {token.word for token in last.phrase.tokens} if isinstance(last, Chunk) else set()
+        of_all = bool(words & {"all", "any", "every", "each"}) and self.phrase_at(self.at + 1) is not None
+        return of_all or _OF_ALL.fullmatch(self.tokens[self.at - 1].word) is not None
 
     def _idle(self, items: Sequence[Item]) -> bool:
         """Returns whether the next word adds nothing: in "that clamp over there", "I need like a towel"."""
@@ -253,7 +260,7 @@ class Reader(Row):
         if token.word == "like" and wants and self.phrase_at(self.at + 1):
             return True
         last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside)), None)
-        purpose = bool(behind) and behind[0].tag == "VB" and (behind[0].word,) in lexicon().verbs
+        purpose = bool(behind) and behind[0].tag == "VB" and any(verb[0] == behind[0].word for verb in lexicon().verbs)
         if purpose and token.tag == "TO" and isinstance(last, Verb) and VerbKind.GO in last.kinds:
             return True  # go to take the broom
         return not items and token.word in ("after", "upon", "by") and bool(behind) and behind[0].tag == "VBG"
@@ -285,6 +292,14 @@ class Reader(Row):
         if token.pos != "VERB" or token.tag not in _VERB_TAGS or not (may_begin_command(items) or token.tag == "VB"):
             return None
         return Outside(self.take(1))
+
+
+def _handles(items: Sequence[Item], phrase: Phrase) -> bool:
+    """Returns whether the last verb carries or finds objects such as the phrase; "is every beer there" does not."""
+    last = next((item for item in reversed(items) if isinstance(item, Verb | Being | Outside | Whether)), None)
+    kinds = last.kinds if isinstance(last, Verb) else frozenset()
+    carries = kinds & {VerbKind.ROUND_TRIP, VerbKind.SINGLE_TRIP, VerbKind.PICK, VerbKind.PLACE}
+    return bool(carries) or (VerbKind.FIND in kinds and phrase.kind in (NounKind.THING, None))
 
 
 def _place(token: Token, role: PrepositionRole) -> Chunk:

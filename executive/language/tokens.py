@@ -17,7 +17,6 @@ from executive.language.lexicon import any_of, lexicon, read_table
 from executive.language.nouns import NounKind
 from executive.words.command import is_attribute, may_be_attribute
 from executive.words.knowledge import Knowledge
-from skills.detect.descriptions import plural
 
 
 @dataclass(frozen=True)
@@ -243,8 +242,11 @@ _SOMEWHERE: Final = frozenset({"in", "on", "at", "inside", "there", "near", "nex
 
 
 _Rule = tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]
-_SMOOTHED: Final = "smoothed"
-_TABLES: Final = tuple("short_forms asides hesitations praises refusals searches requests counting openers".split())  # noqa: SIM905
+_SMOOTHED: Final = ("smoothed", "asked")
+_TABLES: Final = (
+    *("short_forms", "asides", "hesitations", "praises", "refusals", "searches", "requests"),
+    *("telling", "wondering", "kinds_of_place", "openers"),
+)
 
 
 def rephrase(text: str) -> str:
@@ -259,7 +261,7 @@ def rephrase(text: str) -> str:
 
 
 def smooth(text: str) -> str:
-    """Writes short forms in full, and removes hesitations, asides and repeated words."""
+    """Writes short forms in full, removes hesitations, asides and repeated words, and joins "tell me" to questions."""
     for pattern, instead in _rules(_SMOOTHED):
         text = pattern.sub(instead, text)
     text = re.sub(r"\b([ap])\.\s?m\.?(?![\w'])", r"\1m", text, flags=re.IGNORECASE)
@@ -267,7 +269,7 @@ def smooth(text: str) -> str:
 
 
 @cache
-def _rules(family: str | None = None) -> tuple[_Rule, ...]:
+def _rules(families: tuple[str, ...] | None = None) -> tuple[_Rule, ...]:
     tables = {f"<{name}>": getattr(lexicon(), name) for name in _TABLES}
     tables["<verbs>"] = [first for first, *rest in lexicon().verbs if not rest]
     phrases = {mark: any_of(table) for mark, table in tables.items()}
@@ -278,15 +280,9 @@ def _rules(family: str | None = None) -> tuple[_Rule, ...]:
             _FUNCTIONS.get(instead, instead),
         )
         for name, rules in read_table("rephrasing.yaml").items()
-        if family in (None, name)
+        if families is None or name in families
         for pattern, instead in rules
     )
-
-
-def _all(match: re.Match[str]) -> str:
-    """Replaces each of a kind by all of that kind."""
-    what = match["what"].strip()
-    return f"{match['act']} all the {what if what.endswith('s') and not what.endswith('ss') else plural(what)} "
 
 
 def _break(match: re.Match[str]) -> str:
@@ -296,6 +292,5 @@ def _break(match: re.Match[str]) -> str:
 
 _FUNCTIONS: Final[Mapping[str, Callable[[re.Match[str]], str]]] = {
     "$full": lambda match: lexicon().short_forms[match[0].lower()],
-    "$all": _all,
     "$break": _break,
 }

@@ -187,7 +187,7 @@ _MENTIONED: Final = re.compile(
     r"\b(?:is it|are you|house|whole|everywhere|all over|move|if|unless|in case|otherwise|else|every|each|all"
     r"|everyone|everybody|twice|times|once|while|as long as|until"
     r"|till|soon|when|wait|stay|say|tell|announce|ask|greet|know|inform|remind|whatever|matter|regardless|failing|fail"
-    r"|fails|door|battery|charge|percent|repeat|holding|report|provided)\b",
+    r"|fails|should|whether|door|battery|charge|percent|repeat|holding|report|provided)\b",
     re.IGNORECASE,
 )
 """Words without which a sentence has only plain commands, so that the rest of the language is not loaded."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 
 from skills.api import ObjectObservation, Surface
+from skills.files.errors import with_article
 from skills.perception.class_forms import PERSON
 
 SAME_WITHIN_M = 0.12
@@ -26,7 +27,7 @@ def describe(seen: ObjectObservation) -> str:
     """Describes an object: "a red coke on the kitchen table, score 0.90"; gives its position (m) without a surface."""
     x, y, z = seen.position_W
     place = f"on the {seen.surface}" if seen.surface else f"at ({x:.2f}, {y:.2f}, {z:.2f})"
-    return f"a {seen.kind} {place}, score {seen.score:.2f}"
+    return f"{with_article(str(seen.kind))} {place}, score {seen.score:.2f}"
 
 
 def count_sentence(found: Sequence[ObjectObservation], surfaces: Sequence[Surface]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ __all__ = [
     "Problems",
     "SourceLine",
     "count_text",
+    "definite",
     "disk_is_full",
     "known_names",
     "listing",
@@ -20,6 +22,7 @@ __all__ = [
     "one_line",
     "short_list",
     "suggestion",
+    "with_article",
 ]
 
 NEAREST: Final = 3
@@ -153,7 +156,7 @@ def known_names(word: str, known: Iterable[str]) -> str:
 
     names = list(dict.fromkeys(known))
     if len(names) <= FEW:
-        return f"known are {listing(names)}"
+        return f"known are {listing(names)}" if names else "none is known"
     near = process.extract(word.lower(), {name: name.lower() for name in names}, scorer=fuzz.WRatio, limit=NEAREST)
     return f"known are {', '.join(name for _, _, name in near)} and {len(names) - len(near)} more"
 
@@ -169,6 +172,20 @@ def short_list(words: Iterable[str]) -> str:
 def count_text(count: int, noun: str) -> str:
     """Formats a count with its noun: "1 door", "2 doors"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def with_article(noun: str) -> str:
+    """Noun with its indefinite article: "a hammer", "an extinguisher"."""
+    return f"{'an' if _VOWEL.match(noun) else 'a'} {noun}"
+
+
+def definite(noun: str) -> str:
+    """Noun with its definite article, if it needs one: "the hammer", "my mug"."""
+    return noun if _DETERMINED.match(noun) else f"the {noun}"
+
+
+_VOWEL: Final = re.compile(r"[aeio](?!ne\b)|u(?!ni|s[aeiu]|ti)|h(?:our|onest)", re.IGNORECASE)
+_DETERMINED: Final = re.compile(r"(?:the|a|an|my|your|our|his|her|their|this|that)\b|[\w ]+'s\b", re.IGNORECASE)
 
 
 def listing(words: Iterable[str], *, last: str = "and") -> str:

@@ -2,8 +2,8 @@
 
     python -m tests.benchmarks.structured_sentences [--show]
 
-The sentences stand in `structured_sentences.yaml` and `structured_sentences_later.yaml`, with their expected missions
-in short forms. Each table was written before anything of it was tried; docs/language.md has the figures at first sight.
+The sentences stand in `structured_sentences.yaml` and the tables beside it, with their expected missions in short
+forms. Each table was written before anything of it was tried; docs/language.md has the figures at first sight.
 A sentence that is to be refused counts as right when it is refused or asked back about; an accepted one when its
 mission is the expected one, how plain commands are grouped into steps aside.
 """
@@ -27,7 +27,9 @@ from tests.executive.language.notation import as_noted, noted
 
 __all__ = ["TABLES", "Score", "in_full", "measured"]
 
-TABLES: Final = tuple(Path(__file__).with_name(f"structured_sentences{name}.yaml") for name in ("", "_later", "_last"))
+TABLES: Final = tuple(
+    Path(__file__).with_name(f"structured_sentences{name}.yaml") for name in ("", "_later", "_last", "_forms")
+)
 _SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge)\(([^()]*)\)")
 _FORMS: Final = {
     "fetch": "Take [Nothing] to [{1}] and do [grasp] to [{0}] then Take [{0}] to [start] and do [Nothing] to [Nothing]",

@@ -23,10 +23,12 @@ from executive.language.structure.plain import (
     condition_at_source,
     end_of_scope,
     find_last_check,
+    merge_repeats,
     missing_action,
     negate,
     negate_supposed,
     one_errand,
+    rounds_by,
     seconds_of_cue,
     state_behind_both,
     statement_of,
@@ -45,12 +47,12 @@ from executive.words.steps import Choose, Group, Loop, Repeat, Steps, Together, 
 class DecisionBuilder:
     """Builder of steps that decide and repeat. Its methods raise RefusalError.
 
-    `statement` is the one to which "tell Robin" refers, `verb` the last verb of bringing, `notes` say which word was
-    taken for which; `special` says that a mission without blocks is still more than a list of commands.
+    `statement` is the one to which "tell Robin" refers, `given` the last clause with an object, `notes` say which
+    word was taken for which; `special` says that a mission without blocks is still more than a list of commands.
     """
 
-    def __init__(self, reader: PlainReader, statement: str | None = None, verb: str | None = None) -> None:
-        self.reader, self.statement, self.verb = reader, statement, verb
+    def __init__(self, reader: PlainReader, statement: str | None = None, given: str | None = None) -> None:
+        self.reader, self.statement, self.given = reader, statement, given
         self.notes: list[str] = []
         self.special = False
 
@@ -133,6 +135,11 @@ class DecisionBuilder:
         if asked is not None and supposed.condition in (asked.supposed.condition, negate(asked.supposed.condition)):
             row.steps[-asked.steps :] = []
         body = [*cut(rest), *follows]
+        if row.asked is not None and not (asked or row.asked.decided) and clause.kind is Cue.IF:
+            there = condition_at_source(supposed, tuple(row.steps[-row.asked.steps :]), clause.text).condition
+            if there == negate(row.asked.supposed.condition):  # get a coke; if there is no coke, get a beer
+                self._replace_missing(row, row.asked, supposed.said, body)
+                return end
         return self.choose(
             row, negate_supposed(supposed) if clause.kind is Cue.UNLESS else supposed, body, clauses, end
         )
@@ -149,14 +156,15 @@ class DecisionBuilder:
     def split(self, text: str, state: State, follows: Sequence[Clause]) -> tuple[SpokenCondition, str]:
         """Splits a condition from an action that follows without a comma."""
         refusal: RefusalError | None = None
-        for cut_at in (*([len(text)] if follows else []), *verb_positions(text), len(text)):
+        objects = [match.end() for match in ACTS.object_behind.finditer(text)] if self.given is not None else []
+        for cut_at in (*([len(text)] if follows else []), *verb_positions(text), *objects, len(text)):
             rest = re.sub(r"^(?:then|please)\s+", "", text[cut_at:], flags=re.IGNORECASE)
             condition = re.sub(r"\s+(?:then|please|and)$", "", text[:cut_at].rstrip(" ,"), flags=re.IGNORECASE)
             supposed: SpokenCondition | None = None
             try:
                 supposed = parse_condition(condition, state, self.reader)
                 if rest:
-                    inner = type(self)(self.reader, statement_of(supposed), self.verb)
+                    inner = type(self)(self.reader, statement_of(supposed), self.given)
                     inner.sequence([*cut(rest), *follows], supposed.holds)
             except RefusalError as error:
                 asks = error.question is not None or supposed is not None
@@ -201,10 +209,10 @@ class DecisionBuilder:
         """Builds the steps of a branch, in which "tell Robin" refers to the condition."""
         if not clauses:
             raise missing_action("if", supposed.said)
-        inner = type(self)(self.reader, statement_of(supposed), self.verb)
+        inner = type(self)(self.reader, statement_of(supposed), self.given)
         found = inner.nest(clauses, state)
         self.notes += inner.notes
-        self.verb = inner.verb
+        self.given = inner.given
         return found
 
     def attach(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
@@ -236,11 +244,7 @@ class DecisionBuilder:
         if cue is Cue.SO or (missing and asked is None):
             raise RefusalError(f"'{clause.cue}' refers to no earlier look", words)
         if missing and asked is not None:
-            otherwise, state = self.branch(body, negate_supposed(asked.supposed), asked.supposed.fails)
-            done = tuple(row.steps[-asked.steps :])
-            row.steps[-asked.steps :] = []
-            block = Choose(condition=asked.supposed.condition, then=done, otherwise=otherwise)
-            self.put(row, block, state_behind_both(row.state, state))
+            self._replace_missing(row, asked, clause.cue, body)
             return end
         tried = tuple(row.steps[row.begun :])
         otherwise, state = self.nest(body, replace(row.state, held=None, goal=None, at=None))
@@ -249,6 +253,20 @@ class DecisionBuilder:
         attempt = Try(steps=tried, otherwise=otherwise) if otherwise else skipped
         self.put(row, attempt, state_behind_both(row.state, state))
         return end
+
+    def _replace_missing(self, row: StepRow, asked: LastCheck, said: str, body: Sequence[Clause]) -> None:
+        """Builds a choice: the last steps where their object is, otherwise the steps of the body.
+
+        Raises RefusalError when "there" could be where the object is taken, or where it is put.
+        """
+        puts = any(command.task is Task.PLACE for step in row.steps[-asked.steps :] for command in step.commands)
+        if puts and re.search(r"\bthere$", said, re.IGNORECASE):
+            raise RefusalError(f"'{said}' could mean two places; name the place", [said])
+        otherwise, state = self.branch(body, negate_supposed(asked.supposed), asked.supposed.fails)
+        done = tuple(row.steps[-asked.steps :])
+        row.steps[-asked.steps :] = []
+        block = Choose(condition=asked.supposed.condition, then=done, otherwise=otherwise)
+        self.put(row, block, state_behind_both(row.state, state))
 
     def wait_for(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int:
         """Builds a wait for "as soon as Robin comes, ..."."""
@@ -288,7 +306,7 @@ class DecisionBuilder:
         idle = stays and all(isinstance(step, Do) for step in steps)  # only goes to one place, or charges
         if rounds.loop.times is None and rounds.loop.every_s is None and idle:
             raise RefusalError("I see no action to repeat; say 'wait there until ...'", [join_clauses(body)])
-        self.put(row, _one_repeat(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
+        self.put(row, merge_repeats(Repeat(loop=rounds.loop, steps=_done(steps, join_clauses(body)))), state)
 
     def _how_often(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> tuple[Rounds, str]:
         """Splits the rounds from the action after them."""
@@ -307,7 +325,7 @@ class DecisionBuilder:
             if parse_time(said := text[:cut_at].strip(" ,")) is not None:
                 return self._rounds_behind(row, (), replace(clause, text=said)), text[cut_at:]
         supposed, rest = self.split(text, state, follows)
-        return _rounds_by(clause.kind, supposed), rest
+        return rounds_by(clause.kind, supposed), rest
 
     def limit_rounds(self, every_s: float, text: str, state: State) -> Rounds | None:
         """Parses the rounds within "for an hour", "until three o'clock" or "five times"; None for other texts."""
@@ -330,7 +348,7 @@ class DecisionBuilder:
             supposed = parse_condition(match["what"], state, self.reader)
         except RefusalError:
             return None
-        rounds = _rounds_by(Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE, supposed)
+        rounds = rounds_by(Cue.UNTIL if match["how"].lower() in ("until", "till") else Cue.WHILE, supposed)
         return replace(rounds, loop=rounds.loop.model_copy(update={"every_s": every_s}))
 
     def _on_the_way(self, row: StepRow, clause: Clause, follows: Sequence[Clause]) -> bool:
@@ -383,7 +401,7 @@ class DecisionBuilder:
             self.notes += time.notes(found.text)
             return Rounds(Loop(until=ValueIs(text=f'clock >= "{time.text}"')), row.state)
         _, state = type(self)(self.reader).sequence(scope, row.state)
-        return replace(_rounds_by(found.kind, parse_condition(found.text, state, self.reader)), state=row.state)
+        return replace(rounds_by(found.kind, parse_condition(found.text, state, self.reader)), state=row.state)
 
     def _scope(self, row: StepRow, clause: Clause, found: Clause) -> list[Clause]:
         """Clauses to which a trailing cue belongs. Raises RefusalError when they are ambiguous."""
@@ -428,20 +446,3 @@ def _done(steps: Steps, said: str) -> Steps:
     if not steps:
         raise RefusalError(f"'{said}' is nothing to do; leave it out", [said])
     return steps
-
-
-def _one_repeat(block: Repeat) -> Repeat:
-    """Merges rounds around endless rounds, which then end as the outer ones."""
-    inner, outer = block.steps[0], block.loop
-    if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
-        return block
-    if outer.every_s is not None or outer.times is not None:
-        raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
-    loop = inner.loop.model_copy(update={"until": outer.until, "while_": outer.while_})
-    return inner.model_copy(update={"loop": loop})
-
-
-def _rounds_by(kind: Cue | None, supposed: SpokenCondition) -> Rounds:
-    if kind is Cue.UNTIL:
-        return Rounds(Loop(until=supposed.condition), supposed.fails)
-    return Rounds(Loop(while_=supposed.condition), supposed.holds)

@@ -24,7 +24,7 @@ from executive.words.condition import AllOf, Condition, DoorOpen, Look, Not
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
 from executive.words.step import Step
-from executive.words.steps import Loop, Steps
+from executive.words.steps import Loop, Repeat, Steps
 from skills.api import ObjectKind
 
 _LEFT_OUT: Final = frozenset({"not", "n't", "but", "except", "instead", "rather", "neither", "nor"})
@@ -427,3 +427,21 @@ def times_of_cue(cue: str) -> int:
     if count is None:
         raise RefusalError(f"'{cue}' is no number of times that I understand", [cue])
     return count
+
+
+def merge_repeats(block: Repeat) -> Repeat:
+    """Merges rounds around endless rounds, which then end as the outer ones."""
+    inner, outer = block.steps[0], block.loop
+    if len(block.steps) > 1 or not isinstance(inner, Repeat) or not inner.loop.is_endless:
+        return block
+    if outer.every_s is not None or outer.times is not None:
+        raise RefusalError("an endless repetition cannot be repeated again; say how often", [])
+    loop = inner.loop.model_copy(update={"until": outer.until, "while_": outer.while_})
+    return inner.model_copy(update={"loop": loop})
+
+
+def rounds_by(kind: Cue | None, supposed: SpokenCondition) -> Rounds:
+    """Rounds until a condition holds, or while it holds."""
+    if kind is Cue.UNTIL:
+        return Rounds(Loop(until=supposed.condition), supposed.fails)
+    return Rounds(Loop(while_=supposed.condition), supposed.holds)

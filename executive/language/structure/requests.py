@@ -28,7 +28,7 @@ from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Awaited, Charging, Dock, Wait, steps_of_commands
 from executive.words.step import Step
 from executive.words.steps import Steps
-from skills.files.errors import listing
+from skills.files.errors import listing, with_article
 
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
@@ -164,7 +164,8 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
         raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
     if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
         return SpeechRequest(None, to)
-    if CLAUSES.greetings.fullmatch(said) or (not ACTS.question.match(said) and _clause(said, parser)):
+    states = not (to.speaker or ACTS.question.match(said)) and _clause(said, parser)
+    if CLAUSES.greetings.fullmatch(said) or states:
         return SpeechRequest(_told(said), to)
     raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
 
@@ -269,7 +270,7 @@ def _what(match: re.Match[str], text: str, knowledge: Knowledge) -> QuestionRequ
     if not names:
         raise RefusalError(f"I do not know what there is to choose from in '{text}'; name it", [text])
     spoken = "What do you want to drink?" if match["kind"] is None else f"Which {kind} do you want?"
-    return QuestionRequest(spoken, _listener(match), tuple(f"a {name}" for name in names))
+    return QuestionRequest(spoken, _listener(match), tuple(map(with_article, names)))
 
 
 def steps_for_everyone(text: str, state: State, reader: PlainReader) -> tuple[Steps, State] | None:

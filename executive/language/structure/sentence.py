@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import ValidationError
 
 from executive.language.clauses import ACTS, Clause, Cue, cut, split, trailing_cue
-from executive.language.items import Adverb, Chunk, verb
+from executive.language.items import Adverb, Chunk, verb, without_objects
 from executive.language.lexicon import PrepositionRole
 from executive.language.nouns import NounKind
 from executive.language.pipeline import Pipeline, Trace
@@ -83,15 +83,16 @@ class SentenceBuilder(DecisionBuilder):
         if clause.begins and not stated:  # unless it goes on with "there is a hammer on the bench. bring it"
             self.flush(row)
             row.begun = len(row.steps)
-        if self.verb is not None and at == 0 and ACTS.no_verb.match(clause.text):
-            clause = replace(clause, lead=self.reader.read_items(self.verb))
+        if self.given is not None and at == 0 and ACTS.no_verb.match(clause.text):
+            clause = replace(clause, lead=without_objects(self.reader.read_items(self.given)))
             clauses = [clause, *clauses[1:]]
         return self._act(row, clause, clauses, at)
 
     def _act(self, row: StepRow, clause: Clause, clauses: Sequence[Clause], at: int) -> int:
         """Builds the clause at `at`, which begins with an action; returns the index after it."""
         text = clause.text
-        self.verb = match[0] if (match := ACTS.giving.match(text)) is not None else self.verb
+        if ACTS.giving.match(text) is not None:
+            self.given = text if (behind := trailing_cue(text)) is None else behind.before
         if ACTS.answered.fullmatch(text) is not None and self._answered(row):
             return at + 1
         if ACTS.idle.fullmatch(text) is not None:

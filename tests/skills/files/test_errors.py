@@ -1,6 +1,8 @@
 """The error that bad input gives, as a user reads it."""
 
-from skills.files.errors import MOST_LETTERS, InputError
+import pytest
+
+from skills.files.errors import MOST_LETTERS, InputError, definite, known_names, with_article
 
 
 def test_a_message_that_repeats_an_endless_name_is_cut_off():
@@ -12,3 +14,22 @@ def test_a_message_that_repeats_an_endless_name_is_cut_off():
 
 def test_a_message_escapes_control_characters():
     assert str(InputError("no 'a\x1b[31m\u202eb\nc\udcff'", hint="x\x07")) == r"no 'a\x1b[31m\u202eb c\udcff'; x\x07"
+
+
+@pytest.mark.parametrize(
+    "phrase", ["a hammer", "an extinguisher", "an orange cube", "a unit", "an hour", "a one-way door"]
+)
+def test_a_noun_gets_the_article_of_its_sound(phrase):
+    assert with_article(phrase.partition(" ")[2]) == phrase
+
+
+@pytest.mark.parametrize(
+    ("noun", "said"),
+    [("hammer", "the hammer"), ("my mug", "my mug"), ("the desk", "the desk"), ("Robin's mug", "Robin's mug")],
+)
+def test_a_noun_has_one_definite_article_at_most(noun, said):
+    assert definite(noun) == said
+
+
+def test_without_a_known_name_none_is_listed():
+    assert known_names("x", []) == "none is known"

@@ -118,3 +118,29 @@ def test_memory_has_the_last_object(meant):
 def test_names_alone_keep_conditions_refused(parser):
     answer = understand("if there is milk, bring me a glass", parser=parser, knowledge=None, require_wake=False)
     assert answer.status is Status.REFUSED
+
+
+TOLD = (
+    *("tell me", "let me know", "find out", "go and find out for me", "check", "see", "have a look and tell me"),
+    *("I would like to know", "do you know", "report to me", "could you figure out", "I am curious"),
+)
+QUESTIONS = {
+    "how many beers are in the kitchen": (
+        "how many beers there are in the kitchen",
+        "the number of beers in the kitchen",
+    ),
+    "where is the hammer": ("where the hammer is", "in which room the hammer is", "which room the hammer is in"),
+    "is there a hammer in the workshop": ("whether there is a hammer in the workshop",),
+    "is the office door open": ("if the office door is open",),
+    "what is on the workbench": ("what there is on the workbench", "what you can see on the workbench"),
+    "is anybody in the kitchen": ("whether anybody is in the kitchen", "who is in the kitchen"),
+}
+
+
+@pytest.mark.parametrize("told", TOLD)
+@pytest.mark.parametrize("bare", QUESTIONS)
+def test_a_question_that_somebody_asks_for_means_the_bare_question(meant, bare, told):
+    expected = noted(meant(bare, "flat").all_steps)
+    assert expected
+    for question in QUESTIONS[bare]:
+        assert noted(meant(f"{told} {question}", "flat").all_steps) == expected

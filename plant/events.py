@@ -24,6 +24,7 @@ from pydrake.systems.framework import Context
 from plant.saved_state import Stateful
 from plant.worlds.seeding import ATTEMPTS, Placement, candidates, outline_W, polygon_distance
 from plant.worlds.world import DoorRule, MoveRule, Point, SurfaceTop, World
+from skills.files.errors import definite
 from skills.robot import FloatArray
 
 HEIGHT_M, THICKNESS_M, ABOVE_FLOOR_M = 2.0, 0.04, 0.02
@@ -200,18 +201,18 @@ class Moves(Stateful, saved=("_done",)):
         here_W = self._plant.EvalBodyPoseInWorld(self._context, body).translation()
         holder = next((name for name in holding if float(np.linalg.norm(hands_W[name] - here_W)) < FROM_HAND_M), None)
         if holder is not None:
-            self._tell(f"nobody moves the {move.name}, which {holder} holds")
+            self._tell(f"nobody moves {definite(move.name)}, which {holder} holds")
             return
         X_WO = self._goal(number, move, hands_W)
         if X_WO is None:
-            self._tell(f"nobody moves the {move.name}, because the {move.to} has no free spot")
+            self._tell(f"nobody moves {definite(move.name)}, because the {move.to} has no free spot")
             return
         self._plant.SetFreeBodyPose(self._context, body, X_WO)
         self._plant.SetFreeBodySpatialVelocity(
             context=self._context, body=body, V_JpJc=SpatialVelocity(np.zeros(3), np.zeros(3))
         )
         goal = f"the {move.to}" if isinstance(move.to, str) else "({:g}, {:g}, {:g})".format(*move.to)
-        self._tell(f"somebody moves the {move.name} to {goal}")
+        self._tell(f"somebody moves {definite(move.name)} to {goal}")
         for listener in self._listeners:
             listener(move.name)
 

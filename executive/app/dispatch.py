@@ -339,7 +339,7 @@ class Dispatch(Assigner):
         if holding:
             held = next((each.object or each.item for each in commands if each.object or each.item), None)
             return f"the {held or 'object'} is in {name}'s gripper"
-        return f"{name} had begun it, and how far it came is not known"
+        return f"{name} had begun it, and it is not known how far it came"
 
     def _requeue(self, name: str, result: RobotResult) -> int:
         """Queues the rest of a robot's mission; returns its number."""

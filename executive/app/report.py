@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -63,9 +64,19 @@ class Verdict:
     word: str
     text: str
 
-    def line(self) -> str:
-        """Formats the verdict as one line with rich markup."""
-        return f"[bold]{escape(self.who)}:[/bold] {_MARKS[self.good]} {self.word}: {escape(self.text)}"
+    def lines(self) -> Iterator[str]:
+        """Yields the verdict with rich markup: one line, or a list of its sentences when it is long."""
+        head, sentences = f"[bold]{escape(self.who)}:[/bold] {_MARKS[self.good]} {self.word}:", self.sentences
+        if len(sentences) == 1 or len(self.text) <= _LONG_TEXT:
+            yield f"{head} {escape(self.text)}"
+            return
+        yield head
+        yield from (f"  • {escape(sentence)}" for sentence in sentences)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Sentences of the reason, and parts that a semicolon ends."""
+        return tuple(_SENTENCE_END.split(self.text))
 
 
 @dataclass(frozen=True)
@@ -173,14 +184,17 @@ class RunReport(Ending):
         )
         if self.robots:
             for name, robot in self.robots.items():
-                yield from (verdict.line() for verdict in robot.verdicts(name=name, counts=True))
+                yield from (line for verdict in robot.verdicts(name=name, counts=True) for line in verdict.lines())
             yield figures
             return
-        yield from (verdict.line() for verdict in self.verdicts())
+        yield from (line for verdict in self.verdicts() for line in verdict.lines())
         yield figures if self.referee is None else f"{counts_text(self.referee)}; {figures}"
         yield from (escape(f"  {event}") for event in self.seen.events)
 
 
+_LONG_TEXT: Final = 100
+"""Characters of a reason that still stand on the line of its verdict."""
+_SENTENCE_END: Final = re.compile(r"(?<=[.!?;]) (?=\S)")
 NOT_JUDGED: Final = RefereeReport(None, "there is no referee", 0, 0)
 VERDICTS: Final[Mapping[bool | None, str]] = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 _MARKS: Final[Mapping[bool | None, str]] = {

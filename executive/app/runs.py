@@ -214,7 +214,7 @@ class MissionRuns:
             ended(finished.report)
         report, past = finished.report, None if resumed is None else resumed.lines
         if past is not None:
-            self._screen.tell("\n  ".join(["What became of its past:", *past]))
+            self._screen.tell("\n  ".join(["What it did before:", *past]))
         self._screen.name_files(prepared.request.out)
         return MissionResult(mission.id, report.outcome, report.achieved, report.message, report, past)
 

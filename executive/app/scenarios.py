@@ -20,7 +20,7 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.fault_words import parse_fault, random_faults
-from skills.files.errors import InputError, Problems, suggestion
+from skills.files.errors import InputError, Problems, suggestion, with_article
 from skills.files.schema import Name, Text, validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
 from skills.quantities import Coordinate, Delay, Height, Speed
@@ -153,11 +153,12 @@ class EventFile(_Strict):
         given = {name.removesuffix("_") for name in self.model_fields_set} - {named[0]}
         strange = sorted(given - {*_KEYS[named[0]]})
         if strange:
-            raise ValueError(f"'{strange[0]}' is none of the keys of a {named[0]}: {', '.join(_KEYS[named[0]])}")
+            keys = ", ".join(_KEYS[named[0]])
+            raise ValueError(f"{with_article(named[0])} has no key '{strange[0]}'; its keys are {keys}")
         if named[0] == "door" and self.closes is None and self.opens is None:
             raise ValueError("a door needs 'closes' or 'opens'")
         if named[0] != "door" and (self.at is None or self.to is None):
-            raise ValueError(f"a {named[0]} needs 'at' and 'to'")
+            raise ValueError(f"{with_article(named[0])} needs 'at' and 'to'")
         spot = isinstance(self.to, tuple) and len(self.to) == 3 and isinstance(self.to[0], float)
         if named[0] == "person" and spot:
             raise ValueError("a person walks to a point [x, y], without a height")

@@ -53,7 +53,7 @@ def log(
     ] = None,
     at: Annotated[float, quantity_option(Delay, help="Time of the map (s); by default the end.")] = math.inf,
     robot: Annotated[str | None, typer.Option(metavar="NAME", help="Only this one of several robots.")] = None,
-    every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes and late ticks.")] = False,
+    every_node: Annotated[bool, typer.Option("--all", help="Also inner nodes, and ticks that took too long.")] = False,
 ) -> None:
     """Prints the timeline of a run: nodes with causes, detections, outcome, tracebacks of defects."""
     history = read_history(file)

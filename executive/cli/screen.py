@@ -25,12 +25,14 @@ from executive.language.parser import load_parser
 from executive.record.schemas import SPEECH
 from executive.record.work import Profile
 from executive.run.control import Control
+from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, node_view
 from executive.view.styles import Styles, style_of
 from executive.view.text import printable, to_rich
+from skills.api import Cause
 
 SILENCE: Final = Silence()
 
@@ -50,20 +52,37 @@ def voice_for(aloud: bool) -> Iterator[Voice]:
 
 @dataclass(frozen=True)
 class SpeechOutput(RunVisitor):
-    """Output of a robot's speech: on the console unless `quiet`, and by a voice that does not block."""
+    """Output of a robot's speech: by a voice that does not block, and on the console unless `quiet`.
+
+    The console shows it at the end of the tick, behind the skills that ended before it.
+    """
 
     console: Console
     voice: Voice
     quiet: bool
+    _said: list[str] = field(default_factory=list, init=False)
 
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Prints and says a speech message."""
+        """Says a speech message."""
         if topic == SPEECH:
             robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
             if not self.quiet:
-                self.console.print(Text(printable(f"{robot}: {text}"), style="bold"))
+                self._said.append(printable(f"{robot}: {text}"))
             self.voice.say(text)
         return message
+
+    def tick(self, progress: Progress) -> None:
+        """Prints the speech of the tick."""
+        self._print()
+
+    def end(self, result: RunResult) -> None:
+        """Prints the speech after the last tick."""
+        self._print()
+
+    def _print(self) -> None:
+        for line in self._said:
+            self.console.print(Text(line, style="bold"))
+        self._said.clear()
 
 
 @dataclass
@@ -112,7 +131,7 @@ class ConsoleScreen:
         with nullcontext() if self.quiet else shown as view:
             if control.attended and page is None:
                 load_ahead()
-            visitors = (speech, conversations) if view is None else (speech, view, conversations)
+            visitors = (speech, conversations) if view is None else (view, speech, conversations)
             yield RunOptions(control, visitors, page, self.profile)
 
     def conclude(self, finished: FinishedRun) -> None:
@@ -177,7 +196,7 @@ class _Lines(RunVisitor):
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._leaves: dict[str, dict[str, str]] = {}
+        self._leaves: dict[str, dict[str, _Shown]] = {}
         self._last: dict[str, NodeState] = {}
         self._begun_s: dict[str, float] = {}
 
@@ -185,11 +204,11 @@ class _Lines(RunVisitor):
         """Prints the skills that have ended since the last tick."""
         for robot, tree in progress.trees.items():
             if tree.root.path_id not in self._leaves:
-                self._leaves[tree.root.path_id] = _skill_titles(node_view(tree.root))
-            for path_id, title in self._leaves[tree.root.path_id].items():
-                self._tell(path_id, title, progress.states[robot][path_id], progress.now_s)
+                self._leaves[tree.root.path_id] = _shown_skills(node_view(tree.root))
+            for path_id, shown in self._leaves[tree.root.path_id].items():
+                self._tell(path_id, shown, progress.states[robot][path_id], progress.now_s)
 
-    def _tell(self, path_id: str, title: str, state: NodeState, now_s: float) -> None:
+    def _tell(self, path_id: str, shown: _Shown, state: NodeState, now_s: float) -> None:
         before = self._last.get(path_id, NodeState())
         if state is before:
             return
@@ -197,7 +216,7 @@ class _Lines(RunVisitor):
         if before.status is not Status.RUNNING:
             self._begun_s[path_id] = now_s
         if style_of(state) not in _UNDER_WAY and before != state:
-            self._console.print(skill_line(title, state, now_s - self._begun_s[path_id]))
+            self._console.print(skill_line(shown, state, now_s - self._begun_s[path_id]))
 
 
 class _Picture(RunVisitor):
@@ -238,19 +257,29 @@ def visible_rows(picture: Text, rows: int) -> Text:
     return Text("\n", no_wrap=True, overflow="ellipsis").join(lines[first : first + rows])
 
 
-def _skill_titles(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
-    """Returns the titles of the skills below a node by path id."""
+@dataclass(frozen=True)
+class _Shown:
+    """Title of a shown skill; `looks` says that it looks for objects, and may well find none."""
+
+    title: str
+    looks: bool
+
+
+def _shown_skills(node: NodeView, above: NodeView | None = None) -> dict[str, _Shown]:
+    """Returns the skills below a node by path id."""
     if node.kind in _SHOWN_KINDS:
-        return {node.path_id: node.title(above)}
-    return {path_id: title for child in node.children for path_id, title in _skill_titles(child, node).items()}
+        return {node.path_id: _Shown(node.title(above), looks=node.name == "detect")}
+    return {path_id: shown for child in node.children for path_id, shown in _shown_skills(child, node).items()}
 
 
-def skill_line(title: str, state: NodeState, took_s: float) -> Text:
-    """Returns the line of an ended skill: mark, duration, title, cause and message."""
-    style = style_of(state)
-    cause = state.cause.value if state.cause else ""
-    what = printable(": ".join(filter(None, (title, cause, state.message))))
-    return Text.assemble((style.symbol, style.rich), f" {took_s:6.1f} s  {what}")
+def skill_line(shown: _Shown, state: NodeState, took_s: float) -> Text:
+    """Returns the line of an ended skill: mark, duration, title, cause and message; a look without a find is normal."""
+    style, cause = style_of(state), state.cause.value if state.cause else ""
+    mark = (style.symbol, style.rich)
+    if shown.looks and state.cause is Cause.POSTCONDITION:
+        mark, cause = ("–", "dim"), ""
+    what = printable(": ".join(filter(None, (shown.title, cause, state.message))))
+    return Text.assemble(mark, f" {took_s:6.1f} s  {what}")
 
 
 def progress_line(states: Iterable[NodeState], now_s: float) -> Text:

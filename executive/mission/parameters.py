@@ -17,7 +17,7 @@ import yaml
 
 from executive.words.expression import Value
 from executive.words.mission import Parameter
-from skills.files.errors import InputError, listing, nearest_name, suggestion
+from skills.files.errors import InputError, listing, nearest_name, suggestion, with_article
 from skills.files.outside import json_object, plain_text
 from skills.files.yaml_source import KeyPath, YamlSource, scalar_of
 from skills.quantities import LARGEST, Number, QuantityError, display_text, number_of
@@ -117,8 +117,9 @@ def _fitting(parameter: Parameter, value: Any, name: str, source: YamlSource, *,
     kind = _TYPES.get(parameter.type or "", _SCALARS)
     fits = isinstance(value, kind) and (bool in kind or not isinstance(value, bool))
     if not fits:
-        what = f"parameter '{name}' is a {parameter.type}, and {str(value)[:60]!r} is none"
-        raise source.error(here, what, _number_hint(value) if kind == (int, float) else f"give it a {parameter.type}")
+        wanted = "true or false" if parameter.type == "truth" else with_article(parameter.type or "text")
+        what = f"parameter '{name}' must be {wanted}, not {str(value)[:60]!r}"
+        raise source.error(here, what, _number_hint(value) if kind == (int, float) else f"give it {wanted}")
     if parameter.choices and value not in parameter.choices:
         what = f"parameter '{name}' cannot be {str(value)[:60]!r}"
         raise source.error(here, what, f"it is one of {listing(map(str, parameter.choices), last='or')}")

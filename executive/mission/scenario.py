@@ -8,6 +8,7 @@ from typing import Annotated, Any, Final
 
 from executive.words.forms import Option
 from executive.words.forms import OptionGroup as Group
+from skills.files.errors import definite
 from skills.quantities import Quantity
 
 RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
@@ -70,7 +71,7 @@ class Scenario:
         moves = []
         for move in self.moves:
             to = f"the {move['to']}" if isinstance(move["to"], str) else "({:g}, {:g}, {:g})".format(*move["to"])
-            moves.append(f"somebody moves the {move['name']} to {to} at {move['at']:g} s")
+            moves.append(f"somebody moves {definite(move['name'])} to {to} at {move['at']:g} s")
         return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
 
 

@@ -197,9 +197,23 @@ class Entry:
 def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[Entry]:
     """Iterates over the lines of a log's timeline.
 
-    `leaves_only` omits changes of inner nodes that did not fail, and single late ticks.
+    `leaves_only` omits changes of inner nodes that did not fail, and ticks that took too long.
     """
-    return (replace(entry, robot=robot_of(event)) for event, entry in _entries(events, leaves_only))
+    return (replace(entry, robot=robot_of(event)) for event, entry in _entries(_speech_last(events), leaves_only))
+
+
+def _speech_last(events: Iterable[Event]) -> Iterator[Event]:
+    """Yields the speech of a tick behind the changes of nodes, which are logged when the tick ends."""
+    said: list[Event] = []
+    for event in events:
+        if said and event.stamp_s > said[0].stamp_s:
+            yield from said
+            said.clear()
+        if event.topic == SPEECH:
+            said.append(event)
+        else:
+            yield event
+    yield from said
 
 
 def _entries(events: Iterable[Event], leaves_only: bool) -> Iterator[tuple[Event, Entry]]:
@@ -263,8 +277,8 @@ def _ticks(data: Mapping[str, Any]) -> str:
     late = [tick for tick in data.get("tick_s", ()) if tick > (data.get("limit_s") or float("inf"))]
     longest = f"longest {max(late) * 1e3:.0f} ms" if late else ""
     if "wall_time_s" in data:
-        return f"{data['wall_time_s']:.1f} s on the wall's clock, {data.get('overruns')} ticks overran"
-    return f"{len(late)} ticks overran; {longest}" if late else ""
+        return f"{data['wall_time_s']:.1f} s of wall-clock time, {data.get('overruns')} ticks took too long"
+    return f"{len(late)} ticks took too long; {longest}" if late else ""
 
 
 _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {

@@ -222,7 +222,7 @@ class Control:
         """Answers an open question. Raises ValueError when it is not open, or `text` is none of its options."""
         pending = self._questions.get(question_id)
         if pending is None:
-            raise ValueError(f"the question '{question_id[:80]}' is not open (any more)")
+            raise ValueError(f"the question '{question_id[:80]}' is not open")
         try:
             said = plain_text(text, what="the answer", longest=LONGEST_ANSWER)
         except InputError as error:

@@ -112,7 +112,7 @@ class Session(RunRobot):
             if name not in results:
                 return False
             if results[name].outcome is not Outcome.SUCCESS:
-                message = f"{name}, whose part comes first, did not do it: {results[name].message}"
+                message = f"{name} did not finish the part that comes first: {results[name].message}"
                 self.close(Ending(Outcome.FAILURE, Cause.PRECONDITION, message))
                 return False
         return True

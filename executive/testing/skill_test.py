@@ -23,6 +23,7 @@ from executive.tree.types import describe_type, field_types, required_fields
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.fault_words import parse_fault
+from skills.files.errors import with_article
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
@@ -160,7 +161,7 @@ class SkillTestFile(_Strict):
             found = assign_ports(values, skill.Inputs)
             missing = [name for name in required_fields(skill.Inputs) if name not in found]
             if missing:
-                hint = f"give it a {describe_type(hints[missing[0]])}"
+                hint = f"give it {with_article(describe_type(hints[missing[0]]))}"
                 raise PortValueError((), f"input port '{missing[0]}' has no value", hint)
             given = {port: port_value(value, hints[port], knowledge, at) for port, (at, value) in found.items()}
         except PortValueError as error:

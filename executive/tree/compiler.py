@@ -32,7 +32,7 @@ from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
 from skills.api import Surface, Tag
-from skills.files.errors import InputError, suggestion
+from skills.files.errors import InputError, suggestion, with_article
 from skills.perception.doorway import Doorway
 
 __all__ = ["CompiledTree", "StepPart", "compile_mission"]
@@ -152,7 +152,7 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
     types = field_types(skill.Inputs)
     for name in required_fields(skill.Inputs):
         if name not in inputs:
-            yield f"input port '{name}' has no value", f"give it a {describe_type(types[name])}"
+            yield f"input port '{name}' has no value", f"give it {with_article(describe_type(types[name]))}"
     for port, binding in inputs.items():
         if port not in types:
             yield f"there is no input port '{port}'", suggestion(port, types, f"known: {', '.join(types)}")
@@ -165,7 +165,7 @@ def _faults(node: NodeSpec, written: Mapping[str, Any]) -> Iterator[tuple[str, s
 
 def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Iterates over the errors of one bound input, with hints."""
-    wanted = f"give it a {describe_type(kind)}"
+    wanted = f"give it {with_article(describe_type(kind))}"
     if isinstance(binding, Constant) and not conforms(binding.value, kind):
         yield f"input port '{port}' got {binding.value!r}", wanted
     if isinstance(binding, FromBoardOr) and not conforms(binding.default, kind):
@@ -177,7 +177,7 @@ def _misfit(port: str, binding: Binding, kind: Any, written: Mapping[str, Any]) 
         return
     given = binding.gives or written[binding.key]
     if not assignable(given, kind):
-        yield f"input port '{port}' reads '{binding.key}', a {describe_type(given)}", wanted
+        yield f"input port '{port}' reads '{binding.key}', {with_article(describe_type(given))}", wanted
 
 
 def _error(node: NodeSpec, message: str, hint: str) -> InputError:

@@ -103,7 +103,7 @@ def check_name(name: str) -> str:
     if not _NAME.fullmatch(name) or not name_key(name).strip():
         raise InputError(f"'{name[:60]}' is no name for a robot", hint="begin it with a letter, as in 'alice'")
     if name_key(name) in EVERYBODY:
-        raise InputError(f"'{name}' calls all robots, and can be the name of none", hint="give it another name")
+        raise InputError(f"'{name}' means all robots, so no robot can have that name", hint="give it another name")
     return name
 
 
@@ -126,7 +126,7 @@ def parse_robots(text: str, kinds: Collection[str]) -> tuple[RobotConfig, ...]:
     for said in _entries(text):
         match = _ASSIGNED.fullmatch(said)
         if match is None:
-            raise InputError(f"'{said.strip()[:60]}' names no robot with its kind", hint=_FORM)
+            raise InputError(f"'{said.strip()[:60]}' does not give a robot and its kind", hint=_FORM)
         name, (kind, at, start) = check_name(match[1].strip()), match[2].partition("@")
         if (double := name_clash(name, robots)) is not None:
             raise double

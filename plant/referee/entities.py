@@ -11,6 +11,8 @@ from pydrake.geometry import GeometryId
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 
+from skills.files.errors import definite
+
 if TYPE_CHECKING:
     from plant.robots.robot_kind import RobotKind
     from plant.worlds.seeding import Placement
@@ -83,7 +85,7 @@ class Entities:
         """
         loose = [placed for placed in placements if placed.name not in persons]
         objects = {placed.name: _bodies(plant, placed.name)[0] for placed in loose}
-        roles = {int(body.index()): Entity(Kind.OBJECT, name, f"the {name}") for name, body in objects.items()}
+        roles = {int(body.index()): Entity(Kind.OBJECT, name, definite(name)) for name, body in objects.items()}
         entities = {int(body.index()): _scenery(plant, body) for body in _all_bodies(plant)} | roles
         for name in persons:
             entities |= {int(body.index()): Entity(Kind.PERSON, name, name) for body in _bodies(plant, name)}

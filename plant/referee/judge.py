@@ -11,6 +11,7 @@ from executive.words.goal import GoalCondition, GoalKind, RefereeReport, Region,
 from plant.referee.contacts import Collision
 from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
 from plant.referee.truth import ON_TRAY_GAP_S, TimedPath, Truth
+from skills.files.errors import definite, listing
 from skills.robot import FloatArray
 
 NEAR_PERSON_M = 2.0
@@ -80,7 +81,7 @@ def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
     lifted = {history: lift for history, lift in candidates if lift is not None}
     done = {one: lift for one, lift in lifted.items() if _is_held(one, condition, until_s)}
     if len(done) >= condition.needed:
-        froms = (f"the {history.name} was lifted{_from(condition, lift)}" for history, lift in done.items())
+        froms = (f"{definite(history.name)} was lifted{_from(condition, lift)}" for history, lift in done.items())
         return Finding(True, f"{' and '.join(froms)}.")
     if len(lifted) >= condition.needed:
         lost = [history for history in lifted if history not in done]
@@ -151,10 +152,10 @@ def _why_not_handed(
     apart = min(_apart_m(history.last.p_WO, p) for p in people.values())
     where = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
     if history.holder is not None:
-        return f"The {history.name} is still in the gripper, {where}."
+        return f"{definite(history.name)} is still in the gripper, {where}."
     if history.on_tray_of in people:
-        return f"The {history.name} was not yet on the tray of {history.on_tray_of} at the end of its step."
-    return f"The {history.name} {'rests' if history.resting else 'moves'} {where}, not on the tray."
+        return f"{definite(history.name)} was not yet on the tray of {history.on_tray_of} at the end of its step."
+    return f"{definite(history.name)} {'rests' if history.resting else 'moves'} {where}, not on the tray."
 
 
 def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
@@ -164,7 +165,7 @@ def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     done = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
     if len(done) >= condition.needed:
         verb = "was put" if _is_past(condition) else "rests"
-        ons = (f"the {history.name} {verb} on {_region_at(condition.goal, p)}" for history, p in done.items())
+        ons = (f"{definite(history.name)} {verb} on {_region_at(condition.goal, p)}" for history, p in done.items())
         return Finding(True, f"{' and '.join(ons)}.")
     if not objects:
         return Finding(False, f"No {_wanted(condition)} was brought{_out_of(condition.source)}.")
@@ -179,10 +180,10 @@ def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth)
     """Clause that says where an object is that does not, or did not, rest in the goal in time."""
     now = _rest_in(history, condition.goal)
     if now is not None and not history.placed_by_person:
-        return f"the {history.name} was not on {_where(condition.goal)} at the end of its step"
+        return f"{definite(history.name)} was not on {_where(condition.goal)} at the end of its step"
     x, y, z = history.last.p_WO
     state = "is in a gripper" if history.holder else "is" if history.resting else "moves"
-    return f"the {history.name} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
+    return f"{definite(history.name)} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
 
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
@@ -271,8 +272,8 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
             is not None
         ]
         verb = "is" if then_s is None else "was"
-        there = [f"the {name} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.source, p_W))]
-        aside = [f"the {name} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.maybe, p_W))]
+        there = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.source, p_W))]
+        aside = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.maybe, p_W))]
         nothing = f"there is no {_wanted(condition)}{_in(condition.source)}"
     most = len(there) + len(aside)
     right = len(there) < condition.needed if condition.answer is False else most >= condition.needed
@@ -376,7 +377,7 @@ def _region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
 
 def _the(name: str) -> str:
     """Name of a place with its article; a pose or a proper name has none."""
-    return name if name.startswith(("(", "the ")) or name[:1].isupper() else f"the {name}"
+    return name if name.startswith("(") or name[:1].isupper() else definite(name)
 
 
 def _apart_m(p: FloatArray, q: FloatArray) -> float:
@@ -385,7 +386,7 @@ def _apart_m(p: FloatArray, q: FloatArray) -> float:
 
 
 def _names(histories: Iterable[ObjectHistory]) -> str:
-    return " and ".join(f"the {history.name}" for history in histories)
+    return listing(definite(history.name) for history in histories)
 
 
 def _were(histories: Sequence[ObjectHistory]) -> str:

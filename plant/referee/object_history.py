@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from plant.saved_state import Stateful
+from skills.files.errors import definite
 from skills.robot import FloatArray
 
 LIFT_M = 0.03
@@ -218,7 +219,7 @@ class ObjectHistory(Stateful):
         self._by_others.append(len(self.rests_W))
         self.rests_W.append(p_WO)
         self.rested_s.append(time_s)
-        self.events.append(f"Somebody moved the {self.name} at {time_s:.2f} s.")
+        self.events.append(f"Somebody moved {definite(self.name)} at {time_s:.2f} s.")
 
     def forget_past(self) -> None:
         """Forgets the history for another mission; only a held object keeps its lifts and rests."""
@@ -242,7 +243,7 @@ class ObjectHistory(Stateful):
         moved_W = sample.p_WO - self.rests_W[-1]
         if not self._carried and (moved_W[2] >= LIFT_M or float(np.linalg.norm(moved_W[:2])) >= AWAY_M):
             self.lifts.append(Lift(sample.time_s, sample.gripper, self.rests_W[-1]))
-            self.events.append(f"{sample.gripper} lifted the {self.name} at {sample.time_s:.2f} s.")
+            self.events.append(f"{sample.gripper} lifted {definite(self.name)} at {sample.time_s:.2f} s.")
             self._carried = True
 
     def _note_leaving(self, sample: ObjectSample, with_hand: bool) -> None:
@@ -263,7 +264,7 @@ class ObjectHistory(Stateful):
         if self._left_z_m - sample.p_WO[2] > FALL_M or (sample.on_floor and not set_down):
             self._dropped = True
             self.dropped_s.append(sample.time_s)
-            self.events.append(f"{self._grip_robot} dropped the {self.name} at {sample.time_s:.2f} s.")
+            self.events.append(f"{self._grip_robot} dropped {definite(self.name)} at {sample.time_s:.2f} s.")
 
     def _note_rest(self, sample: ObjectSample) -> None:
         """Ends a carry and records the place, once the object has rested for a while."""
@@ -275,7 +276,8 @@ class ObjectHistory(Stateful):
         if sample.time_s - self._still_since_s < REST_S:
             return
         if not self._carried and self.rests_W[-1][2] - sample.p_WO[2] > FALL_M:
-            self.events.append(f"The {self.name} was knocked down before {sample.time_s:.2f} s.")
+            name = definite(self.name)
+            self.events.append(f"{name[0].upper()}{name[1:]} was knocked down before {sample.time_s:.2f} s.")
         if self._carried or float(np.linalg.norm(sample.p_WO - self.rests_W[-1])) > 0.02:
             self._rests(sample)
         self._carried, self._left_z_m, self._dropped = False, None, False

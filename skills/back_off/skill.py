@@ -72,7 +72,7 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
             if left_m < self.options.arrived_m:
                 break
             if clock.now() - best_s > PATIENCE_S:
-                text = f"The robot does not get on; {left_m:.2f} m are left of backing off."
+                text = f"The robot is stuck {left_m:.2f} m before the place to which it backs off."
                 raise SkillFailure(Cause.EXECUTION, text)
             speed = min(self.options.speed_m_s, max(0.08, 1.5 * left_m))
             velocity = speed * off.x_m / left_m, speed * off.y_m / left_m if sideways else 0.0, 0.5 * off.yaw_rad

@@ -79,7 +79,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
             seen = yield from self._look(door, inputs.door)
             if seen.least_m >= self._needed_m() or seen.most_m < self._needed_m():
                 return self._answer(inputs, seen)
-        few = f"hardly anything is seen of the {inputs.door}"
+        few = f"the scan shows hardly anything of the {inputs.door}"
         why = few if seen.rays < _FEW_RAYS else f"something stands in the {inputs.door} or before it"
         raise SkillFailure(Cause.POSTCONDITION, why)
 
@@ -99,7 +99,7 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
         if (far_m := door.distance_m((x_m, y_m))) > self.options.reach_m:
             raise SkillFailure(Cause.POSTCONDITION, f"the {name} is {far_m:.1f} m away, too far to tell")
         if door.view_angle_rad((x_m, y_m)) > self.options.flattest_rad:
-            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is seen too flat from here to tell")
+            raise SkillFailure(Cause.POSTCONDITION, f"the {name} is seen at too flat an angle from here to tell")
         return measure_opening(door, scans)
 
     def _next_scan(self, message: str) -> Routine[Scan]:

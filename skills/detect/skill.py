@@ -341,7 +341,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
             why = "it is dark" if is_dark(self._last.image) else "the camera shows none of it"
             return SkillFailure(Cause.EXECUTION, f"{names} could not be looked at from here: {why}")
         if found:
-            few = f"{count_sentence(found, inputs.surfaces)}, and not {inputs.count} ({seen})"
+            few = f"{count_sentence(found, inputs.surfaces)}, fewer than {inputs.count} ({seen})"
             return SkillFailure(Cause.POSTCONDITION, few)
         return SkillFailure(Cause.POSTCONDITION, f"no {what} seen on {names} from here ({seen})")
 

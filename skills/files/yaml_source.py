@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import yaml
 
-from skills.files.errors import InputError
+from skills.files.errors import InputError, with_article
 from skills.files.outside import read_text
 
 __all__ = ["KeyPath", "YamlSource", "parse_yaml", "quoted_key", "read_yaml", "scalar_of", "yaml_of"]
@@ -234,7 +234,7 @@ class _Reader:
             return self.scalars.construct_object(node)
         except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
             kind = node.tag.removeprefix(_TAG)
-            what = f"it looks like a {_NOUNS.get(kind, kind)} and is none"
+            what = f"it looks like {with_article(_NOUNS.get(kind, kind))}, but is not a valid one"
             raise self._error(node, what, "correct it, or put it in quotes") from error
 
     def _list(self, node: yaml.Node, path: KeyPath) -> list[Any]:

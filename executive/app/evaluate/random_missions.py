@@ -16,7 +16,7 @@ from executive.app.worlds import knowledge_of, open_world
 from executive.mission.request import Request
 from executive.words.knowledge import Knowledge
 from skills.detect.descriptions import plural
-from skills.files.errors import InputError
+from skills.files.errors import InputError, with_article
 from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml
 
@@ -223,7 +223,7 @@ class _Slots(dict[str, str]):
 
 
 def _with_article(article: str, name: str) -> str:
-    return f"an {name}" if article == "a" and name[0].lower() in "aeiou" else f"{article} {name}"
+    return with_article(name) if article == "a" else f"{article} {name}"
 
 
 _SLOTS: Final[Mapping[str, Callable[[_Slots], str]]] = MappingProxyType(

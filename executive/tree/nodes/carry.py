@@ -161,12 +161,12 @@ def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
 
 
 def _person_at_start(builder: PlanBuilder) -> str:
-    """Name of the only person in the room of the start, else "person" for anybody there."""
+    """Name of the only person in the room of the start, else "somebody"."""
     knowledge = builder.knowledge
     start = (knowledge.start.x, knowledge.start.y)
     rooms = [name for name, place in knowledge.places.items() if inside(place.polygon, start)]
     there = [name for name, facts in knowledge.people.items() if knowledge.room(builder.place(facts.at)) in rooms]
-    return there[0] if len(there) == 1 else "person"
+    return there[0] if len(there) == 1 else "somebody"
 
 
 DROPPED: Final = Trigger(frozenset({Cause.EXECUTION}), own=True)

@@ -29,6 +29,7 @@ from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.goal import GoalCondition, When
 from executive.words.leaf_steps import Do, Say
+from skills.detect.descriptions import count_of
 from skills.files.errors import InputError, listing
 from skills.quantities import Quantity
 
@@ -206,7 +207,8 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     if item is not None and brought & set(surfaces_to_search(builder.knowledge, item.name, builder.place(get.goal))):
         hint = "name the surface that they are to be taken from"
         raise builder.error(
-            f"{several} that lie in the {get.goal} already cannot be told from those brought there", hint
+            f"{several} that lie in the {get.goal} already look like those that are brought there",
+            hint,
         )
     trips = []
     for number in range(1, count + 1):
@@ -214,7 +216,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         get_one = replace(trip.at("get"), command=replace(get, object_count=1))
         bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
         trips.append(trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one)))
-    return builder.sequence(f"bring {count} {item} to {goal}, one at a time", *trips)
+    return builder.sequence(f"bring {count_of(count, str(item))} to {goal}, one at a time", *trips)
 
 
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {

@@ -176,7 +176,7 @@ class MustHold(guard.Condition):
             return holds
         if holds is None:
             return Waiting(f"cannot tell yet whether {self.words}")
-        return None if holds else Failed(Cause.PRECONDITION, f"it does not hold any more that {self.words}")
+        return None if holds else Failed(Cause.PRECONDITION, f"it is no longer true that {self.words}")
 
     def _holds(self, context: RunContext) -> bool | Failed | None:
         view = self._view = self._view or View(context)
@@ -250,7 +250,7 @@ class Decide(MemoryComposite):
             self._restart()
         while looks or not self._decided():
             if self._index == len(self.children):
-                self._end(Cause.ERROR, f"it cannot be told whether {self.words}")
+                self._end(Cause.ERROR, f"cannot tell whether {self.words}")
                 break
             if looks or self.decision.answers[self._index] not in self.context.board:
                 child = self.current_child = self.children[self._index]

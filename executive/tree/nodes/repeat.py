@@ -126,8 +126,8 @@ class Repeat(MemoryComposite):
         elif self.mode == "times":
             self._end(None, self._report())
         else:
-            still = "still" if self.mode == "while" else "not"
-            self._end(Cause.POSTCONDITION, f"it is {still} so after {self.times} rounds that {self.words}")
+            still = "still" if self.mode == "while" else "not yet"
+            self._end(Cause.POSTCONDITION, f"after {self.times} rounds it is {still} true that {self.words}")
 
     def _report(self) -> str:
         done = self.rounds - (1 if self._phase == "before" else 0)

@@ -22,7 +22,7 @@ from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish, Surface
 from skills.detect.descriptions import count_of, count_sentence, distinct_objects, plural
-from skills.files.errors import listing
+from skills.files.errors import listing, with_article
 from skills.geometry import compose
 from skills.robot import Pose2D
 
@@ -337,11 +337,12 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     person = None if command.object is None else knowledge.somebody(command.object.name)
     if person is not None:
         what = "somebody" if person == ANYBODY else person
-        asked = what if command.object_count == 1 else _asked_for(person, command.object_count)
+        asked = absent = what if command.object_count == 1 else _asked_for(person, command.object_count)
         looks = people_looks(builder.at("search"), person, place, key, tallied=counting)
     else:
         item = builder.required_object(command.object)
         what, asked = str(item), _asked_for(str(item), command.object_count)
+        absent = str(item) if command.object_count == 1 else asked
         whole_room = place is None or place in knowledge.places
         extra = {"floor": whole_room, "count": 0 if counting else 1}
         surfaces = required_surfaces(builder, item, place)
@@ -351,7 +352,7 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
     tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
     spot = place_phrase(knowledge, place)
-    denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {asked} {spot}"
+    denied = f"{'not' if command.object_count > 1 or person in knowledge.people else 'no'} {absent} {spot}"
     if what == ANYTHING:
         asked, denied = "something", f"nothing {spot}"
     elif person == ANYBODY and not counting:
@@ -374,9 +375,9 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
 
 
 def _asked_for(item: str, count: int) -> str:
-    """Text of the object of a question: "beer", "two beers", or "beers" for any number."""
+    """Text of the object of a question: "a beer", "two beers", or "beers" for any number."""
     if count == 1:
-        return item
+        return with_article(item)
     return count_of(count, item) if count else plural(item)
 
 

@@ -259,4 +259,4 @@ def why_no_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabili
             f"the {name} is too flat for the gripper: {1000 * target.height_m:.0f} mm high, "
             f"and the fingers need {1000 * least_m:.0f} mm"
         )
-    return f"the fingers find no hold on the {name}: no part of its outline is straight over their breadth"
+    return f"the fingers find no hold on the {name}: no straight part of its outline is as wide as they are"

@@ -190,7 +190,7 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
                 seen += people[:1] if not seen else _same(people, seen[0])
             yield Running(f"looking for {name}")
         if len(seen) < _SCANS:
-            raise SkillFailure(Cause.PRECONDITION, f"nobody is seen near, so {name} cannot be handed anything")
+            raise SkillFailure(Cause.PRECONDITION, "nobody is seen near to take the object")
         x, y = (float(np.median([p.place_W[axis] for p in seen])) for axis in (0, 1))
         return replace(seen[-1], place_W=(x, y))
 

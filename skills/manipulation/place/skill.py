@@ -146,7 +146,7 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
                 yield from self.try_shift_hand(_LIFT_AGAIN_M * UP_B, "lifting the object again")
             return (yield from self.run(inputs))
         if spot_W is None:
-            raise SkillFailure(Cause.PRECONDITION, "there is nothing in the gripper, and it was not yet over its place")
+            raise SkillFailure(Cause.PRECONDITION, "the object left the gripper before it was over its place")
         self.checkpoint = {"released_W": spot_W.tolist(), **self.checkpoint}
         if over_spot:
             yield from self.let_go(None)

@@ -56,7 +56,7 @@ class PlaceVerification(ReleasingSkill[InputsT]):
         if not free:
             raise SkillFailure(Cause.POSTCONDITION, "the object is still in the gripper")
         if not left:
-            raise SkillFailure(Cause.POSTCONDITION, "the object is put down, and the hand cannot be drawn back from it")
+            raise SkillFailure(Cause.POSTCONDITION, "the object is put down, but the hand cannot draw back from it")
 
     def check(
         self,

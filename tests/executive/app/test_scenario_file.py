@@ -122,7 +122,7 @@ def test_a_scenario_comes_back_from_the_json_of_its_request(read):
             ":3: .*event already",
         ),
         (event("{door: [hall, kitchen]}"), "a door needs 'closes' or 'opens'"),
-        (event("{door: [hall, kitchen], closes: 1, to: hall}"), "'to' is none of the keys of a door"),
+        (event("{door: [hall, kitchen], closes: 1, to: hall}"), "a door has no key 'to'"),
         (
             event("{door: [hall, garden], closes: 1}"),
             "no door is known between hall and garden; known are kitchen",

@@ -33,6 +33,7 @@ def test_speech_is_printed_unless_quiet_and_said_by_the_voice(quiet, shown):
     speech = SpeechOutput(Console(file=told, width=80), voice, quiet)
     speech.message("speech", {"robot": "Alice", "text": "[bold]Hello", "t": 1.0})
     speech.message("pose", {"robot": "Alice"})
+    speech.tick(Progress(1.0, 20, 0, {}))
     assert (told.getvalue(), voice.texts) == (shown, ["[bold]Hello"])
 
 
@@ -96,3 +97,30 @@ def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compile
     first, second = told.getvalue().splitlines()
     assert re.match(r"✓ +2.5 s  go to the counter: there$", first)
     assert re.match(r"✗ +0.4 s  detect \(coke, beer; counter\): PRECONDITION: saw none$", second)
+
+
+def test_a_look_that_found_nothing_has_no_cross(compiled, make):
+    tree = compiled(*make.FETCH)
+    detect = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/detect"))
+    idle = {path_id: NodeState() for path_id in tree.path_ids}
+    told = io.StringIO()
+    with live_view(Console(file=told, width=200)) as view:
+        for state in (NodeState(Status.RUNNING), NodeState(Status.FAILURE, Cause.POSTCONDITION, "no coke seen")):
+            view.tick(Progress(1.0, 20, 0, {"Alice": {**idle, detect: state}}, {"Alice": tree}))
+    assert re.match(r"– +0.0 s  detect \(coke, beer; counter\): no coke seen$", told.getvalue().strip())
+
+
+def test_speech_is_printed_behind_the_skills_that_ended_before_it(compiled, make):
+    tree = compiled(*make.FETCH)
+    drive = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/navigate"))
+    idle = {path_id: NodeState() for path_id in tree.path_ids}
+    told = io.StringIO()
+    console = Console(file=told, width=200)
+    with live_view(console) as view:
+        speech = SpeechOutput(console, Heard(), quiet=False)
+        speech.message("speech", {"robot": "Alice", "text": "hello", "t": 1.0})
+        for visitor in (view, speech):
+            states = {**idle, drive: NodeState(Status.SUCCESS, message="there")}
+            visitor.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
+    first, second = told.getvalue().splitlines()
+    assert (first.endswith("there"), second) == (True, "Alice: hello")

@@ -42,9 +42,9 @@ def test_values_take_the_places_of_the_defaults(resolved):
     [
         ("room=kitchn", 3, "parameter 'room': unknown place 'kitchn'; did you mean 'kitchen'?"),
         ("who=Rbin", 4, "parameter 'who': unknown person 'Rbin'; did you mean 'Robin'?"),
-        ("limit=soon", 1, "parameter 'limit' is a number, and 'soon' is none; give it a number"),
-        ("limit=true", 1, "parameter 'limit' is a number, and 'True' is none"),
-        ("loud=1", 1, "parameter 'loud' is a truth, and '1' is none"),
+        ("limit=soon", 1, "parameter 'limit' must be a number, not 'soon'; give it a number"),
+        ("limit=true", 1, "parameter 'limit' must be a number, not 'True'"),
+        ("loud=1", 1, "parameter 'loud' must be true or false, not '1'"),
         ("mood=sad", 1, "parameter 'mood' cannot be 'sad'; it is one of calm or hasty"),
     ],
 )
@@ -63,7 +63,7 @@ def test_a_number_may_be_given_for_a_text(resolved):
 
 
 def test_a_default_of_another_type_is_refused_in_its_line(resolved):
-    with pytest.raises(InputError, match="parameter 'who' is a person, and 'True' is none") as error:
+    with pytest.raises(InputError, match="parameter 'who' must be a person, not 'True'") as error:
         resolved(text=FILE.replace("default: Robin", "default: true"))
     assert error.value.line == 4
 

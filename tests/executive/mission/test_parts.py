@@ -108,7 +108,7 @@ def test_errors_in_robots_and_parts_have_their_line(load, text, line, words):
 NAMED = [
     ("alice: spot\n  Alice: fetch", 4, "'alice' and 'Alice' are the same name"),
     ("alice: spot\n  bob: ftch", 4, "unknown kind of robot 'ftch'; did you mean 'fetch'?"),
-    ("everyone: spot", 3, "calls all robots"),
+    ("everyone: spot", 3, "means all robots"),
 ]
 
 

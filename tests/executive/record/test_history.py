@@ -134,3 +134,12 @@ def test_the_timeline_lists_speech():
     assert [(entry.t, entry.about, entry.text) for entry in timeline(events)] == [
         (2.0, "speech", 'Alice says: "Hello"')
     ]
+
+
+def test_the_timeline_lists_speech_behind_the_changes_of_its_tick():
+    said = Event("speech", 2.0, {"t": 2.0, "robot": "Alice", "text": "Hello"})
+    seen = Event("battery", 2.0, {})
+    ended = Event("outcome", 2.0, {"robot": "Alice", "outcome": "success", "message": "done"})
+    later = Event("outcome", 2.05, {"robot": "Bob", "outcome": "success", "message": "done"})
+    order = [entry.text.split()[0] for entry in timeline([said, seen, ended, later])]
+    assert order == ["Alice:", "Alice", "Bob:"]

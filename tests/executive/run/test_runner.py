@@ -313,7 +313,7 @@ def test_a_robot_that_waits_for_one_that_fails_does_not_begin(run_two, script, p
     script.ends["navigate"] = lambda skill: Failed(Cause.EXECUTION, "stuck")
     alice, bob = run_two(Alice=("Bob",)).robots
     assert (alice.outcome, alice.cause, bob.outcome) == (Outcome.FAILURE, Cause.PRECONDITION, Outcome.FAILURE)
-    assert alice.message.startswith("Bob, whose part comes first, did not do it")
+    assert alice.message.startswith("Bob did not finish the part that comes first")
     assert {m["robot"] for m in transitions(published)} == {"Bob"}
 
 

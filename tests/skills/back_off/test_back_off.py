@@ -88,7 +88,7 @@ def test_a_robot_that_does_not_move_is_given_up():
 
     robot.pass_time = pass_time
     step = outcome(bench)
-    assert (step.cause, "does not get on" in step.message) == (Cause.EXECUTION, True)
+    assert (step.cause, "is stuck" in step.message) == (Cause.EXECUTION, True)
 
 
 def test_it_stops_when_it_is_ended_while_it_drives():

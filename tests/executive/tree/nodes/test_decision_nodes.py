@@ -376,7 +376,7 @@ def test_must_hold(run_context, robot):
     robot.charge = 0.4
     verdict = watch.check(run_context)
     assert isinstance(verdict, Failed)
-    assert (verdict.cause, verdict.message) == (Cause.PRECONDITION, "it does not hold any more that it is full")
+    assert (verdict.cause, verdict.message) == (Cause.PRECONDITION, "it is no longer true that it is full")
 
 
 def test_must_hold_without_a_value(run_context):

@@ -56,7 +56,7 @@ def resumed(robot, checkpoint, surface=TABLE):
 def test_after_a_restart_an_empty_gripper_that_was_not_yet_over_the_spot_is_a_failed_precondition():
     step = resumed(ScriptedRobot(), {})
     assert isinstance(step, Failed)
-    assert (step.cause, "not yet over its place" in step.message) == (Cause.PRECONDITION, True)
+    assert (step.cause, "before it was over its place" in step.message) == (Cause.PRECONDITION, True)
 
 
 def test_after_a_restart_a_robot_with_an_empty_gripper_looks_for_the_object_on_its_spot():

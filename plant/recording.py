@@ -19,8 +19,8 @@ _MOST_BYTES = 9.5e6
 _BODY_BYTES = 105.0
 _FEWEST_FRAMES = 400
 """A frame takes `_BODY_BYTES` of a file for each body; the shapes of a world take about ten megabytes."""
-BESIDE_M = (-0.7, -1.5, 3.0)
-"""Offset of the following camera from the robot, in the axes of the world."""
+BESIDE_M = (-0.4, -1.0, 3.6)
+"""Offset of the following camera from the robot, in the axes of the world: steep, to look over a wall behind it."""
 
 
 @dataclass(frozen=True)

@@ -138,7 +138,7 @@
       svg.append(image, ...picture.detections.flatMap((each) => this.boxed(each)));
       const names = picture.detections.map((each) => `${each.class_name} ${Math.round(100 * each.score)} %`);
       const said = names.length ? names.join(", ") : "nothing found";
-      svg.setAttribute("aria-label", `Picture of the hand camera at ${picture.t.toFixed(1)} s: ${said}`);
+      svg.setAttribute("aria-label", `Picture of a camera at ${picture.t.toFixed(1)} s: ${said}`);
       this.seen.textContent = `${picture.t.toFixed(1)} s: ${said}`;
       this.box.replaceChildren(svg);
     }
@@ -166,7 +166,7 @@
   }
 
   // The scene while it runs, or its recording, which follows the slider.
-  const BESIDE_M = [-0.7, 3.0, 1.5];
+  const BESIDE_M = [-0.4, 3.6, 1.0]; // steep, so that it looks over a wall half a metre behind the robot
 
   class ScenePanel {
     constructor(box, follow) {

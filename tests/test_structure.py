@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 811,
     "executive/app": 7575,
     "executive/cli": 4382,
-    "skills": 27298,
+    "skills": 27329,
     "plant": 12601,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8

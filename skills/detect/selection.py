@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skills.api import FLOOR
+from skills.api import FLOOR, ObjectObservation
 from skills.detect.ports import DetectInputs
 from skills.perception.class_forms import ANY_OBJECT, class_form
-from skills.perception.detection_3d import has_attribute
+from skills.perception.detection_3d import Detection3D, has_attribute
 from skills.perception.surface_segmentation import Cluster
-from skills.perception.tracker import Track
+from skills.perception.tracker import CONFIRMED_BELIEF, Track
 from skills.quantities import Angle, Duration, Length, Tries
 from skills.robot import FloatArray
 
@@ -25,6 +25,12 @@ _SMALLEST, _LARGEST = 0.4, 1.3
 """Shares of the shortest and longest objects of a class, since clusters may be hidden in part or merged."""
 _FREE_M = 0.15
 """Distance to the next object beyond which more does not count."""
+
+
+_SEEN_AGAIN_M = 0.06
+"""Distance from where an object was seen within which a segment without a label may be it."""
+_SAME_SIZE, _SAME_SIZE_M = 0.3, 0.015
+"""Difference of sizes, as a share and in metres, within which they are alike."""
 
 
 @dataclass(frozen=True)
@@ -135,3 +141,24 @@ def _may_be(cluster: Cluster, classes: Sequence[str]) -> bool:
     longest = max(cluster.shape.length_m, cluster.shape.height_m)
     ranges = (class_form(name).length_m for name in classes)
     return any(_SMALLEST * low < longest < _LARGEST * high for low, high in ranges)
+
+
+def seen_again(before: ObjectObservation, segments: Sequence[Detection3D]) -> tuple[Detection3D, ...]:
+    """The segment without a label that is as large as an object seen before and at its place, as one of its class.
+
+    The search has confirmed its class from two sides; a picture from near may lack what the network knows it by. An
+    empty tuple when no segment is like it.
+    """
+    off = {id(each): level_distance(each.position_W, before.position_W) for each in segments}
+    alike = [each for each in segments if off[id(each)] < _SEEN_AGAIN_M and _is_as_large(each.size_m, before.size_m)]
+    nearest = min(alike, key=lambda each: off[id(each)], default=None)
+    if nearest is None:
+        return ()
+    detection = replace(nearest.detection, class_name=before.kind.name, score=max(before.score, CONFIRMED_BELIEF))
+    return (replace(nearest, detection=detection),)
+
+
+def _is_as_large(size_m: Sequence[float], other_m: Sequence[float]) -> bool:
+    """Returns whether length and height are alike; width and height of what is seen from one side may be less."""
+    pairs = ((size_m[0], other_m[0]), (size_m[2], other_m[2]))
+    return all(abs(a - b) < max(_SAME_SIZE_M, _SAME_SIZE * max(a, b)) for a, b in pairs)

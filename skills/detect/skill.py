@@ -34,6 +34,7 @@ from skills.detect.selection import (
     is_sure,
     level_distance,
     matching_tracks,
+    seen_again,
     sure_tracks,
     unlabelled_clusters,
 )
@@ -46,7 +47,7 @@ from skills.perception.detection_3d import Detection3D, detections_3d, observati
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
 from skills.perception.model_detector import models_of
 from skills.perception.model_matching import identified
-from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_surfaces
+from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
 from skills.perception.visibility import Coverage, in_plain_view
 from skills.robot import FloatArray, Image
@@ -293,6 +294,9 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
                 sure = [each for each in placed if each.detection.score >= SURE_SCORE]
                 loose = loose_clusters(image, place, views, sure, inputs.surfaces)
                 placed += identified(loose, image, place, self._own)
+            elif inputs.seen_before is not None and not any(each.class_name in inputs.classes for each in placed):
+                loose = loose_clusters(image, place, views, placed, inputs.surfaces)
+                placed += seen_again(inputs.seen_before, [segment_3d(each, image, place) for each in loose])
             return Look(image, place, found, placed, tuple(each for view in views for each in view.clusters))
 
         look = yield from self.compute(examine, latency_s=DETECTION_LATENCY_S, name="detect", message=message)

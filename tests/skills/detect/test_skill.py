@@ -7,7 +7,7 @@ import pytest
 from scripted_robot import MODEL, Colours, ScriptedRobot, context_of, failed, outcome
 from table_scene import BLUE, COKE, GREY, PINK, RED, TABLE, Can
 
-from skills.api import Cause, Succeeded, Surface
+from skills.api import Cause, ObjectKind, ObjectObservation, Succeeded, Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.manipulation.stow.skill import Stow, StowInputs
 
@@ -206,6 +206,37 @@ def test_with_an_expected_position_only_objects_near_it_count():
     assert step.outputs["observation"].position_W[1] == pytest.approx(SECOND.y, abs=0.02)
     skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(skill, replace(near, expected_W=(1.2, 0.5, 0.8)), Cause.POSTCONDITION, "no coke seen")
+
+
+SEEN_BEFORE = ObjectObservation(
+    0.0, ObjectKind("coke"), (COKE.x, COKE.y, 0.8075), (0.066, 0.066, 0.115), 0.0, 0.55, "table"
+)
+
+
+class Blind(Colours):
+    """Knows its classes, and sees none."""
+
+    def detect(self, pictures):
+        return [() for _ in pictures]
+
+
+# What stands where a coke was seen, which the network does not know from near; whether it is the coke.
+@pytest.mark.parametrize(
+    ("thing", "is_it"),
+    [(COKE, True), (replace(COKE, y=COKE.y + 0.1), False), (replace(COKE, height=0.23), False), (None, False)],
+    ids=["itself", "beside", "taller", "gone"],
+)
+def test_object_seen_before_is_known_from_near_by_its_place_and_size(thing, is_it):
+    again = DetectInputs(("coke",), (TABLE,), expected_W=SEEN_BEFORE.position_W, seen_before=SEEN_BEFORE)
+    things = [] if thing is None else [thing]
+    step = outcome(Detect(context_of(ScriptedRobot(things=things), detector=Blind())), again)
+    assert isinstance(step, Succeeded) == is_it
+
+
+def test_object_of_another_class_is_not_the_one_seen_before():
+    again = DetectInputs(("coke",), (TABLE,), expected_W=SEEN_BEFORE.position_W, seen_before=SEEN_BEFORE)
+    blue = replace(COKE, colour=BLUE)
+    failed(Detect(context_of(ScriptedRobot(things=[blue]))), again, Cause.POSTCONDITION, "no coke seen")
 
 
 def test_unlabelled_cluster_is_viewed_from_near():

@@ -168,7 +168,7 @@ def test_the_picture_of_a_nested_mission_has_the_size_of_a_page(page, nested, tm
 def report_page(tmp_path, nested):
     """The report of a run with everything that a report may have, with long texts."""
     whole = "x" * 120
-    why = f"the coke stands on the counter; Robin has no coke; {whole}"
+    why = f"The coke stands on the counter. Robin has no coke. {whole}"
     referee = RefereeReport(False, why, 1, 2, events=("1.0 s: it fell",))
     done = Styles.SUCCESS.value
     steps = tuple(
@@ -192,6 +192,7 @@ def report_page(tmp_path, nested):
 
 def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, report_page: Path):
     page.goto(report_page.as_uri())
+    assert page.locator(".verdict li").count() == 6
     page.locator("details.tree summary").click()
     assert page.evaluate(OVERFLOWING) == []
     assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 811,
     "executive/app": 7575,
     "executive/cli": 4382,
-    "skills": 27329,
+    "skills": 27342,
     "plant": 12601,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8

@@ -29,6 +29,10 @@ _ALIGNING_RAD = np.linspace(-0.28, 0.28, 15)
 """Angles by which a part of an outline may lie oblique to the whole."""
 _LEAST_TOUCHING = 0.55
 """Least part of a finger's breadth that must touch the outline."""
+_FINGER_HALF_M = 0.03
+"""Half the breadth of a finger."""
+_PER_BEYOND_END_M = 30.0
+"""Cost per metre of the breadth of fingers that lies beyond the end of an object."""
 _LOOSE_COST = 1.5
 """Cost of a finger that touches the outline nowhere."""
 _PER_LEVER_M = 4.0
@@ -38,6 +42,8 @@ _PER_WIDTH_M = 2.0
 _WIDE_M = 0.095
 """Local width from which on the fingers have little space on both sides."""
 _PER_WIDE_M = 20.0
+_SLIM_M, _PER_SLIM_M = 0.01, 40.0
+"""Local width below which a part turns in the fingers, and its cost per metre."""
 """Additional cost of the local width beyond that."""
 _SLICE_M = 0.03
 """Half the height of a slice of an upright object, and the distance between slices."""
@@ -266,7 +272,13 @@ def _along(target: Target, ahead_rad: float, middle_B: FloatArray | None = None)
             for azimuth in (turned, turned + np.pi):
                 off = abs(wrap(azimuth - ahead_rad))
                 cost = 4.0 * abs(shift) + _width_cost(high - low) + 0.15 * off + _LOOSE_COST * (1.0 - touching)
+                cost += 0.0 if square else _PER_BEYOND_END_M * _beyond_end_m(along, middle + shift)
                 yield Placement(xy, azimuth, float(high - low), 0.02, cost, abs(shift))
+
+
+def _beyond_end_m(along_m: FloatArray, at_m: float) -> float:
+    """Length (m) by which fingers at a position along an outline reach beyond its end: they slide off a tapered one."""
+    return max(0.0, _FINGER_HALF_M - min(at_m - float(np.min(along_m)), float(np.max(along_m)) - at_m))
 
 
 def _aligned(xy: FloatArray, yaw_rad: float) -> float:
@@ -282,7 +294,8 @@ def _turned(azimuth_rad: float) -> FloatArray:
 
 
 def _width_cost(width_m: float) -> float:
-    return _PER_WIDTH_M * width_m + _PER_WIDE_M * max(0.0, width_m - _WIDE_M)
+    wide_m, slim_m = max(0.0, width_m - _WIDE_M), max(0.0, _SLIM_M - width_m)
+    return _PER_WIDTH_M * width_m + _PER_WIDE_M * wide_m + _PER_SLIM_M * slim_m
 
 
 def _touching_both(s: FloatArray, t: FloatArray, low_m: float, high_m: float, length_m: float | None = None) -> float:

@@ -132,6 +132,19 @@ def test_both_fingers_end_well_below_the_middle_of_a_round_handle(height_m):
     assert max(_tips_m(_found(handle)[0], handle.base_m, beside_m)) < 0.5 * height_m - 0.0035
 
 
+def _screwdriver():
+    """A shaft of 6 mm over 11 cm, and a handle of 11 cm that widens from 18 to 31 mm towards its end."""
+    x, across = np.meshgrid(np.linspace(-0.11, 0.11, 221), np.linspace(-1.0, 1.0, 9))
+    half_m = np.where(x < 0.0, 0.003, 0.009 + 0.06 * np.maximum(x, 0.0))
+    return _target(0.22, 0.03, 0.036, points=np.column_stack([x.ravel(), (across * half_m).ravel()]))
+
+
+def test_a_screwdriver_is_held_by_its_handle_with_no_finger_beyond_the_end():
+    best = _found(_screwdriver())[0]
+    along_m = (best.X_BH @ np.array([GRIPPER.tip_x_m, 0.0, 0.0]))[0] - 0.85
+    assert 0.03 < along_m < 0.11 - 0.03 + 0.001
+
+
 def test_nobody_takes_a_sheet_of_paper():
     assert grasp_candidates(_target(0.25, 0.02, 0.002), MODEL.p_BS, GRIPPER) == []
 

@@ -50,4 +50,7 @@ def _parts(cell: dict[str, Any]) -> list[str]:
 def _shown(output: dict[str, Any]) -> str:
     if "text" in output:
         return f"```text\n{''.join(output['text'])}```"
-    return f'<img alt="figure" src="data:image/png;base64,{output["data"]["image/png"].strip()}">'
+    data = output["data"]
+    if "text/html" in data:
+        return f'<div class="result">{"".join(data["text/html"])}</div>'
+    return f'<img alt="figure" src="data:image/png;base64,{data["image/png"].strip()}">'

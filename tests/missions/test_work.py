@@ -8,7 +8,7 @@ from executive.record.history import read_events
 BUDGETS = {
     "arm_configuration_checks": 2_070,
     "arm_edge_checks": 11,
-    "bytes_logged": 456_000,
+    "bytes_logged": 1_170_000,
     "contact_points": 16_700,
     "depth_pictures_160x120": 234,
     "depth_pictures_640x480": 9,

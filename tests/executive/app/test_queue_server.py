@@ -533,7 +533,7 @@ def test_values_are_put_into_the_file_as_it_was_when_it_was_given(calls, stand, 
         (b'{"x": NaN}', "'x' is not a name with a value"),
         (b'{"no name": 1}', "'no name' is not a name with a value"),
         (b'{"z": 1}', "has no parameter 'z'; it has x and fast"),
-        (b'{"x": "left"}', "'left' .*give (it )?a number"),
+        (b'{"x": "left"}', "not 'left'; give it a number"),
         (b'{"x": 500.0}', "no|not"),
     ],
 )

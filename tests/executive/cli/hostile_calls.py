@@ -53,6 +53,7 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
     "world from-map": {"map_file": "map.yaml", "--out": "made"},
     "world from-cylinders": {"file": "good.json", "--out": "made"},
     "world show": {"folder": "flat"},
+    "world add": {"what": "person", "folder": "flat"},
     "object import": {"mesh": "good.stl", "--name": "tool", "--mass": "0.5", "--out": "made"},
     "object show": {"folder": "object"},
     "object tag": {"number": "7", "--out": "made.svg"},

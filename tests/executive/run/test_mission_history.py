@@ -106,10 +106,10 @@ def test_the_claim_lists_the_answers_briefly(message, sentences, skipped, told):
 def test_a_mission_that_only_looked_claims_what_it_found(compiled, run_tree, script):
     script.seen_on = ("counter", "bedside table")
     worst = run_tree(compiled(*CHECKS, name="patrol")).worst
-    assert worst.message == "yes: hammer in the kitchen; yes: drink in the bedroom"
+    assert worst.message == "yes: a hammer in the kitchen; yes: a drink in the bedroom"
     assert [(one.answer, one.sentence) for one in worst.findings] == [
-        (True, "yes: hammer in the kitchen"),
-        (True, "yes: drink in the bedroom"),
+        (True, "yes: a hammer in the kitchen"),
+        (True, "yes: a drink in the bedroom"),
     ]
     assert worst.answers == {one.path_id: True for one in worst.findings}
     assert 0.0 < worst.findings[0].t_s < worst.findings[1].t_s
@@ -117,7 +117,7 @@ def test_a_mission_that_only_looked_claims_what_it_found(compiled, run_tree, scr
 
 def test_a_mission_that_also_brought_something_claims_both(compiled, run_tree, make):
     worst = run_tree(compiled(CHECKS[0], *make.FETCH)).worst
-    assert (worst.outcome, worst.message) == (Outcome.SUCCESS, "yes: hammer in the kitchen; hand_over done")
+    assert (worst.outcome, worst.message) == (Outcome.SUCCESS, "yes: a hammer in the kitchen; hand_over done")
 
 
 def test_a_mission_that_failed_says_what_it_found_before(compiled, run_tree, script):
@@ -128,7 +128,7 @@ def test_a_mission_that_failed_says_what_it_found_before(compiled, run_tree, scr
     there = "Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]"
     worst = run_tree(compiled(CHECKS[0], there)).worst
     assert worst.outcome is Outcome.FAILURE
-    assert worst.message.endswith("(found out: yes: hammer in the kitchen)")
+    assert worst.message.endswith("(found out: yes: a hammer in the kitchen)")
 
 
 def test_a_pure_drive_keeps_its_sentence(compiled, run_tree):

@@ -214,7 +214,7 @@ def test_two_runs_of_a_seed_log_the_same(compiled, run_tree, make, robot, clock,
         clock.time_s, robot.holder, robot.holding = 0.0, None, False
         published.clear()
         run_tree(compiled(*make.FETCH))
-        logs.append([event for event in published if event[0] != "wall"])
+        logs.append([(topic, repr(data)) for topic, data in published if topic != "wall"])
     assert logs[0] == logs[1]
 
 

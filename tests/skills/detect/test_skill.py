@@ -139,7 +139,10 @@ def test_search_ends_with_the_wanted_number_of_objects():
 def test_too_few_objects_fail_with_their_number():
     skill = Detect(context_of(ScriptedRobot(things=[COKE])))
     failed(
-        skill, DetectInputs(("coke",), (TABLE,), count=3), Cause.POSTCONDITION, "there is one coke on the table, and"
+        skill,
+        DetectInputs(("coke",), (TABLE,), count=3),
+        Cause.POSTCONDITION,
+        "there is one coke on the table, fewer than 3",
     )
 
 

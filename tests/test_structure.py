@@ -26,7 +26,7 @@ LINES = {
     "executive/view": 1446,
     "executive/testing": 811,
     "executive/app": 7575,
-    "executive/cli": 4382,
+    "executive/cli": 4384,
     "skills": 27342,
     "plant": 12601,
 }

@@ -212,6 +212,8 @@ def _add_object(site: _Site, wanted: _Wanted) -> str:
 def _add_person(site: _Site, wanted: _Wanted) -> str:
     from plant.worlds.builder.furnish import add_person
 
+    if wanted.room is not None or wanted.at is not None:
+        raise InputError("a person stands beside the robot's start", hint="leave --in and --at out")
     add_person(site.folder, site.world, site.grid(), wanted.name, site.room(None))
     return f"{wanted.name} stands beside the robot's start"
 

@@ -39,7 +39,7 @@ def _ports_of(spec: NodeSpec) -> Iterator[Port]:
         parts = spec.path_id.split("/")
         for name, value in options.items():
             text = plain(value)
-            for length in (len(parts), len(parts) - 1, 2):
+            for length in (len(parts), len(parts) - 1, 2):  # ids below it, beside it, and in the same mission
                 text = text.replace("".join(f"{part}/" for part in parts[:length]), "") if length > 1 else text
             yield Port(name, text)
         return

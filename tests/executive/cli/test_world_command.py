@@ -187,6 +187,7 @@ def test_two_pieces_two_people_and_comments_stand_together_in_the_files(own):
         (("object", "{own}", "coke"), "lies on a surface"),
         (("dock", "{own}"), "there is a dock"),
         (("person", "{own}", "Robin"), "'Robin' is in knowledge.yaml already"),
+        (("person", "{own}", "Maya", "--at", 1, 1, 0), "a person stands beside the robot's start"),
         (("room", "{own}", "den"), "the former name is missing"),
         (("table", "nowhere", "t"), "there is no such folder"),
     ],

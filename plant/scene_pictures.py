@@ -161,14 +161,14 @@ def draw_map(
     picture = view.picture.copy()
     paths = {text: (view.pixels(path), ink) for text, (path, ink) in paths_W.items() if len(path)}
     names = Names(picture, [pixels for pixels, _ in paths.values()])
-    for pixels, ink in paths.values():
-        draw_path(picture, pixels, ink)
-        names.keep_clear(pixels[0], 12.0)
-        names.keep_clear(pixels[-1], 16.0)
     dots = {text: view.pixels(np.array([point]))[0] for text, point in (marks or {}).items()}
     for pixel in dots.values():
         _dot(picture, pixel, BOX_COLOUR)
         names.keep_clear(pixel, 12.0)
+    for pixels, ink in paths.values():
+        draw_path(picture, pixels, ink)
+        names.keep_clear(pixels[0], 12.0)
+        names.keep_clear(pixels[-1], 16.0)
     for text, pixel in dots.items():
         names.write(text, pixel, ground=BOX_COLOUR)
     for text, centre in (labels or {}).items():

@@ -20,17 +20,17 @@ LINES = {
     "executive/mission": 1598,
     "executive/tree": 7751,
     "executive/run": 3094,
-    "executive/record": 1333,
+    "executive/record": 1362,
     "executive/store": 1681,
     "executive/conversation": 581,
-    "executive/view": 1446,
+    "executive/view": 1555,
     "executive/testing": 811,
-    "executive/app": 7575,
-    "executive/cli": 4384,
+    "executive/app": 7586,
+    "executive/cli": 4435,
     "skills": 27342,
     "plant": 12601,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 465, 73, 8
+MODULES, ONE_IMPORTER, SAME_NAME = 466, 73, 8
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -35,6 +35,7 @@ from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.assignments import GivenMissions
 from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.view.foxglove import LiveServer
 from executive.words.robot_config import RobotConfig
 from plant.worlds.world import World
 from skills.files.errors import InputError, Problems
@@ -51,11 +52,13 @@ def run_fleet(
     seed: int,
     time_limit_s: float | None = None,
     page: PageView | None = None,
+    live: LiveServer | None = None,
     first: Prepared | None = None,
 ) -> None:
     """Runs until no mission can be assigned any more; writes log, recording and report into the folder `out`.
 
-    `page` shows the run; the log begins with the map of the `first` mission. Raises InputError.
+    `page` shows the run, and `live` sends what is logged; the log begins with the map of the `first` mission. Raises
+    InputError.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
@@ -63,6 +66,8 @@ def run_fleet(
         dispatch.log = log
         if page is not None:
             page.serve(log, backend.show_live())
+        if live is not None:
+            live.follow(log)
         if first is not None:
             log_map(log, first.world, first.knowledge)
         control = Control(pace=None) if page is None else page.control

@@ -36,6 +36,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
+from executive.view.foxglove import LiveServer
 from executive.words.goal import RefereeReport
 from executive.words.knowledge import Knowledge
 from plant.worlds.world import World
@@ -66,14 +67,15 @@ def run_request(
     visitors: Sequence[RunVisitor] = (),
     control: Control | None = None,
     page: PageView | None = None,
+    live: LiveServer | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
 ) -> FinishedRun:
     """Runs a prepared request and writes log, tree, report and pictures into its folder.
 
     The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
-    pauses, steps and cancels it, and `page` shows it. `durable` stores its state so that another process can resume
-    it, or resumes an earlier run. `profile` measures the time of the subsystems.
+    pauses, steps and cancels it, `page` shows it, and `live` sends what is logged. `durable` stores its state so that
+    another process can resume it, or resumes an earlier run. `profile` measures the time of the subsystems.
 
     Raises InputError if the world or the stored state cannot be used.
     """
@@ -88,6 +90,8 @@ def run_request(
     with closing(EventLog(path, clock, apart=prepared.several)) as log:
         if page is not None:
             page.serve(log, backend.show_live())
+        if live is not None:
+            live.follow(log)
         log_map(log, world, prepared.knowledge)
         facts: dict[str, Any] = {"world": world.name, "seed": request.seed, "scenario": scenario.lines()}
         for each in prepared.all:

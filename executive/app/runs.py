@@ -25,6 +25,7 @@ from executive.store.journal import StoreJournal
 from executive.store.missions import MissionState, MissionStore, StoredMission
 from executive.store.recollection import Recollection
 from executive.store.resuming import ended_tree, resumed_tree
+from executive.view.foxglove import LiveServer
 from executive.words.slug import slug
 from skills.files.errors import InputError, disk_is_full
 
@@ -38,6 +39,7 @@ class RunOptions:
     control: Control
     visitors: Sequence[RunVisitor] = ()
     page: PageView | None = None
+    live: LiveServer | None = None
     profile: Profile | None = None
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from executive.app.report import VERDICTS
-from executive.cli.options import AS_JSON, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
+from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, show_table
 from executive.mission.request import Request
 from executive.store.assignments import GivenMissions
@@ -40,6 +40,7 @@ def run(
     view: VIEW = False,
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
+    foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions in one world with several robots.
@@ -53,6 +54,7 @@ def run(
         from executive.app.fleet import missions_json
         from executive.app.fleet_run import run_fleet, simulated_fleet
         from executive.app.page_view import PageView
+        from executive.view.foxglove import serve_live
 
         if not request.robots:
             raise InputError("a fleet needs its robots", hint="name them, as in --robots alice=spot,bob=spot")
@@ -71,7 +73,9 @@ def run(
         folder = out or (queue if is_folder(queue) else store.parent) / "fleet"
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         page = PageView(None, tell, port=view_port) if view or view_for is not None else None
-        run_fleet(dispatch, out=folder, seed=request.seed, time_limit_s=request.time_limit_s, page=page, first=first)
+        limit_s = request.time_limit_s
+        with serve_live(foxglove, tell) as live:
+            run_fleet(dispatch, out=folder, seed=request.seed, time_limit_s=limit_s, page=page, live=live, first=first)
         results = missions_json(missions, [each.id for each in queued])
         left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]

@@ -25,7 +25,9 @@ from executive.words.forms import OptionGroup as Group
 from skills.quantities import Port, Wait, quantity_of
 from skills.robot import Pose2D
 
-_START: Final = "--start"
+_START, _FOXGLOVE = "--start", "--foxglove"
+_FOXGLOVE_ADDRESS: Final = "127.0.0.1:8765"
+_WITH_PORT: Final = re.compile(r"[^\s/=]*:[^\s/=]*")
 _NUMERIC: Final = re.compile(r"[-+]?\.?\d[\d.,]*(?:e[-+]?\d+)?", re.IGNORECASE)
 
 
@@ -51,13 +53,23 @@ VIEW_FOR = Annotated[
 ]
 VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
 
+FOXGLOVE = Annotated[
+    str | None,
+    grouped(
+        Group.PAGE,
+        _FOXGLOVE,
+        metavar="[HOST:PORT]",
+        help=f"Serve what the log gets live for Foxglove; by default at {_FOXGLOVE_ADDRESS}.",
+    ),
+]
+
 
 class StartCommand(TyperCommand):
-    """Command whose `--start` takes three numbers or one word, and whose help has a heading for each group."""
+    """Command with `--start` of three numbers or one word, `--foxglove` of one or none, and groups in its help."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Joins the numbers after `--start`, and parses as click does."""
-        return super().parse_args(ctx, join_start(args))
+        """Joins the values of options that take any number of words, and parses as click does."""
+        return super().parse_args(ctx, join_values(args))
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Writes the arguments, then the options of each group, then the others."""
@@ -72,14 +84,17 @@ class StartCommand(TyperCommand):
                     formatter.write_dl(rows)
 
 
-def join_start(arguments: Sequence[str]) -> list[str]:
-    """Joins three numbers after `--start` into one argument, so that one word is allowed as well."""
+def join_values(arguments: Sequence[str]) -> list[str]:
+    """Joins three numbers after `--start` into one argument, and an address after `--foxglove`, or the usual one."""
     words, rest = list[str](), list(arguments)
     while rest:
         word = rest.pop(0)
         if word == _START and rest and _NUMERIC.fullmatch(rest[0]):
             numbers = [*takewhile(lambda each: not each.startswith("--"), rest[:3])]
             word, rest = f"{_START}={' '.join(numbers)}", rest[len(numbers) :]
+        elif word == _FOXGLOVE:
+            given = rest and _WITH_PORT.fullmatch(rest[0])
+            word = f"{_FOXGLOVE}={rest.pop(0) if given else _FOXGLOVE_ADDRESS}"
         words.append(word)
     return words
 

@@ -12,7 +12,7 @@ import typer
 
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
-from executive.cli.options import AS_JSON, QUIET, STORE, StartCommand, takes_request
+from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, STORE, StartCommand, takes_request
 from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.load import load_stack
@@ -110,20 +110,26 @@ def remove(number: Number, out: Out = Path("out"), store: STORE = None) -> None:
     console_for(False).print(f"Mission {number} is removed.")
 
 
-@queue.command()
+@queue.command(cls=StartCommand)
 def run(
     out: Out = Path("out"),
     store: STORE = None,
     quiet: QUIET = False,
+    foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions, each in the world that the mission before it left."""
     from executive.app.runs import MissionRuns, queued_missions, resumable_line, run_in_turn
     from executive.cli.screen import ConsoleScreen
+    from executive.view.foxglove import serve_live
 
     console = console_for(as_json)
-    with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
-        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
+    with (
+        MissionStore(store or store_in(out), create=False) as missions,
+        missions.claim(),
+        serve_live(foxglove, plain_lines(console)) as live,
+    ):
+        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
         ended = run_in_turn(queued_missions(missions), runs)
         resumable = resumable_line(missions)
     if ended:
@@ -184,7 +190,7 @@ def _trigger(at: str | None, every: str | None, on: str | None, missed: Missed |
     return trigger
 
 
-@queue.command()
+@queue.command(cls=StartCommand)
 def serve(
     out: Out = Path("out"),
     store: STORE = None,
@@ -200,21 +206,27 @@ def serve(
         quantity_option(Wait, "--for", help="Begin no mission after this time, and end."),
     ] = None,
     quiet: QUIET = False,
+    foxglove: FOXGLOVE = None,
     as_json: AS_JSON = False,
 ) -> None:
     """Queues missions at times, on a full battery, calls and messages, and runs them, until Ctrl-C."""
     from executive.app.queue_server import CallAddress, Listeners, QueueServer
     from executive.app.runs import MissionRuns, resumable_line
     from executive.cli.screen import ConsoleScreen
+    from executive.view.foxglove import serve_live
 
     console = console_for(as_json)
     tell = plain_lines(console)
     with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
-        with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
+        with (
+            WakeupPipe(missions) as wakeup,
+            Listeners(missions.path, address, tell) as listeners,
+            serve_live(foxglove, tell) as live,
+        ):
             standing = StandingMissions(missions)
-            runner = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
+            runner = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
             server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
             with ended_by_signals(server.stop):
                 tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
@@ -235,15 +247,22 @@ def resume(
     ] = None,
     as_json: AS_JSON = False,
     quiet: QUIET = False,
+    foxglove: FOXGLOVE = None,
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
+    from executive.view.foxglove import serve_live
+
     console = console_for(as_json)
-    with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
+    with (
+        MissionStore(store or store_in(out), create=False) as missions,
+        missions.claim(),
+        serve_live(foxglove, plain_lines(console)) as live,
+    ):
         from executive.app.runs import MissionRuns, queued_missions, run_in_turn
         from executive.cli.screen import ConsoleScreen
 
         chosen = _interrupted(missions, mission)
-        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet), ask=terminal_answerer())
+        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
         ended = [runs.run(chosen), *(run_in_turn(queued_missions(missions), runs) if chosen.queued else ())]
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))

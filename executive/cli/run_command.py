@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from executive.cli.options import ANYWAY, AS_JSON, QUIET, STORE, VIEW, VIEW_FOR, VIEW_PORT, grouped, takes_request
+from executive.cli.options import (
+    ANYWAY,
+    AS_JSON,
+    FOXGLOVE,
+    QUIET,
+    STORE,
+    VIEW,
+    VIEW_FOR,
+    VIEW_PORT,
+    grouped,
+    takes_request,
+)
 from executive.cli.output import NOT_ACHIEVED, console_for, plain_lines, print_json, terminal_answerer
 from executive.mission.request import Request
 from executive.words.forms import OptionGroup as Group
@@ -38,6 +49,7 @@ def run(
     view: VIEW = False,
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
+    foxglove: FOXGLOVE = None,
 ) -> None:
     """Runs a sentence or a mission file in the simulated world."""
     refuse_unaddressed(request)
@@ -48,25 +60,24 @@ def run(
     from executive.cli.screen import ConsoleScreen, voice_for
     from executive.record.work import Profile, lines
     from executive.store.missions import MissionStore, store_in
+    from executive.view.foxglove import serve_live
 
     console = console_for(as_json)
     kept_in = store or store_in(request.out)
     timing = Profile() if profile else None
 
     def page_of(prepared: Prepared) -> PageView:
-        return PageView(
-            prepared,
-            plain_lines(console),
-            port=view_port,
-            later=queue_function(prepared, store=kept_in, out=request.out),
-        )
+        later = queue_function(prepared, store=kept_in, out=request.out)
+        return PageView(prepared, plain_lines(console), port=view_port, later=later)
 
-    with voice_for(aloud) as voice:
+    with voice_for(aloud) as voice, serve_live(foxglove, plain_lines(console)) as live:
         if listen_to is not None:
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view or view_for is not None else None
-        screen = ConsoleScreen(console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, profile=timing)
+        screen = ConsoleScreen(
+            console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, live=live, profile=timing
+        )
         with MissionStore(kept_in) as missions, missions.claim():
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen).run(mission, prepared)

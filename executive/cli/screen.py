@@ -30,6 +30,7 @@ from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
 from executive.tree.node import NodeState
 from executive.tree.node_view import NodeView, node_view
+from executive.view.foxglove import LiveServer
 from executive.view.styles import Styles, style_of
 from executive.view.text import printable, to_rich
 from skills.api import Cause
@@ -89,8 +90,8 @@ class SpeechOutput(RunVisitor):
 class ConsoleScreen:
     """Display and control of runs on the console.
 
-    `page` builds the live page of a run, and `shown_page` is the last one. With `whole_tree` it shows all nodes of the
-    tree at the end. `profile` measures the time of subsystems.
+    `page` builds the live page of a run, and `shown_page` is the last one; `live` sends what the runs log. With
+    `whole_tree` it shows all nodes of the tree at the end. `profile` measures the time of subsystems.
     """
 
     console: Console
@@ -98,6 +99,7 @@ class ConsoleScreen:
     whole_tree: bool = False
     voice: Voice = SILENCE
     page: Callable[[Prepared], PageView] | None = None
+    live: LiveServer | None = None
     profile: Profile | None = None
     shown_page: PageView | None = field(default=None, init=False)
 
@@ -122,7 +124,7 @@ class ConsoleScreen:
         speech = SpeechOutput(self.console, self.voice, self.quiet)
         if self.quiet and page is None:  # no user can speak to the run
             load_parser().release()
-            yield RunOptions(control, (speech,), page, self.profile)
+            yield RunOptions(control, (speech,), page, self.live, self.profile)
             return
         own = None if page is None else page.conversations
         conversations = own or Conversations(prepared, control)
@@ -132,7 +134,7 @@ class ConsoleScreen:
             if control.attended and page is None:
                 load_ahead()
             visitors = (speech, conversations) if view is None else (view, speech, conversations)
-            yield RunOptions(control, visitors, page, self.profile)
+            yield RunOptions(control, visitors, page, self.live, self.profile)
 
     def conclude(self, finished: FinishedRun) -> None:
         """Shows verdicts and figures, after the whole tree if `whole_tree`."""

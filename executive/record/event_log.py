@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, BinaryIO, Final
@@ -53,7 +54,33 @@ _CLEAR: Final = MappingProxyType({"r": 0.0, "g": 0.0, "b": 0.0, "a": 0.0})
 _BACK: Final = MappingProxyType({"r": 1.0, "g": 1.0, "b": 1.0, "a": 0.8})
 
 Message = Mapping[str, Any]
-Listener = Callable[[str, float, Message], None]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Channel of a log: its name, the topic, which the name has behind a robot's, and the schema."""
+
+    name: str
+    topic: str
+    schema: Schema
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """Metadata of one robot's channel; {} if its name is the topic."""
+        return {} if self.name == self.topic else {TOPIC: self.topic}
+
+
+@dataclass(frozen=True)
+class LoggedMessage:
+    """Message as it is logged: channel, the robot's clock (s), JSON values, and the same as text."""
+
+    channel: Channel
+    stamp_s: float
+    values: Message
+    data: bytes
+
+
+Listener = Callable[[LoggedMessage], None]
 
 
 class EventLog(RunVisitor):
@@ -76,7 +103,7 @@ class EventLog(RunVisitor):
         self._file: BinaryIO = path.open("wb")
         self._writer: Any = Writer(self._file)
         self._writer.start(profile="", library=LIBRARY)
-        self._channels: dict[tuple[str, str, str], int] = {}
+        self._channels: dict[tuple[str, str, str], tuple[Channel, int]] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_s = -math.inf
         self._sequence = 0
@@ -115,7 +142,7 @@ class EventLog(RunVisitor):
         self(WALL, {"start_s": self._start_s, "tick_s": ticks, "limit_s": self._tick_limit_s, **more})
 
     def listen(self, listener: Listener) -> None:
-        """Passes every message to `listener` from now on: topic, the robot's clock (s), and JSON values."""
+        """Passes every message to `listener` from now on."""
         self._listeners.append(listener)
 
     def __call__(self, topic: str, message: Mapping[str, Any]) -> None:
@@ -142,10 +169,10 @@ class EventLog(RunVisitor):
         stamp_ns, self._sequence = round(now_s * 1e9), self._sequence + 1
         data = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
         self.bytes += len(data) if topic != WALL else 0
-        channel = self._channel(topic, schema_of(topic, plain), robot)
-        self._writer.add_message(channel, stamp_ns, data, stamp_ns, self._sequence)
+        channel, number = self._channel(topic, schema_of(topic, plain), robot)
+        self._writer.add_message(number, stamp_ns, data, stamp_ns, self._sequence)
         for listener in self._listeners:
-            listener(topic, now_s, plain)
+            listener(LoggedMessage(channel, now_s, plain, data))
 
     def flush(self) -> None:
         """Writes all buffered messages to the file."""
@@ -161,14 +188,16 @@ class EventLog(RunVisitor):
             if not broken:
                 self._writer.finish()
 
-    def _channel(self, topic: str, schema: Schema, robot: str) -> int:
+    def _channel(self, topic: str, schema: Schema, robot: str) -> tuple[Channel, int]:
+        """Returns the channel of a topic with its number in the file."""
         key = (topic, schema.name, robot)
         if key not in self._channels:
             if schema.name not in self._schemas:
                 data = json.dumps(schema.json()).encode()
                 self._schemas[schema.name] = self._writer.register_schema(schema.name, "jsonschema", data)
-            name, metadata = (f"{slug(robot)}/{topic}", {TOPIC: topic}) if robot else (topic, {})
-            self._channels[key] = self._writer.register_channel(name, "json", self._schemas[schema.name], metadata)
+            channel = Channel(f"{slug(robot)}/{topic}" if robot else topic, topic, schema)
+            number = self._writer.register_channel(channel.name, "json", self._schemas[schema.name], channel.metadata)
+            self._channels[key] = channel, number
         return self._channels[key]
 
 

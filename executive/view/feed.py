@@ -51,7 +51,7 @@ class Feed:
         self._read = self._readers = 0
 
     def __call__(self, topic: str, t: float, message: Mapping[str, Any]) -> None:
-        """Adds a logged message (`executive.record.event_log.Listener`): topic, time (s), plain values."""
+        """Adds a logged message: topic, the robot's clock (s), JSON values."""
         if topic in _UNSEEN:
             return
         with self._lock:

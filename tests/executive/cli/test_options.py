@@ -24,7 +24,7 @@ from skills.files.yaml_source import read_yaml
 GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yaml")).data
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
-    *("--view", "--view-for", "--view-port", "--help"),
+    *("--view", "--view-for", "--view-port", "--foxglove", "--help"),
 }
 
 

@@ -230,3 +230,29 @@ def test_the_random_faults_of_a_run_are_printed(no_plant, tmp_path):
     ]
     drawn = [[line for line in text.splitlines() if line.startswith("Scenario: fault:")] for text in lines]
     assert (len(drawn[0]), drawn[0] == drawn[1], drawn[0] == drawn[2]) == (2, True, False)
+
+
+def test_run_with_foxglove_serves_what_the_run_logs(no_plant, tmp_path, monkeypatch):
+    served = []
+
+    class Server:
+        url = "ws://there"
+
+        def __init__(self, address):
+            served.append(address)
+
+        def close(self):
+            served.append("closed")
+
+    monkeypatch.setattr("executive.view.foxglove.LiveServer", Server)
+    monkeypatch.setattr(
+        "executive.app.runs.run_request", lambda prepared, live, **_: served.append(type(live)) or 1 / 0
+    )
+    invoke("run", "--say", FETCH, "--foxglove", "127.0.0.1:0", "--out", str(tmp_path / "out"))
+    assert served == ["127.0.0.1:0", Server, "closed"]
+
+
+def test_run_refuses_an_address_without_a_port(tmp_path):
+    result = invoke("run", "--say", FETCH, "--foxglove=here", "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2 and "--foxglove 'here' is no address with a port" in result.output
+    assert not (tmp_path / "out").exists()

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import executive
 from executive.cli import entry
-from executive.cli.options import join_start
+from executive.cli.options import join_values
 from executive.words.knowledge import load_knowledge
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import load_world
@@ -103,8 +103,25 @@ def test_a_value_that_the_file_does_not_take_is_refused(setting, why):
 
 
 def test_three_numbers_after_start_are_one_value():
-    assert join_start(["run", "--start", "1", "-2", "0.5", "m.yaml"]) == ["run", "--start=1 -2 0.5", "m.yaml"]
-    assert join_start(["run", "--start", "unknown", "m.yaml"]) == ["run", "--start", "unknown", "m.yaml"]
+    assert join_values(["run", "--start", "1", "-2", "0.5", "m.yaml"]) == ["run", "--start=1 -2 0.5", "m.yaml"]
+    assert join_values(["run", "--start", "unknown", "m.yaml"]) == ["run", "--start", "unknown", "m.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("words", "address"),
+    [
+        (["--foxglove"], "127.0.0.1:8765"),
+        (["--foxglove", "--quiet"], "127.0.0.1:8765"),
+        (["--foxglove", "patrol"], "127.0.0.1:8765"),
+        (["--foxglove", "my/patrol.yaml"], "127.0.0.1:8765"),
+        (["--foxglove", "0.0.0.0:9000", "patrol"], "0.0.0.0:9000"),
+        (["--foxglove", "[::1]:9000"], "[::1]:9000"),
+        (["--foxglove", "host:x"], "host:x"),
+    ],
+)
+def test_foxglove_takes_an_address_or_the_usual_one(words, address):
+    given = words[1:2] == [address]
+    assert join_values(words) == [f"--foxglove={address}", *words[2 if given else 1 :]]
 
 
 @pytest.fixture

@@ -236,8 +236,7 @@ def _row(outer: NodeView, within: Sequence[NodeView], spans: Mapping[str, tuple[
         above.kind in _SKIPS and below.state.status is Status.FAILURE for above, below in pairwise(within)
     )
     style = Styles.CANCELLED.value if skipped else style_of(state)
-    cause = f" ({state.cause.value})" if state.cause is not None else ""
-    word = _SKIPPED if skipped else f"{style.word}{cause}"
+    word = _SKIPPED if skipped else f"{style.word} ({state.cause_text})".removesuffix(" ()")
     return StepRow(inner.title(), style, word, depth, spans.get(outer.path_id), state.message)
 
 

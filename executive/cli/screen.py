@@ -28,12 +28,12 @@ from executive.run.control import Control
 from executive.run.outcome import RunResult
 from executive.run.visitor import Progress, RunVisitor
 from executive.speech.voice import Silence, Voice, queued_voice
-from executive.tree.node import NodeState
+from executive.tree.compiler import CompiledTree
+from executive.tree.node import NodeState, Snapshot
 from executive.tree.node_view import NodeView, node_view
 from executive.view.foxglove import LiveServer
 from executive.view.styles import Styles, style_of
 from executive.view.text import printable, to_rich
-from skills.api import Cause
 
 SILENCE: Final = Silence()
 
@@ -198,27 +198,30 @@ class _Lines(RunVisitor):
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._leaves: dict[str, dict[str, _Shown]] = {}
+        self._titles: dict[str, dict[str, str]] = {}
         self._last: dict[str, NodeState] = {}
         self._begun_s: dict[str, float] = {}
 
     def tick(self, progress: Progress) -> None:
         """Prints the skills that have ended since the last tick."""
         for robot, tree in progress.trees.items():
-            if tree.root.path_id not in self._leaves:
-                self._leaves[tree.root.path_id] = _shown_skills(node_view(tree.root))
-            for path_id, shown in self._leaves[tree.root.path_id].items():
-                self._tell(path_id, shown, progress.states[robot][path_id], progress.now_s)
+            if tree.root.path_id not in self._titles:
+                self._titles[tree.root.path_id] = _shown_skills(node_view(tree.root))
+            for path_id, title in self._titles[tree.root.path_id].items():
+                self._tell(tree, path_id, title, progress.states[robot], progress.now_s)
 
-    def _tell(self, path_id: str, shown: _Shown, state: NodeState, now_s: float) -> None:
-        before = self._last.get(path_id, NodeState())
+    def _tell(self, tree: CompiledTree, path_id: str, title: str, states: Snapshot, now_s: float) -> None:
+        before, state = self._last.get(path_id, NodeState()), states[path_id]
         if state is before:
             return
         self._last[path_id] = state
         if before.status is not Status.RUNNING:
             self._begun_s[path_id] = now_s
         if style_of(state) not in _UNDER_WAY and before != state:
-            self._console.print(skill_line(shown, state, now_s - self._begun_s[path_id]))
+            if state.status is Status.FAILURE:
+                nodes = (node for _, node in node_view(tree.root, states).walk())
+                state = next(node.state for node in nodes if node.path_id == path_id)
+            self._console.print(skill_line(title, state, now_s - self._begun_s[path_id]))
 
 
 class _Picture(RunVisitor):
@@ -259,29 +262,17 @@ def visible_rows(picture: Text, rows: int) -> Text:
     return Text("\n", no_wrap=True, overflow="ellipsis").join(lines[first : first + rows])
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """Title of a shown skill; `looks` says that it looks for objects, and may well find none."""
-
-    title: str
-    looks: bool
-
-
-def _shown_skills(node: NodeView, above: NodeView | None = None) -> dict[str, _Shown]:
-    """Returns the skills below a node by path id."""
+def _shown_skills(node: NodeView, above: NodeView | None = None) -> dict[str, str]:
+    """Returns the titles of the skills below a node by path id."""
     if node.kind in _SHOWN_KINDS:
-        return {node.path_id: _Shown(node.title(above), looks=node.name == "detect")}
-    return {path_id: shown for child in node.children for path_id, shown in _shown_skills(child, node).items()}
+        return {node.path_id: node.title(above)}
+    return {path_id: title for child in node.children for path_id, title in _shown_skills(child, node).items()}
 
 
-def skill_line(shown: _Shown, state: NodeState, took_s: float) -> Text:
-    """Returns the line of an ended skill: mark, duration, title, cause and message; a look without a find is normal."""
-    style, cause = style_of(state), state.cause.value if state.cause else ""
-    mark = (style.symbol, style.rich)
-    if shown.looks and state.cause is Cause.POSTCONDITION:
-        mark, cause = ("–", "dim"), ""
-    what = printable(": ".join(filter(None, (shown.title, cause, state.message))))
-    return Text.assemble(mark, f" {took_s:6.1f} s  {what}")
+def skill_line(title: str, state: NodeState, took_s: float) -> Text:
+    """Returns the line of an ended skill: mark, duration, title, cause and message."""
+    style, what = style_of(state), printable(": ".join(filter(None, (title, state.cause_text, state.message))))
+    return Text.assemble((style.symbol, style.rich), f" {took_s:6.1f} s  {what}")
 
 
 def progress_line(states: Iterable[NodeState], now_s: float) -> Text:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from operator import itemgetter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any, Final
 
@@ -135,20 +136,14 @@ class History:
 
         Raises InputError if the log holds no tree, or a broken one.
         """
-        found: list[tuple[dict[str, Any], dict[str, NodeState]]] = []
+        found = list[_LoggedTree]()
         for event in self.events:
-            if until_s is not None and event.stamp_s > until_s + 1e-9:
-                continue
-            if event.topic == TREE:
-                found.append((event.data, {}))
-            elif event.topic == TRANSITIONS and found:
-                _latest(found, event.data.get("robot"))[event.data["node"]] = logged_state(event.data)
-            elif event.topic == ACTIVITY and found:
-                _latest(found, event.data.get("robot"))[event.data["node"]] = logged_activity(event.data)
+            if until_s is None or event.stamp_s <= until_s + 1e-9:
+                _apply(event, found)
         if not found:
             raise InputError("the log holds no tree", hint="it ended before the mission began", file=self.file)
         try:
-            return tuple(logged_view(data["root"], states) for data, states in found)
+            return tuple(each.view() for each in found)
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f"the log's tree is broken ({error})", hint="run it again", file=self.file) from error
 
@@ -174,10 +169,31 @@ def logged_activity(activity: dict[str, Any]) -> NodeState:
     return NodeState(Status.RUNNING, None, activity.get("message") or "")
 
 
-def _latest(found: list[tuple[dict[str, Any], dict[str, NodeState]]], robot: Any) -> dict[str, NodeState]:
-    """States of the robot's latest tree, or of the latest tree if no robot is named."""
-    mine = [states for data, states in found if data.get("robot") == robot]
-    return mine[-1] if mine else found[-1][1]
+@dataclass(frozen=True)
+class _LoggedTree:
+    """Logged message of a tree, and the states of its nodes by path id."""
+
+    data: Mapping[str, Any]
+    states: dict[str, NodeState] = field(default_factory=dict)
+
+    def view(self) -> NodeView:
+        """View of the tree. Raises KeyError, TypeError or ValueError for a broken one."""
+        return logged_view(self.data["root"], self.states)
+
+
+def _apply(event: Event, found: list[_LoggedTree]) -> None:
+    """Adds a logged tree, or applies a change of a node to the robot's latest tree."""
+    if event.topic == TREE:
+        found.append(_LoggedTree(event.data))
+    elif event.topic in (TRANSITIONS, ACTIVITY) and found:
+        changed = logged_state if event.topic == TRANSITIONS else logged_activity
+        _latest(found, event.data.get("robot")).states[event.data["node"]] = changed(event.data)
+
+
+def _latest(found: Sequence[_LoggedTree], robot: Any) -> _LoggedTree:
+    """The robot's latest tree, or the latest tree if no robot is named."""
+    mine = [each for each in found if each.data.get("robot") == robot]
+    return mine[-1] if mine else found[-1]
 
 
 @dataclass(frozen=True)
@@ -199,34 +215,36 @@ def timeline(events: Iterable[Event], *, leaves_only: bool = False) -> Iterator[
 
     `leaves_only` omits changes of inner nodes that did not fail, and ticks that took too long.
     """
-    return (replace(entry, robot=robot_of(event)) for event, entry in _entries(_speech_last(events), leaves_only))
+    return (replace(entry, robot=robot_of(event)) for event, entry in _entries(events, leaves_only))
 
 
-def _speech_last(events: Iterable[Event]) -> Iterator[Event]:
-    """Yields the speech of a tick behind the changes of nodes, which are logged when the tick ends."""
-    said: list[Event] = []
-    for event in events:
-        if said and event.stamp_s > said[0].stamp_s:
-            yield from said
-            said.clear()
-        if event.topic == SPEECH:
-            said.append(event)
-        else:
-            yield event
-    yield from said
+def _ticks_of(events: Iterable[Event]) -> Iterator[tuple[Sequence[Event], Collection[str]]]:
+    """Iterates over the events of each tick, with the path ids of the expected failures at its end.
+
+    Speech stands behind the changes of nodes, which are logged when the tick ends.
+    """
+    found = list[_LoggedTree]()
+    for _, group in groupby(events, key=attrgetter("stamp_s")):
+        tick = sorted(group, key=lambda event: event.topic == SPEECH)
+        for event in tick:
+            _apply(event, found)
+        failed = [each for each in tick if each.topic == TRANSITIONS and each.data["to"] == Status.FAILURE.value]
+        trees = {id(tree): tree for each in failed if found and (tree := _latest(found, each.data.get("robot")))}
+        nodes = [node for tree in trees.values() for _, node in tree.view().walk()]
+        yield tick, {node.path_id for node in nodes if node.state.expected}
 
 
 def _entries(events: Iterable[Event], leaves_only: bool) -> Iterator[tuple[Event, Entry]]:
     inner: set[str] = set()
     commands: Sequence[str] = ()
-    for event in events:
+    for event, expected in ((event, expected) for tick, expected in _ticks_of(events) for event in tick):
         if event.topic == RUN:
             commands = event.data.get("commands", ())
         if event.topic == TREE:
             inner |= _inner_nodes(event.data["root"])
         if event.topic == TRANSITIONS:
-            entry = _transition(event)
-            if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause):
+            entry = _transition(event, expected)
+            if not leaves_only or entry.about not in inner or (entry.state is not None and entry.state.cause_text):
                 yield event, entry
         elif event.topic == ACTIVITY:
             state = logged_activity(event.data)
@@ -244,11 +262,11 @@ def _inner_nodes(structure: Mapping[str, Any]) -> set[str]:
     return set().union(*below) | ({structure["id"]} if structure["children"] else set())
 
 
-def _transition(event: Event) -> Entry:
-    data = event.data
-    state = logged_state(data)
-    cause = state.cause.value if state.cause else ""
-    return Entry(data.get("t", event.stamp_s), data["node"], ": ".join(filter(None, (cause, state.message))), state)
+def _transition(event: Event, expected: Collection[str]) -> Entry:
+    state = logged_state(event.data)
+    state = state._replace(expected=state.status is Status.FAILURE and event.data["node"] in expected)
+    text = ": ".join(filter(None, (state.cause_text, state.message)))
+    return Entry(event.data.get("t", event.stamp_s), event.data["node"], text, state)
 
 
 def _run(data: Mapping[str, Any]) -> str:

@@ -47,12 +47,21 @@ class NodeSpec:
 
 
 class NodeState(NamedTuple):
-    """Status, cause, message and, for a skill, progress from 0 to 1 where known."""
+    """Status, cause, message and, for a skill, progress from 0 to 1 where known.
+
+    `expected` marks a failure that is normal (`executive.tree.node_view.node_view`).
+    """
 
     status: Status = Status.INVALID
     cause: Cause | None = None
     message: str = ""
     progress: float | None = None
+    expected: bool = False
+
+    @property
+    def cause_text(self) -> str:
+        """Cause to show: none for an expected failure."""
+        return "" if self.cause is None or self.expected else self.cause.value
 
 
 class Change(NamedTuple):

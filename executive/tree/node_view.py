@@ -9,9 +9,12 @@ from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass,
 from pathlib import Path
 from typing import Any, Final
 
+from py_trees.common import Status
+
 from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec, NodeState
 from executive.tree.types import describe_type, field_types
+from skills.api import Cause
 from skills.files.errors import SourceLine
 
 
@@ -30,6 +33,7 @@ _NAMED: Final = frozenset({"skill", "step", "mission"})
 _SPOKEN: Final = frozenset({"repeat", "choose"})
 _CONTAINERS: Final = frozenset({"sequence", "selector", "interrupts", "summary"})
 _UNNAMED: Final = frozenset({"round", "steps", "group"})
+_LOOKS: Final = frozenset({"detect", "find_people"})
 
 
 def _ports_of(spec: NodeSpec) -> Iterator[Port]:
@@ -230,22 +234,48 @@ def _is_telling(port: Port) -> bool:
 
 
 def node_view(spec: NodeSpec, states: Mapping[str, NodeState] | None = None) -> NodeView:
-    """Returns the view of a spec, with states by path id."""
-    known = states or {}
+    """Returns the view of a spec, with states by path id.
+
+    A look that found nothing is an expected failure in a success, and in a selector that tries what is left, unless it
+    made a step fail; so is a node that failed by such looks alone.
+    """
+    return _with_expected(_view_of(spec, states or {}), False)
+
+
+def _with_expected(node: NodeView, inside: bool) -> NodeView:
+    """Marks the expected failures; `inside` says that those below the nearest node above may be expected."""
+    state, failed = node.state, node.state.status is Status.FAILURE
+    goes_on = state.status is Status.RUNNING and node.kind == "selector"
+    inside = state.status is Status.SUCCESS or goes_on or (inside and failed and not node.step)
+    children = tuple(_with_expected(child, inside) for child in node.children)
+    below = [child.state.expected for child in children if child.state.status is Status.FAILURE]
+    found_none = node.kind == "skill" and node.name in _LOOKS and state.cause is Cause.POSTCONDITION
+    expected = failed and inside and (found_none or (bool(below) and all(below)))
+    return replace(node, state=state._replace(expected=expected), children=children)
+
+
+def _view_of(spec: NodeSpec, known: Mapping[str, NodeState]) -> NodeView:
     return NodeView(
         path_id=spec.path_id,
         kind=spec.kind,
         name=spec.name,
         state=known.get(spec.path_id, NodeState()),
         source=spec.source,
-        children=tuple(node_view(child, known) for child in spec.children),
+        children=tuple(_view_of(child, known) for child in spec.children),
         ports=tuple(_ports_of(spec)),
         step=spec.step,
     )
 
 
 def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -> NodeView:
-    """Returns the view of a logged structure. Raises KeyError or TypeError for values of another form."""
+    """Returns the view of a logged structure, marked as in `node_view`.
+
+    Raises KeyError or TypeError for values of another form.
+    """
+    return _with_expected(_logged_view(structure, states), False)
+
+
+def _logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -> NodeView:
     source = structure.get("source")
     return NodeView(
         path_id=structure["id"],
@@ -253,7 +283,7 @@ def logged_view(structure: Mapping[str, Any], states: Mapping[str, NodeState]) -
         name=structure["name"],
         state=states.get(structure["id"], NodeState()),
         source=None if source is None else SourceLine(Path(source["file"]), int(source["line"])),
-        children=tuple(logged_view(child, states) for child in structure["children"]),
+        children=tuple(_logged_view(child, states) for child in structure["children"]),
         ports=tuple(Port(**port) for port in structure.get("ports", ())),
         step=bool(structure.get("step")),
     )

@@ -37,6 +37,7 @@ class Styles(enum.Enum):
     RUNNING = NodeStyle("running", "▶", "[>]", "#0072b2", "#00537f", "#e5f3fb", "bold blue", "7 3")
     SUCCESS = NodeStyle("success", "✓", "[+]", "#009e73", "#00573f", "#e6f6f1", "green")
     FAILURE = NodeStyle("failure", "✗", "[x]", "#d55e00", "#8f3f00", "#fdeee3", "bold red")
+    EXPECTED = NodeStyle("found nothing", "–", "[-]", "#57606a", "#424a53", "#f1f3f5", "dim", "5 4")
     CANCELLED = NodeStyle("cancelled", "⊘", "[/]", "#cc79a7", "#84305d", "#faeef5", "magenta", "9 3 2 3")
 
 
@@ -55,7 +56,7 @@ def style_of(state: NodeState) -> NodeStyle:
     if state.status is Status.INVALID:
         styles = Styles.CANCELLED if state.cause is Cause.CANCELLED else Styles.IDLE
     else:
-        styles = _BY_STATUS[state.status]
+        styles = Styles.EXPECTED if state.expected else _BY_STATUS[state.status]
     style: NodeStyle = styles.value
     return style
 

@@ -63,7 +63,7 @@ def note_of(node: NodeView) -> str:
     is_own = state.message and all(state.message != child.state.message for child in node.children)
     counts = state.cause is not None or not node.children or node.kind == "retry"
     sentence = state.message if is_own and counts else ""
-    return ": ".join(filter(None, (state.cause.value if state.cause else "", sentence)))
+    return ": ".join(filter(None, (state.cause_text, sentence)))
 
 
 def is_closed(node: NodeView) -> bool:

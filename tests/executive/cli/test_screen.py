@@ -99,15 +99,25 @@ def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compile
     assert re.match(r"✗ +0.4 s  detect \(coke, beer; counter\): PRECONDITION: saw none$", second)
 
 
-def test_a_look_that_found_nothing_has_no_cross(compiled, make):
+@pytest.mark.parametrize(
+    ("search", "line"),
+    [
+        (Status.RUNNING, r"– +0.0 s  detect \(coke, beer; counter\): no coke seen$"),
+        (Status.FAILURE, r"✗ +0.0 s  detect \(coke, beer; counter\): POSTCONDITION: no coke seen$"),
+    ],
+)
+def test_a_look_that_found_nothing_has_no_cross_while_the_search_goes_on(compiled, make, search, line):
     tree = compiled(*make.FETCH)
     detect = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/detect"))
+    look = detect.removesuffix("/detect")
+    find = next(node.path_id for node in tree.root.walk() if look in [child.path_id for child in node.children])
     idle = {path_id: NodeState() for path_id in tree.path_ids}
     told = io.StringIO()
     with live_view(Console(file=told, width=200)) as view:
         for state in (NodeState(Status.RUNNING), NodeState(Status.FAILURE, Cause.POSTCONDITION, "no coke seen")):
-            view.tick(Progress(1.0, 20, 0, {"Alice": {**idle, detect: state}}, {"Alice": tree}))
-    assert re.match(r"– +0.0 s  detect \(coke, beer; counter\): no coke seen$", told.getvalue().strip())
+            states = {**idle, look: NodeState(Status.FAILURE), find: NodeState(search), detect: state}
+            view.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
+    assert re.match(line, told.getvalue().strip())
 
 
 def test_speech_is_printed_behind_the_skills_that_ended_before_it(compiled, make):

@@ -8,6 +8,7 @@ from py_trees.common import Status
 from executive.record.event_log import EventLog
 from executive.record.history import Event, read_history, timeline
 from executive.tree.node_view import node_view, to_json
+from executive.view.styles import style_of
 from skills.api import Cause, Failed
 from skills.files.errors import InputError
 
@@ -95,6 +96,27 @@ def test_the_timeline_lists_skills_failures_and_the_outcome(failed_run):
     assert "TIMEOUT: no room to stand" in texts
     assert any(entry.about == "outcome" and "TIMEOUT" in entry.text for entry in entries)
     assert not [entry for entry in entries if entry.about == "alice/fetch-drink" and entry.state.cause is None]
+
+
+@pytest.mark.parametrize(("found", "marks"), [(True, "––✓"), (False, "–––✗")])
+def test_looks_that_another_one_follows_are_expected_to_find_nothing(
+    tmp_path, compiled, run_tree, make, script, clock, found, marks
+):
+    def detect(skill):
+        third = script.begun.count("detect") == 3
+        script.seen_on = tuple(surface.name for surface in skill.inputs.surfaces) if found and third else ()
+        return make.default_end(script, "detect")(skill)
+
+    script.ends["detect"] = detect
+    log = EventLog(tmp_path / "log.mcap", clock)
+    run_tree(compiled(*make.FETCH), log=log)
+    log.close()
+    entries = list(timeline(read_history(log.path).events, leaves_only=True))
+    over = [entry for entry in entries if entry.state and entry.state.status in (Status.SUCCESS, Status.FAILURE)]
+    looks = [entry for entry in over if entry.about.endswith("/detect")]
+    assert "".join(style_of(entry.state).symbol for entry in looks) == marks
+    assert {entry.text for entry in looks[:2]} == {"not seen"}
+    assert all(entry in looks for entry in over if style_of(entry.state).symbol == "–")
 
 
 def test_a_log_without_a_tree_is_refused(tmp_path, clock):

@@ -7,7 +7,7 @@ import pytest
 from py_trees.common import Status
 
 from executive.tree.node import NodeState
-from executive.tree.node_view import NodeView, node_view, to_json
+from executive.tree.node_view import NodeView, logged_view, node_view, to_json
 from executive.view.formats import to_svg
 from executive.view.styles import Styles, style_of
 from executive.view.text import to_rich, to_text
@@ -91,7 +91,50 @@ def test_states_differ_in_symbol_and_colour():
         (NodeState(Status.RUNNING), "running"),
         (NodeState(Status.SUCCESS), "success"),
         (NodeState(Status.FAILURE, Cause.PLANNING), "failure"),
+        (NodeState(Status.FAILURE, Cause.POSTCONDITION, expected=True), "found nothing"),
     ],
 )
 def test_style_of_each_state(state, word):
     assert style_of(state).word == word
+
+
+NONE = NodeState(Status.FAILURE, Cause.POSTCONDITION, "no coke seen")
+NO_WAY = NodeState(Status.FAILURE, Cause.PLANNING, "no way")
+DONE, RUNS, BROKEN = NodeState(Status.SUCCESS), NodeState(Status.RUNNING), NodeState(Status.FAILURE)
+
+
+def search(**states: NodeState) -> dict[str, str]:
+    """Symbols of a mission whose step looks from two places, one after another: nodes by name."""
+
+    def node(kind: str, name: str, *children: dict, step: bool = False) -> dict:
+        return {"id": name, "type": kind, "name": name, "children": children, "step": step}
+
+    first = node("sequence", "first", node("skill", "navigate"), node("skill", "detect"))
+    second = node("sequence", "second", node("skill", "find_people"))
+    step = node("answer", "step", node("selector", "find", first, second), step=True)
+    view = logged_view(node("sequence", "mission", step, step=True), states)
+    return {node.name: style_of(node.state).symbol for _, node in view.walk()}
+
+
+@pytest.mark.parametrize("above", [DONE, RUNS])
+def test_a_look_that_found_nothing_has_a_dash_in_a_success_and_while_the_search_goes_on(above):
+    symbols = search(mission=above, step=above, find=above, first=NONE, navigate=DONE, detect=NONE)
+    assert (symbols["first"], symbols["navigate"], symbols["detect"]) == ("–", "✓", "–")
+
+
+def test_a_search_of_expected_failures_alone_has_a_dash_in_an_answer_of_no():
+    symbols = search(mission=DONE, step=DONE, find=NONE, first=NONE, detect=NONE, second=NONE, find_people=NONE)
+    assert {symbols[name] for name in ("find", "first", "detect", "second", "find_people")} == {"–"}
+
+
+@pytest.mark.parametrize("mission", [BROKEN, RUNS])
+def test_a_look_that_makes_its_step_fail_has_a_cross(mission):
+    symbols = search(mission=mission, step=NONE, find=NONE, first=NONE, detect=NONE, second=NONE, find_people=NONE)
+    assert {symbols[name] for name in ("step", "find", "first", "detect", "second", "find_people")} == {"✗"}
+
+
+def test_any_other_failure_in_a_search_has_a_cross():
+    lost = search(mission=DONE, step=DONE, find=NO_WAY, first=NO_WAY, navigate=NO_WAY, second=NONE, find_people=NONE)
+    assert [lost[name] for name in ("find", "first", "navigate", "second", "find_people")] == ["✗", "✗", "✗", "–", "–"]
+    blind = search(mission=DONE, step=DONE, find=DONE, first=BROKEN, detect=NodeState(Status.FAILURE, Cause.TIMEOUT))
+    assert (blind["first"], blind["detect"]) == ("✗", "✗")

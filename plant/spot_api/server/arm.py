@@ -1,0 +1,408 @@
+"""Motions of arm and gripper: joint moves, named positions, Cartesian moves, gaze, velocities, stop; opening and force."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from bosdyn.api import arm_command_pb2, basic_command_pb2, gripper_command_pb2
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform, RotationMatrix
+
+from plant.spot_api.server.computer import HAND_X_M, Computer, Snapshot
+from plant.spot_api.server.messages import InvalidRequestError, duration, finite, seconds, transform, vector
+from plant.spot_api.server.mobility import UnknownFrameError
+from skills.robot import ArmTrajectory, CommandState, FloatArray
+
+Status = basic_command_pb2.RobotCommandFeedbackStatus
+JOINTS: Final = ("sh0", "sh1", "el0", "el1", "wr0", "wr1")
+READY_RAD: Final = (0.0, -0.9, 1.8, 0.0, -0.9, 0.0)
+CARRY_RAD: Final = (0.0, -2.6, 2.2, 0.0, 0.4, 0.0)
+"""Named postures of the arm; the robot's own are near these."""
+_FASTEST_RAD_S: Final = 2.5
+_USUAL_RAD_S, _USUAL_M_S, _USUAL_TURN_RAD_S = 1.5, 0.4, 1.0
+_LEAST_S: Final = 0.2
+_STEPS: Final = 20
+X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
+"""Pose of the API's frame `hand` in `link_wr1`, the default tool."""
+
+
+class ArmMotion:
+    """Motion of the arm, with its feedback. Other threads read `feedback`, which is replaced whole."""
+
+    field: ClassVar[str]
+    """Field of the feedback."""
+    complete: ClassVar[int]
+    going: ClassVar[int]
+    """Statuses within that field, at the goal and before it."""
+
+    def __init__(self) -> None:
+        self.status: int = Status.STATUS_PROCESSING
+        self.feedback = self._made(done=False)
+        self._command: Any = None
+
+    def begin(self, computer: Computer) -> None:
+        """Starts it."""
+
+    def tick(self, computer: Computer) -> None:
+        """Reports whether the arm is at its goal."""
+        if self._command is not None and self.status == Status.STATUS_PROCESSING:
+            done = computer.robot.command_status(self._command).state is CommandState.DONE
+            self.feedback = self._made(done=done)
+
+    def end(self, status: int) -> None:
+        """Ends it with a status."""
+        self.status = status
+        made = arm_command_pb2.ArmCommand.Feedback()
+        made.CopyFrom(self.feedback)
+        made.status = status
+        self.feedback = made
+
+    def _made(self, *, done: bool) -> Any:
+        made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
+        getattr(made, self.field).status = self.complete if done else self.going
+        return made
+
+    def _follow(self, computer: Computer, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> None:
+        """Follows postures at times since now, slower where a joint would be too fast."""
+        trajectory = smooth(computer.arm_rad(), times_s, positions_rad)
+        until_s = computer.forever()
+        self._command = computer.robot.move_arm(trajectory, until_s=until_s, lease=computer.lease)
+
+
+def smooth(start_rad: FloatArray, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> ArmTrajectory:
+    """Returns a trajectory that begins at rest and comes to rest at each posture, no earlier than at its time."""
+    times, positions = [0.0], [start_rad]
+    for time_s, goal_rad in zip(times_s, positions_rad, strict=True):
+        began_s, begin_rad = times[-1], positions[-1]
+        needed_s = 1.6 * float(np.abs(goal_rad - begin_rad).max()) / _FASTEST_RAD_S
+        length_s = max(_LEAST_S, needed_s, time_s - began_s)
+        for k in range(1, _STEPS + 1):
+            share = k / _STEPS
+            times.append(began_s + share * length_s)
+            positions.append(begin_rad + (goal_rad - begin_rad) * (share**2 * (3.0 - 2.0 * share)))
+    return ArmTrajectory(np.array(times), np.array(positions))
+
+
+class JointMove(ArmMotion):
+    """Moves the joints through postures."""
+
+    field = "arm_joint_move_feedback"
+    complete = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_COMPLETE
+    going = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_IN_PROGRESS
+
+    def __init__(self, request: Any, now_rad: FloatArray, now_s: float) -> None:
+        trajectory = request.trajectory
+        if not trajectory.points:
+            raise InvalidRequestError("arm_joint_move_command.trajectory has no points")
+        fastest = trajectory.maximum_velocity.value if trajectory.HasField("maximum_velocity") else _USUAL_RAD_S
+        fastest = finite(fastest, "arm_joint_move_command.trajectory.maximum_velocity")
+        offset_s = seconds(trajectory.reference_time) - now_s if trajectory.HasField("reference_time") else 0.0
+        self._times_s, self._positions, before = list[float](), list[FloatArray](), now_rad
+        for point in trajectory.points:
+            goal = _joints(point.position, before)
+            slow_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
+            self._times_s.append(max(slow_s, offset_s + seconds(point.time_since_reference)))
+            self._positions.append(goal)
+            before = goal
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move."""
+        self._follow(computer, self._times_s, self._positions)
+
+    def _made(self, *, done: bool) -> Any:
+        made = super()._made(done=done)
+        part = made.arm_joint_move_feedback
+        part.planner_status = arm_command_pb2.ArmJointMoveCommand.Feedback.PLANNER_STATUS_SUCCESS
+        part.time_to_goal.CopyFrom(duration(0.0 if done else max(0.0, self._times_s[-1])))
+        return made
+
+
+def _joints(message: Any, before: FloatArray) -> FloatArray:
+    """Joint angles of a message; those that are left out stay."""
+    return np.array(
+        [
+            finite(getattr(message, name).value, f"position.{name}") if message.HasField(name) else value
+            for name, value in zip(JOINTS, before, strict=True)
+        ]
+    )
+
+
+class Named(ArmMotion):
+    """Moves to a named posture: stow, ready or carry."""
+
+    field = "named_arm_position_feedback"
+    complete = arm_command_pb2.NamedArmPositionsCommand.Feedback.STATUS_COMPLETE
+    going = arm_command_pb2.NamedArmPositionsCommand.Feedback.STATUS_IN_PROGRESS
+
+    def __init__(self, request: Any) -> None:
+        names = arm_command_pb2.NamedArmPositionsCommand
+        self._posture = {names.POSITIONS_READY: READY_RAD, names.POSITIONS_CARRY: CARRY_RAD}.get(request.position)
+        if self._posture is None and request.position != names.POSITIONS_STOW:
+            raise InvalidRequestError("named_arm_position_command.position is unknown")
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move, by way of the ready posture where the arm folds or unfolds."""
+        arm = computer.capabilities.arm
+        assert arm is not None
+        goal = np.array(self._posture or arm.stowed_rad)
+        now = computer.arm_rad()
+        middle = np.array([goal[0], -1.6, 2.3, 0.0, -0.7, 0.0])
+        through = [middle, goal] if abs(now[2] - goal[2]) > 0.8 else [goal]
+        ends = [1.5 * float(np.abs(b - a).max()) / _USUAL_RAD_S for a, b in zip([now, *through], through, strict=False)]
+        self._follow(computer, list(np.cumsum(ends)), through)
+
+
+class Cartesian(ArmMotion):
+    """Moves a tool of the wrist through poses in a frame; a goal out of reach ends it as stalled."""
+
+    field = "arm_cartesian_feedback"
+    complete = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
+    going = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_IN_PROGRESS
+    stalled = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_STALLED
+
+    def __init__(self, request: Any, snapshot: Snapshot, now_s: float) -> None:
+        frame = _known(request.root_frame_name, snapshot)
+        X_WT = (
+            transform(request.wrist_tform_tool, "wrist_tform_tool") if request.HasField("wrist_tform_tool") else X_HAND
+        )
+        X_RT = transform(request.root_tform_task, "root_tform_task")
+        points = request.pose_trajectory_in_task.points
+        if not points:
+            raise InvalidRequestError("arm_cartesian_command.pose_trajectory_in_task has no points")
+        given = request.pose_trajectory_in_task
+        offset_s = seconds(given.reference_time) - now_s if given.HasField("reference_time") else 0.0
+        self._times_s = [max(0.0, offset_s + seconds(point.time_since_reference)) for point in points]
+        X_OR = snapshot.X_AB("odom", frame)
+        self._X_OW = [X_OR @ X_RT @ transform(point.pose, "pose") @ X_WT.inverse() for point in points]
+        self._out_of_reach = False
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move; the poses stay where they are in `odom`."""
+        postures, before = [], computer.arm_rad()
+        for X_OW in self._X_OW:
+            posture = _posture_at(computer, computer.snapshot.X_AB("body", "odom") @ X_OW, before)
+            if posture is None:
+                self._out_of_reach = True
+                self.feedback = self._made(done=False)
+                return
+            postures.append(posture)
+            before = posture
+        times = []
+        for time_s, before_X, after_X in zip(
+            self._times_s, [computer.snapshot.X_AB("odom", "link_wr1"), *self._X_OW], self._X_OW, strict=False
+        ):
+            far_s = float(np.linalg.norm(after_X.translation() - before_X.translation())) / _USUAL_M_S
+            times.append(max(time_s, (times or [0.0])[-1] + 1.5 * far_s))
+        self._follow(computer, times, postures)
+
+    def tick(self, computer: Computer) -> None:
+        """Reports how far the hand is from its goal."""
+        super().tick(computer)
+        X_WG = computer.snapshot.X_AB("link_wr1", "odom") @ self._X_OW[-1]
+        made = arm_command_pb2.ArmCommand.Feedback()
+        made.CopyFrom(self.feedback)
+        made.arm_cartesian_feedback.measured_pos_distance_to_goal = float(np.linalg.norm(X_WG.translation()))
+        made.arm_cartesian_feedback.measured_rot_distance_to_goal = X_WG.rotation().ToAngleAxis().angle()
+        self.feedback = made
+
+    def _made(self, *, done: bool) -> Any:
+        made = super()._made(done=done)
+        if self._out_of_reach:
+            made.arm_cartesian_feedback.status = self.stalled
+        return made
+
+
+class Gaze(ArmMotion):
+    """Turns the hand's camera to a point, where the hand is or at a pose of its tool."""
+
+    field = "arm_gaze_feedback"
+    complete = arm_command_pb2.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
+    going = arm_command_pb2.GazeCommand.Feedback.STATUS_IN_PROGRESS
+
+    def __init__(self, request: Any, snapshot: Snapshot) -> None:
+        frame = _known(request.frame1_name, snapshot)
+        if not request.target_trajectory_in_frame1.points:
+            raise InvalidRequestError("arm_gaze_command.target_trajectory_in_frame1 has no points")
+        target = vector(request.target_trajectory_in_frame1.points[-1].point, "target")
+        self._target_O = snapshot.X_AB("odom", frame) @ np.array(target)
+        self._at_O: FloatArray | None = None
+        if request.tool_trajectory_in_frame2.points:
+            X_OF = snapshot.X_AB("odom", _known(request.frame2_name, snapshot))
+            X_OT = X_OF @ transform(request.tool_trajectory_in_frame2.points[-1].pose, "tool")
+            self._at_O = np.asarray(X_OT.translation())
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to turn; nearer or lower where the hand cannot look from there."""
+        X_BO, now = computer.snapshot.X_AB("body", "odom"), computer.arm_rad()
+        target_B = np.asarray(X_BO @ self._target_O)
+        hand_B = np.asarray(computer.snapshot.X_AB("body", "hand").translation())
+        ready_B = np.array([0.75, 0.0, 0.25])
+        for at_B in ([] if self._at_O is None else [np.asarray(X_BO @ self._at_O)]) + [hand_B, ready_B]:
+            away = target_B - at_B
+            if np.linalg.norm(away) < 0.05:
+                continue
+            X_BW = RigidTransform(_looking(away), at_B) @ X_HAND.inverse()
+            if (posture := _posture_at(computer, X_BW, now)) is not None:
+                self._follow(computer, [1.5 * float(np.abs(posture - now).max()) / _USUAL_RAD_S], [posture])
+                return
+
+    def _made(self, *, done: bool) -> Any:
+        made = super()._made(done=done)
+        part = made.arm_gaze_feedback
+        part.gazing_at_target = part.hand_position_at_goal = part.hand_roll_at_goal = done
+        return made
+
+
+def _looking(away: FloatArray) -> RotationMatrix:
+    """Rotation whose x axis points along a vector, with z as far up as possible."""
+    x = away / np.linalg.norm(away)
+    side = np.cross([0.0, 0.0, 1.0], x)
+    y = side / np.linalg.norm(side) if np.linalg.norm(side) > 1e-6 else np.array([0.0, 1.0, 0.0])
+    return RotationMatrix(np.column_stack([x, y, np.cross(x, y)]))
+
+
+class Moving(ArmMotion):
+    """Moves the hand at a velocity until its end."""
+
+    field = "arm_velocity_feedback"
+
+    def __init__(self, request: Any, snapshot: Snapshot, end_s: float) -> None:
+        self._end_s, self._frame = end_s, "odom"
+        self._angular = vector(request.angular_velocity_of_hand_rt_odom_in_hand, "angular_velocity")
+        self._cylindrical = request.HasField("cylindrical_velocity")
+        if self._cylindrical:
+            v = request.cylindrical_velocity.linear_velocity
+            self._linear = tuple(finite(getattr(v, name), name) * 0.5 for name in ("r", "theta", "z"))
+        else:
+            self._frame = _known(request.cartesian_velocity.frame_name, snapshot)
+            self._linear = vector(request.cartesian_velocity.velocity_in_frame_name, "velocity_in_frame_name")
+        super().__init__()
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move."""
+        self._q = computer.arm_rad()
+
+    def tick(self, computer: Computer) -> None:
+        """Moves the hand on by one step."""
+        if self.status != Status.STATUS_PROCESSING:
+            return
+        if computer.now_s() >= self._end_s:
+            self.end(Status.STATUS_COMMAND_TIMED_OUT)
+            return
+        step_s, X_BW = 0.1, computer.solver.X_BH(self._q) if computer.solver else RigidTransform()
+        X_BHand = X_BW @ X_HAND
+        moved = RigidTransform(
+            X_BHand.rotation() @ _turned(np.array(self._angular) * step_s),
+            X_BHand.translation() + step_s * self._velocity_B(computer, X_BHand),
+        )
+        posture = _posture_at(computer, moved @ X_HAND.inverse(), self._q)
+        if posture is None or np.abs(posture - self._q).max() > 0.4:
+            return
+        share = 0.25
+        begun, self._q = self._q, self._q + share * (posture - self._q)
+        trajectory = ArmTrajectory(np.array([0.0, 2 * share * step_s]), np.array([begun, self._q]))
+        computer.robot.move_arm(trajectory, until_s=computer.until_s(self._end_s), lease=computer.lease)
+
+    def _velocity_B(self, computer: Computer, X_BHand: RigidTransform) -> FloatArray:
+        if not self._cylindrical:
+            R_BF = computer.snapshot.X_AB("body", self._frame).rotation()
+            return np.asarray(R_BF @ np.array(self._linear))
+        r, theta, z = self._linear
+        shoulder_B = np.array([0.292, 0.0, 0.188])
+        x, y, _ = X_BHand.translation() - shoulder_B
+        heading, radius = math.atan2(y, x), math.hypot(x, y)
+        out, aside = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
+        return np.array([*(r * out + theta * radius * aside), z])
+
+    def _made(self, *, done: bool) -> Any:
+        made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
+        made.arm_velocity_feedback.SetInParent()
+        return made
+
+
+def _turned(rotation_vector: FloatArray) -> RotationMatrix:
+    angle = float(np.linalg.norm(rotation_vector))
+    if angle < 1e-9:
+        return RotationMatrix()
+    x, y, z = rotation_vector / angle * math.sin(angle / 2)
+    return RotationMatrix(Quaternion(math.cos(angle / 2), x, y, z))
+
+
+class ArmHalt(ArmMotion):
+    """Holds the arm where it is."""
+
+    field = "arm_stop_feedback"
+
+    def begin(self, computer: Computer) -> None:
+        """Holds the present posture."""
+        now = computer.arm_rad()
+        until_s = computer.clock.now() + 1.0
+        computer.robot.move_arm(ArmTrajectory(np.array([0.1]), now[None]), until_s=until_s, lease=computer.lease)
+
+    def _made(self, *, done: bool) -> Any:
+        made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
+        made.arm_stop_feedback.SetInParent()
+        return made
+
+
+def _known(frame: str, snapshot: Snapshot) -> str:
+    """Returns a frame of the tree. Raises UnknownFrameError."""
+    if frame not in snapshot.frames:
+        raise UnknownFrameError(f"frame {frame!r} is unknown")
+    return frame
+
+
+def _posture_at(computer: Computer, X_BW: RigidTransform, near_rad: FloatArray) -> FloatArray | None:
+    """Joint angles that put the wrist at a pose, the nearest to a posture; None out of reach."""
+    found = [] if computer.solver is None else list(computer.solver.inverse(X_BW))
+    return min(found, key=lambda q: float(np.abs(q - near_rad).max()), default=None)
+
+
+class Claw:
+    """Opens or closes the gripper. Its feedback is replaced whole."""
+
+    def __init__(self, request: Any, widest: float, most_force_n: float, tip_radius_m: float) -> None:
+        """Takes a trajectory of angles, of which the last is the goal: 0 closed, negative open (rad)."""
+        if not request.trajectory.points:
+            raise InvalidRequestError("claw_gripper_command.trajectory has no points")
+        goal = finite(request.trajectory.points[-1].point, "claw_gripper_command.trajectory.point")
+        self._opening = min(max(-goal, 0.0), widest)
+        torque = request.maximum_torque.value if request.HasField("maximum_torque") else 5.5
+        force = finite(torque, "claw_gripper_command.maximum_torque") / tip_radius_m
+        self._force_n = min(max(force, 1.0), most_force_n)
+        self.status: int = Status.STATUS_PROCESSING
+        self._command: Any = None
+        self.feedback = self._made(gripper_command_pb2.ClawGripperCommand.Feedback.STATUS_IN_PROGRESS)
+
+    def begin(self, computer: Computer) -> None:
+        """Starts to move."""
+        until_s = computer.forever()
+        self._command = computer.robot.set_gripper(self._opening, self._force_n, until_s=until_s, lease=computer.lease)
+
+    def tick(self, computer: Computer) -> None:
+        """Reports whether the gripper is at its goal, or presses on an object."""
+        if self._command is None or self.status != Status.STATUS_PROCESSING:
+            return
+        part = gripper_command_pb2.ClawGripperCommand.Feedback
+        status = computer.robot.command_status(self._command)
+        if status.state is CommandState.RUNNING:
+            self.feedback = self._made(part.STATUS_IN_PROGRESS)
+        else:
+            self.feedback = self._made(part.STATUS_APPLYING_FORCE if status.reason else part.STATUS_AT_GOAL)
+
+    def end(self, status: int) -> None:
+        """Ends it with a status."""
+        self.status = status
+        self.feedback = self._made(self.feedback.claw_gripper_feedback.status)
+
+    def _made(self, status: int) -> Any:
+        made = gripper_command_pb2.GripperCommand.Feedback(status=self.status)
+        made.claw_gripper_feedback.status = status
+        return made

@@ -1,0 +1,137 @@
+"""gRPC services from plain classes: headers, tokens and malformed messages are treated in one place.
+
+A service is a class whose methods have the names of the API's calls. Each takes the request and the `Call`, and returns
+the response. Calls of the API that the class lacks are answered with UNIMPLEMENTED and their names.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Final
+
+import grpc
+from bosdyn.api import header_pb2
+from google.protobuf import descriptor_pool
+from google.protobuf.message import DecodeError, Message
+from google.protobuf.message_factory import GetMessageClass
+
+from plant.spot_api.server.messages import InvalidRequestError, timestamp
+
+_LOG: Final = logging.getLogger(__name__)
+UserOf = Callable[[str], str | None]
+"""Returns the user of a token; None for one that does not count."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """Circumstances of a call: who calls, and when it was received (robot time, s since 1970)."""
+
+    user: str
+    client_name: str
+    received_s: float
+
+
+class Service:
+    """One service of the API: its name in the directory, its type, and the authority under which it is reached."""
+
+    name: ClassVar[str]
+    type: ClassVar[str]
+    authority: ClassVar[str]
+    needs_token: ClassVar[bool] = True
+
+
+def handlers(services: Sequence[Service], user_of: UserOf, now: Callable[[], float]) -> list[grpc.GenericRpcHandler]:
+    """Returns the handlers of services; the last one answers all other calls. `now` gives the robot's time (s)."""
+    made = [_ServiceHandler(service, user_of, now).generic() for service in services]
+    return [*made, _OtherCalls()]
+
+
+class _ServiceHandler:
+    """Handlers of the calls of one service."""
+
+    def __init__(self, service: Service, user_of: UserOf, now: Callable[[], float]) -> None:
+        self._service, self._user_of, self._now = service, user_of, now
+
+    def generic(self) -> grpc.GenericRpcHandler:
+        described = descriptor_pool.Default().FindServiceByName(self._service.type)
+        methods = {method.name: self._handler(method) for method in described.methods}
+        return grpc.method_handlers_generic_handler(self._service.type, methods)
+
+    def _handler(self, method: Any) -> grpc.RpcMethodHandler:
+        """Returns the handler of one call; those with streams are not served."""
+        answer = getattr(self._service, method.name, None)
+        if answer is None or method.client_streaming or method.server_streaming:
+            return _unimplemented(f"{self._service.type}/{method.name}")
+        request_type, response_type = GetMessageClass(method.input_type), GetMessageClass(method.output_type)
+
+        def parse(data: bytes) -> Message | None:
+            try:
+                parsed: Message = request_type.FromString(data)
+            except DecodeError:
+                return None
+            return parsed
+
+        def handle(request: Message | None, context: grpc.ServicerContext) -> Message:
+            return self._answer(answer, request, response_type, context)
+
+        return grpc.unary_unary_rpc_method_handler(handle, parse, response_type.SerializeToString)
+
+    def _answer(
+        self, answer: Callable[[Any, Call], Any], request: Any, response_type: Any, context: grpc.ServicerContext
+    ) -> Message:
+        received_s = self._now()
+        if request is None:
+            context.abort(grpc.StatusCode.INVALID_ARGUMENT, "the message cannot be parsed")
+        user = self._user_of(_token(context)) if self._service.needs_token else ""
+        if user is None:
+            context.abort(grpc.StatusCode.UNAUTHENTICATED, "401: the token is missing, not valid or expired")
+        call = Call(user or "", request.header.client_name, received_s)
+        error = header_pb2.CommonError(code=header_pb2.CommonError.CODE_OK)
+        try:
+            response = answer(request, call)
+        except InvalidRequestError as invalid:
+            response = response_type()
+            error = header_pb2.CommonError(code=header_pb2.CommonError.CODE_INVALID_REQUEST, message=str(invalid))
+        except Exception as failed:
+            _LOG.exception("%s failed", self._service.type)
+            response = response_type()
+            error = header_pb2.CommonError(code=header_pb2.CommonError.CODE_INTERNAL_SERVER_ERROR, message=str(failed))
+        _fill_header(response, request, error, received_s, self._now())
+        return response  # type: ignore[no-any-return]
+
+
+def _fill_header(
+    response: Any, request: Any, error: header_pb2.CommonError, received_s: float, answered_s: float
+) -> None:
+    """Fills the header of a response: both times are needed for the time synchronisation of clients."""
+    response.header.request_header.CopyFrom(request.header)
+    response.header.request_received_timestamp.CopyFrom(timestamp(received_s))
+    response.header.response_timestamp.CopyFrom(timestamp(answered_s))
+    response.header.error.CopyFrom(error)
+
+
+def _token(context: grpc.ServicerContext) -> str:
+    """Returns the bearer token of a call; empty without one."""
+    for key, value in context.invocation_metadata():
+        if key == "authorization" and value.startswith("Bearer "):
+            return str(value).removeprefix("Bearer ")
+    return ""
+
+
+def _unimplemented(call: str) -> grpc.RpcMethodHandler:
+    """Returns a handler that refuses a call by its name, whatever its messages are."""
+
+    def refuse(_request: Any, context: grpc.ServicerContext) -> Any:
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{call} is not served by Errand")
+
+    return grpc.stream_stream_rpc_method_handler(refuse, bytes, bytes)
+
+
+class _OtherCalls(grpc.GenericRpcHandler):  # type: ignore[misc]
+    """Answers calls of services that are not served."""
+
+    def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler:
+        """Returns the handler of a call."""
+        return _unimplemented(handler_call_details.method.strip("/"))

@@ -1,0 +1,320 @@
+"""The robot's computer: steps the clock, publishes what the robot senses, and runs the commands of clients.
+
+One thread owns robot and clock. Calls of clients read the last snapshot, and hand over work to be done between steps.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from enum import Enum
+from threading import Event
+from typing import Final, Protocol, TypeVar
+
+import numpy as np
+from bosdyn.api import basic_command_pb2, estop_pb2
+from pydrake.math import RigidTransform
+
+from plant.spot_api.server.estop import EstopService
+from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
+from skills.robot import (
+    Battery,
+    Capabilities,
+    Clock,
+    CommandId,
+    CommandState,
+    FloatArray,
+    Gripper,
+    Joints,
+    Lease,
+    Mount,
+    Odometry,
+    Robot,
+    Scan,
+)
+
+T = TypeVar("T")
+PERIOD_S: Final = 0.025
+POWER_ON_S: Final = 1.0
+_LATE_S: Final = 0.3
+OVERRIDDEN: Final = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN
+_FOREVER_S: Final = 1e7
+HAND_X_M: Final = 0.19557
+"""Distance of the API's frame `hand` ahead of `link_wr1`, the protocol's hand frame H (SDK, frames of the arm)."""
+
+
+class Solver(Protocol):
+    """Kinematics of the arm."""
+
+    def X_BH(self, q_rad: FloatArray) -> RigidTransform:
+        """Pose of the last link for joint angles (J,)."""
+
+    def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> Sequence[FloatArray]:
+        """Joint angles (J,) that put the last link at a pose."""
+
+
+class Motors(Enum):
+    """Power of the motors."""
+
+    OFF = "off"
+    STARTING = "starting"
+    ON = "on"
+
+
+class Pace(Enum):
+    """What drives the clock: wall time, or a client that steps it (for tests)."""
+
+    REAL = "real"
+    CLIENT = "client"
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Readings after a step. `time_s` is the robot's time (s since 1970); frames are child -> (parent, X_PC)."""
+
+    time_s: float
+    odometry: Odometry
+    joints: Joints
+    gripper: Gripper
+    battery: Battery
+    scan: Scan | None
+    faults: tuple[str, ...]
+    motors: Motors
+    sitting: bool
+    frames: Mapping[str, tuple[str, RigidTransform]]
+
+    def X_AB(self, a: str, b: str) -> RigidTransform:
+        """Pose of frame `b` in frame `a`. Raises KeyError for an unknown frame."""
+        return self._from_root(a).inverse() @ self._from_root(b)
+
+    def _from_root(self, frame: str) -> RigidTransform:
+        X = RigidTransform()
+        while frame != "body":
+            frame, X_PF = self.frames[frame]
+            X = X_PF @ X
+        return X
+
+
+class Motion(Protocol):
+    """Motion of one part of the robot on a client's command; only the computer's thread calls it."""
+
+    def begin(self, computer: Computer) -> None:
+        """Starts it."""
+
+    def tick(self, computer: Computer) -> None:
+        """Goes on with it after a step."""
+
+    def end(self, status: int) -> None:
+        """Ends it with a status of `RobotCommandFeedbackStatus`."""
+
+
+class Computer:
+    """The computer of one robot."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        clock: Clock,
+        *,
+        leases: LeaseService,
+        estop: EstopService,
+        solver: Solver | None,
+        pace: Pace = Pace.REAL,
+    ) -> None:
+        """Takes the robot's lease. The robot sits down, as before its motors are switched on."""
+        self.robot, self.clock, self.solver, self.pace = robot, clock, solver, pace
+        self.leases, self.estop = leases, estop
+        self.lease: Lease = robot.take_lease("the server of Spot's API")
+        self.capabilities: Capabilities = robot.capabilities()
+        self.motors, self._motors_since_s = Motors.OFF, 0.0
+        self.settling = False
+        self._motions: dict[str, Motion] = {}
+        self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._started_s = time.time()
+        self.behind_s = 0.0
+        self._sit_command: CommandId | None = None
+        self.sit()
+        self.snapshot = self._sensed()
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def now_s(self) -> float:
+        """The robot's time (s since 1970): wall time, or with a client's pace the start plus the clock's."""
+        return time.time() if self.pace is Pace.REAL else self._started_s + self.clock.now()
+
+    def until_s(self, robot_time_s: float) -> float:
+        """Converts a robot time to one of the robot's clock; what is left of it counts from now on."""
+        return self.clock.now() + robot_time_s - self.now_s()
+
+    def forever(self) -> float:
+        """A time (robot's clock) that never comes."""
+        return self.clock.now() + _FOREVER_S
+
+    # -- for the calls of clients ------------------------------------------------------------------------------------
+
+    def do(self, work: Callable[[], T]) -> Future[T]:
+        """Hands over work to be done between steps."""
+        done: Future[T] = Future()
+
+        def run() -> None:
+            if done.set_running_or_notify_cancel():
+                try:
+                    done.set_result(work())
+                except Exception as error:  # the caller gets it
+                    done.set_exception(error)
+
+        self._work.put(run)
+        return done
+
+    def lost(self, parts: Sequence[str]) -> None:
+        """Stops the parts whose lease has changed hands."""
+        self.do(lambda: self.stop_parts(parts))
+
+    # -- the loop ----------------------------------------------------------------------------------------------------
+
+    def run(self, stopping: Event) -> None:
+        """Steps at the pace of wall time until `stopping` is set. A plant that is late does not catch up in leaps."""
+        due_s = time.monotonic()
+        while not stopping.is_set():
+            due_s = max(due_s + PERIOD_S, time.monotonic() - _LATE_S)
+            self._work_until(due_s)
+            self.behind_s = max(self.behind_s, time.monotonic() - due_s)
+            self.step()
+
+    def step(self) -> None:
+        """Does the waiting work, steps the clock and goes on with all motions."""
+        self._work_until(0.0)
+        self._watch()
+        self.clock.advance(PERIOD_S)
+        self.snapshot = self._sensed()
+        for motion in list(self._motions.values()):
+            motion.tick(self)
+
+    def _work_until(self, due_s: float) -> None:
+        """Does work that waits, or comes until a time (s, monotonic)."""
+        while True:
+            left_s = due_s - time.monotonic()
+            try:
+                work = self._work.get(timeout=left_s) if left_s > 0.0 else self._work.get_nowait()
+            except queue.Empty:
+                return
+            work()
+
+    # -- motors ------------------------------------------------------------------------------------------------------
+
+    def switch_on(self) -> None:
+        """Switches the motors on, which takes a second."""
+        if self.motors is Motors.OFF:
+            self.motors, self._motors_since_s = Motors.STARTING, self.clock.now()
+            self.estop.motors_on = True
+
+    def switch_off(self) -> None:
+        """Switches the motors off: all motions end, and the robot sinks down."""
+        self.stop_parts((MOBILITY, ARM, GRIPPER))
+        self.motors, self.settling = Motors.OFF, False
+        self.estop.motors_on = False
+        self.sit()
+
+    def settle(self) -> None:
+        """Sits down, and then switches the motors off."""
+        if not self.settling and self.motors is not Motors.OFF:
+            self.stop_parts((MOBILITY, ARM))
+            self.settling = True
+            self.sit()
+
+    def _watch(self) -> None:
+        """Obeys the E-stop and stale leases, and finishes what takes time with the motors."""
+        level = self.estop.level()
+        if self.motors is not Motors.OFF:
+            if level == estop_pb2.ESTOP_LEVEL_CUT:
+                self.switch_off()
+            elif level == estop_pb2.ESTOP_LEVEL_SETTLE_THEN_CUT:
+                self.settle()
+        if self.motors is Motors.STARTING and self.clock.now() - self._motors_since_s >= POWER_ON_S:
+            self.motors = Motors.ON
+        if self.settling and self.snapshot.sitting:
+            self.switch_off()
+        if stale := [part for part in self.leases.stale_parts() if part in self._motions]:
+            self.stop_parts(stale)
+
+    # -- motions -----------------------------------------------------------------------------------------------------
+
+    def move(self, motions: Mapping[str, Motion]) -> None:
+        """Starts motions of parts in place of those that run."""
+        for part, motion in motions.items():
+            if (before := self._motions.pop(part, None)) is not None:
+                before.end(OVERRIDDEN)
+            self._motions[part] = motion
+            motion.begin(self)
+
+    def stop_parts(self, parts: Sequence[str]) -> None:
+        """Ends the motions of parts; the base stops, and the arm holds its position."""
+        for part in parts:
+            if (motion := self._motions.pop(part, None)) is not None:
+                motion.end(OVERRIDDEN)
+        if MOBILITY in parts or ARM in parts:
+            self.robot.stop(lease=self.lease)
+
+    def sit(self) -> None:
+        """Sits down."""
+        self._sit_command = self.robot.sit(until_s=self.forever(), lease=self.lease)
+
+    def stand(self, height_m: float, pitch_rad: float) -> CommandId:
+        """Stands up, or changes height and pitch of the body."""
+        self._sit_command = None
+        return self.robot.stand(height_m, pitch_rad, until_s=self.forever(), lease=self.lease)
+
+    def _sits(self) -> bool:
+        command = self._sit_command
+        return command is not None and self.robot.command_status(command).state is CommandState.DONE
+
+    # -- sensing -----------------------------------------------------------------------------------------------------
+
+    def _sensed(self) -> Snapshot:
+        odometry, joints = self.robot.odometry(), self.robot.joints()
+        return Snapshot(
+            self.now_s(),
+            odometry,
+            joints,
+            self.robot.gripper(),
+            self.robot.battery(),
+            self.robot.scan(),
+            self.robot.faults(),
+            self.motors,
+            self._sits(),
+            self._frames(odometry, joints),
+        )
+
+    def _frames(self, odometry: Odometry, joints: Joints) -> Mapping[str, tuple[str, RigidTransform]]:
+        """The frame tree as a real Spot gives it: the root is `body`; `odom` and `vision` are the same here."""
+        X_BO = odometry.X_OB.inverse()
+        X_OF = odometry.pose.transform(float(odometry.X_OB.translation()[2]))
+        edges = {
+            "body": ("", RigidTransform()),
+            "odom": ("body", X_BO),
+            "vision": ("body", X_BO),
+            "flat_body": ("body", X_BO @ X_OF),
+            "gpe": ("odom", odometry.pose.transform()),
+        }
+        if self.solver is not None and self.capabilities.arm is not None:
+            X_BH = self.solver.X_BH(self.arm_rad(joints))
+            edges["link_wr1"] = edges["arm0.link_wr1"] = ("body", X_BH)
+            edges["hand"] = ("arm0.link_wr1", RigidTransform([HAND_X_M, 0.0, 0.0]))
+        for camera in self.capabilities.cameras:
+            parent = "body" if camera.mount is Mount.BODY else "arm0.link_wr1"
+            edges[sensor_frame(camera.source)] = (parent, camera.X_FC)
+        return edges
+
+    def arm_rad(self, joints: Joints | None = None) -> FloatArray:
+        """Joint angles (J,) of the arm."""
+        assert self.capabilities.arm is not None
+        read = joints or self.robot.joints()
+        return np.array([read.position_rad[name] for name in self.capabilities.arm.joint_names])
+
+
+def sensor_frame(source: str) -> str:
+    """Name of a camera's frame in the API."""
+    return "hand_color_image_sensor" if source == "hand" else source

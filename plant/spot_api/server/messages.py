@@ -1,0 +1,87 @@
+"""Conversions between SI values and the API's messages: times, poses, velocities and frame trees."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from bosdyn.api import geometry_pb2
+from google.protobuf.duration_pb2 import Duration
+from google.protobuf.timestamp_pb2 import Timestamp
+from pydrake.common.eigen_geometry import Quaternion
+from pydrake.math import RigidTransform, RotationMatrix
+
+_NANOS = 1_000_000_000
+
+
+class InvalidRequestError(ValueError):
+    """A request with a value that the API does not allow; the message names the field."""
+
+
+def timestamp(unix_s: float) -> Timestamp:
+    """Returns the message of a time (s since 1970)."""
+    nanos = round(unix_s * _NANOS)
+    return Timestamp(seconds=nanos // _NANOS, nanos=nanos % _NANOS)
+
+
+def duration(duration_s: float) -> Duration:
+    """Returns the message of a duration (s)."""
+    made = Duration()
+    made.FromNanoseconds(round(duration_s * _NANOS))
+    return made
+
+
+def seconds(message: Timestamp | Duration) -> float:
+    """Returns a time (s since 1970) or a duration (s)."""
+    return float(message.seconds) + float(message.nanos) / _NANOS
+
+
+def finite(value: float, field: str) -> float:
+    """Returns a finite value. Raises InvalidRequestError."""
+    if not math.isfinite(value):
+        raise InvalidRequestError(f"{field} is {value}; it must be finite")
+    return value
+
+
+def vector(message: geometry_pb2.Vec3, field: str) -> tuple[float, float, float]:
+    """Returns the coordinates of a vector. Raises InvalidRequestError unless they are finite."""
+    x, y, z = (finite(getattr(message, axis), f"{field}.{axis}") for axis in "xyz")
+    return x, y, z
+
+
+def vec3(values: Iterable[float]) -> geometry_pb2.Vec3:
+    """Returns the message of a vector (x, y, z)."""
+    x, y, z = (float(value) for value in values)
+    return geometry_pb2.Vec3(x=x, y=y, z=z)
+
+
+def transform(message: geometry_pb2.SE3Pose, field: str) -> RigidTransform:
+    """Returns the transform of a pose; a rotation that was left out is none. Raises InvalidRequestError."""
+    q = message.rotation
+    wxyz = np.array([finite(getattr(q, name), f"{field}.rotation.{name}") for name in "wxyz"])
+    length = float(np.linalg.norm(wxyz))
+    if length < 1e-6:
+        wxyz, length = np.array([1.0, 0.0, 0.0, 0.0]), 1.0
+    return RigidTransform(RotationMatrix(Quaternion(wxyz / length)), vector(message.position, f"{field}.position"))
+
+
+def pose(X_AB: RigidTransform) -> geometry_pb2.SE3Pose:
+    """Returns the message of a transform."""
+    w, x, y, z = X_AB.rotation().ToQuaternion().wxyz()
+    return geometry_pb2.SE3Pose(position=vec3(X_AB.translation()), rotation=geometry_pb2.Quaternion(w=w, x=x, y=y, z=z))
+
+
+def velocity(linear: Iterable[float], angular: Iterable[float]) -> geometry_pb2.SE3Velocity:
+    """Returns the message of a linear (m/s) and an angular (rad/s) velocity."""
+    return geometry_pb2.SE3Velocity(linear=vec3(linear), angular=vec3(angular))
+
+
+def frame_tree(edges: Mapping[str, tuple[str, RigidTransform]]) -> geometry_pb2.FrameTreeSnapshot:
+    """Returns the message of a frame tree: child -> (parent, X_parent_child). The root's parent is empty."""
+    made = geometry_pb2.FrameTreeSnapshot()
+    for child, (parent, X_PC) in edges.items():
+        edge = made.child_to_parent_edge_map[child]
+        edge.parent_frame_name = parent
+        edge.parent_tform_child.CopyFrom(pose(X_PC))
+    return made

@@ -1,0 +1,146 @@
+"""The server: all services of one robot on one port with TLS, and the thread that steps it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import grpc
+
+from plant.spot_api.server import identity, state
+from plant.spot_api.server.calls import Service, handlers
+from plant.spot_api.server.commands import PowerService, RobotCommandService
+from plant.spot_api.server.computer import Computer, Pace, Solver
+from plant.spot_api.server.estop import EstopService, Tablet
+from plant.spot_api.server.identity import DOMAIN, Credentials
+from plant.spot_api.server.leases import LeaseService
+from skills.robot import Clock, Robot
+
+_MOST_BYTES: Final = 64 * 1024**2
+_THREADS: Final = 24
+LISTED: Final[Mapping[str, str]] = {
+    "arm-surface-contact": "bosdyn.api.ArmSurfaceContactService",
+    "auto-return": "bosdyn.api.auto_return.AutoReturnService",
+    "autowalk-service": "bosdyn.api.autowalk.AutowalkService",
+    "data": "bosdyn.api.DataService",
+    "data-acquisition": "bosdyn.api.DataAcquisitionService",
+    "data-acquisition-store": "bosdyn.api.DataAcquisitionStoreService",
+    "docking": "bosdyn.api.docking.DockingService",
+    "door": "bosdyn.api.spot.DoorService",
+    "graph-nav-service": "bosdyn.api.graph_nav.GraphNavService",
+    "gripper-camera-param": "bosdyn.api.GripperCameraParamService",
+    "keepalive": "bosdyn.api.keepalive.KeepaliveService",
+    "local-grid-service": "bosdyn.api.LocalGridService",
+    "log-status": "bosdyn.api.log_status.LogStatusService",
+    "manipulation": "bosdyn.api.ManipulationApiService",
+    "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
+    "payload-registration": "bosdyn.api.PayloadRegistrationService",
+    "ray-cast": "bosdyn.api.RayCastService",
+    "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
+    "robot-command-streaming": "bosdyn.api.RobotCommandStreamingService",
+    "robot-state-streaming": "bosdyn.api.RobotStateStreamingService",
+    "spot-check": "bosdyn.api.spot.SpotCheckService",
+}
+"""Services of a real Spot that are in the directory, and whose calls answer UNIMPLEMENTED."""
+_DESCRIBED_IN: Final = (
+    *("auth", "data_buffer", "directory_registration", "directory", "estop", "fault", "image", "lease", "license"),
+    *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
+    "spot.inverse_kinematics",
+)
+"""Files of the SDK that describe the services; importing them registers their descriptions."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet."""
+
+    passwords: Mapping[str, str]
+    port: int = 0
+    pace: Pace = Pace.REAL
+    tablet: Tablet = Tablet.TABLET
+
+
+class SpotServer:
+    """Server of the API for one robot. Nothing steps it before `run`."""
+
+    def __init__(
+        self, robot: Robot, clock: Clock, solver: Solver | None, credentials: Credentials, options: Options
+    ) -> None:
+        """Opens the port on 127.0.0.1. Raises OSError when it is in use."""
+        for name in _DESCRIBED_IN:
+            importlib.import_module(f"bosdyn.api.{name}_service_pb2")
+        estop = EstopService(options.tablet)
+        leases = LeaseService(lambda: self.computer.now_s(), lambda parts: self.computer.lost(parts))
+        self.computer = Computer(robot, clock, leases=leases, estop=estop, solver=solver, pace=options.pace)
+        auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
+        services = self._services(leases, estop, auth, robot.name)
+        self._grpc = grpc.server(
+            ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
+            options=[
+                ("grpc.max_receive_message_length", _MOST_BYTES),
+                ("grpc.max_send_message_length", _MOST_BYTES),
+                ("grpc.so_reuseport", 0),
+            ],
+        )
+        self._grpc.add_generic_rpc_handlers(handlers(services, auth.user_of, self.computer.now_s))
+        key, certificate = credentials.private_key.read_bytes(), credentials.certificate.read_bytes()
+        try:
+            self.port = self._grpc.add_secure_port(
+                f"127.0.0.1:{options.port}", grpc.ssl_server_credentials([(key, certificate)])
+            )
+        except RuntimeError as error:
+            raise OSError(f"port {options.port} of 127.0.0.1 cannot be opened") from error
+
+    def _services(
+        self, leases: LeaseService, estop: EstopService, auth: identity.AuthService, robot_name: str
+    ) -> Sequence[Service]:
+        """All services that are served; the directory lists them and the others."""
+        computer, clocks = self.computer, identity.TimeSyncService()
+        served: list[Service] = [
+            auth,
+            clocks,
+            leases,
+            estop,
+            identity.RobotIdService(robot_name),
+            identity.LicenseService(),
+            PowerService(computer, leases),
+            RobotCommandService(computer, leases, clocks),
+            state.RobotStateService(computer),
+            state.ImageService(computer),
+            state.WorldObjectService(),
+            state.FaultService(),
+            state.PayloadService(),
+            state.DataBufferService(),
+        ]
+        if computer.solver is not None:
+            served.append(state.InverseKinematicsService(computer))
+        if computer.capabilities.lidar_height_m is not None:
+            served.append(state.PointCloudService(computer))
+        known = [(service.name, service.type, service.authority) for service in served]
+        own = (identity.DirectoryService, identity.DirectoryRegistrationService)
+        known += [(each.name, each.type, each.authority) for each in own]
+        known += [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
+        directory = identity.DirectoryService(known, computer.now_s)
+        return [*served, directory, identity.DirectoryRegistrationService(directory)]
+
+    @contextmanager
+    def running(self) -> Iterator[SpotServer]:
+        """Answers calls. The caller steps the robot: with `computer.run`, or with `computer.step`.
+
+        The thread that built a simulation must step it, because its renderer belongs to that thread.
+        """
+        self._grpc.start()
+        try:
+            yield self
+        finally:
+            self._grpc.stop(0.5).wait()
+
+    @staticmethod
+    def credentials(folder: Path) -> Credentials:
+        """Returns the credentials in a folder; see `identity.credentials`."""
+        return identity.credentials(folder)

@@ -31,7 +31,7 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,foxglove,test,browser,bench,dev]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,foxglove,spot,test,browser,bench,dev]'
 	$(BIN)/python -m pip install --quiet --no-deps --editable training
 	$(BIN)/errand warm-up
 	@touch $@

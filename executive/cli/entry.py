@@ -81,6 +81,8 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     ),
     "report": _Command("evaluate_command", "report", "Report the results of an evaluation: rates, causes, failures."),
     "teleop": _Command("robot_command", "teleop", "Drive a robot's body and arm by hand: keys, gamepad, live page."),
+    "serve": _Command("spot_command", "serve", "Serve Spot's API for a simulated Spot, for programs of its SDK."),
+    "sdk": _Command("spot_command", "sdk", "Run a program of Spot's SDK, unchanged, with a simulated Spot."),
     "detect": _Command("detect_command", "detect", "Find objects of the nine classes in pictures."),
     "stack": _Command("plugins_command", "stack", "What a robot uses: localiser, planners, controller, detector."),
     "map": _Command("map_command", "map_group", "Maps that the robot builds itself, by exploring or along a route."),

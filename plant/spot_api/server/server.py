@@ -77,6 +77,7 @@ class SpotServer:
         estop = EstopService(options.tablet)
         leases = LeaseService(lambda: self.computer.now_s(), lambda parts: self.computer.lost(parts))
         self.computer = Computer(robot, clock, leases=leases, estop=estop, solver=solver, pace=options.pace)
+        self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
         services = self._services(leases, estop, auth, robot.name)
         self._grpc = grpc.server(

@@ -1,0 +1,126 @@
+"""`errand serve` serves Spot's API for a simulated robot; `errand sdk` runs a program of the SDK against it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Annotated, Final
+
+import typer
+
+from executive.cli.number_options import quantity_option
+from executive.cli.output import console_for
+from skills.files.errors import InputError
+from skills.quantities import Port, Seed
+
+if TYPE_CHECKING:
+    from plant.spot_api.server.server import SpotServer
+
+USER: Final = "user"
+PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
+_FOLDER: Final = "spot-api"
+WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]
+SEED = Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")]
+NO_TABLET = Annotated[
+    bool, typer.Option("--no-tablet", help="No operator's tablet holds a released E-stop: the program brings its own.")
+]
+
+
+def serve(
+    world: WORLD = "flat",
+    seed: SEED = 1,
+    port: Annotated[int, quantity_option(Port, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
+    no_tablet: NO_TABLET = False,
+) -> None:
+    """Serves Spot's API for a simulated Spot in real time, until Ctrl-C."""
+    with _server(world, seed, port, tablet=not no_tablet) as server:
+        console = console_for(False)
+        console.print(f"Spot's API: 127.0.0.1:{server.port} (Ctrl-C ends it)\n", markup=False)
+        for name, value in _environment(server).items():
+            console.print(f"export {name}={value}", markup=False)
+        try:
+            server.computer.run(Event())
+        except KeyboardInterrupt:
+            return
+
+
+sdk = typer.Typer(rich_markup_mode=None, pretty_exceptions_enable=False)
+
+
+@sdk.command(context_settings={"ignore_unknown_options": True, "allow_interspersed_args": False})
+def run_program(
+    script: Annotated[Path, typer.Argument(metavar="SCRIPT", help="A Python program that uses the SDK.")],
+    arguments: Annotated[
+        list[str] | None, typer.Argument(metavar="ARGUMENTS", help="Its arguments; the robot's address is 127.0.0.1.")
+    ] = None,
+    world: WORLD = "flat",
+    seed: SEED = 1,
+    no_tablet: NO_TABLET = False,
+) -> None:
+    """Runs a program of Spot's SDK, unchanged, with a simulated Spot; exits as the program does."""
+    if not script.is_file():
+        raise InputError(f"{script}: there is no such program", hint="name a Python file, after the options of Errand")
+    with _server(world, seed, 0, tablet=not no_tablet) as server:
+        ended, code = Event(), list[int]()
+
+        def run() -> None:
+            code.append(_run(script, arguments or [], server))
+            ended.set()
+
+        program = Thread(target=run, name="sdk-program", daemon=True)
+        program.start()
+        server.computer.run(ended)
+        program.join()
+    raise typer.Exit(code[0])
+
+
+def _run(script: Path, arguments: list[str], server: SpotServer) -> int:
+    """Runs a program in a process of its own; returns its exit code."""
+    certificate = _environment(server)["SPOT_CERTIFICATE"]
+    launch = [sys.executable, "-m", "plant.spot_api.launch", certificate, str(server.port)]
+    return subprocess.run([*launch, str(script), *arguments], env={**os.environ, **_environment(server)}).returncode
+
+
+def _environment(server: SpotServer) -> dict[str, str]:
+    """Environment variables with which programs and drivers find the server, and log in."""
+    return {
+        "SPOT_IP": "127.0.0.1",
+        "SPOT_PORT": str(server.port),
+        "SPOT_CERTIFICATE": str(server.certificate),
+        "BOSDYN_CLIENT_USERNAME": USER,
+        "BOSDYN_CLIENT_PASSWORD": PASSWORD,
+    }
+
+
+@contextmanager
+def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotServer]:
+    """Builds the simulation with Alice, and serves her. Raises InputError without the SDK, or when the port is in use."""
+    if find_spec("bosdyn") is None:
+        raise InputError("Spot's SDK is not installed", hint="install it: pip install 'spot-errand[spot]'")
+    from executive.app.placed_robots import only_robot
+    from executive.app.simulated import compile_first, simulate
+    from executive.app.worlds import open_world
+    from plant.models.catalogue import user_cache
+    from plant.spot_api.server.estop import Tablet
+    from plant.spot_api.server.server import Options, SpotServer
+    from skills.manipulation.arm.kinematics import arm_model
+
+    opened = open_world(world)
+    placed = only_robot("Alice", opened, seed=seed)
+    compile_first()
+    simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
+    robot = simulation.robots["Alice"]
+    options = Options({USER: PASSWORD}, port, tablet=Tablet.TABLET if tablet else Tablet.NONE)
+    try:
+        credentials = SpotServer.credentials(user_cache() / _FOLDER)
+        server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), credentials, options)
+    except OSError as error:
+        raise InputError(str(error), hint="name another --port, or 0 for a free one") from error
+    with server.running():
+        yield server

@@ -100,7 +100,7 @@ def _environment(server: SpotServer) -> dict[str, str]:
 
 @contextmanager
 def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotServer]:
-    """Builds the simulation with Alice, and serves her. Raises InputError without the SDK, or when the port is in use."""
+    """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
     if find_spec("bosdyn") is None:
         raise InputError("Spot's SDK is not installed", hint="install it: pip install 'spot-errand[spot]'")
     from executive.app.placed_robots import only_robot

@@ -1,4 +1,4 @@
-"""Motions of arm and gripper: joint moves, named positions, Cartesian moves, gaze, velocities, stop; opening and force."""
+"""Motions of arm and gripper: joint moves, named and Cartesian positions, gaze, velocities, stop; opening and force."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 from bosdyn.api import arm_command_pb2, basic_command_pb2, gripper_command_pb2
-from pydrake.common.eigen_geometry import Quaternion
+from pydrake.common.eigen_geometry import AngleAxis, Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
+from scipy.interpolate import PchipInterpolator
 
 from plant.spot_api.server.computer import HAND_X_M, Computer, Snapshot
 from plant.spot_api.server.messages import InvalidRequestError, duration, finite, seconds, transform, vector
@@ -24,7 +25,10 @@ CARRY_RAD: Final = (0.0, -2.6, 2.2, 0.0, 0.4, 0.0)
 _FASTEST_RAD_S: Final = 2.5
 _USUAL_RAD_S, _USUAL_M_S, _USUAL_TURN_RAD_S = 1.5, 0.4, 1.0
 _LEAST_S: Final = 0.2
+_SETTLING_S, _STILL_RAD_S = 1.0, 0.05
 _STEPS: Final = 20
+_SAMPLE_S: Final = 0.05
+_PER_SEGMENT: Final = 6
 X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
 """Pose of the API's frame `hand` in `link_wr1`, the default tool."""
 
@@ -42,15 +46,19 @@ class ArmMotion:
         self.status: int = Status.STATUS_PROCESSING
         self.feedback = self._made(done=False)
         self._command: Any = None
+        self._joints: Sequence[str] = ()
+        self._ends_s = 0.0
 
     def begin(self, computer: Computer) -> None:
         """Starts it."""
 
     def tick(self, computer: Computer) -> None:
-        """Reports whether the arm is at its goal."""
+        """Reports whether the arm is at its goal, or rests as near as its load lets it."""
         if self._command is not None and self.status == Status.STATUS_PROCESSING:
             done = computer.robot.command_status(self._command).state is CommandState.DONE
-            self.feedback = self._made(done=done)
+            late_s = computer.clock.now() - self._ends_s
+            rests = max(abs(computer.snapshot.joints.velocity_rad_s[name]) for name in self._joints) < _STILL_RAD_S
+            self.feedback = self._made(done=done or (late_s > _SETTLING_S and rests))
 
     def end(self, status: int) -> None:
         """Ends it with a status."""
@@ -67,23 +75,35 @@ class ArmMotion:
 
     def _follow(self, computer: Computer, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> None:
         """Follows postures at times since now, slower where a joint would be too fast."""
-        trajectory = smooth(computer.arm_rad(), times_s, positions_rad)
+        solver = computer.solver
+        assert solver is not None
+        trajectory = smooth(np.clip(computer.arm_rad(), solver.lower_rad, solver.upper_rad), times_s, positions_rad)
+        assert computer.capabilities.arm is not None
+        self._joints, self._ends_s = (
+            computer.capabilities.arm.joint_names,
+            computer.clock.now() + trajectory.times_s[-1],
+        )
         until_s = computer.forever()
         self._command = computer.robot.move_arm(trajectory, until_s=until_s, lease=computer.lease)
 
 
 def smooth(start_rad: FloatArray, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> ArmTrajectory:
-    """Returns a trajectory that begins at rest and comes to rest at each posture, no earlier than at its time."""
-    times, positions = [0.0], [start_rad]
-    for time_s, goal_rad in zip(times_s, positions_rad, strict=True):
-        began_s, begin_rad = times[-1], positions[-1]
-        needed_s = 1.6 * float(np.abs(goal_rad - begin_rad).max()) / _FASTEST_RAD_S
-        length_s = max(_LEAST_S, needed_s, time_s - began_s)
-        for k in range(1, _STEPS + 1):
-            share = k / _STEPS
-            times.append(began_s + share * length_s)
-            positions.append(begin_rad + (goal_rad - begin_rad) * (share**2 * (3.0 - 2.0 * share)))
-    return ArmTrajectory(np.array(times), np.array(positions))
+    """Returns a trajectory from rest to rest through postures at times, all later where a joint would be too fast.
+
+    Between the postures it follows monotone cubic curves (Fritsch and Carlson, 1980).
+    """
+    times = np.maximum.accumulate([0.0, *times_s]) + 1e-3 * np.arange(len(times_s) + 1)
+    postures = np.array([start_rad, *positions_rad])
+    if len(times_s) == 1:  # eased in and out
+        shares = np.linspace(0.0, 1.0, _STEPS + 1)
+        eased = shares**2 * (3.0 - 2.0 * shares)
+        sampled, samples = shares * times[-1], start_rad + np.outer(eased, postures[-1] - start_rad)
+    else:
+        sampled = np.linspace(0.0, times[-1], max(_STEPS, int(times[-1] / _SAMPLE_S)) + 1)
+        samples = PchipInterpolator(times, postures)(sampled)
+    fastest = float((np.abs(np.diff(samples, axis=0)).max(axis=1) / np.diff(sampled)).max())
+    length_s = max(times[-1] * max(1.0, fastest / _FASTEST_RAD_S), _LEAST_S)
+    return ArmTrajectory(sampled * (length_s / sampled[-1]), samples)
 
 
 class JointMove(ArmMotion):
@@ -101,12 +121,17 @@ class JointMove(ArmMotion):
         fastest = finite(fastest, "arm_joint_move_command.trajectory.maximum_velocity")
         offset_s = seconds(trajectory.reference_time) - now_s if trajectory.HasField("reference_time") else 0.0
         self._times_s, self._positions, before = list[float](), list[FloatArray](), now_rad
+        timed = any(point.HasField("time_since_reference") for point in trajectory.points)
         for point in trajectory.points:
             goal = _joints(point.position, before)
-            slow_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
-            self._times_s.append(max(slow_s, offset_s + seconds(point.time_since_reference)))
+            at_s = offset_s + seconds(point.time_since_reference)
+            if not timed:
+                at_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
+            self._times_s.append(max(0.0, at_s))
             self._positions.append(goal)
             before = goal
+        while len(self._times_s) > 1 and self._times_s[0] <= 0.0:  # it is late: these have passed
+            del self._times_s[0], self._positions[0]
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
@@ -183,23 +208,25 @@ class Cartesian(ArmMotion):
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
-        """Starts to move; the poses stay where they are in `odom`."""
-        postures, before = [], computer.arm_rad()
-        for X_OW in self._X_OW:
-            posture = _posture_at(computer, computer.snapshot.X_AB("body", "odom") @ X_OW, before)
-            if posture is None:
-                self._out_of_reach = True
-                self.feedback = self._made(done=False)
-                return
-            postures.append(posture)
-            before = posture
-        times = []
-        for time_s, before_X, after_X in zip(
-            self._times_s, [computer.snapshot.X_AB("odom", "link_wr1"), *self._X_OW], self._X_OW, strict=False
-        ):
-            far_s = float(np.linalg.norm(after_X.translation() - before_X.translation())) / _USUAL_M_S
-            times.append(max(time_s, (times or [0.0])[-1] + 1.5 * far_s))
-        self._follow(computer, times, postures)
+        """Starts to move straight from pose to pose; the poses stay where they are in `odom`."""
+        X_BO, before = computer.snapshot.X_AB("body", "odom"), computer.arm_rad()
+        X_OW, time_s = computer.snapshot.X_AB("odom", "link_wr1"), 0.0
+        times, postures = list[float](), list[FloatArray]()
+        for goal_s, X_OGoal in zip(self._times_s, self._X_OW, strict=True):
+            far_m = float(np.linalg.norm(X_OGoal.translation() - X_OW.translation()))
+            end_s = max(goal_s, time_s + 1.5 * far_m / _USUAL_M_S)
+            for share in np.linspace(0.0, 1.0, _PER_SEGMENT + 1)[1:]:
+                posture = _posture_at(computer, X_BO @ _between(X_OW, X_OGoal, float(share)), before)
+                if posture is not None:
+                    times.append(time_s + share * (end_s - time_s))
+                    postures.append(posture)
+                    before = posture
+            self._out_of_reach = self._out_of_reach or posture is None
+            X_OW, time_s = X_OGoal, end_s
+        if self._out_of_reach:
+            self.feedback = self._made(done=False)
+        else:
+            self._follow(computer, times, postures)
 
     def tick(self, computer: Computer) -> None:
         """Reports how far the hand is from its goal."""
@@ -258,6 +285,13 @@ class Gaze(ArmMotion):
         part = made.arm_gaze_feedback
         part.gazing_at_target = part.hand_position_at_goal = part.hand_roll_at_goal = done
         return made
+
+
+def _between(X_AB: RigidTransform, X_AC: RigidTransform, share: float) -> RigidTransform:
+    """Pose at a share of the straight way from B to C; the rotation turns about one axis."""
+    turn = X_AB.rotation().InvertAndCompose(X_AC.rotation()).ToAngleAxis()
+    moved = (1.0 - share) * X_AB.translation() + share * X_AC.translation()
+    return RigidTransform(X_AB.rotation() @ RotationMatrix(AngleAxis(share * turn.angle(), turn.axis())), moved)
 
 
 def _looking(away: FloatArray) -> RotationMatrix:

@@ -20,6 +20,8 @@ from google.protobuf.message_factory import GetMessageClass
 from plant.spot_api.server.messages import InvalidRequestError, timestamp
 
 _LOG: Final = logging.getLogger(__name__)
+_MALFORMED: Final = object()
+"""Stands for a message that cannot be parsed; for None grpc would answer itself."""
 UserOf = Callable[[str], str | None]
 """Returns the user of a token; None for one that does not count."""
 
@@ -66,23 +68,23 @@ class _ServiceHandler:
             return _unimplemented(f"{self._service.type}/{method.name}")
         request_type, response_type = GetMessageClass(method.input_type), GetMessageClass(method.output_type)
 
-        def parse(data: bytes) -> Message | None:
+        def parse(data: bytes) -> Message | object:
             try:
                 parsed: Message = request_type.FromString(data)
             except DecodeError:
-                return None
+                return _MALFORMED
             return parsed
 
-        def handle(request: Message | None, context: grpc.ServicerContext) -> Message:
+        def handle(request: Message | object, context: grpc.ServicerContext) -> Message:
             return self._answer(answer, request, response_type, context)
 
         return grpc.unary_unary_rpc_method_handler(handle, parse, response_type.SerializeToString)
 
     def _answer(
         self, answer: Callable[[Any, Call], Any], request: Any, response_type: Any, context: grpc.ServicerContext
-    ) -> Message:
+    ) -> Any:
         received_s = self._now()
-        if request is None:
+        if request is _MALFORMED:
             context.abort(grpc.StatusCode.INVALID_ARGUMENT, "the message cannot be parsed")
         user = self._user_of(_token(context)) if self._service.needs_token else ""
         if user is None:
@@ -99,7 +101,7 @@ class _ServiceHandler:
             response = response_type()
             error = header_pb2.CommonError(code=header_pb2.CommonError.CODE_INTERNAL_SERVER_ERROR, message=str(failed))
         _fill_header(response, request, error, received_s, self._now())
-        return response  # type: ignore[no-any-return]
+        return response
 
 
 def _fill_header(

@@ -40,6 +40,7 @@ T = TypeVar("T")
 PERIOD_S: Final = 0.025
 POWER_ON_S: Final = 1.0
 _LATE_S: Final = 0.3
+_STILL_M, _STILL_S = 0.01, 1.0
 OVERRIDDEN: Final = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN
 _FOREVER_S: Final = 1e7
 HAND_X_M: Final = 0.19557
@@ -47,7 +48,15 @@ HAND_X_M: Final = 0.19557
 
 
 class Solver(Protocol):
-    """Kinematics of the arm."""
+    """Kinematics of the arm, with the limits of its joints (J,)."""
+
+    @property
+    def lower_rad(self) -> FloatArray:
+        """Lower limits."""
+
+    @property
+    def upper_rad(self) -> FloatArray:
+        """Upper limits."""
 
     def X_BH(self, q_rad: FloatArray) -> RigidTransform:
         """Pose of the last link for joint angles (J,)."""
@@ -136,6 +145,7 @@ class Computer:
         self._started_s = time.time()
         self.behind_s = 0.0
         self._sit_command: CommandId | None = None
+        self._still_at_m, self._still_since_s = 0.0, 0.0
         self.sit()
         self.snapshot = self._sensed()
 
@@ -260,16 +270,24 @@ class Computer:
 
     def sit(self) -> None:
         """Sits down."""
+        self._still_since_s = self.clock.now()
         self._sit_command = self.robot.sit(until_s=self.forever(), lease=self.lease)
 
     def stand(self, height_m: float, pitch_rad: float) -> CommandId:
         """Stands up, or changes height and pitch of the body."""
-        self._sit_command = None
+        self._sit_command, self._still_since_s = None, self.clock.now()
         return self.robot.stand(height_m, pitch_rad, until_s=self.forever(), lease=self.lease)
 
-    def _sits(self) -> bool:
-        command = self._sit_command
-        return command is not None and self.robot.command_status(command).state is CommandState.DONE
+    def at_rest(self, command: CommandId) -> bool:
+        """Returns whether a posture is reached: exactly, or as far as the load on the arm lets the body go."""
+        still_s = self.clock.now() - self._still_since_s
+        return self.robot.command_status(command).state is CommandState.DONE or still_s > _STILL_S
+
+    def _sits(self, height_m: float) -> bool:
+        """Returns whether the robot sits, after it has measured the height of its body."""
+        if abs(height_m - self._still_at_m) > _STILL_M:
+            self._still_at_m, self._still_since_s = height_m, self.clock.now()
+        return self._sit_command is not None and self.at_rest(self._sit_command)
 
     # -- sensing -----------------------------------------------------------------------------------------------------
 
@@ -284,7 +302,7 @@ class Computer:
             self.robot.scan(),
             self.robot.faults(),
             self.motors,
-            self._sits(),
+            self._sits(float(odometry.X_OB.translation()[2])),
             self._frames(odometry, joints),
         )
 

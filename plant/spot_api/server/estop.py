@@ -63,7 +63,7 @@ class EstopService(Service):
             self._held["tablet"] = _Held(endpoint, estop_pb2.ESTOP_LEVEL_NONE, own=True)
 
     def level(self) -> int:
-        """The level that counts for the robot, the strictest of all endpoints; cut if there are none or one is missing."""
+        """The level that counts for the robot, the strictest of all endpoints; cut if one is missing, or all are."""
         now_s = time.monotonic()
         with self._lock:
             if not self._config.endpoints or len(self._held) < len(self._config.endpoints):

@@ -129,7 +129,7 @@ class LeaseService(Service):
             made.status = Result.STATUS_WRONG_EPOCH
             return made
         covered = set(leaves(lease.resource))
-        wanted = [part for part in (parts or sorted(covered))]
+        wanted = list(parts) or sorted(covered)
         if not covered.issuperset(wanted):
             made.status = Result.STATUS_INVALID_LEASE
             return made
@@ -180,12 +180,12 @@ class LeaseService(Service):
         """Judges a lease for one smallest part."""
         claim = self._claims.get(leaf)
         if claim is None:
-            return Result.STATUS_REVOKED if leaf in self._freed else Result.STATUS_INVALID_LEASE
+            return int(Result.STATUS_REVOKED if leaf in self._freed else Result.STATUS_INVALID_LEASE)
         newest, given = list(claim.lease.sequence), list(lease.sequence)
         if given[0] > newest[0]:
-            return Result.STATUS_INVALID_LEASE
+            return int(Result.STATUS_INVALID_LEASE)
         shorter = min(len(newest), len(given))
-        return Result.STATUS_OK if given[:shorter] >= newest[:shorter] else Result.STATUS_OLDER
+        return int(Result.STATUS_OK if given[:shorter] >= newest[:shorter] else Result.STATUS_OLDER)
 
     def _describe(self, made: Any, resource: str, with_lease: bool) -> None:
         claims = [self._claims[leaf] for leaf in leaves(resource) if leaf in self._claims]

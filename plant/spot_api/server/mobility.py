@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform
 
 from plant.spot_api.server.computer import Computer, Snapshot
 from plant.spot_api.server.messages import InvalidRequestError, finite, seconds, transform
-from skills.robot import CommandState, FloatArray, Pose2D
+from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
 Feedback = mobility_command_pb2.MobilityCommand.Feedback
@@ -103,7 +103,7 @@ class Stand(BaseMotion):
 
     def tick(self, computer: Computer) -> None:
         """Reports whether the robot stands."""
-        done = computer.robot.command_status(self._command).state is not CommandState.RUNNING
+        done = computer.at_rest(self._command)
         part = basic_command_pb2.StandCommand.Feedback
         self.feedback = self._made(
             part(

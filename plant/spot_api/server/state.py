@@ -1,4 +1,4 @@
-"""What clients read: the robot's state, its hardware, pictures, point clouds, objects, and services that only answer."""
+"""What clients read: state, hardware, pictures, point clouds, objects; and services that only answer."""
 
 from __future__ import annotations
 
@@ -95,8 +95,10 @@ class RobotStateService(Service):
         return made
 
     def GetRobotLinkModel(self, request: Any, _call: Call) -> Any:
-        """Refuses: the looks of the maker's robot are not ours to give."""
-        raise InvalidRequestError(f"link_name: there is no mesh of {request.link_name!r}")
+        """Returns an empty mesh: the looks of the maker's robot are not ours to give."""
+        made = robot_state_pb2.RobotLinkModelResponse()
+        made.link_model.file_name, made.link_model.file_contents = f"{request.link_name}.obj", "# no mesh\n"
+        return made
 
     def _power(self, state: Any, snapshot: Snapshot) -> None:
         charge, stamp = 100.0 * snapshot.battery.charge, timestamp(snapshot.time_s)
@@ -176,17 +178,21 @@ def kinematic_state(snapshot: Snapshot) -> Any:
 class _Source:
     """One source of the image service: a camera, its picture or its depth, and how pictures are coded."""
 
-    def __init__(self, name: str, camera: CameraCapabilities, *, depth: bool, coloured: bool) -> None:
-        self.name, self.camera, self.depth, self.coloured = name, camera, depth, coloured
+    def __init__(self, name: str, camera: CameraCapabilities, *, coloured: bool = False) -> None:
+        self.name, self.camera, self.coloured = name, camera, coloured
+        self.depth = "_depth" in name
+        self._as_picture = name.endswith("_frame")
 
     def intrinsics(self, image: Image) -> Intrinsics:
-        return image.depth_intrinsics if self.depth else image.intrinsics
+        return image.depth_intrinsics if self.depth and not self._as_picture else image.intrinsics
 
     def pixels(self, image: Image) -> NDArray[Any]:
-        """Depth (H, W) in mm as uint16, or the picture (H, W) or (H, W, 3) RGB."""
-        if self.depth:
-            return np.clip(np.nan_to_num(image.depth_m, posinf=0.0) * 1000.0, 0.0, 65535.0).astype(np.uint16)
-        return image.grey if image.colour is None else image.colour
+        """Depth (H, W) in mm as uint16, perhaps with the picture's size, or the picture (H, W) or (H, W, 3) RGB."""
+        if not self.depth:
+            return image.grey if image.colour is None else image.colour
+        depth: NDArray[Any] = np.clip(np.nan_to_num(image.depth_m, posinf=0.0) * 1000.0, 0.0, 65535.0).astype(np.uint16)
+        size = (image.intrinsics.width, image.intrinsics.height)
+        return np.asarray(cv2.resize(depth, size, interpolation=cv2.INTER_NEAREST)) if self._as_picture else depth
 
 
 def _sources(cameras: tuple[CameraCapabilities, ...]) -> Mapping[str, _Source]:
@@ -194,14 +200,11 @@ def _sources(cameras: tuple[CameraCapabilities, ...]) -> Mapping[str, _Source]:
     made: list[_Source] = []
     for camera in cameras:
         if camera.source == "hand":
-            made.append(_Source("hand_color_image", camera, depth=False, coloured=True))
-            made.append(_Source("hand_image", camera, depth=False, coloured=False))
-            made.append(_Source("hand_depth", camera, depth=True, coloured=False))
-            made.append(_Source("hand_depth_in_hand_color_frame", camera, depth=True, coloured=False))
+            made.append(_Source("hand_color_image", camera, coloured=True))
+            made += [_Source(name, camera) for name in ("hand_image", "hand_depth", "hand_depth_in_hand_color_frame")]
         else:
-            made.append(_Source(f"{camera.source}_fisheye_image", camera, depth=False, coloured=False))
-            made.append(_Source(f"{camera.source}_depth", camera, depth=True, coloured=False))
-            made.append(_Source(f"{camera.source}_depth_in_visual_frame", camera, depth=True, coloured=False))
+            kinds = ("fisheye_image", "depth", "depth_in_visual_frame")
+            made += [_Source(f"{camera.source}_{kind}", camera) for kind in kinds]
     return {source.name: source for source in made}
 
 

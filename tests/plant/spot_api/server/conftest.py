@@ -1,0 +1,89 @@
+"""A server with a scripted robot, stepped in a thread, and the SDK's robot logged in to it."""
+
+import os
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import pytest
+
+pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
+
+import bosdyn.client
+from bosdyn.client.lease import LeaseKeepAlive
+from bosdyn.client.robot_command import RobotCommandClient, blocking_stand
+from bosdyn.client.robot_state import RobotStateClient
+
+from plant.robots.spot.kind import spot_capabilities
+from plant.spot_api.server.computer import Pace
+from plant.spot_api.server.server import Options, SpotServer
+from skills.manipulation.arm.kinematics import arm_model
+from skills.testing.blocks import Block
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
+
+USER, PASSWORD = "user", "right"
+
+
+@dataclass
+class Served:
+    """A running server, its scripted robot, and a way to log in."""
+
+    server: SpotServer
+    scripted: ScriptedRobot
+
+    def login(self, password: str = PASSWORD) -> bosdyn.client.Robot:
+        sdk = bosdyn.client.create_standard_sdk("test", cert_resource_glob=str(self.server.certificate))
+        robot = sdk.create_robot("127.0.0.1")
+        robot.update_secure_channel_port(self.server.port)
+        robot.authenticate(USER, password)
+        return robot
+
+
+@pytest.fixture(scope="session")
+def credentials(tmp_path_factory):
+    return SpotServer.credentials(tmp_path_factory.mktemp("credentials"))
+
+
+@pytest.fixture
+def served(credentials) -> Iterator[Served]:
+    clock = VirtualClock()
+    scripted = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[Block(3.0, -2.0, 3.2, 2.0)])
+    solver = arm_model(spot_capabilities())
+    server = SpotServer(scripted, clock, solver, credentials, Options({USER: PASSWORD}, pace=Pace.REAL))
+    stopping = threading.Event()
+    stepping = threading.Thread(target=server.computer.run, args=(stopping,))
+    with server.running():
+        stepping.start()
+        yield Served(server, scripted)
+        stopping.set()
+        stepping.join()
+
+
+@dataclass
+class Spot:
+    """The SDK's robot with its clients, standing with motors on."""
+
+    robot: bosdyn.client.Robot
+    commands: RobotCommandClient
+    states: RobotStateClient
+    served: Served
+
+    @property
+    def tree(self):
+        return self.states.get_robot_state().kinematic_state.transforms_snapshot
+
+
+@pytest.fixture
+def spot(served) -> Iterator[Spot]:
+    robot = served.login()
+    robot.time_sync.wait_for_sync(timeout_sec=5.0)
+    with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_exit=True):
+        robot.power_on(timeout_sec=10, update_frequency=20.0)
+        commands = robot.ensure_client("robot-command")
+        blocking_stand(commands, timeout_sec=5.0, update_frequency=20.0)
+        yield Spot(robot, commands, robot.ensure_client("robot-state"), served)
+    robot.time_sync.stop()
+
+
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")

@@ -1,0 +1,229 @@
+"""Motion commands of the SDK, and the answer to each that cannot be done.
+
+motors off            not powered on         frame unknown         unknown frame
+clock not synchronised  no time sync         part not simulated    unsupported
+end time past         expired                NaN                   invalid request
+end time an hour on   too distant            lease taken           the robot stops
+"""
+
+import math
+import time
+
+import bosdyn.client.robot_command as rc
+import pytest
+from bosdyn.api import (
+    arm_command_pb2,
+    basic_command_pb2,
+    geometry_pb2,
+    mobility_command_pb2,
+    robot_command_pb2,
+    synchronized_command_pb2,
+)
+from bosdyn.client.exceptions import InvalidRequestError
+from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
+from bosdyn.client.math_helpers import SE3Pose
+from bosdyn.client.robot_command import RobotCommandBuilder as Build
+from bosdyn.geometry import EulerZXY
+
+from plant.spot_api.server.messages import timestamp
+
+Progress = basic_command_pb2.RobotCommandFeedbackStatus
+
+
+def wait_until(true, seconds=5.0):
+    """Waits until a condition holds; returns whether it did in time."""
+    until = time.monotonic() + seconds
+    while not true() and time.monotonic() < until:
+        time.sleep(0.02)
+    return true()
+
+
+def sent(spot, command, ahead_s=5.0):
+    return spot.commands.robot_command(command, end_time_secs=time.time() + ahead_s)
+
+
+def base_feedback(spot, command_id):
+    return spot.commands.robot_command_feedback(command_id).feedback.synchronized_feedback.mobility_command_feedback
+
+
+def test_a_velocity_is_driven_until_its_end(spot):
+    command = sent(spot, Build.synchro_velocity_command(0.5, 0.0, 0.0), ahead_s=1.0)
+    assert wait_until(lambda: base_feedback(spot, command).status == Progress.STATUS_COMMAND_TIMED_OUT)
+    x_m = get_odom_tform_body(spot.tree).x
+    assert x_m == pytest.approx(0.5, abs=0.08)
+    time.sleep(0.2)
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(x_m, abs=0.01)
+
+
+def test_a_pose_is_driven_to(spot):
+    command = sent(spot, Build.synchro_se2_trajectory_point_command(0.4, 0.2, 0.5, "odom"))
+    assert rc.block_for_trajectory_cmd(spot.commands, command, timeout_sec=5.0, feedback_interval_secs=0.05)
+    body = get_odom_tform_body(spot.tree)
+    assert (body.x, body.y, body.rot.to_yaw()) == pytest.approx((0.4, 0.2, 0.5), abs=0.04)
+
+
+def test_a_pose_in_the_body_frame_stays_where_it_was(spot):
+    command = Build.synchro_trajectory_command_in_body_frame(0.3, 0.0, 0.0, spot.tree)
+    assert rc.block_for_trajectory_cmd(spot.commands, sent(spot, command), timeout_sec=5.0, feedback_interval_secs=0.05)
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(0.3, abs=0.04)
+
+
+def test_a_later_command_overrides_an_earlier_one(spot):
+    first = sent(spot, Build.synchro_velocity_command(0.2, 0.0, 0.0))
+    sent(spot, Build.stop_command())
+    assert wait_until(lambda: base_feedback(spot, first).status == Progress.STATUS_COMMAND_OVERRIDDEN)
+    x_m = get_odom_tform_body(spot.tree).x
+    time.sleep(0.2)
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(x_m, abs=0.005)
+
+
+def test_the_body_stands_at_the_height_and_pitch_asked_for(spot):
+    rc.blocking_stand(
+        spot.commands,
+        timeout_sec=5.0,
+        update_frequency=20.0,
+        params=Build.mobility_params(body_height=-0.05, footprint_R_body=EulerZXY(pitch=0.2)),
+    )
+    assert spot.served.scripted.height_m == pytest.approx(0.47, abs=0.01)
+    assert spot.served.scripted.pitch_rad == pytest.approx(0.2, abs=0.02)
+
+
+def test_the_arm_goes_to_its_named_positions(spot):
+    for build, position in ((Build.arm_ready_command, 1.8), (Build.arm_stow_command, 3.06)):
+        rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(build()), timeout_sec=8.0)
+        assert spot.served.scripted.q_rad[2] == pytest.approx(position, abs=0.05)
+
+
+def test_the_hand_goes_to_a_pose(spot):
+    command = Build.arm_pose_command(0.75, 0.1, 0.3, 1.0, 0.0, 0.0, 0.0, "body", 1.0)
+    assert rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(command), timeout_sec=8.0)
+    hand = get_a_tform_b(spot.tree, "body", "hand")
+    assert (hand.x, hand.y, hand.z) == pytest.approx((0.75, 0.1, 0.3), abs=0.01)
+
+
+def test_a_pose_out_of_reach_is_stalled_and_moves_nothing(spot):
+    before = spot.served.scripted.q_rad.copy()
+    command = spot.commands.robot_command(Build.arm_pose_command(2.0, 0.0, 0.3, 1.0, 0.0, 0.0, 0.0, "body", 1.0))
+    stalled = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_STALLED
+
+    def status():
+        found = spot.commands.robot_command_feedback(command).feedback.synchronized_feedback
+        return found.arm_command_feedback.arm_cartesian_feedback.status
+
+    assert wait_until(lambda: status() == stalled)
+    assert spot.served.scripted.q_rad == pytest.approx(before, abs=1e-6)
+
+
+def test_joints_pass_their_postures_at_the_times_asked_for(spot):
+    rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(Build.arm_ready_command()), timeout_sec=8.0)
+    ready = [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]
+    postures = [[0.2 * k, *ready[1:]] for k in (1, 2, 3)]
+    began = time.monotonic()
+    command = Build.arm_joint_move_helper(joint_positions=postures, times=[0.5, 1.0, 1.5])
+    assert rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(command), timeout_sec=8.0)
+    assert spot.served.scripted.q_rad[0] == pytest.approx(0.6, abs=0.04)
+    assert 1.3 < time.monotonic() - began < 2.5
+
+
+def test_the_gripper_opens_by_a_share(spot):
+    spot.commands.robot_command(Build.claw_gripper_open_fraction_command(0.5))
+    assert wait_until(lambda: abs(spot.states.get_robot_state().manipulator_state.gripper_open_percentage - 50.0) < 4.0)
+
+
+def test_arm_and_base_move_together_and_report_apart(spot):
+    command = Build.build_synchro_command(Build.arm_ready_command(), Build.synchro_velocity_command(0.2, 0.0, 0.0))
+    found = spot.commands.robot_command_feedback(sent(spot, command, 1.0)).feedback.synchronized_feedback
+    assert found.HasField("arm_command_feedback")
+    assert found.HasField("mobility_command_feedback")
+    assert not found.HasField("gripper_command_feedback")
+
+
+def test_safe_power_off_sits_and_switches_the_motors_off(spot):
+    spot.robot.power_off(cut_immediately=False, timeout_sec=10, update_frequency=20.0)
+    assert not spot.robot.is_powered_on()
+    assert spot.served.scripted.height_m < 0.3
+    with pytest.raises(rc.NotPoweredOnError):
+        sent(spot, Build.synchro_velocity_command(0.1, 0.0, 0.0))
+
+
+def test_a_taken_lease_stops_the_robot_and_ends_the_earlier_one(spot):
+    sent(spot, Build.synchro_velocity_command(0.3, 0.0, 0.0))
+    spot.served.login().ensure_client("lease").take("body")
+    assert wait_until(lambda: not any(spot.served.scripted.velocity))
+    with pytest.raises(rc.ResponseError):
+        sent(spot, Build.synchro_velocity_command(0.1, 0.0, 0.0))
+
+
+def test_an_estop_cuts_the_motors(spot):
+    estop = spot.served.server.computer.estop
+    estop._held["tablet"].level = 1
+    assert wait_until(lambda: not spot.robot.is_powered_on())
+
+
+def raw(spot, request, *, clock=None):
+    """Sends a mobility request past the builders of the SDK."""
+    command = robot_command_pb2.RobotCommand(
+        synchronized_command=synchronized_command_pb2.SynchronizedCommand.Request(mobility_command=request)
+    )
+    lease = spot.robot.lease_wallet.get_lease("body").create_newer().lease_proto
+    message = robot_command_pb2.RobotCommandRequest(
+        lease=spot.robot.lease_wallet.advance("body").lease_proto if lease else None,
+        command=command,
+        clock_identifier=clock or spot.robot.time_sync.endpoint.clock_identifier,
+    )
+    message.header.client_name = "test"
+    return spot.commands._stub.RobotCommand(message)
+
+
+def velocity(end_s, frame="body", x=0.1):
+    return mobility_command_pb2.MobilityCommand.Request(
+        se2_velocity_request=basic_command_pb2.SE2VelocityCommand.Request(
+            end_time=timestamp(end_s),
+            se2_frame_name=frame,
+            velocity=geometry_pb2.SE2Velocity(linear=geometry_pb2.Vec2(x=x)),
+        )
+    )
+
+
+Status = robot_command_pb2.RobotCommandResponse
+
+
+@pytest.mark.parametrize(
+    ("request_of", "clock", "status", "said"),
+    [
+        (lambda now: velocity(now - 1.0), None, Status.STATUS_EXPIRED, "1.0"),
+        (lambda now: velocity(now + 3600.0), None, Status.STATUS_TOO_DISTANT, "at most 600 s"),
+        (lambda now: velocity(now + 1.0, frame="moon"), None, Status.STATUS_UNKNOWN_FRAME, "moon"),
+        (lambda now: velocity(now + 1.0, x=math.nan), None, Status.STATUS_INVALID_REQUEST, "linear.x is nan"),
+        (lambda now: velocity(now + 1.0), "unknown clock", Status.STATUS_NO_TIMESYNC, "clock"),
+        (
+            lambda now: mobility_command_pb2.MobilityCommand.Request(
+                follow_arm_request=basic_command_pb2.FollowArmCommand.Request()
+            ),
+            None,
+            Status.STATUS_UNSUPPORTED,
+            "follow_arm_request",
+        ),
+        (lambda now: mobility_command_pb2.MobilityCommand.Request(), None, Status.STATUS_UNSUPPORTED, "no command"),
+    ],
+    ids=["expired", "too distant", "frame", "NaN", "clock", "unsupported", "empty"],
+)
+def test_a_command_that_cannot_be_done_says_why_and_moves_nothing(spot, request_of, clock, status, said):
+    answer = raw(spot, request_of(time.time()), clock=clock)
+    assert answer.status == status
+    assert said in answer.message
+    time.sleep(0.1)
+    assert not any(spot.served.scripted.velocity)
+
+
+def test_feedback_of_an_unknown_command_is_an_invalid_request(spot):
+    with pytest.raises(InvalidRequestError):
+        spot.commands.robot_command_feedback(4711)
+
+
+def test_the_camera_looks_at_a_point(spot):
+    target = SE3Pose(2.0, 0.5, 0.0, EulerZXY().to_quaternion())
+    command = Build.arm_gaze_command(target.x, target.y, target.z, "odom")
+    assert rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(command), timeout_sec=8.0)
+    hand_target = get_a_tform_b(spot.tree, "hand", "odom") * target
+    assert math.atan2(math.hypot(hand_target.y, hand_target.z), hand_target.x) < 0.1

@@ -1,0 +1,154 @@
+"""What clients read: state, pictures, points, objects."""
+
+import numpy as np
+import pytest
+from bosdyn.api import image_pb2, point_cloud_pb2, world_object_pb2
+from bosdyn.api.spot import inverse_kinematics_pb2
+from bosdyn.client.exceptions import InvalidRequestError
+from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
+from bosdyn.client.image import build_image_request, depth_image_to_pointcloud
+from bosdyn.client.inverse_kinematics import InverseKinematicsClient
+from bosdyn.client.math_helpers import SE3Pose
+from bosdyn.client.world_object import make_add_world_object_req, make_delete_world_object_req
+
+from plant.spot_api.server.state import api_joint
+
+
+@pytest.fixture
+def robot(served):
+    return served.login()
+
+
+def test_the_state_has_the_joints_and_frames_of_a_spot(robot):
+    state = robot.ensure_client("robot-state").get_robot_state()
+    names = {joint.name for joint in state.kinematic_state.joint_states}
+    assert {"arm0.sh0", "arm0.wr1"} <= names
+    tree = state.kinematic_state.transforms_snapshot
+    assert get_odom_tform_body(tree).z == pytest.approx(0.2, abs=0.35)
+    assert get_a_tform_b(tree, "arm0.link_wr1", "hand").x == pytest.approx(0.19557)
+    assert robot.has_arm()
+    assert not robot.is_powered_on()
+    assert not robot.is_estopped()
+
+
+@pytest.mark.parametrize(("ours", "theirs"), [("fl_hx", "fl.hx"), ("hr_kn", "hr.kn"), ("arm_f1x", "arm0.f1x")])
+def test_joints_have_the_names_of_the_api(ours, theirs):
+    assert api_joint(ours) == theirs
+
+
+def test_faults_of_the_robot_are_system_faults(served, robot):
+    served.scripted.present_faults = ("motor too hot",)
+    client = robot.ensure_client("robot-state")
+    faults = []
+    while not faults:
+        faults = client.get_robot_state().system_fault_state.faults
+    assert [fault.name for fault in faults] == ["motor too hot"]
+
+
+def test_hardware_names_the_links_and_the_description(robot):
+    hardware = robot.ensure_client("robot-state").get_robot_hardware_configuration()
+    assert "<robot" in hardware.skeleton.urdf
+    assert "arm0.link_wr1" in {link.name for link in hardware.skeleton.links}
+
+
+def test_every_source_that_is_listed_gives_a_picture_of_its_size(robot):
+    client = robot.ensure_client("image")
+    sources = {source.name: source for source in client.list_image_sources()}
+    assert {"hand_color_image", "hand_depth", "frontleft_fisheye_image", "back_depth_in_visual_frame"} <= set(sources)
+    for name, source in sources.items():
+        (answer,) = client.get_image_from_sources([name])
+        assert (answer.shot.image.cols, answer.shot.image.rows) == (source.cols, source.rows)
+        assert answer.shot.transforms_snapshot.child_to_parent_edge_map[answer.shot.frame_name_image_sensor]
+
+
+def test_depth_is_in_millimetres_and_makes_a_point_cloud(robot):
+    (answer,) = robot.ensure_client("image").get_image_from_sources(["frontleft_depth"])
+    assert answer.shot.image.pixel_format == image_pb2.Image.PIXEL_FORMAT_DEPTH_U16
+    depth = np.frombuffer(answer.shot.image.data, np.uint16)
+    assert len(depth) == answer.shot.image.rows * answer.shot.image.cols
+    assert answer.source.depth_scale == 1000.0
+    assert len(depth_image_to_pointcloud(answer)) == np.count_nonzero(depth)
+
+
+@pytest.mark.parametrize(
+    ("request_made", "status"),
+    [
+        (build_image_request("periscope"), image_pb2.ImageResponse.STATUS_UNKNOWN_CAMERA),
+        (
+            build_image_request("hand_color_image", resize_ratio=2.0),
+            image_pb2.ImageResponse.STATUS_UNSUPPORTED_RESIZE_RATIO_REQUESTED,
+        ),
+        (
+            build_image_request("hand_depth", pixel_format=image_pb2.Image.PIXEL_FORMAT_RGB_U8),
+            image_pb2.ImageResponse.STATUS_UNSUPPORTED_PIXEL_FORMAT_REQUESTED,
+        ),
+    ],
+)
+def test_a_picture_that_cannot_be_given_says_why(robot, request_made, status):
+    client = robot.ensure_client("image")
+    request = image_pb2.GetImageRequest(image_requests=[request_made])
+    request.header.client_name = "test"
+    assert client._stub.GetImage(request).image_responses[0].status == status
+
+
+def test_a_picture_is_made_smaller(robot):
+    (answer,) = robot.ensure_client("image").get_image([build_image_request("hand_color_image", resize_ratio=0.5)])
+    assert answer.shot.image.cols == answer.source.cols
+    assert answer.source.pinhole.intrinsics.principal_point.x == pytest.approx(answer.source.cols / 2, rel=0.1)
+
+
+def test_the_lidar_sees_the_wall_ahead(robot):
+    from bosdyn.client.point_cloud import PointCloudClient
+
+    robot.sync_with_directory()
+    robot.service_client_factories_by_type[PointCloudClient.service_type] = PointCloudClient
+    client = robot.ensure_client("velodyne-point-cloud")
+    (answer,) = client.get_point_cloud_from_sources(["velodyne-point-cloud"])
+    assert answer.point_cloud.encoding == point_cloud_pb2.PointCloud.ENCODING_XYZ_32F
+    points = np.frombuffer(answer.point_cloud.data, np.float32).reshape(-1, 3)
+    ahead = points[np.abs(points[:, 1]) < 0.2]
+    assert np.min(ahead[ahead[:, 0] > 0.0, 0]) == pytest.approx(3.0, abs=0.1)
+
+
+def test_objects_of_clients_are_added_and_deleted(robot):
+    client = robot.ensure_client("world-objects")
+    added = client.mutate_world_objects(make_add_world_object_req(world_object_pb2.WorldObject(name="crate")))
+    (listed,) = client.list_world_objects().world_objects
+    assert (listed.name, listed.id) == ("crate", added.mutated_object_id)
+    client.mutate_world_objects(make_delete_world_object_req(listed))
+    assert not client.list_world_objects().world_objects
+    answer = client.mutate_world_objects(make_delete_world_object_req(listed))
+    assert answer.status == world_object_pb2.MutateWorldObjectResponse.STATUS_INVALID_MUTATION_ID
+
+
+@pytest.mark.parametrize(("x_m", "reached"), [(0.75, True), (2.5, False)])
+def test_inverse_kinematics_says_what_is_in_reach(robot, x_m, reached):
+    Request = inverse_kinematics_pb2.InverseKinematicsRequest
+    robot.service_client_factories_by_type[InverseKinematicsClient.service_type] = InverseKinematicsClient
+    request = Request(
+        root_frame_name="body",
+        tool_pose_task=Request.ToolPoseTask(task_tform_desired_tool=SE3Pose(x_m, 0.0, 0.3, rot_identity()).to_proto()),
+    )
+    answer = robot.ensure_client("inverse-kinematics").inverse_kinematics(request)
+    assert (answer.status == inverse_kinematics_pb2.InverseKinematicsResponse.STATUS_OK) is reached
+    if reached:
+        assert len(answer.robot_configuration.joint_states) >= 6
+
+
+def rot_identity():
+    from bosdyn.client.math_helpers import Quat
+
+    return Quat()
+
+
+def test_inverse_kinematics_in_an_unknown_frame_is_an_invalid_request(robot):
+    Request = inverse_kinematics_pb2.InverseKinematicsRequest
+    request = Request(root_frame_name="moon", tool_pose_task=Request.ToolPoseTask())
+    with pytest.raises(InvalidRequestError):
+        robot.ensure_client("inverse-kinematics").inverse_kinematics(request)
+
+
+def test_comments_and_events_are_taken(robot):
+    robot.time_sync.wait_for_sync(timeout_sec=5.0)
+    robot.operator_comment("seen")
+    robot.time_sync.stop()

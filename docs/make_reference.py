@@ -21,6 +21,8 @@ from executive.tree.registry import built_in_skills
 from executive.tree.types import describe_type, field_types
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
+from plant.spot_api.server.calls import service_calls
+from plant.spot_api.server.server import LISTED, MOTIONS, SERVICES
 from plant.worlds.world import SeedRules
 from skills.api import Skill
 from skills.durations import DURATION_PATTERN
@@ -99,7 +101,22 @@ def pages() -> dict[str, str]:
     """The text of every page by file name."""
     written = {f"{page.name}.md": schema_page(page) for page in SCHEMA_PAGES}
     more = {"skills.md": skills_page(), "stack.md": stack_page(), "faults.md": faults_page(), "api.md": api_page(NOTE)}
-    return {**written, **more}
+    return {**written, **more, "spot-api.md": spot_api_page()}
+
+
+def spot_api_page() -> str:
+    """The page on the calls of Spot's API."""
+    rows = [
+        f"| `{service.name}` | {', '.join(f'`{call}`' for call in service_calls(service))} |" for service in SERVICES
+    ]
+    listed = ", ".join(f"`{name}`" for name in sorted(LISTED))
+    return (
+        f"{NOTE}# Calls of Spot's API\n\nCalls that [`errand serve`](../how-to/spot-sdk.md) answers, by service of the "
+        f"directory.\n\n| service | calls |\n|---|---|\n"
+        + "\n".join(rows)
+        + "\n\nThe directory also lists services whose "
+        f"calls answer `UNIMPLEMENTED`: {listed}.\n\nMotions: {MOTIONS}\n"
+    )
 
 
 def schema_page(page: SchemaPage) -> str:

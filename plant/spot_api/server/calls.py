@@ -50,6 +50,11 @@ def handlers(services: Sequence[Service], user_of: UserOf, now: Callable[[], flo
     return [*made, _OtherCalls()]
 
 
+def service_calls(service: type[Service]) -> tuple[str, ...]:
+    """Names of the API's calls that a service answers."""
+    return tuple(name for name in vars(service) if name[0].isupper() and callable(getattr(service, name)))
+
+
 class _ServiceHandler:
     """Handlers of the calls of one service."""
 

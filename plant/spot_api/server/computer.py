@@ -74,7 +74,7 @@ class Motors(Enum):
 
 
 class Pace(Enum):
-    """What drives the clock: wall time, or a client that steps it (for tests)."""
+    """Driver of the clock: wall time, or a client that steps it (for tests)."""
 
     REAL = "real"
     CLIENT = "client"

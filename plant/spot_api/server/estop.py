@@ -20,7 +20,7 @@ _SETTLE_S: Final = 3.0
 
 
 class Tablet(Enum):
-    """Whether an operator's tablet holds a released E-stop from the start."""
+    """Presence of an operator's tablet that holds a released E-stop from the start."""
 
     TABLET = "tablet"
     NONE = "none"
@@ -31,12 +31,12 @@ class _Held:
     """A registered endpoint: its last level, challenge and valid answer (s)."""
 
     endpoint: Any
-    level: int = estop_pb2.ESTOP_LEVEL_CUT
+    level: Any = estop_pb2.ESTOP_LEVEL_CUT
     challenge: int = 0
     answered_s: float = float("-inf")
     own: bool = False
 
-    def effective_level(self, now_s: float) -> int:
+    def effective_level(self, now_s: float) -> Any:
         """The level that counts: a silent endpoint first settles the robot, then cuts the power."""
         silent_s = now_s - self.answered_s
         timeout_s = seconds(self.endpoint.timeout)
@@ -68,7 +68,7 @@ class EstopService(Service):
         with self._lock:
             if not self._config.endpoints or len(self._held) < len(self._config.endpoints):
                 return int(estop_pb2.ESTOP_LEVEL_CUT)
-            return min(held.effective_level(now_s) for held in self._held.values())
+            return int(min(held.effective_level(now_s) for held in self._held.values()))
 
     # -- the API's calls --------------------------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Who the robot is and who may call it: certificate, users and tokens, directory, identity, licence and clock."""
+"""Identity of the robot and of those who call it: certificate, users and tokens, directory, licence and clock."""
 
 from __future__ import annotations
 

@@ -82,7 +82,7 @@ class LeaseService(Service):
         return Response(status=Response.STATUS_OK, lease=lease, lease_owner=owner)
 
     def TakeLease(self, request: Any, call: Call) -> Any:
-        """Gives a lease on a resource, whoever claims it."""
+        """Gives a lease on a resource, also while another client claims it."""
         Response, resource = lease_pb2.TakeLeaseResponse, request.resource
         if not _exists(resource):
             return Response(status=Response.STATUS_INVALID_RESOURCE)

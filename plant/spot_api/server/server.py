@@ -12,7 +12,7 @@ from typing import Final
 
 import grpc
 
-from plant.spot_api.server import identity, state
+from plant.spot_api.server import identity, pictures, state
 from plant.spot_api.server.calls import Service, handlers
 from plant.spot_api.server.commands import PowerService, RobotCommandService
 from plant.spot_api.server.computer import Computer, Pace, Solver
@@ -47,6 +47,33 @@ LISTED: Final[Mapping[str, str]] = {
     "spot-check": "bosdyn.api.spot.SpotCheckService",
 }
 """Services of a real Spot that are in the directory, and whose calls answer UNIMPLEMENTED."""
+SERVICES: Final[tuple[type[Service], ...]] = (
+    identity.AuthService,
+    identity.RobotIdService,
+    identity.DirectoryService,
+    identity.DirectoryRegistrationService,
+    identity.LicenseService,
+    identity.TimeSyncService,
+    EstopService,
+    LeaseService,
+    PowerService,
+    RobotCommandService,
+    state.RobotStateService,
+    pictures.ImageService,
+    pictures.PointCloudService,
+    state.InverseKinematicsService,
+    state.WorldObjectService,
+    state.FaultService,
+    state.PayloadService,
+    state.DataBufferService,
+)
+"""Services that are served."""
+MOTIONS: Final = (
+    "stand with height and pitch, sit, velocity, trajectory of poses, stance, stop, freeze, safe power off, "
+    "self-right; the arm's joint moves, named positions, Cartesian moves, gaze, velocity and stop; the gripper. Others "
+    "are refused as unsupported."
+)
+"""The motions of `RobotCommand`, in words."""
 _DESCRIBED_IN: Final = (
     *("auth", "data_buffer", "directory_registration", "directory", "estop", "fault", "image", "lease", "license"),
     *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
@@ -112,7 +139,7 @@ class SpotServer:
             PowerService(computer, leases),
             RobotCommandService(computer, leases, clocks),
             state.RobotStateService(computer),
-            state.ImageService(computer),
+            pictures.ImageService(computer),
             state.WorldObjectService(),
             state.FaultService(),
             state.PayloadService(),
@@ -121,7 +148,7 @@ class SpotServer:
         if computer.solver is not None:
             served.append(state.InverseKinematicsService(computer))
         if computer.capabilities.lidar_height_m is not None:
-            served.append(state.PointCloudService(computer))
+            served.append(pictures.PointCloudService(computer))
         known = [(service.name, service.type, service.authority) for service in served]
         own = (identity.DirectoryService, identity.DirectoryRegistrationService)
         known += [(each.name, each.type, each.authority) for each in own]

@@ -1,0 +1,71 @@
+"""`errand serve` and `errand sdk`.
+
+SDK missing      one line that names the extra, exit 2
+program missing  one line that names it, exit 2
+program ends     its exit code
+"""
+
+import sys
+from importlib import util
+
+import pytest
+from typer.testing import CliRunner
+
+from executive.cli import spot_command
+from executive.cli.entry import app
+
+PROGRAM = """
+import os, sys, time
+import bosdyn.client, bosdyn.client.util
+from bosdyn.client.frame_helpers import get_odom_tform_body
+from bosdyn.client.lease import LeaseKeepAlive
+from bosdyn.client.robot_command import RobotCommandBuilder, block_for_trajectory_cmd, blocking_stand
+from beside import GOAL_M
+
+robot = bosdyn.client.create_standard_sdk("walk").create_robot(sys.argv[1])
+bosdyn.client.util.authenticate(robot)
+robot.time_sync.wait_for_sync()
+commands, states = robot.ensure_client("robot-command"), robot.ensure_client("robot-state")
+with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_exit=True):
+    robot.power_on(timeout_sec=20)
+    blocking_stand(commands, timeout_sec=10)
+    command = RobotCommandBuilder.synchro_se2_trajectory_point_command(GOAL_M, 0.0, 0.0, "odom")
+    sent = commands.robot_command(command, end_time_secs=time.time() + 20)
+    assert block_for_trajectory_cmd(commands, sent, timeout_sec=20)
+    x_m = get_odom_tform_body(states.get_robot_state().kinematic_state.transforms_snapshot).x
+    (picture,) = robot.ensure_client("image").get_image_from_sources(["hand_color_image"])
+    robot.power_off(cut_immediately=False, timeout_sec=20)
+print("walked", round(x_m, 1), picture.shot.image.cols)
+sys.exit(7)
+"""
+
+
+def test_without_the_sdk_the_extra_is_named(monkeypatch, tmp_path):
+    found = util.find_spec
+    monkeypatch.setattr(spot_command, "find_spec", lambda name: None if name == "bosdyn" else found(name))
+    result = CliRunner().invoke(app, ["serve"])
+    assert result.exit_code == 2
+    assert "pip install 'spot-errand[spot]'" in result.output
+
+
+def test_a_program_that_is_not_there_is_named(tmp_path):
+    result = CliRunner().invoke(app, ["sdk", str(tmp_path / "none.py"), "127.0.0.1"])
+    assert result.exit_code == 2
+    assert "none.py: there is no such program" in result.output
+
+
+@pytest.mark.mission
+def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd):
+    pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
+    (tmp_path / "beside.py").write_text("GOAL_M = 0.5\n")
+    program = tmp_path / "walk.py"
+    program.write_text(PROGRAM)
+    result = CliRunner().invoke(app, ["sdk", "--seed", "2", str(program), "127.0.0.1"])
+    said = capfd.readouterr().out
+    assert (result.exit_code, "walked 0.5 640" in said) == (7, True), said + result.output
+
+
+def test_nothing_but_the_server_loads_the_sdk():
+    before = {name for name in sys.modules if name.startswith("bosdyn")}
+    CliRunner().invoke(app, ["sdk", "--help"])
+    assert {name for name in sys.modules if name.startswith("bosdyn")} == before

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 7769,
     "executive/speech": 1588,
     "executive/mission": 1598,
-    "executive/tree": 7790,
+    "executive/tree": 7794,
     "executive/run": 3094,
     "executive/record": 1380,
     "executive/store": 1681,

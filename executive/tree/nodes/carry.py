@@ -80,7 +80,7 @@ def put_down_plan(builder: PlanBuilder, item: ObjectKind, place: str) -> tuple[N
         )
     to = f"to the {place}"
     each = tuple(_put_on_plan(builder.at(name), item, name, to) for name in surfaces)
-    put = builder.node("selector", f"put {item} down {place_phrase(builder.knowledge, place)}", *each)
+    put = builder.node("selector", f"put the {item} down {place_phrase(builder.knowledge, place)}", *each)
     return put, tuple(guard for plan in each for guard in plan.children)
 
 
@@ -89,7 +89,7 @@ def _put_on_plan(builder: PlanBuilder, item: ObjectKind, surface: str, to: str) 
     view, carry = pose_2d(builder.knowledge.surfaces[surface].viewpoints[0]), builder.at("carry")
     place = builder.skill("place", {"surface": builder.surface(surface)}, _released(builder, "place"))
     return builder.sequence(
-        f"put it on {surface}",
+        f"put it on the {surface}",
         _holding(carry, item, to, go_near_plan(carry, view, f"the {surface}")),
         _holding(builder.at("put"), item, to, place, until_put_down=True),
     )
@@ -116,7 +116,7 @@ def _holding(
 ) -> NodeSpec:
     """Guards nodes below while the gripper holds the item, or until it puts the item down."""
     condition = Holds(str(item), to, until_put_down, builder.search_classes(item.name), item.attributes)
-    return builder.node("guard", f"holding {item}", below, condition=condition)
+    return builder.node("guard", f"holding the {item}", below, condition=condition)
 
 
 def goal_in_words(builder: PlanBuilder, goal: str) -> str:
@@ -305,7 +305,7 @@ def recover_fallen_plan(
     missed = (replace(MISSED, node=skill.path_id) for skill in hands_on)
     lost = Recovery((*dropped, *missed), uses=builder.pick_ups)
     recovery = _pick_up_again_plan(builder.at("again"), item, to)
-    return builder.recover(f"carry {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
+    return builder.recover(f"carry the {item}", carry, (recovery, lost), attempts=builder.pick_ups + 1)
 
 
 def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> NodeSpec:
@@ -335,9 +335,9 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
     stand_back = back.node("selector", "stand back", back.skill("back_off", ports), stay)
     look = _look_plan(builder, item, keys)
     pick_up = pick_up_plan(builder, item, look, keys["detection"], FromBoard(keys["around"]))
-    take = builder.at("take").sequence(f"take {item} from where it lies", stand_back, pick_up)
-    have = builder.node("selector", f"have {item} again", held_plan(builder, item), take, part="have")
-    return builder.sequence(f"pick {item} up again", fell, free, have)
+    take = builder.at("take").sequence(f"take the {item} from where it lies", stand_back, pick_up)
+    have = builder.node("selector", f"have the {item} again", held_plan(builder, item), take, part="have")
+    return builder.sequence(f"pick the {item} up again", fell, free, have)
 
 
 def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> NodeSpec:
@@ -355,7 +355,7 @@ def _look_plan(builder: PlanBuilder, item: ObjectKind, keys: dict[str, str]) -> 
     spot = [detect_plan(builder.at("spot"), item, floor, detection, {"expected_W": FromBoard(keys["spot"])})]
     return builder.node(
         "selector",
-        f"find {item} where it fell",
+        f"find the {item} where it fell",
         *(spot if knows_spot else []),
         detect_plan(builder, item, floor, detection),
         _near_plan(builder.at("near"), item, detection),
@@ -380,4 +380,4 @@ def _near_plan(builder: PlanBuilder, item: ObjectKind, detection: str) -> NodeSp
         otherwise="there is only the floor",
     )
     look = detect_plan(builder, item, FromBoard(near), detection)
-    return builder.sequence(f"look for {item} on the surfaces near", surfaces, look)
+    return builder.sequence(f"look for the {item} on the surfaces near", surfaces, look)

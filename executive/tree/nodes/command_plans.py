@@ -141,10 +141,11 @@ def grasp_plan(builder: PlanBuilder, *, anywhere: bool = True) -> NodeSpec:
     if not builder.in_gripper:
         held = known_held_plan(builder.at("have"), item)
         alone = HoldsNothingElse(str(item), builder.search_classes(item.name), item.attributes)
-        get = builder.node("guard", f"get {item} with an empty gripper", get, part="empty-handed", condition=alone)
-        have = builder.node("selector", f"have {item}, or get it", held, get, part="have")
-        return builder.sequence(f"get {item} {place_phrase(builder.knowledge, place)}", have)
-    return builder.node("selector", f"have {item}", held_plan(builder, item), builder.at("get").sequence("get it", get))
+        get = builder.node("guard", f"get the {item} with an empty gripper", get, part="empty-handed", condition=alone)
+        have = builder.node("selector", f"have the {item}, or get it", held, get, part="have")
+        return builder.sequence(f"get the {item} {place_phrase(builder.knowledge, place)}", have)
+    get = builder.at("get").sequence("get it", get)
+    return builder.node("selector", f"have the {item}", held_plan(builder, item), get)
 
 
 def go_plan(builder: PlanBuilder) -> NodeSpec:
@@ -216,7 +217,7 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
         get_one = replace(trip.at("get"), command=replace(get, object_count=1))
         bring_one = replace(trip.at("bring"), command=replace(bring, item_count=1, object_count=1))
         trips.append(trip.sequence(f"trip {number}", grasp_plan(get_one, anywhere=False), carry_plan(bring_one)))
-    return builder.sequence(f"bring {count_of(count, str(item))} to {goal}, one at a time", *trips)
+    return builder.sequence(f"bring {count_of(count, str(item))} to the {goal}, one at a time", *trips)
 
 
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {

@@ -92,7 +92,7 @@ def pick_up_plan(
     grasp = builder.skill("grasp", inputs, outputs)
     tuck = _tucked(builder, item)
     steps = (approach, grasp, tuck) if seen else (search, approach, grasp, tuck)
-    attempt = builder.at("pick-up").sequence(f"pick up {item}", *steps)
+    attempt = builder.at("pick-up").sequence(f"pick up the {item}", *steps)
     around, beside = builder.at("around"), builder.at("aside")
     work = {
         "have it": known_held_plan(builder.at("in-hand"), item),
@@ -151,4 +151,4 @@ def known_held_plan(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
 
 def _tucked(builder: PlanBuilder, item: ObjectKind) -> NodeSpec:
     """Draws the arm in under a guard that the gripper holds the object."""
-    return builder.node("guard", f"holding {item}", tuck_plan(builder), part="held", condition=Holds(str(item)))
+    return builder.node("guard", f"holding the {item}", tuck_plan(builder), part="held", condition=Holds(str(item)))

@@ -169,7 +169,8 @@ def look_plans(
     plans = []
     for name in surfaces:
         for number, view in enumerate(builder.knowledge.surfaces[name].viewpoints, start=1):
-            below, title = builder.at(f"{name}-{number}"), f"look at {name}" + (f" ({number})" if number > 1 else "")
+            title = f"look at the {name} ({number})".removesuffix(" (1)")
+            below = builder.at(f"{name}-{number}")
             drive = below.navigate(pose_2d(view), f"the {name}")
             look = detect_plan(below, item, (name,), key, extra, tallied=tallied)
             plans.append((name, below.sequence(title, drive, look)))
@@ -256,7 +257,7 @@ def search_plan(
     looked = place_phrase(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")
     return builder.node(
         "selector",
-        f"find {item}",
+        f"find the {item}",
         find_again_plan(builder.at("again"), item, (*surfaces, *elsewhere), key),
         *_looks_at_last_known(builder.at("last-known"), item, key),
         *(look for _, look in looks),
@@ -300,7 +301,8 @@ def _looks_from_aside(
         if aside is not None:
             below = builder.at(f"{name}-aside")
             look = detect_plan(below, item, (name,), key)
-            yield below.sequence(f"look at {name} from aside", below.navigate(aside, f"the side of the {name}"), look)
+            drive = below.navigate(aside, f"the side of the {name}")
+            yield below.sequence(f"look at the {name} from aside", drive, look)
 
 
 def surfaces_first_known(builder: PlanBuilder, item: ObjectKind, place: str | None) -> tuple[str, ...]:
@@ -348,7 +350,8 @@ def find_plan(builder: PlanBuilder, answer_key: str | None = None) -> NodeSpec:
         surfaces = required_surfaces(builder, item, place)
         looks = look_plans(builder.at("search"), item, surfaces, key, extra, tallied=counting)
     below = builder.at("search")
-    search = below.node("round" if counting else "selector", f"look for {what}", *(look for _, look in looks))
+    title = f"look for {what if what == ANYTHING else asked}"
+    search = below.node("round" if counting else "selector", title, *(look for _, look in looks))
     leaves = {s: tuple(look.children[-1].path_id for name, look in looks if name == s) for s, _ in looks}
     tallies = {look.children[-1].path_id: tally_of(look.children[-1]) for _, look in looks if counting}
     spot = place_phrase(knowledge, place)

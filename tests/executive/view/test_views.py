@@ -37,8 +37,8 @@ def test_ascii_text_is_ascii(failed):
 
 def test_collapsed_view_hides_what_is_done_or_not_begun(failed):
     shown = to_rich(failed).plain
-    assert "look at counter" not in shown
-    assert "selector find drink" in shown
+    assert "look at the counter" not in shown
+    assert "selector find the drink" in shown
     assert "nodes)" in shown
 
 

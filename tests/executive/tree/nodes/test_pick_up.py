@@ -344,7 +344,7 @@ def test_a_dropped_object_that_is_not_found_is_a_failure(carrying, script):
     script.seen_on = ()
     worst = carrying(0.5)
     assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.EXECUTION)
-    assert worst.message.startswith("the coke was lost on the way to the bedroom; pick coke up again: ")
+    assert worst.message.startswith("the coke was lost on the way to the bedroom; pick the coke up again: ")
     assert "the coke is not found again where it fell: not seen" in worst.message
     assert script.begun[3:] == ["detect", "navigate", "detect", "navigate", "detect", "stow"]
 

@@ -19,7 +19,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import Estimate, RoutePlanner
 from executive.tree.node_view import node_view
 from executive.view.formats import to_svg
-from executive.view.text import DRAWN_NODES, fold_to
+from executive.view.text import DRAWN_NODES, readable
 from skills.files.errors import InputError
 
 MOST_LETTERS: Final = 300
@@ -49,7 +49,7 @@ class Checked:
         lines = [f"error: {error}" for error in self.errors] + [f"warning: {warning}" for warning in self.warnings]
         lines += [str(command) for tree in self.trees for command in tree.commands]
         lines += [f"about {taken.duration_s:.0f} s, {taken.distance_m:.0f} m of driving"] if self.ok else []
-        pictures = (to_svg(fold_to(node_view(tree.root), DRAWN_NODES)) for tree in self.trees)
+        pictures = (to_svg(readable(node_view(tree.root), DRAWN_NODES)) for tree in self.trees)
         return "".join(f"<p>{escape(line)}</p>" for line in lines) + "".join(pictures)
 
 

@@ -118,6 +118,7 @@ def test_a_keyword_argument_that_cannot_be_used_is_refused_by_name(field, value)
 def test_results_show_themselves_in_a_notebook():
     checked = executive.check("go to the kitchen", world="flat")
     assert all(each in checked._repr_html_() for each in ("Take [Nothing] to [kitchen]", "m of driving", "<svg"))
+    assert "STEP" in checked._repr_html_() and "battery" not in checked._repr_html_()
     assert "error: " in executive.check("go to the moon")._repr_html_()
     assert GO in executive.parse("go to the kitchen")._repr_html_()
     assert "moon" in executive.parse("go to the moon")._repr_html_()

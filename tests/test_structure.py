@@ -26,11 +26,11 @@ LINES = {
     "executive/view": 1556,
     "executive/testing": 811,
     "executive/app": 7585,
-    "executive/cli": 4554,
-    "skills": 27342,
-    "plant": 15644,
+    "executive/cli": 4607,
+    "skills": 27459,
+    "plant": 15772,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 482, 77, 10
+MODULES, ONE_IMPORTER, SAME_NAME = 484, 78, 10
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

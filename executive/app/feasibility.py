@@ -105,7 +105,7 @@ def abilities_in(world: World, kind: str = DEFAULT_KIND) -> Abilities:
     """Returns the abilities of a kind of robot in a world: imported models, people who take objects, full surfaces."""
     abilities = abilities_of(kind)
     masses, others = dict(abilities.masses_kg), {rule.model for rule in world.seed_rules.objects}
-    for name in sorted(others & set(world.imports)):
+    for name in sorted(world.own_objects.keys() | (others & world.imports.keys())):
         own = world.imports[name].object
         only = own.class_name not in others or own.class_name not in masses
         masses[own.class_name] = own.mass_kg if only else min(own.mass_kg, masses[own.class_name])

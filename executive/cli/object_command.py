@@ -1,15 +1,17 @@
-"""`errand object` imports a mesh as a model for worlds and missions, and shows imported models."""
+"""`errand object` imports a mesh or photographs as a model for worlds and missions, and shows imported models."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from executive.cli.number_options import quantity_argument, quantity_option
+from executive.cli.number_options import OutOfRangeError, quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
 from executive.cli.output import console_for, new_folder, print_json, writing
 from plant.models.catalogue import ImportedObject, read_imported
@@ -17,20 +19,53 @@ from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass, TagNumber, TagSize
 
-PICTURE_PX = (640, 480)
+if TYPE_CHECKING:
+    from plant.models.builder.importing import ImportOptions
 
-object_group = typer.Typer(name="object", help="Objects of your own, from any mesh.", rich_markup_mode=None)
+PICTURE_PX = (640, 480)
+_SIDES = re.compile(r"\s*x\s*".join([r"(\d{1,6}(?:\.\d{1,6})?)"] * 3) + r"\s*(mm|cm|m)?")
+_UNITS_M = {None: 0.001, "mm": 0.001, "cm": 0.01, "m": 1.0}
+_SIDES_M = (0.008, 0.6)
+"""Least and greatest side of an object that the robot can recognise."""
+
+_HELP = "Objects of your own, from any mesh or photographs."
+object_group = typer.Typer(name="object", help=_HELP, rich_markup_mode=None)
 
 
 @object_group.callback()
 def _group() -> None:
-    """Objects of your own, from any mesh."""
+    """Objects of your own, from any mesh or photographs."""
+
+
+def _sides_m(text: str) -> tuple[float, ...]:
+    """Returns width, depth and height (m) of a text like "80x80x95" (mm) or "8x8x9.5cm". Raises OutOfRangeError."""
+    match = _SIDES.fullmatch(text.strip().lower().replace("\N{MULTIPLICATION SIGN}", "x"))
+    sides = tuple(round(float(match[k]) * _UNITS_M[match[4]], 6) for k in (1, 2, 3)) if match else (0.0,)
+    if not _SIDES_M[0] <= min(sides) <= max(sides) <= _SIDES_M[1]:
+        limits = f"from {1e3 * _SIDES_M[0]:g} to {1e3 * _SIDES_M[1]:g} mm each"
+        raise OutOfRangeError(f"should be width x depth x height, {limits}; write 80x80x95 for mm, or 8x8x9.5cm")
+    return sides
+
+
+_SIZE = Annotated[
+    Any,
+    typer.Option(
+        parser=_sides_m,
+        metavar="WxDxH",
+        help="With photographs: width, depth and height as the object stands, 80x80x95 (mm) or 8x8x9.5cm.",
+    ),
+]
 
 
 @object_group.command(name="import")
 def import_command(
     mesh: Annotated[
-        Path, typer.Argument(metavar="MESH", help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB, COLLADA or 3MF.")
+        Path,
+        typer.Argument(
+            metavar="MESH|PHOTOS",
+            help="A closed mesh: OBJ, STL, PLY, OFF, glTF, GLB, COLLADA or 3MF; or a folder with 4 to 60 photographs "
+            "of one object from all sides, PNG or JPEG, transparent or before a plain background.",
+        ),
     ],
     name: Annotated[str, typer.Option(help="Name of the model in worlds: letters, digits and _.")],
     mass: Annotated[float | None, quantity_option(Mass, help="Mass, kg; by default by its volume.")] = None,
@@ -54,18 +89,25 @@ def import_command(
         ),
     ] = None,
     close_holes: Annotated[bool, typer.Option("--close-holes", help="Close the holes of an open mesh.")] = False,
+    size: _SIZE = None,
     as_json: AS_JSON = False,
 ) -> None:
-    """Imports a mesh as a model: visual geometry, convex collision parts, and inertia from volume and mass."""
-    from plant.models.builder.importing import ImportOptions, ImportReports, import_object
+    """Imports an object as a model, from a mesh or from photographs.
+
+    A mesh gives visual geometry, convex collision parts, and inertia from volume and mass. By photographs the robot
+    recognises an object that has no mesh; a simulated world cannot place it.
+    """
+    from plant.models.builder.importing import ImportOptions, ImportReports, import_object, import_photographs
 
     wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
         wanted.check()
+    _refuse_mixed(mesh, wanted, sized=size is not None)
     out = Path(name) if out is None else out
     notes = list[str]()
     with _refused(mesh), new_folder(out) as folder, _bar() as step:
-        made = import_object(mesh, wanted, folder, ImportReports(step, notes.append))
+        importing = import_object if size is None else partial(import_photographs, size_m=size)
+        made = importing(mesh, wanted, folder, ImportReports(step, notes.append))
     for note in notes:
         typer.echo(f"errand: warning: {mesh}: {note}", err=True)
     if (doubt := _unlike_its_class(made)) is not None:
@@ -122,6 +164,16 @@ def tag(
             write_plate(folder, number, size)
     carrier = f"on: {read_imported(on).class_name}" if on is not None else "at: [x, y, z], yaw: 0.0"
     typer.echo(f"{out}: for knowledge.yaml, under 'tags': {{id: {number}, size: {size:g}, {carrier}}}")
+
+
+def _refuse_mixed(mesh: Path, wanted: ImportOptions, *, sized: bool) -> None:
+    """Raises InputError for options that do not fit to a folder of photographs, or to a mesh."""
+    if sized != mesh.is_dir():
+        what = "it is no folder of photographs" if sized else "photographs show no size"
+        hint = "leave --size out for a mesh" if sized else "give it by --size, for example 80x80x95 for mm"
+        raise InputError(what, hint=hint, file=mesh)
+    if sized and (wanted.class_name or wanted.up or wanted.close_holes or wanted.scale != 1.0):
+        raise InputError("--class, --scale, --up and --close-holes are for a mesh", hint="leave them out", file=mesh)
 
 
 @contextmanager
@@ -181,8 +233,9 @@ def _draw(folder: Path, found: ImportedObject, picture: Path) -> None:
 
 
 def _in_words(made: ImportedObject) -> str:
-    size, parts = " x ".join(f"{value:.3f}" for value in made.size_m), made.collision_parts
-    return f"{made.name}, class {_class_of(made)}, {size} m, {made.mass_kg:g} kg, {count_text(parts, 'collision part')}"
+    size = " x ".join(f"{value:.3f}" for value in made.size_m)
+    parts = count_text(made.photographs or made.collision_parts, "photograph" if made.photographs else "collision part")
+    return f"{made.name}, class {_class_of(made)}, {size} m, {made.mass_kg:g} kg, {parts}"
 
 
 def _class_of(found: ImportedObject) -> str:

@@ -67,6 +67,7 @@ FACTS_FILE: Final = "object.yaml"
 _AGAIN: Final = "make it by `errand object import`"
 NAME: Final = r"^[A-Za-z][A-Za-z0-9_]{0,39}$"
 Inertia = Annotated[float, quantities.Quantity(ge=-1e6, le=1e6)]
+Photographs = Annotated[int, quantities.Quantity(ge=0, le=1000)]
 Parts = Annotated[int, quantities.Quantity(ge=1, le=10_000_000)]
 
 
@@ -74,7 +75,7 @@ class ImportedObject(BaseModel):
     """One imported object: `class` is the class that a detector finds, by default the object's own name.
 
     The origin of its frame is the centre of the bounding box `size_m`, z is up as it rests; `inertia_kg_m2` is xx, yy,
-    zz, xy, xz, yz about its centre of mass.
+    zz, xy, xz, yz about its centre of mass. With `photographs`, a box stands for the object, which has no mesh.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True, allow_inf_nan=False)
@@ -88,6 +89,7 @@ class ImportedObject(BaseModel):
     collision_parts: Parts
     triangles: Parts
     round: bool = False
+    photographs: Photographs = 0
 
     def form(self, folder: Path) -> ModelForm:
         """Form of the object, with its files in a folder."""

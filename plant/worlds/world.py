@@ -422,6 +422,8 @@ def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
         if rule.model not in known:
             hint = suggestion(rule.model, known, f"there are {', '.join(known)}")
             raise WorldError(f"no model {rule.model!r} for {rule.name}; {hint}", path=("objects", index, "model"))
+        if rule.model in imports and imports[rule.model].object.photographs:
+            raise WorldError(f"{rule.model!r} is of photographs: no mesh to place", path=("objects", index, "model"))
 
 
 def _receiving(rule: PersonRule | None) -> dict[str, Any]:

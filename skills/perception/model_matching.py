@@ -3,7 +3,8 @@
 An object rests on a surface, so its pose is one of its resting rotations, a turn about the vertical and a place. For
 some turns the segment's points are compared with the model's surface; the best are refined by iterated closest points
 (point to plane). A pose counts when the points of the segment lie on the model, the picture shows no farther surface
-through the model, and the colours agree.
+through the model, and the colours agree. A model of photographs has no surface but its bounding box: the object must
+have its size, and look as in one of the photographs (`view_matching.py`).
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from skills.files.object_model import ObjectModel
 from skills.perception.detection_3d import Detection3D
 from skills.perception.point_cloud import MIN_DEPTH_M, camera_pose_W, nearest_pixels, project
 from skills.perception.surface_segmentation import Cluster, segment_3d
+from skills.perception.view_matching import lab_of, likeness, seen_view
 from skills.robot import FloatArray, Image
 
 _TURNS: Final = 24
@@ -37,6 +39,8 @@ _HEIGHT_M, _HEIGHT_SHARE = 0.010, 0.06
 """Largest difference of the height, in metres and as a part of the model's."""
 _WIDER_M, _LEAST_WIDTH = 0.015, 0.6
 """Distance by which a segment may be wider than its model (m), and its least width as a part of the model's."""
+_WIDER_THAN_BOX_M, _LEAST_OF_BOX = 0.010, 0.8
+"""The same for a model of photographs: what is hidden in part does not look as in them."""
 _FAR_M: Final = 0.02
 """Distance from the model beyond which a point is not on it."""
 _FAR_SIGMAS: Final = 10.0
@@ -73,7 +77,8 @@ class Fit:
 
     `on_model` is the share of the segment's points on the model, `off` their mean distance from it in sigmas of the
     depth; `shown` is the share of the model's front that the segment shows, of what is not hidden by or part of
-    something else, `hidden` the share that is; `colour` is the mean difference in Lab.
+    something else, `hidden` the share that is; `colour` is the mean difference in Lab. A model of photographs has only
+    `likeness`, that to the most similar of them.
     """
 
     model: ObjectModel
@@ -83,6 +88,7 @@ class Fit:
     shown: float
     hidden: float
     colour: float
+    likeness: float = 1.0
 
 
 def fits(cluster: Cluster, sight: Sight, models: Iterable[ObjectModel]) -> list[Fit]:
@@ -93,8 +99,11 @@ def fits(cluster: Cluster, sight: Sight, models: Iterable[ObjectModel]) -> list[
 def _best(cluster: Cluster, sight: Sight, model: ObjectModel) -> Fit | None:
     step = max(1, len(cluster.points) // _POINTS)
     p_W = cluster.points.p_W[::step]
-    poses = [_refined(p_W, model, X_WM) for X_WM in _first_poses(cluster, p_W, sight, model)]
-    found = [_judged(cluster, sight, model, X_WM) for X_WM in poses]
+    poses = _first_poses(cluster, p_W, sight, model)
+    if len(model.views) and poses:
+        alike = likeness(seen_view(cluster, sight.image, sight.X_WC), model.views)
+        return Fit(model, poses[0], 1.0, 0.0, 1.0, 0.0, 0.0, alike)
+    found = [_judged(cluster, sight, model, _refined(p_W, model, X_WM)) for X_WM in poses]
     return max(found, key=quality, default=None)
 
 
@@ -106,16 +115,19 @@ def _first_poses(cluster: Cluster, p_W: FloatArray, sight: Sight, model: ObjectM
     near = float(np.percentile(p_W @ along, 2))
     tried = list[tuple[float, RigidTransform]]()
     some = p_W[:: max(1, len(p_W) // 120)]
+    least, wider_m = (_LEAST_OF_BOX, _WIDER_THAN_BOX_M) if len(model.views) else (_LEAST_WIDTH, _WIDER_M)
     for R in model.rests:
         rest = model.points @ R.T
         top_m = float(np.ptp(rest[:, 2]))
         if abs(top_m - height_m) > _HEIGHT_M + _HEIGHT_SHARE * top_m:
             continue
+        # only a body with edges is wider across than its sides
+        widest_m = float(np.ptp(rest[:, :2], axis=0).max()) if len(model.views) and cluster.shape.round else math.inf
         for turn in np.arange(_TURNS) * (2.0 * math.pi / _TURNS):
             R_WM = RotationMatrix.MakeZRotation(float(turn)).matrix() @ R
             turned = model.points @ R_WM.T
             low, high = (turned @ across).min(), (turned @ across).max()
-            if not _LEAST_WIDTH * (high - low) - _WIDER_M < right - left < high - low + _WIDER_M:
+            if not least * (high - low) - wider_m < right - left < min(high - low, widest_m) + wider_m:
                 continue
             xy = (near - (turned @ along).min()) * along + 0.5 * (left + right - low - high) * across
             p_WM = np.array([xy[0], xy[1], cluster.base_m - rest[:, 2].min()])
@@ -237,21 +249,16 @@ def _colour_difference(seen: NDArray[np.uint8], of_model: NDArray[np.uint8]) -> 
     """Mean difference of colours (N, 3) in Lab, after the lightness of all is made equal within limits."""
     if len(seen) == 0:
         return 100.0
-    a, b = (_lab(colours) for colours in (seen, of_model))
+    a, b = (lab_of(colours) for colours in (seen, of_model))
     gain = float(np.clip(a[:, 0].mean() / max(b[:, 0].mean(), 1.0), 0.6, 1.4))
     b = b * [gain, 1.0, 1.0]
     return float(np.minimum(np.linalg.norm(a - b, axis=1), 60.0).mean())
 
 
-def _lab(colours: NDArray[np.uint8]) -> FloatArray:
-    scaled = (colours.reshape(1, -1, 3) / np.float32(255.0)).astype(np.float32)
-    return np.asarray(cv2.cvtColor(scaled, cv2.COLOR_RGB2LAB)[0], dtype=np.float64)
-
-
 def quality(fit: Fit) -> float:
     """Likeness of a fit, 0 to 1."""
     shape = max(0.0, 1.0 - 4.0 * (1.0 - fit.on_model)) * max(0.0, 1.0 - 3.0 * (1.0 - fit.shown))
-    return float(shape * math.exp(-((fit.colour / 30.0) ** 2)) * math.exp(-(fit.off**4)))
+    return float(fit.likeness * shape * math.exp(-((fit.colour / 30.0) ** 2)) * math.exp(-(fit.off**4)))
 
 
 def identified(

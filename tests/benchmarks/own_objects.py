@@ -22,22 +22,42 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.geometry import (
+    FramePoseVector,
+    GeometryFrame,
+    GeometryInstance,
+    MakeRenderEngineVtk,
+    Mesh,
+    PerceptionProperties,
+    RenderEngineVtkParams,
+    RenderLabel,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform, RotationMatrix
 
 from errand_train.dataset.views import View
 from executive.app.worlds import knowledge_of, open_world
 from executive.testing.bench import SkillBench
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
-from plant.models.builder.importing import ImportOptions, ObjectImportError, import_object
+from plant.models.builder.importing import (
+    ImportOptions,
+    ImportReports,
+    ObjectImportError,
+    import_object,
+    import_photographs,
+)
 from plant.models.builder.importing.solid import Solid
-from plant.rendering import RENDERER, render_parameters
+from plant.rendering import RENDERER, lights, render_parameters
+from plant.scene_pictures import look_at, render_view
 from plant.sensors.camera_spec import colour_render_camera, depth_render_camera
 from plant.worlds.world import World
 from skills.api import Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.detection import NoDetector
+from skills.files.errors import InputError
 from skills.files.object_model import ObjectModel, read_model
 from skills.geometry import inside_polygon
 from skills.perception.model_detector import ModelDetector
@@ -205,6 +225,65 @@ def imported(folder: Path, half: int) -> list[ObjectModel]:
     return models
 
 
+PHOTO_PX, PHOTO_FOV_RAD = 480, 0.5
+PHOTO_ELEVATIONS_DEG = (25.0, 50.0)
+PHOTO_GROUND = (0.30, 0.45, 0.50)
+PHOTO_NOISE, PHOTO_EXPOSURE, PHOTO_TINT = 3.0, 0.15, 0.04
+STANDING, LYING, SIDES = 12, 6, 3
+"""Numbers of photographs of an object as it stands, and on each other side; number of other sides."""
+
+
+def photographed(folder: Path, model: ObjectModel, pictures: Path, seed: int = 0) -> Path:
+    """Renders photographs of an imported object, as it stands and on other sides; the JPEG files lie in a folder.
+
+    The background is plain, and the exposure and the tint of each are a little wrong.
+    """
+    pictures.mkdir(parents=True, exist_ok=True)
+    scene, rng = SceneGraph(), np.random.default_rng(seed)
+    scene.AddRenderer(
+        "vtk", MakeRenderEngineVtk(RenderEngineVtkParams(default_clear_color=np.array(PHOTO_GROUND), lights=lights()))
+    )
+    mesh = Mesh(str(folder / model.name / f"{model.name}.obj"), np.ones(3))
+    appearance, properties = GeometryInstance(RigidTransform(), mesh, model.name), PerceptionProperties()
+    properties.AddProperty("label", "id", RenderLabel(1))
+    appearance.set_perception_properties(properties)
+    source = scene.RegisterSource("photograph")
+    frame = scene.RegisterFrame(source, GeometryFrame("object"))
+    scene.RegisterGeometry(source, frame, appearance)
+    context = scene.CreateDefaultContext()
+    reach_m = 1.15 * float(np.linalg.norm(model.points, axis=1).max()) / np.sin(PHOTO_FOV_RAD / 2.0)
+    for side, R in enumerate(model.rests[: 1 + SIDES]):
+        pose = FramePoseVector()
+        pose.set_value(frame, RigidTransform(RotationMatrix.ProjectToRotationMatrix(R)))
+        scene.get_source_pose_port(source).FixValue(context, pose)
+        query, count = scene.get_query_output_port().Eval(context), LYING if side else STANDING
+        for k in range(count):
+            turn, rise = 2.0 * np.pi * k / count + rng.uniform(-0.1, 0.1), np.radians(PHOTO_ELEVATIONS_DEG[k % 2])
+            eye = reach_m * np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
+            picture = render_view(query, look_at(eye, np.zeros(3)), (PHOTO_PX, PHOTO_PX), fov_y_rad=PHOTO_FOV_RAD)
+            gain = (1.0 + rng.uniform(-PHOTO_EXPOSURE, PHOTO_EXPOSURE)) * (1.0 + rng.normal(0.0, PHOTO_TINT, 3))
+            noisy = gain * picture + rng.normal(0.0, PHOTO_NOISE, picture.shape)
+            cv2.imwrite(str(pictures / f"{side}{k:02d}.jpg"), np.clip(noisy, 0, 255).astype(np.uint8)[..., ::-1])
+    return pictures
+
+
+def by_photographs(folder: Path, models: Sequence[ObjectModel]) -> list[ObjectModel]:
+    """Models of the same objects, of photographs instead of meshes; leaves out those that no import takes."""
+    found = list[ObjectModel]()
+    for model in models:
+        x, y, z = (round(float(side), 3) for side in np.ptp(model.points, axis=0))
+        out = folder / f"{model.name}_seen"
+        out.mkdir()
+        try:
+            pictures = photographed(folder, model, folder / f"{model.name}_photographs")
+            import_photographs(pictures, ImportOptions(model.name), out, ImportReports(), (x, y, z))
+        except InputError as error:
+            sys.stderr.write(f"{model.name}: {error}\n")
+            continue
+        found.append(read_model(out))
+    return found
+
+
 def _bounding_box(solid: Solid) -> tuple[FloatArray, ...]:
     low, high = solid.points.min(axis=0), solid.points.max(axis=0)
     return (np.array(list(product(*zip(low, high, strict=True)))),)
@@ -335,12 +414,15 @@ def ask(made: Scene, number: int, name: str, detector: ModelDetector, folder: Pa
     return Asked(name, number, bool(places), found, claimed and not found, run.message, wall_s)
 
 
-def results(folder: Path, half: int, scenes: int, seed: int, tell: Callable[[Asked], None]) -> list[Asked]:
-    """Asks in all scenes of all objects."""
+def results(
+    folder: Path, half: int, scenes: int, seed: int, tell: Callable[[Asked], None], *, photographs: bool = False
+) -> list[Asked]:
+    """Asks in all scenes of all objects, which the robot knows by their meshes or by photographs."""
     rng, world = np.random.default_rng([seed, half]), open_world("flat")
     models = imported(folder, half)
     pool = [models[k] for k in rng.permutation(len(models))]
-    detector, every = ModelDetector(NoDetector(), pool[:OBJECTS]), list[Asked]()
+    known = by_photographs(folder, pool[:OBJECTS]) if photographs else pool[:OBJECTS]
+    detector, every = ModelDetector(NoDetector(), known), list[Asked]()
     for target in pool[:OBJECTS]:
         for number in range(scenes):
             made = scene(rng, world, target, pool)
@@ -376,13 +458,14 @@ def main() -> None:
     parser.add_argument("--half", type=int, choices=(0, 1), default=0)
     parser.add_argument("--scenes", type=int, default=5)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--photographs", action="store_true", help="photographs of each object, no meshes")
     args = parser.parse_args()
 
     def tell(one: Asked) -> None:
         sys.stderr.write(f"{json.dumps(asdict(one))}\n")
 
     with tempfile.TemporaryDirectory(prefix="errand-own-") as folder:
-        every = results(Path(folder), args.half, args.scenes, args.seed, tell)
+        every = results(Path(folder), args.half, args.scenes, args.seed, tell, photographs=args.photographs)
     sys.stdout.write(json.dumps(summary(every), indent=1) + "\n")
 
 

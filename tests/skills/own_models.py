@@ -1,8 +1,13 @@
-"""Models of upright cans, as `errand object import` would describe them."""
+"""Models of upright cans, as `errand object import` would describe them, from meshes and from photographs."""
 
+from itertools import product
+
+import cv2
 import numpy as np
+from table_scene import GREY, TABLE, Can, taken
 
-from skills.files.object_model import ObjectModel
+from skills.files.object_model import ObjectModel, view_of
+from skills.manipulation.arm.poses import camera_pose
 
 
 def can_model(name, radius, height, colour, points=2000):
@@ -21,3 +26,20 @@ def can_model(name, radius, height, colour, points=2000):
         np.tile(np.array(colour, np.uint8), (points, 1)),
         np.eye(3)[None],
     )
+
+
+def photographed_can(name, radius, height, colour):
+    """A can that is known by six photographs from some heights, and by its size."""
+    can, views = Can(1.0, 0.0, radius, height, colour), []
+    middle = np.array([1.0, 0.0, TABLE.height_m + 0.5 * height])
+    for rise in np.radians([10, 20, 30, 40, 50, 60]):
+        eye = middle - 0.45 * np.array([np.cos(rise), 0.0, -np.sin(rise)])
+        photograph, _ = taken(camera_pose(eye, middle), [can])
+        mask = np.uint8(255) * (photograph != GREY).any(axis=-1)
+        left, top, width, height_px = cv2.boundingRect(mask)
+        views.append(view_of(np.dstack([photograph, mask])[top : top + height_px, left : left + width]))
+    steps = np.linspace(-1.0, 1.0, 13)
+    box = np.array([p for p in product(steps, steps, steps) if max(map(abs, p)) == 1.0])
+    normals = box / np.linalg.norm(box, axis=1)[:, None]
+    grey = np.full(box.shape, 128, np.uint8)
+    return ObjectModel(name, box * [radius, radius, 0.5 * height], normals, grey, np.eye(3)[None], np.array(views))

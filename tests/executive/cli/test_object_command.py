@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -282,3 +283,67 @@ def test_an_object_with_the_name_of_another_thing_is_refused_where_both_are(mesh
     assert result.exit_code == 2
     (line,) = result.stderr.splitlines()
     assert "the imported object 'bottle' has a name that means 'beer' in this world; import it under another" in line
+
+
+@pytest.fixture
+def photographs(tmp_path: Path) -> Path:
+    """Five photographs of a box; the border cuts it in the last."""
+    folder = tmp_path / "photographs"
+    folder.mkdir()
+    for k in range(5):
+        picture = np.full((300, 300, 3), 200, np.uint8)
+        picture[90 : 300 if k == 4 else 210, 100:200] = (200, 60, 30)
+        cv2.imwrite(str(folder / f"{k}.png"), picture)
+    return folder
+
+
+def photographed(photographs: Path, *more: object):
+    out = photographs.parent / "jar"
+    return invoke("object", "import", photographs, "--name", "jar", "--out", out, *more)
+
+
+def test_photographs_become_a_model_that_no_world_can_place(photographs, tmp_path):
+    result = photographed(photographs, "--size", "8x8x9.5cm")
+    assert result.exit_code == 0, result.output
+    assert "jar, class of its own, known by its model, 0.080 x 0.080 x 0.095 m" in result.stdout
+    assert ", 4 photographs" in result.stdout
+    assert f"left out: {photographs / '4.png'}: the border cuts the object" in result.stderr
+    shown = json.loads(invoke("object", "show", tmp_path / "jar", "--json").stdout)
+    assert (shown["photographs"], shown["size_m"]) == (4, [0.08, 0.08, 0.095])
+
+
+def test_a_mission_may_name_what_photographs_show_but_not_place_it(photographs, tmp_path):
+    photographed(photographs, "--size", "80x80x95")
+    mission = tmp_path / "fetch_jar.yaml"
+    mission.write_text("name: fetch the jar\nimports: [jar]\nsteps:\n  - say: fetch me the jar\n")
+    assert invoke("check", mission).exit_code == 0
+    mission.write_text(f"objects:\n  my jar: {{model: jar, surfaces: [workbench]}}\n{mission.read_text()}")
+    refused = invoke("check", mission)
+    assert refused.exit_code == 2
+    assert "'jar' is of photographs: no mesh to place" in refused.stderr + refused.stdout
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ((), "photographs show no size; give it by --size, for example 80x80x95"),
+        (
+            ("--size", "80x80"),
+            "--size: should be width x depth x height, from 8 to 600 mm each; write 80x80x95 for mm, or 8x8x9.5cm",
+        ),
+        (("--size", "0.08x0.08x0.095"), "--size: should be width x depth x height, from 8 to 600 mm each; write"),
+        (("--size", "80x80x95", "--class", "wrench"), "--close-holes are for a mesh; leave them out"),
+    ],
+)
+def test_wrong_options_of_photographs_are_refused_in_one_line(photographs, more, why):
+    result = photographed(photographs, *more)
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("errand: ") and why in line
+
+
+def test_a_size_is_refused_for_a_mesh(mesh, tmp_path):
+    assert (
+        "it is no folder of photographs; leave --size out for a mesh"
+        in made(mesh, tmp_path / "drill", "--size", "80x80x95").stderr
+    )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from own_models import can_model
+from own_models import can_model, photographed_can
 
 from executive.record.work import CountedDetector, Work
 from skills.files.errors import InputError
@@ -21,6 +21,20 @@ def test_a_model_is_read_as_it_was_written(tmp_path):
     np.testing.assert_array_equal(read.colours, MODEL.colours)
 
 
+def test_views_of_photographs_are_read_as_they_were_written(tmp_path):
+    model = photographed_can("tin", 0.04, 0.12, (190, 15, 20))
+    model.write(tmp_path)
+    np.testing.assert_array_equal(read_model(tmp_path).views, model.views)
+
+
+def test_a_model_from_before_there_were_views_has_none(tmp_path):
+    MODEL.write(tmp_path)
+    with np.load(tmp_path / RECOGNITION_FILE) as data:
+        before = {key: data[key] for key in data if key != "views"}
+    np.savez(tmp_path / RECOGNITION_FILE, **before)
+    assert len(read_model(tmp_path).views) == 0
+
+
 @pytest.mark.parametrize("content", [None, b"", b"no archive"])
 def test_a_folder_without_a_model_is_refused_in_one_sentence(tmp_path, content):
     if content is not None:
@@ -33,6 +47,15 @@ def test_a_model_with_too_few_colours_is_refused(tmp_path):
     MODEL.write(tmp_path)
     with np.load(tmp_path / RECOGNITION_FILE) as data:
         changed = {**data, "colours": data["colours"][:5]}
+    np.savez(tmp_path / RECOGNITION_FILE, **changed)
+    with pytest.raises(InputError, match="damaged"):
+        read_model(tmp_path)
+
+
+def test_a_model_with_views_of_another_size_is_refused(tmp_path):
+    photographed_can("tin", 0.04, 0.12, (190, 15, 20)).write(tmp_path)
+    with np.load(tmp_path / RECOGNITION_FILE) as data:
+        changed = {**data, "views": data["views"][:, :12]}
     np.savez(tmp_path / RECOGNITION_FILE, **changed)
     with pytest.raises(InputError, match="damaged"):
         read_model(tmp_path)

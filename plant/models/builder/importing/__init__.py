@@ -1,6 +1,7 @@
-"""Import of mesh files as models: `import_object` writes a folder that worlds and missions name under `imports`."""
+"""Import of mesh files and photographs: writes a folder that worlds and missions name under `imports`."""
 
 from plant.models.builder.importing.import_object import STEPS, ImportOptions, ImportReports, import_object
+from plant.models.builder.importing.photographs import import_photographs
 from plant.models.catalogue import ObjectImportError, ObjectsExtraMissingError
 
 __all__ = [
@@ -10,4 +11,5 @@ __all__ = [
     "ObjectImportError",
     "ObjectsExtraMissingError",
     "import_object",
+    "import_photographs",
 ]

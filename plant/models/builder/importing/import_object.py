@@ -133,9 +133,15 @@ def import_object(
         OSError: the folder cannot be written.
     """
     options.check()
-    reading, closing, fitting, writing = STEPS
-    reports.step(reading)
-    content = read_mesh(mesh)
+    reports.step(STEPS[0])
+    return import_content(read_mesh(mesh), options, folder, reports)
+
+
+def import_content(
+    content: MeshContent, options: ImportOptions, folder: Path, reports: ImportReports = _NO_REPORTS
+) -> ImportedObject:
+    """Writes the model of a mesh that has been read; raises as `import_object` does."""
+    _, closing, fitting, writing = STEPS
     reports.step(closing)
     body = _at_rest(_placed(content, options))
     for note in (*content.notes, *_size_doubts(np.ptp(body.solid.points, axis=0), options.scale)):

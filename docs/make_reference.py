@@ -17,8 +17,8 @@ from pydantic import BaseModel
 from executive.app.scenarios import ScenarioFile
 from executive.mission.json_schema import mission_json_schema
 from executive.testing.skill_test import SkillTestFile
+from executive.tree.port_values import describe_type, field_types
 from executive.tree.registry import built_in_skills
-from executive.tree.types import describe_type, field_types
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
 from plant.spot_api.server.calls import service_calls

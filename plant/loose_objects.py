@@ -144,7 +144,8 @@ class Sleepers:
         others = [body for body in _moving_bodies(plant) if int(body.index()) not in passed_over]
         self._links = _Spheres(plant, inspector, others)
         of_robots = {int(instance) for robot in world.robots.values() for instance in robot.instances()}
-        sliding = [body for body in others if _slides(body, world.models)]
+        models = world.models.values()
+        sliding = [body for body in others if body.model_instance() in models and not body.is_floating_base_body()]
         known = of_robots | {int(body.model_instance()) for body in sliding}
         self._only_known_move = all(int(body.model_instance()) in known for body in others)
         self._known = [*(robot.body for robot in world.robots.values()), *sliding]
@@ -266,11 +267,6 @@ def _objects(
             shapes = {shape: inspector.GetProximityProperties(shape) for shape in found}
             start = bodies[0].floating_velocities_start_in_v()
             yield _Object(name, bodies[0], shapes, slice(start, start + 6))
-
-
-def _slides(body: RigidBody, models: Mapping[str, ModelInstanceIndex]) -> bool:
-    """Returns whether a moving body is a model that slides on a planar joint, such as a walking person."""
-    return body.model_instance() in models.values() and not body.is_floating_base_body()
 
 
 def _moving_bodies(plant: MultibodyPlant) -> Iterator[RigidBody]:

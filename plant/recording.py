@@ -49,27 +49,22 @@ class Recorder:
         """Records from the plant's `context`, at most `most_frames` (None: as many as fit into a file of 20 MB)."""
         self._plant, self._context = world.plant, context
         self._period_s = 1.0 / frames_per_second
-        self._frames: list[Frame] = []
+        self.frames: list[Frame] = []
         self._most = most_frames or max(_FEWEST_FRAMES, round(_MOST_BYTES / (_BODY_BYTES * world.plant.num_bodies())))
 
     def __call__(self, now_s: float) -> None:
         """Records a frame when one is due."""
-        if not self._frames or now_s - self._frames[-1].time_s >= self._period_s - 1e-9:
-            self._frames.append(Frame(now_s, self._plant.GetPositions(self._context).copy()))
-        if len(self._frames) > self._most:
-            self._frames = thin_out(self._frames)
-
-    @property
-    def frames(self) -> Sequence[Frame]:
-        """Frames recorded so far."""
-        return self._frames
+        if not self.frames or now_s - self.frames[-1].time_s >= self._period_s - 1e-9:
+            self.frames.append(Frame(now_s, self._plant.GetPositions(self._context).copy()))
+        if len(self.frames) > self._most:
+            self.frames = thin_out(self.frames)
 
     def frame_at(self, time_s: float) -> Frame:
         """Returns the last frame at or before a time, or the first. Raises LookupError when there are no frames."""
-        if not self._frames:
+        if not self.frames:
             raise LookupError("nothing was recorded")
-        earlier = [frame for frame in self._frames if frame.time_s <= time_s + 1e-9]
-        return earlier[-1] if earlier else self._frames[0]
+        earlier = [frame for frame in self.frames if frame.time_s <= time_s + 1e-9]
+        return earlier[-1] if earlier else self.frames[0]
 
 
 def thin_out(frames: Sequence[Frame]) -> list[Frame]:
@@ -186,15 +181,12 @@ class LiveScene:
 
     def publish(self) -> None:
         """Refreshes the scene now."""
-        camera = self._camera()
+        camera = self._view
+        if self._follows and self._followed is not None:
+            camera = View.close_up(self._followed.EvalPoseInWorld(self._context).translation())
         if camera is not None and camera != self._camera_at:
             set_camera(self._meshcat, camera)
             self._camera_at = camera
         self._shown.plant.SetPositions(self._shown_context, self._plant.GetPositions(self._context))
         self._shown.diagram.ForcedPublish(self._root_context)
         self._published_s = time.perf_counter()
-
-    def _camera(self) -> View | None:
-        if self._follows and self._followed is not None:
-            return View.close_up(self._followed.EvalPoseInWorld(self._context).translation())
-        return self._view

@@ -65,10 +65,11 @@ class Simulation:
                 friction=variation.friction,
             )
         )
-        self.engine = Engine(built, seed=seed)
+        self.engine = self.clock = Engine(built, seed=seed)
+        self.robots: Mapping[str, Robot] = self.engine.robots
         if world.moves:
             moves = Moves(built.plant, self.engine.context, world, objects, seed=seed, tell=self.engine.record_event)
-            moves.listen(self._moved)
+            moves.listen(lambda name: self.referee.record_move(name, self.engine.context, self.engine.now()))
             self.engine.moves = moves
         self.referee = Referee(
             built.plant,
@@ -84,21 +85,8 @@ class Simulation:
         if self.recorder is not None:
             self.engine.observe(self.recorder)
 
-    def _moved(self, name: str) -> None:
-        self.referee.record_move(name, self.engine.context, self.engine.now())
-
     def _referee_observes(self, now_s: float) -> None:
         self.referee.observe(self.engine.context, now_s, asleep=self.engine.asleep)
-
-    @property
-    def clock(self) -> Engine:
-        """The clock of the run; advancing it steps the plant."""
-        return self.engine
-
-    @property
-    def robots(self) -> Mapping[str, Robot]:
-        """The robots by name."""
-        return self.engine.robots
 
     def true_pose(self, robot_name: str) -> Pose2D:
         """True pose of a robot's body, for judging afterwards. Raises KeyError for an unknown name."""

@@ -26,8 +26,8 @@ from skills.detection import Detector as Detector
 from skills.perception.doorway import Doorway
 from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
-from skills.traffic import NO_TRAFFIC, Traffic
 from skills.world_model import FLOOR as FLOOR
+from skills.world_model import NO_TRAFFIC, Traffic
 from skills.world_model import NO_WORK_COUNTER as NO_WORK_COUNTER
 from skills.world_model import ClearableCostmap as ClearableCostmap
 from skills.world_model import Costmap as Costmap
@@ -308,8 +308,9 @@ class Skill(ABC, Generic[InputsT]):
     are the parts of the robot that the skill uses: skills that share none may run side by side. `Options` is a frozen
     dataclass of the skill's settings in a stack file, all with defaults.
 
-    A class without a body may declare all this in the module `ports` of a skill's package; the class that does the work
-    derives from it and is named by `done_by` ("module:Class"). Then trees are compiled without its imports.
+    A class without a body may declare all this in the module `ports` of the skill's package or of one around it; the
+    class that does the work derives from it and is named by `done_by` ("module:Class"). Then trees are compiled without
+    its imports.
 
     `max_data_age_s` is the largest age (s) of the data on which a success rests, by name: a sense verb (not `image`),
     "localisation", or an output port whose value has a `stamp_s`. A success on older data is a failed postcondition.

@@ -5,16 +5,38 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Generator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import wrap
-from skills.patience import Patience
 from skills.robot import ArmTrajectory, Clock, CommandId, CommandState, FloatArray, NoImageError, Pose2D
+
+PATIENCE_S: Final = 6.5
+"""Duration (s) up to which trouble ends no skill."""
+
+
+@dataclass
+class Patience:
+    """Timer of trouble that may pass; starts again after `reset`."""
+
+    clock: Clock
+    lasts_s: float = PATIENCE_S
+    _since_s: float | None = field(default=None, init=False)
+
+    def is_left(self) -> bool:
+        """Notes that there is trouble now; returns whether it may still pass."""
+        now_s = self.clock.now()
+        self._since_s = now_s if self._since_s is None else self._since_s
+        return now_s - self._since_s <= self.lasts_s
+
+    def reset(self) -> None:
+        """Notes that there is no trouble now."""
+        self._since_s = None
+
 
 ResultT = TypeVar("ResultT")
 OtherT = TypeVar("OtherT")

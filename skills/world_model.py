@@ -1,12 +1,13 @@
-"""World model of skills: seen objects, the estimated pose, and free space.
+"""World model of skills: seen objects, the estimated pose, free space, and the traffic of the robots of one run.
 
-Skills of others import these names from `skills.api`.
+Skills of others import these names from `skills.api`. Nothing in the traffic is the simulator's truth. A robot that
+reports nothing for some seconds is not listed any more, and is only an obstacle that others see.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol, runtime_checkable
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.quantities import Angle, Coordinate, Delay, Height, Margin, Share, TagNumber, TagSize
-from skills.robot import Robot, Scan
+from skills.robot import FloatArray, Robot, Scan
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform
@@ -211,3 +212,66 @@ NO_WORK_COUNTER: Final = NoWorkCounter()
 
 IN_THE_WAY: Final = "in_the_way"
 """Output port with the objects that block every grasp."""
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """Another robot: its name, its believed pose (3,) and the poses (N, 3) still before it, all x, y, yaw in the world.
+
+    `path` is None while it stands. `discs` (x, y, radius) cover its outline in the body frame. `first` while it goes
+    before us where the two paths meet; `yields` while it clears a path that is reserved against it, because it goes
+    after us or has nothing to do. A robot with neither works where it stands, and the others wait for it.
+    """
+
+    name: str
+    pose: FloatArray
+    path: FloatArray | None
+    discs: FloatArray
+    stamp_s: float
+    first: bool = False
+    yields: bool = False
+
+
+class Traffic(Protocol):
+    """One robot's view of the others and of who goes first."""
+
+    def claim(self) -> None:
+        """Asks for the right to go; the robot that asked first goes first. Keeps a claim that it has already."""
+
+    def announce(self, path: FloatArray, discs: FloatArray) -> None:
+        """Reports the poses (N, 3) that lie ahead, and the outline (discs in the body frame) that will follow them.
+
+        With a claim, they are reserved against all robots that claimed later.
+        """
+
+    def release(self) -> None:
+        """Gives claim and path back. Idempotent."""
+
+    def others(self) -> Sequence[Neighbour]:
+        """Returns the other robots that reported lately, by name."""
+
+    def let_pass(self, name: str) -> None:
+        """Changes turns with a robot that we should have made way for and cannot."""
+
+
+class _Alone:
+    """Traffic of a robot that is alone."""
+
+    def claim(self) -> None:
+        """Does nothing."""
+
+    def announce(self, path: FloatArray, discs: FloatArray) -> None:
+        """Does nothing."""
+
+    def release(self) -> None:
+        """Does nothing."""
+
+    def others(self) -> Sequence[Neighbour]:
+        """Returns an empty list."""
+        return ()
+
+    def let_pass(self, name: str) -> None:
+        """Does nothing."""
+
+
+NO_TRAFFIC: Final[Traffic] = _Alone()

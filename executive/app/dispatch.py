@@ -35,9 +35,8 @@ from executive.record.event_log import EventLog
 from executive.record.schemas import MISSIONS
 from executive.run.outcome import Outcome, RobotResult, RobotStatus
 from executive.run.visitor import Assigner, MissionEnd, Progress, RunEntry
-from executive.store.assignments import GivenMissions
-from executive.store.missions import MissionState, MissionStore
-from executive.tree.last_known import Sign
+from executive.store.missions import GivenMissions, MissionState, MissionStore
+from executive.tree.board import Sign
 from executive.tree.node_view import node_view
 from executive.words.knowledge import BatteryFacts
 from plant.robots.robot_kind import PlacedRobot

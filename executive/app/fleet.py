@@ -19,12 +19,11 @@ from executive.app.report_file import EndedTree
 from executive.language.addressees import RobotChoice
 from executive.mission.request import Request
 from executive.run.visitor import RunEntry, TickNote
-from executive.store.assignments import GivenMission, GivenMissions
-from executive.store.missions import MissionStore, StoredMission
+from executive.store.missions import GivenMission, GivenMissions, MissionStore, StoredMission
+from executive.tree.board import LastKnown, LastKnownTracker
 from executive.tree.check import Checked
 from executive.tree.compiler import CompiledTree
 from executive.tree.estimate import RoutePlanner, load_estimates
-from executive.tree.last_known import LastKnown, LastKnownTracker
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.guard import KnowsPlace
 from executive.words.command import Command, Task
@@ -53,7 +52,7 @@ class FleetMission:
 
     It began at `since_s` (s on the robots' clock; None: not yet). `shares` are the parts that other robots did;
     `tried` maps a robot that failed to the reason. The store holds the rest of its state
-    (`executive.store.assignments.GivenMission`).
+    (`executive.store.missions.GivenMission`).
     """
 
     stored: StoredMission

@@ -33,8 +33,7 @@ from executive.run.control import Control
 from executive.run.runner import run
 from executive.run.visitor import RunSettings
 from executive.run.worker import LockStepWorker
-from executive.store.assignments import GivenMissions
-from executive.store.missions import MissionState, MissionStore, StoredMission
+from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission
 from executive.view.foxglove import LiveServer
 from executive.words.robot_config import RobotConfig
 from plant.worlds.world import World

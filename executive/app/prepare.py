@@ -28,7 +28,7 @@ from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose, with_own_objects
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
 from executive.words.robot_config import RobotConfig, find_robot, robots_of_file
-from executive.words.yaml_steps import steps_from_lines
+from executive.words.steps import steps_from_lines
 from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.world import ObjectRule, World, WorldError
 from skills.files.errors import InputError, Problems, listing, suggestion

@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from executive.mission.request import Request
+from executive.tree.board import LastKnown
 from executive.tree.compiler import CompiledTree, compile_mission
-from executive.tree.last_known import LastKnown
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge
 from executive.words.mission import Mission
-from executive.words.yaml_steps import lines_of_steps
+from executive.words.steps import lines_of_steps
 from plant.robots.robot_kind import PlacedRobot
 from plant.worlds.world import World
 from skills.robot import Pose2D

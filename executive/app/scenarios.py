@@ -19,7 +19,7 @@ from executive.words.mission import Route, Stop
 from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.faults.fault_words import parse_fault, random_faults
+from skills.faults.faulty_robot import parse_fault, random_faults
 from skills.files.errors import InputError, Problems, suggestion, with_article
 from skills.files.schema import Name, Text, validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml

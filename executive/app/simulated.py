@@ -21,7 +21,7 @@ from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from executive.words.variation import NO_VARIATION, Variation
-from plant.pipelined_clock import Pipeline
+from plant.engine import Pipeline
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation

@@ -12,8 +12,7 @@ from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
 from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, show_table
 from executive.mission.request import Request
-from executive.store.assignments import GivenMissions
-from executive.store.missions import MissionState, MissionStore, StoredMission, store_in
+from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
 from skills.files.errors import InputError
 from skills.files.outside import is_folder
@@ -153,7 +152,7 @@ def resumable_lines(missions: MissionStore, queue: Path | None = None) -> Sequen
 
 def _faults(words: Sequence[str], robots: Sequence[str]) -> Mapping[str, Sequence[str]]:
     """Returns the faults of each robot. Raises InputError if there is no such fault."""
-    from skills.faults.fault_words import parse_fault
+    from skills.faults.faulty_robot import parse_fault
 
     faults: dict[str, list[str]] = {name: [] for name in robots}
     for each in words:

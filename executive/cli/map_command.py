@@ -156,7 +156,7 @@ class _Drive:
 
     def result(self) -> dict[str, Any]:
         """Saves the grids; returns the result as JSON values. Raises InputError."""
-        from plant.referee.truth import trajectory_error_m
+        from plant.referee.object_history import trajectory_error_m
         from skills.mapping.map_folder import map_grids, save_grids
 
         mapper = self._mapper

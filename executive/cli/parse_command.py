@@ -16,7 +16,7 @@ from executive.cli.output import BAD_INPUT, print_json, writing
 from executive.language.explain import arcs_svg, explain, explanation_lines
 from executive.language.understand import Status, Understanding
 from executive.words.mission import DEFAULT_WORLD
-from executive.words.yaml_steps import steps_to_yaml
+from executive.words.steps import steps_to_yaml
 from skills.files.errors import InputError
 from skills.files.outside import read_text
 

@@ -10,7 +10,7 @@ from executive.language.command_frames import spoken_command
 from executive.language.items import Predicate, spoken_words
 from executive.language.pipeline import Trace
 from executive.language.tokens import Token
-from executive.words.yaml_steps import steps_to_yaml
+from executive.words.steps import steps_to_yaml
 
 
 def explain(trace: Trace) -> dict[str, Any]:

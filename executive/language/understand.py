@@ -19,7 +19,7 @@ from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
-from executive.words.yaml_steps import steps_to_data, steps_to_yaml
+from executive.words.steps import steps_to_data, steps_to_yaml
 
 if TYPE_CHECKING:
     from executive.language.addressees import RobotChoice

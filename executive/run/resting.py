@@ -12,8 +12,8 @@ from executive.run.traffic_table import TrafficTable
 from executive.run.watchdog import Watchdog
 from skills.api import Running, SkillContext
 from skills.navigate.giving_way import GivingWay
-from skills.navigate.ports import NavigateInputs
 from skills.navigate.skill import Navigate
+from skills.ports import NavigateInputs
 
 _LOOK_S = 0.5
 

@@ -158,7 +158,7 @@ def _with_tags(entry: RunEntry) -> Detector:
     """Returns the detector of a robot, which recognises objects by their tags, too, where there are any."""
     if not entry.tree.tags:
         return entry.detector
-    from skills.perception.tagged_objects import with_tags
+    from skills.perception.fiducials import with_tags
 
     return with_tags(entry.detector, entry.tree.tags)
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from skills.robot import FloatArray, Pose2D
-from skills.traffic import Neighbour
+from skills.world_model import Neighbour
 
 SILENT_S = 2.0
 """A robot that has not reported for so long (s of the run's clock) loses its claim and its path."""
@@ -20,7 +20,7 @@ _LOGGED_EVERY_M = 0.25
 
 @dataclass
 class _Robot:
-    """Row of the table for one robot, which is also its view of the table (`skills.traffic.Traffic`).
+    """Row of the table for one robot, which is also its view of the table (`skills.world_model.Traffic`).
 
     `turn` is its place in the order of claims, None without one. A robot is `idle` while it has no work and clears
     paths that others reserve.

@@ -26,7 +26,7 @@ from executive.testing.bench import SkillBench, SkillRun, scripted_bench
 from executive.testing.skill_test import BenchMakers, SkillTestFile, bench_of_setup, carry_out, load_skill_tests
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import SENSE_VERBS, STANDARD_FAULTS, VERBS, Call, Effect, FaultKind, InjectedFault
-from skills.faults.fault_words import Fault
+from skills.faults.faulty_robot import Fault
 from skills.files.errors import InputError
 from skills.robot import Capabilities
 from skills.testing.robot import ScriptedRobot

@@ -15,14 +15,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, field_validator, model_validator
 
-from executive.testing.bench import SkillBench, SkillRun, scripted_bench
-from executive.testing.small_room import room_knowledge
-from executive.tree.port_values import PortValueError, assign_ports, port_value
+from executive.testing.bench import SkillBench, SkillRun, room_knowledge, scripted_bench
+from executive.tree.port_values import (
+    PortValueError,
+    assign_ports,
+    describe_type,
+    field_types,
+    port_value,
+    required_fields,
+)
 from executive.tree.registry import missing_skill
-from executive.tree.types import describe_type, field_types, required_fields
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
-from skills.faults.fault_words import parse_fault
+from skills.faults.faulty_robot import parse_fault
 from skills.files.errors import with_article
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml

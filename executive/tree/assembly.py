@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from executive.mission.certainty import refuse_certain_comparisons
 from executive.mission.gripper import InGripper, held_after_either
-from executive.tree.last_known import LastKnown
+from executive.tree.board import LastKnown
 from executive.tree.nodes.policies import under_policy
 from executive.tree.plan import PICK_UPS, Assembled, PlanBuilder, Registry
 from executive.words.command import START, Command

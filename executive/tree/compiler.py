@@ -13,9 +13,8 @@ from py_trees.behaviour import Behaviour
 from executive.tree import nodes
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import ExplainedNode
-from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr
+from executive.tree.board import Binding, Constant, FromBoard, FromBoardOr, LastKnown
 from executive.tree.context import RunContext
-from executive.tree.last_known import LastKnown
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import buttons_of
 from executive.tree.nodes.door_check import doorway
@@ -23,7 +22,7 @@ from executive.tree.nodes.group import mission_plan
 from executive.tree.nodes.interrupts import watch_plan
 from executive.tree.nodes.policies import AskOperator, Skip, under_policy
 from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, StepPart, start_key
-from executive.tree.types import assignable, conforms, describe_type, field_types, required_fields
+from executive.tree.port_values import assignable, conforms, describe_type, field_types, required_fields
 from executive.words.command import START, Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import UseMission

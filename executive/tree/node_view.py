@@ -13,7 +13,7 @@ from py_trees.common import Status
 
 from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec, NodeState
-from executive.tree.types import describe_type, field_types
+from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause
 from skills.files.errors import SourceLine
 

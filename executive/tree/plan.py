@@ -9,8 +9,7 @@ from types import MappingProxyType
 from typing import Any, Final
 
 from executive.mission.gripper import InGripper
-from executive.tree.board import Constant, FromBoard
-from executive.tree.last_known import LastKnown
+from executive.tree.board import Constant, FromBoard, LastKnown
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.registry import missing_skill

@@ -16,7 +16,7 @@ from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from typing import Any, Final
 
-from executive.tree.types import describe_type, field_types
+from executive.tree.port_values import describe_type, field_types
 from skills.api import Cause, Skill
 from skills.files.errors import InputError, suggestion
 from skills.files.plugins import LIMIT_S, OURS, PluginDefect, distribution_of, run_plugin
@@ -144,15 +144,17 @@ def _checked(entry: EntryPoint, limit_s: float) -> SkillClass:
 
 
 def _class_of(entry: EntryPoint) -> Any:
-    """Returns the class of the package's module `ports` that names the skill by `done_by`, else the skill's own class.
+    """Returns the class of a module `ports` that names the skill by `done_by`, else the skill's own class.
 
-    With such a class, the skill's module and all its imports are loaded only when the skill is used.
+    The module stands in the skill's package or in one around it. With such a class, the skill's module and all its
+    imports are loaded only when the skill is used.
     """
-    package = entry.module.rpartition(".")[0]
-    if package and find_spec(f"{package}.ports") is not None:
-        for kind in vars(import_module(f"{package}.ports")).values():
-            if inspect.isclass(kind) and issubclass(kind, Skill) and kind.done_by == entry.value:
-                return kind
+    package = entry.module
+    while package := package.rpartition(".")[0]:
+        if find_spec(f"{package}.ports") is not None:
+            for kind in vars(import_module(f"{package}.ports")).values():
+                if inspect.isclass(kind) and issubclass(kind, Skill) and kind.done_by == entry.value:
+                    return kind
     return entry.load()
 
 

@@ -282,8 +282,9 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]
         yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.places)
     for name, person in knowledge.people.items():
         yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
+    tagged = [tag.on for tag in knowledge.tags if tag.on is not None]
     for name, facts in knowledge.things.items():
-        yield from _unless_known(source, ("things", name), name, (*class_forms(), *_tagged(knowledge), *own))
+        yield from _unless_known(source, ("things", name), name, (*class_forms(), *tagged, *own))
         for index, usual in enumerate(facts.usual):
             yield from _unless_known(source, ("things", name, "usual", index), usual, knowledge.place_names())
     for task, table in knowledge.defaults.items():
@@ -299,11 +300,6 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]
         if tag.id in (other.id for other in knowledge.tags[:index]):
             yield source.error(("tags", index, "id"), f"tag {tag.id} is listed twice", "print each tag once only")
     yield from _doubles(knowledge, source)
-
-
-def _tagged(knowledge: Knowledge) -> set[str]:
-    """Classes of objects that carry a tag, which the robot recognises by it."""
-    return {tag.on for tag in knowledge.tags if tag.on is not None}
 
 
 def _unless_known(

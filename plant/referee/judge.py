@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, Region, When
-from plant.referee.contacts import Collision
-from plant.referee.object_history import SETTLE_S, Lift, ObjectHistory
-from plant.referee.truth import ON_TRAY_GAP_S, TimedPath, Truth
+from plant.referee.entities import Collision
+from plant.referee.object_history import ON_TRAY_GAP_S, SETTLE_S, Lift, ObjectHistory, TimedPath, Truth
 from skills.files.errors import definite, listing
 from skills.robot import FloatArray
 
@@ -31,7 +30,7 @@ class Finding:
 
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequence[Collision]) -> RefereeReport:
     """Judges all conditions at the times at which they must hold, and counts collisions and drops."""
-    findings = [_judge_one(condition, truth) for condition in conditions]
+    findings = [_JUDGES[condition.kind](condition, truth) for condition in conditions]
     success = all(finding.holds for finding in findings) if findings else None
     since_s = min((condition.since_s for condition in conditions), default=0.0)
     collisions = [each for each in collisions if each.time_s >= since_s]
@@ -39,18 +38,13 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequ
     drops = sum(when_s >= since_s for history in truth.histories for when_s in history.dropped_s)
     return RefereeReport(
         success,
-        " ".join(dict.fromkeys(finding.sentence for finding in findings)),
+        " ".join(dict.fromkeys(each.sentence[0].upper() + each.sentence[1:] for each in findings)),
         collisions=len(own),
         drops=drops,
         people_hit=sum(each.person is not None for each in own),
         hit_by_people=len(collisions) - len(own),
         robots_hit=sum(each.other_robot is not None for each in own),
     )
-
-
-def _judge_one(condition: GoalCondition, truth: Truth) -> Finding:
-    finding = _JUDGES[condition.kind](condition, truth)
-    return Finding(finding.holds, finding.sentence[0].upper() + finding.sentence[1:])
 
 
 def _until_s(condition: GoalCondition, truth: Truth) -> float:
@@ -274,7 +268,7 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
         verb = "is" if then_s is None else "was"
         there = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.source, p_W))]
         aside = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.maybe, p_W))]
-        nothing = f"there is no {_wanted(condition)}{_in(condition.source)}"
+        nothing = f"there is no {_wanted(condition)}{f' on {_where(condition.source)}' if condition.source else ''}"
     most = len(there) + len(aside)
     right = len(there) < condition.needed if condition.answer is False else most >= condition.needed
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
@@ -418,10 +412,6 @@ def _where(regions: Sequence[Region]) -> str:
 
 def _out_of(regions: Sequence[Region]) -> str:
     return f" from {_where(regions)}" if regions else ""
-
-
-def _in(regions: Sequence[Region]) -> str:
-    return f" on {_where(regions)}" if regions else ""
 
 
 def _either(people: Iterable[str]) -> str:

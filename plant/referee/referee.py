@@ -13,11 +13,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from executive.words.goal import GoalCondition, RefereeReport
-from plant.referee.contacts import FLOOR_Z_M, Collision, CollisionCounter, Pair, contact_heights
-from plant.referee.entities import Entities, Kind
+from plant.referee.entities import FLOOR_Z_M, Collision, CollisionCounter, Entities, Kind, Pair, contact_heights
 from plant.referee.judge import judge
-from plant.referee.object_history import Lift, ObjectHistory, ObjectSample
-from plant.referee.truth import TimedPath, Truth, extend_path, extend_stays
+from plant.referee.object_history import Lift, ObjectHistory, ObjectSample, TimedPath, Truth, extend_path, extend_stays
 from plant.saved_state import State, Stateful
 from skills.robot import FloatArray
 

@@ -125,7 +125,8 @@ class DepthDegrader:
         edge = self._edge(z)
         lost = edge & (self._rng.random(z.shape, dtype=np.float32) < self._noise.edge_loss)
         lost |= ~edge & self._grazing(z)
-        keep = valid & ~lost & ~self._unseen(grey) & self._not_specks() & (noisy >= near) & (noisy <= far)
+        keep = valid & ~lost & ~self._unseen(grey) & (noisy >= near) & (noisy <= far)
+        keep &= self._rng.random(z.shape, dtype=np.float32) >= self._noise.speck
         return np.where(keep, np.round(noisy, 3), np.float32(0.0)).astype(np.float32)
 
     def _edge(self, z: DepthArray) -> NDArray[np.bool_]:
@@ -145,8 +146,3 @@ class DepthDegrader:
         """Mask of the patches that are lost on dark and shiny spots."""
         patches = cv2.resize(self._patches.crop()[..., 0], (grey.shape[1], grey.shape[0]))
         return np.asarray(((grey < self._noise.dark) | (grey > self._noise.shiny)) & (patches > 0.0))
-
-    def _not_specks(self) -> NDArray[np.bool_]:
-        """Mask of all pixels except the few that are lost anywhere."""
-        shape = (self._intrinsics.height, self._intrinsics.width)
-        return np.asarray(self._rng.random(shape, dtype=np.float32) >= self._noise.speck)

@@ -110,8 +110,8 @@ class RayScene:
         """Returns all shapes in the world frame at the context's state."""
         if not len(self._moving):
             return self._anchored
-        R_WF, p_WF = self._body_poses(plant_context)
-        R_WF, p_WF = R_WF[self._body_slots], p_WF[self._body_slots]
+        poses = [self._plant.EvalBodyPoseInWorld(plant_context, body).GetAsMatrix34() for body in self._bodies]
+        R_WF, p_WF = (np.array(poses)[:, :, part][self._body_slots] for part in (slice(3), 3))
         moved_p = np.einsum("nij,nj->ni", R_WF, self._moving.positions_m) + p_WF
         return ShapeArrays(
             self._kinds,
@@ -127,13 +127,6 @@ class RayScene:
                 return slot
         self._bodies.append(body)
         return len(self._bodies) - 1
-
-    def _body_poses(self, plant_context: Context) -> tuple[FloatArray, FloatArray]:
-        """Rotations (B, 3, 3) and positions (B, 3) of the moving bodies in the world frame."""
-        matrices = np.array(
-            [self._plant.EvalBodyPoseInWorld(plant_context, body).GetAsMatrix34() for body in self._bodies]
-        )
-        return matrices[:, :, :3], matrices[:, :, 3]
 
 
 def shape_row(inspector: SceneGraphInspector, geometry: GeometryId) -> Row:

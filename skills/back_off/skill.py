@@ -9,16 +9,15 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import Cause, Running, Succeeded
-from skills.back_off.ports import BackOffInputs, BackOffPorts
 from skills.geometry import compose, relative_pose
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clearance_m, pose_array
 from skills.navigate.sensor_watch import ScanHealth
-from skills.patience import PATIENCE_S
+from skills.ports import BackOffInputs, BackOffPorts
 from skills.quantities import Delay, Length, Speed
 from skills.robot import BaseKind, Pose2D
-from skills.routine import Routine, SkillFailure
+from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 DIRECTIONS_RAD = tuple(math.radians(degrees) for degrees in (180, 150, -150, 90, -90, 30, -30, 0))
 """Directions in the body frame, backwards first; a base that cannot go sideways uses the first and the last."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
-from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway, Opening, measure_opening
 from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
 from skills.robot import Scan
-from skills.routine import Routine, RoutineSkill, SkillFailure
+from skills.routine import PATIENCE_S, Routine, RoutineSkill, SkillFailure
 
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform

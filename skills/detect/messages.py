@@ -10,9 +10,8 @@ from pydrake.math import RigidTransform
 from skills.api import Detection, ObjectObservation, SkillContext
 from skills.perception.class_forms import class_form
 from skills.perception.detection_3d import Detection3D
-from skills.perception.point_cloud import camera_pose_W
+from skills.perception.point_cloud import SurfaceShares, camera_pose_W
 from skills.perception.tracker import Track
-from skills.perception.visibility import SurfaceShares
 from skills.robot import Image
 
 Message = Mapping[str, Any]

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skills.api import FLOOR, ObjectObservation
-from skills.detect.ports import DetectInputs
 from skills.perception.class_forms import ANY_OBJECT, class_form
 from skills.perception.detection_3d import Detection3D, has_attribute
 from skills.perception.surface_segmentation import Cluster
 from skills.perception.tracker import CONFIRMED_BELIEF, Track
+from skills.ports import DetectInputs
 from skills.quantities import Angle, Duration, Length, Tries
 from skills.robot import FloatArray
 

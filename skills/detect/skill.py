@@ -18,7 +18,6 @@ from skills.api import (
     ObjectObservation,
     Running,
     Succeeded,
-    Surface,
 )
 from skills.detect.descriptions import count_sentence, describe, surface_names, wanted_names
 from skills.detect.messages import (
@@ -28,7 +27,6 @@ from skills.detect.messages import (
     object_to_detect_message,
     tracks_message,
 )
-from skills.detect.ports import DetectInputs, DetectPorts
 from skills.detect.selection import (
     DetectOptions,
     is_sure,
@@ -47,11 +45,12 @@ from skills.perception.detection_3d import Detection3D, detections_3d, observati
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image, is_dark
 from skills.perception.model_detector import models_of
 from skills.perception.model_matching import identified
+from skills.perception.point_cloud import Coverage, in_plain_view
 from skills.perception.surface_segmentation import Cluster, loose_clusters, segment_3d, segment_surfaces
 from skills.perception.tracker import FAINT_SCORE, SURE_SCORE, Track, Tracker
-from skills.perception.visibility import Coverage, in_plain_view
+from skills.ports import DetectInputs, DetectPorts
 from skills.robot import FloatArray, Image
-from skills.routine import Routine, SkillFailure
+from skills.routine import Routine, SkillFailure, planning_failure
 
 _LEAST_SEEN = 0.02
 _FITS_NEAR_M = 0.4
@@ -127,7 +126,11 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         """Points p_BT to look at, in this order."""
         if inputs.expected_W is not None:
             return [X_WB.inverse() @ np.array(inputs.expected_W)]
-        return [t for s in _by_distance(inputs.surfaces, X_WB) for t in look_targets(s, X_WB, self.model.p_BS)]
+        here = X_WB.translation()[:2]
+        nearest_first = sorted(
+            inputs.surfaces, key=lambda s: float(np.min(np.linalg.norm(np.asarray(s.polygon_W) - here, axis=1)))
+        )
+        return [target for surface in nearest_first for target in look_targets(surface, X_WB, self.model.p_BS)]
 
     def _has_enough(self, inputs: DetectInputs) -> bool:
         return 0 < inputs.count <= len(self._sure(inputs))
@@ -189,7 +192,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
             X_BW = self.X_WB().inverse()
             p_BO, eye_B = X_BW @ track.position_W, X_BW @ np.array(track.eyes_W[-1])
             viewpoints = [*viewpoints_beside(self.model.p_BS, eye_B, p_BO), *self._viewpoints(p_BO)]
-            yield from self._look_if_possible(inputs, p_BO, viewpoints)
+            yield from planning_failure(self.look(inputs, p_BO, viewpoints))
 
     def _old_result(self, inputs: DetectInputs) -> Track | None:
         """The track seen last, if it is sure and its picture is old."""
@@ -211,7 +214,7 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
     ) -> Routine[None]:
         """Views a point, and candidates again from the side. Adds a failure of the arm to `blocked`."""
         viewpoints = self._viewpoints(p_BT, shift_rad, close=close)
-        failure = yield from self._look_if_possible(inputs, p_BT, viewpoints, raised_m)
+        failure = yield from planning_failure(self.look(inputs, p_BT, viewpoints, raised_m))
         if failure is not None:
             blocked.append(failure)
             return
@@ -220,19 +223,8 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
             p_BO = self.X_WB().inverse() @ track.position_W
             other_m = _RAISED_M * (tries % 3)
             other_m = raised_m - other_m if raised_m > 0.0 else other_m
-            yield from self._look_if_possible(inputs, p_BO, self._confirming(track, tries, close=close), other_m)
-
-    def _look_if_possible(
-        self, inputs: DetectInputs, p_BT: FloatArray, viewpoints_B: Sequence[FloatArray], raised_m: float = 0.0
-    ) -> Routine[SkillFailure | None]:
-        """Views a point; returns the failure when the arm cannot."""
-        try:
-            yield from self.look(inputs, p_BT, viewpoints_B, raised_m)
-        except SkillFailure as failure:
-            if failure.cause is not Cause.PLANNING:
-                raise
-            return failure
-        return None
+            viewpoints = self._confirming(track, tries, close=close)
+            yield from planning_failure(self.look(inputs, p_BO, viewpoints, other_m))
 
     def _viewpoints(self, p_BT: FloatArray, shift_rad: float = 0.0, *, close: bool = False) -> list[FloatArray]:
         """Camera positions p_BC to view p_BT, turned by shift_rad about the shoulder; near ones first if close."""
@@ -256,12 +248,15 @@ class Detect(DetectPorts, LookingSkill[DetectInputs]):
         return self._viewpoints(p_BO, shifts_rad[tries - 1], close=close)
 
     def _candidate(self, inputs: DetectInputs) -> Track | None:
-        """The likeliest track that needs another view, if any."""
+        """The likeliest track that needs another view, if any: one more where neither side showed its place."""
         if self._has_enough(inputs) or len(self._tried) > self.options.candidates + inputs.count:
             return None
         shifts = len(self.options.confirm_shifts_rad)
-        open_ones = (t for t in self._matching(inputs) if not is_sure(t, inputs))
-        return next((t for t in open_ones if self._tried.get(t.number, 0) < _tries_for(t, shifts)), None)
+        for track in self._matching(inputs):
+            tries = shifts + (track.views == 1 and track.missed == 0)
+            if not is_sure(track, inputs) and self._tried.get(track.number, 0) < tries:
+                return track
+        return None
 
     def _matching(self, inputs: DetectInputs) -> list[Track]:
         return matching_tracks(self._tracker.snapshot(), inputs, self.options, self.X_WB().translation())
@@ -361,15 +356,5 @@ def _observed(track: Track, attributes: tuple[str, ...]) -> ObjectObservation:
     return seen if track.is_confirmed(1) else replace(seen, kind=ObjectKind(ANY_OBJECT, attributes))
 
 
-def _tries_for(track: Track, shifts: int) -> int:
-    """Number of confirming views of a track: one more from nearby where neither side showed its place."""
-    return shifts + (track.views == 1 and track.missed == 0)
-
-
 def _bearing(p_B: FloatArray) -> float:
     return math.atan2(p_B[1], p_B[0])
-
-
-def _by_distance(surfaces: tuple[Surface, ...], X_WB: RigidTransform) -> list[Surface]:
-    here = X_WB.translation()[:2]
-    return sorted(surfaces, key=lambda s: float(np.min(np.linalg.norm(np.asarray(s.polygon_W) - here, axis=1))))

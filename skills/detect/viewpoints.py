@@ -35,7 +35,9 @@ def look_targets(surface: Surface, X_WB: RigidTransform, p_BS: FloatArray) -> li
 
     Empty when no part lies between NEAREST_M and FURTHEST_M and within the arm's turn.
     """
-    offsets = _samples(surface) @ X_WB.inverse().rotation().matrix().T + X_WB.inverse().translation() - p_BS
+    xy = np.concatenate([np.asarray(surface.polygon_W, dtype=float), grid_inside(surface.polygon_W, 0.1)])
+    samples = np.column_stack([xy, np.full(len(xy), surface.height_m)])
+    offsets = samples @ X_WB.inverse().rotation().matrix().T + X_WB.inverse().translation() - p_BS
     bearing, distance = np.arctan2(offsets[:, 1], offsets[:, 0]), np.hypot(offsets[:, 0], offsets[:, 1])
     seen = (distance > NEAREST_M) & (distance < FURTHEST_M) & (np.abs(bearing) < _BEARING_LIMIT_RAD)
     if not np.any(seen):
@@ -64,12 +66,6 @@ def _bins(values: FloatArray, among: NDArray[np.bool_], half_rad: float) -> list
     middles = [low + (2 * k + 1) * half for k in range(count)]
     masks = [among & (np.abs(values - middle) <= half + 1e-9) for middle in middles]
     return [(middle, mask) for middle, mask in zip(middles, masks, strict=True) if np.any(mask)]
-
-
-def _samples(surface: Surface, step_m: float = 0.1) -> FloatArray:
-    """Samples points (N, 3) all over a surface, with its corners."""
-    xy = np.concatenate([np.asarray(surface.polygon_W, dtype=float), grid_inside(surface.polygon_W, step_m)])
-    return np.column_stack([xy, np.full(len(xy), surface.height_m)])
 
 
 def surface_boxes(surfaces: Iterable[Surface], X_WB: RigidTransform) -> list[Box]:

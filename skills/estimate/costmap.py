@@ -52,7 +52,7 @@ class LayeredCostmap:
     """Costmap on a surveyed grid `keepout`, whose unknown cells count as blocked; implements `skills.api.Costmap`."""
 
     def __init__(self, keepout: GridMap, options: CostmapOptions | None = None) -> None:
-        self._keepout = keepout.with_unknown_blocked()
+        self.keepout = keepout.with_unknown_blocked()
         self._options = options or CostmapOptions()
         rows_columns = [max(2, math.ceil(size / self._options.cell_m)) for size in reversed(keepout.size_m)]
         self._layer = GridMap(np.zeros(rows_columns, dtype=np.bool_), self._options.cell_m, keepout.origin_m)
@@ -69,15 +69,10 @@ class LayeredCostmap:
         self._filter: SelfFilter | None = None
         self._left_out_W: FloatArray = np.empty((0, 3))
 
-    @property
-    def keepout(self) -> GridMap:
-        """The surveyed grid."""
-        return self._keepout
-
     def clearance_m(self, points_W: FloatArray) -> FloatArray:
         """Distance (m) from each (x, y) row to the nearest obstacle, negative inside one and off the grid."""
         points = np.ascontiguousarray(points_W, dtype=np.float64)
-        clearance = self._keepout.distance_m(points)
+        clearance = self.keepout.distance_m(points)
         field = self._layer_field()
         if field is None:
             return clearance
@@ -115,7 +110,9 @@ class LayeredCostmap:
         """Takes in the newest scan, if it is new and the robot is localised."""
         odometry = robot.odometry()
         X_WO = Pose2D.from_transform(localisation.X_WO)
-        self._pass_time(odometry.stamp_s)
+        self._now_s = odometry.stamp_s
+        if self._now_s >= self._next_expiry_s:
+            self._note_change()
         self._X_WB = compose(X_WO, odometry.pose)
         self._filter = self._filter or SelfFilter.of(robot.capabilities())
         scan = robot.scan()
@@ -137,12 +134,6 @@ class LayeredCostmap:
         self._until_s[rows, columns] = np.maximum(self._until_s[rows, columns], stamp_s + self._options.memory_s)
         self._height_m[rows, columns] = points[first[enough], 2]
         self._note_change()
-
-    def _pass_time(self, now_s: float) -> None:
-        """Notes the time, at which cells may expire."""
-        self._now_s = now_s
-        if now_s >= self._next_expiry_s:
-            self._note_change()
 
     def _note_change(self) -> None:
         """Notes that the set of blocked cells changed."""
@@ -189,7 +180,7 @@ class LayeredCostmap:
 
     def _unexplained(self, points_W: FloatArray) -> FloatArray:
         """The (x, y, z) rows that lie on the grid and away from its occupied cells."""
-        return np.ascontiguousarray(points_W[self._keepout.distance_m(points_W) > self._options.explained_m])
+        return np.ascontiguousarray(points_W[self.keepout.distance_m(points_W) > self._options.explained_m])
 
     def _outside_robots(self, points_W: FloatArray) -> FloatArray:
         """The (x, y, z) rows that do not lie where another robot reports to be."""

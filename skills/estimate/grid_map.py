@@ -192,7 +192,8 @@ def _picture(source: YamlSource, file: _MapFile) -> tuple[Brightness, tuple[str,
     name = file.image.replace("\\", "/").rpartition("/")[2]
     beside, notes = source.path.parent / name, tuple[str, ...]()
     try:
-        if _is_absolute(file.image) and not is_file(Path(file.image)) and name and is_file(beside):
+        absolute = PurePosixPath(file.image).is_absolute() or PureWindowsPath(file.image).is_absolute()
+        if absolute and not is_file(Path(file.image)) and name and is_file(beside):
             notes, picture = (f"image: there is no {file.image[:100]}; {name} beside the file is read",), beside
         else:
             picture = file_beside(source.path, file.image)
@@ -205,10 +206,6 @@ def _picture(source: YamlSource, file: _MapFile) -> tuple[Brightness, tuple[str,
         what = f"image: it has {columns} x {rows} cells"
         raise source.error(("image",), what, "name a picture of 2 x 2 cells or more")
     return found, notes
-
-
-def _is_absolute(name: str) -> bool:
-    return PurePosixPath(name).is_absolute() or PureWindowsPath(name).is_absolute()
 
 
 def _notes(picture: Brightness, file: _MapFile, occupied: BoolGrid, unknown: BoolGrid) -> tuple[str, ...]:

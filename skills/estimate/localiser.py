@@ -67,7 +67,7 @@ class ScanMatchingLocaliser:
     """
 
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: LocaliserOptions | None = None) -> None:
-        self._grid, self._surfaces = grid, grid_surfaces(grid)
+        self.grid, self._surfaces = grid, grid_surfaces(grid)
         self._options = options or LocaliserOptions()
         self._heights_m = self._options.height_band_m or grid.height_band_m or _HEIGHTS_M
         self._initial = initial
@@ -84,11 +84,6 @@ class ScanMatchingLocaliser:
         self._localised = False
         self._transformed: tuple[Pose2D, RigidTransform] | None = None
         self._left_out_W: FloatArray = np.empty((0, 3))
-
-    @property
-    def grid(self) -> GridMap:
-        """The surveyed grid that scans are matched to."""
-        return self._grid
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate, with the stamp of its last scan (minus infinity before the first)."""
@@ -240,9 +235,9 @@ class ScanMatchingLocaliser:
         options = self._options
         if len(points_F) < options.min_points:
             return []
-        poses = candidate_poses(self._grid, centre, radius_m)
+        poses = candidate_poses(self.grid, centre, radius_m)
         few = np.ascontiguousarray(points_F[:: max(1, len(points_F) // 120)])
-        best = poses[np.argsort(-score_poses(self._grid, few, poses), kind="stable")[:20]]
+        best = poses[np.argsort(-score_poses(self.grid, few, poses), kind="stable")[:20]]
         spread = np.diag([0.2**2, 0.2**2, 0.15**2])
         return [match(self._surfaces, points_F, Pose2D(*pose), spread, options.matching) for pose in best.tolist()]
 

@@ -69,29 +69,24 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
     def __init__(self, grid: GridMap, initial: Pose2D | None, options: MonteCarloOptions | None = None) -> None:
         self._own = options or MonteCarloOptions()
         super().__init__(grid, initial, self._own.tracking)
-        self._filter = ParticleFilter(grid, self._own.particles)
+        self.particles = ParticleFilter(grid, self._own.particles)
         if initial is None:
-            self._filter.scatter()
+            self.particles.scatter()
         else:
-            self._filter.place(initial, self._covariance)
-        self._lost_covariance = self._filter.covariance
+            self.particles.place(initial, self._covariance)
+        self._lost_covariance = self.particles.covariance
         self._weighed_at: Pose2D | None = None
         self._scans = self._at_rest = self._contrary_updates = 0
         self._agreeing = 0 if initial is None else self._own.sure_updates
         self._mass = 0.0 if initial is None else 1.0
         self._expected = initial is not None
 
-    @property
-    def particles(self) -> ParticleFilter:
-        """The particle filter."""
-        return self._filter
-
     def particles_W(self, most: int) -> FloatArray:
         """Sample poses of the particles; see `skills.api.ParticleView`."""
-        weights = np.cumsum(self._filter.weights)
+        weights = np.cumsum(self.particles.weights)
         ends = (np.arange(most) + 0.5) / most * weights[-1]
         chosen = np.unique(np.searchsorted(weights, ends))
-        return np.asarray(self._filter.poses[chosen])
+        return np.asarray(self.particles.poses[chosen])
 
     def estimate(self) -> LocalisationEstimate:
         """The latest estimate; while the place is unknown its covariance is that of all particles."""
@@ -102,7 +97,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         """Believes an estimate from now on; all particles go there."""
         super().accept(estimate)
         if self._X_OB is not None:
-            self._filter.place(compose(self._X_WO, self._X_OB), estimate.covariance + _SPREAD)
+            self.particles.place(compose(self._X_WO, self._X_OB), estimate.covariance + _SPREAD)
             self._weighed_at = self._X_OB
         self._mass, self._agreeing = 1.0, self._own.sure_updates
 
@@ -155,7 +150,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
     def _weigh(self, points_F: FloatArray) -> None:
         """Updates the filter and the belief by one scan."""
         assert self._X_OB is not None
-        particles, self._scans = self._filter, 0
+        particles, self._scans = self.particles, 0
         self._at_rest += 1
         particles.move(relative_pose(self._weighed_at or self._X_OB, self._X_OB))
         self._weighed_at = self._X_OB
@@ -169,9 +164,9 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
         """Moves the belief to where the particles are, and decides whether the place is known."""
         assert self._X_OB is not None
         options = self._own
-        self._mass = self._filter.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0
+        self._mass = self.particles.mass_near(compose(self._X_WO, self._X_OB)) if self._placed else 0.0
         if self._mass < options.unsure_mass:
-            self._go_to(self._filter.mode(), points_F)
+            self._go_to(self.particles.mode(), points_F)
         sure = self._mass >= options.sure_mass and self._inlier_share >= self._options.found_share
         self._agreeing = self._agreeing + 1 if sure or (self._localised and self._mass >= options.unsure_mass) else 0
         if sure and self._agreeing >= options.sure_updates:
@@ -193,7 +188,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
     def _injected(self, points_F: FloatArray, beams: FloatArray) -> FloatArray | None:
         """Particles about the belief and, when scans surprise, about hypotheses anywhere; None when there are none."""
         assert self._X_OB is not None
-        options, particles = self._own, self._filter
+        options, particles = self._own, self.particles
         hypotheses = [compose(self._X_WO, self._X_OB)] if self._placed else []
         if particles.surprise > options.surprise or not self._localised:
             hypotheses += [each.pose for each in self._hypotheses(points_F, beams)]
@@ -202,7 +197,7 @@ class MonteCarloLocaliser(ScanMatchingLocaliser):
 
     def _hypotheses(self, points_F: FloatArray, beams: FloatArray) -> list[Match]:
         """The best of some random poses, refined by scan matching."""
-        best = self._filter.likeliest_poses(self._own.draws, self._own.hypotheses, beams)
+        best = self.particles.likeliest_poses(self._own.draws, self._own.hypotheses, beams)
         surfaces, options = self._surfaces, self._options.matching
         found = [match(surfaces, points_F, Pose2D(*pose), _BASIN, options) for pose in best.tolist()]
         return [each for each in found if each.inlier_share >= self._options.lost_share]

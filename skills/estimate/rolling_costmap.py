@@ -130,7 +130,8 @@ class RollingCostmap:
             return
         points = points_W[self._filter.foreign(points_in_body_axes(points_W, self._X_WB), np.empty((0, 3)))]
         cells, first, counts = np.unique(self._cells(points), axis=0, return_index=True, return_counts=True)
-        enough = (counts >= self._options.min_points_per_cell) & self._inside(cells)
+        inside = np.all((cells >= 0) & (cells < self._odds.shape), axis=1)
+        enough = (counts >= self._options.min_points_per_cell) & inside
         rows, columns = cells[enough].T
         self._odds[rows, columns] = _MOST
         self._height_m[rows, columns] = points[first[enough], 2]
@@ -143,9 +144,6 @@ class RollingCostmap:
         """The (row, column) of each point."""
         scaled = (points_W[:, :2] - (self._corner_m or (0.0, 0.0))) / self._options.cell_m
         return np.asarray(np.floor(scaled[:, ::-1]).astype(np.int64))
-
-    def _inside(self, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-        return np.asarray(np.all((cells >= 0) & (cells < self._odds.shape), axis=1))
 
     def _follow(self, X_WF: Pose2D) -> None:
         """Keeps the robot in the middle half of the window; cells of the old window that lie in the new one stay."""

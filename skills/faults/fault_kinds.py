@@ -141,10 +141,6 @@ def _raise(call: Call) -> Any:
     raise InjectedFault(f"{call.verb} does not answer")
 
 
-def _refuses(match: re.Match[str]) -> Effect:
-    return _answer(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order"))
-
-
 def _answer(match: re.Match[str], status: CommandStatus) -> Effect:
     """The fault by which a verb's commands do nothing, and have this status for ever."""
 
@@ -292,7 +288,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         r"(?P<verb>\w+) refuses",
         "arm refuses",
         "a motion verb refuses its commands",
-        _refuses,
+        lambda match: _answer(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order")),
         "{motion} refuses {span}",
     ),
     FaultKind(

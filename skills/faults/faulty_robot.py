@@ -1,16 +1,144 @@
-"""Injection of faults by name, such as "camera freezes at 3 s", into any robot."""
+"""Injection of faults by name, such as "camera freezes at 3 s", into any robot. `docs/reference/faults.md` lists them.
+
+A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at their head, and perhaps a time: `at T s` or
+`from T s` (and ever after), `from T s to U s`, `5 s at T s`, `after N calls` (of the verbs concerned), or no time
+(always).
+"""
 
 from __future__ import annotations
 
+import difflib
 import inspect
+import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, cast
+from typing import Any, Final, cast
 
-from skills.faults.fault_kinds import VERBS, Call
-from skills.faults.fault_words import Fault, parse_fault
+import numpy as np
+
+from skills.durations import seconds_in
+from skills.faults.fault_kinds import STANDARD_FAULTS, VERBS, Call, Effect, FaultKind
 from skills.robot import Clock, Robot
+
+__all__ = ["Fault", "parse_fault", "random_faults"]
+
+_NUMBER: Final = r"\d+(?:\.\d+)?"
+_WHEN: Final = re.compile(
+    r"(?P<what>.+?)"
+    rf"(?: (?:for )?(?P<lasts>{_NUMBER}) ?s)?"
+    rf"(?: (?:(?:at|from) (?P<from>{_NUMBER}) ?s(?: (?:to|until) (?P<to>{_NUMBER}) ?s)?"
+    r"|after (?P<calls>\d+) calls?))?"
+)
+_SPAN: Final = re.compile(
+    rf"(?:PT[\dHMS.]+|\b{_NUMBER} ?(?:ms|min|mins|minutes?|h|hours?|days?|sec|secs|seconds?)\b"
+    rf"(?: (?:and )?{_NUMBER} ?(?:min|mins|minutes?|s|sec|secs|seconds?)\b)*)"
+)
+_PREFIX: Final = re.compile(r"(?P<sensor>\w+)(?:\.(?P<source>[\w-]+))?: ?(?P<words>.+)")
+_STREAM: Final = 11
+"""Stream of the seed for random faults."""
+_FIRST_S, _LAST_S = 5.0, 90.0
+_MOTIONS: Final = ("arm", "base", "body")
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault by its words: its effect, on from `from_s` until before `to_s`, after `calls` calls.
+
+    With a `source`, it concerns only the pictures of that camera.
+    """
+
+    words: str
+    effect: Effect
+    from_s: float = 0.0
+    to_s: float = math.inf
+    calls: int = 0
+    source: str | None = None
+
+    def over_by(self, now_s: float) -> bool:
+        """Returns whether the fault is over at a time; one that happens once is over when it has begun before."""
+        return now_s >= self.to_s or (self.effect.once and now_s > self.from_s)
+
+
+def parse_fault(words: str, kinds: Sequence[FaultKind] = STANDARD_FAULTS, *, cameras: Sequence[str] = ()) -> Fault:
+    """Parses the words of a fault. `cameras` are the robot's, where the robot is known.
+
+    Raises ValueError, with a hint, when no kind has such words or the robot has no such camera.
+    """
+    plain = _SPAN.sub(_seconds, " ".join(words.split()))
+    prefix = _PREFIX.fullmatch(plain)
+    source = None if prefix is None else prefix["source"]
+    when = _WHEN.fullmatch(plain if prefix is None else f"{prefix['sensor']} {prefix['words']}")
+    for kind in kinds if when is not None else ():
+        assert when is not None
+        match = re.fullmatch(kind.pattern, when["what"])
+        if match is None:
+            continue
+        effect = kind.effect(match)
+        if source is not None:
+            _check_source(source, effect, cameras)
+        return Fault(words, effect, *_span(words, when), int(when["calls"] or 0), source)
+    examples = [kind.example for kind in kinds]
+    near = difflib.get_close_matches(plain, examples, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'?" if near else f"known are, for instance: {'; '.join(examples)}"
+    raise ValueError(f"there is no fault '{words}'; {hint}")
+
+
+def _seconds(match: re.Match[str]) -> str:
+    """A duration of any unit in seconds; other text unchanged."""
+    seconds = seconds_in(match[0])
+    return match[0] if seconds is None else f"{seconds:.12g} s"
+
+
+def _span(words: str, when: re.Match[str]) -> tuple[float, float]:
+    """Start and end of the fault (s). Raises ValueError when the words contradict each other."""
+    from_s, to_s = float(when["from"] or 0.0), float(when["to"] or math.inf)
+    if when["lasts"] is not None:
+        if when["to"] is not None or when["calls"] is not None:
+            raise ValueError(f"'{words}' gives the duration twice; write '5 s at 20 s' or 'from 20 s to 25 s'")
+        to_s = from_s + float(when["lasts"])
+    if to_s <= from_s:
+        raise ValueError(f"'{words}' ends before it begins; write the earlier time first")
+    return from_s, to_s
+
+
+def _check_source(source: str, effect: Effect, cameras: Sequence[str]) -> None:
+    """Raises ValueError unless the effect is on pictures and the source is a camera of the robot."""
+    if effect.verbs != {"image"}:
+        raise ValueError(f"'.{source}' names a camera, but this fault does not concern cameras; remove '.{source}'")
+    if cameras and source not in cameras:
+        near = difflib.get_close_matches(source, cameras, n=1)
+        hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(cameras)}"
+        raise ValueError(f"the robot has no camera '{source}'; {hint}")
+
+
+def random_faults(
+    count: int, seed: int, cameras: Sequence[str], kinds: Sequence[FaultKind] = STANDARD_FAULTS
+) -> tuple[str, ...]:
+    """Draws the words of `count` faults by a seed, among the kinds marked as random; in order of time.
+
+    A larger count adds faults to those of a smaller one.
+    """
+    rng = np.random.default_rng([seed, _STREAM])
+    drawable = [kind.random for kind in kinds if kind.random]
+    drawn = [_drawn(drawable[int(rng.integers(len(drawable)))], cameras, rng) for _ in range(count)]
+    return tuple(words for _, words in sorted(drawn))
+
+
+def _drawn(template: str, cameras: Sequence[str], rng: np.random.Generator) -> tuple[float, str]:
+    """Draws one fault of a kind: its time (s) and its words."""
+    images = [f"camera.{source}" for source in cameras] or ["camera"]
+    at_s = round(float(rng.uniform(_FIRST_S, _LAST_S)), 1)
+    values = {
+        "camera": images[int(rng.integers(len(images)))],
+        "sensor": ("lidar", *images)[int(rng.integers(1 + len(images)))],
+        "motion": _MOTIONS[int(rng.integers(len(_MOTIONS)))],
+        "metres": round(float(rng.uniform(-0.3, 0.3)), 2),
+        "span": f"{round(float(rng.uniform(1.0, 6.0)), 1):g} s at {at_s:g} s",
+        "at": f"at {at_s:g} s",
+    }
+    return at_s, template.format(**values)
 
 
 @dataclass

@@ -12,18 +12,16 @@ import shapely
 from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
-from skills.find_people.ports import FindPeopleInputs, FindPeoplePorts
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
-from skills.patience import Patience
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
-from skills.perception.people import SeenPerson, add_person, people_in_scan
-from skills.perception.people_watch import located_people, people_detections
+from skills.perception.people import SeenPerson, add_person, located_people, people_detections, people_in_scan
+from skills.ports import FindPeopleInputs, FindPeoplePorts
 from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
-from skills.routine import Routine, SkillFailure
+from skills.routine import Patience, Routine, SkillFailure
 
 _SCAN_AGE_S = 1.0
 _AHEAD_RAD = 0.2
@@ -65,7 +63,11 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             echoes += [] if by_camera is None else by_lidar
             for one in by_lidar if by_camera is None else by_camera:
                 seen = add_person(seen, one, same_m) if area.covers(shapely.Point(one.place_W)) else seen
-            found = [one for one in seen if one.looks > 1 or any(_apart_m(one, echo) <= same_m for echo in echoes)]
+            found = [
+                one
+                for one in seen
+                if one.looks > 1 or any(math.dist(one.place_W, echo.place_W) <= same_m for echo in echoes)
+            ]
             if 0 < inputs.count <= len(found):
                 break
         return self._ended(inputs, tuple(_observation(one, inputs) for one in found))
@@ -89,7 +91,8 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         if not found or len(found) < inputs.count:
             few = count_sentence(found, ()) if found else f"nobody is seen in the {inputs.place} from here"
             raise SkillFailure(Cause.POSTCONDITION, few)
-        said = _describe(found[0]) if inputs.count == 1 else count_sentence(found, ())
+        who = "somebody" if found[0].kind.name == PERSON else found[0].kind.name
+        said = f"saw {who} in the {found[0].surface}" if inputs.count == 1 else count_sentence(found, ())
         return Succeeded(said, {"observation": found[0], "observations": found})
 
     def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:
@@ -132,16 +135,6 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             yield Running(f"{message}; waits for a scan")
         X_WB = self.context.localiser.estimate().X_WO @ robot.odometry().X_OB
         return people_in_scan(scan, X_WB, robot.capabilities().footprint_m)
-
-
-def _apart_m(one: SeenPerson, other: SeenPerson) -> float:
-    return math.dist(one.place_W, other.place_W)
-
-
-def _describe(seen: ObjectObservation) -> str:
-    """Describes a person: "saw Robin in the kitchen"."""
-    who = "somebody" if seen.kind.name == PERSON else seen.kind.name
-    return f"saw {who} in the {seen.surface}"
 
 
 def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservation:

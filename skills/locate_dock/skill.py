@@ -51,7 +51,7 @@ class LocateDock(RoutineSkill[LocateDockInputs]):
 
     def run(self, inputs: LocateDockInputs) -> Routine[Succeeded]:
         """Takes the pictures, and averages over those that show the tag."""
-        from skills.perception.tag_views import look_for_tags
+        from skills.perception.fiducials import look_for_tags
 
         context, tag, mapped = self.context, inputs.tag, inputs.dock
         if not context.localiser.estimate().localised:

@@ -151,8 +151,8 @@ class Mapper:
         if scan is None or (self._scan is not None and scan.stamp_s <= self._scan.stamp_s):
             return
         self._filter = self._filter or SelfFilter.of(robot.capabilities())
-        options, frozen = self._options, self._frozen(scan)
-        before, self._scan = self._scan, scan
+        options, before, self._scan = self._options, self._scan, scan
+        frozen = before is not None and scan.repeats(before) and has_moved(before, scan)
         step = Pose2D(0.0, 0.0, 0.0)
         X_OF, self._X_OF = self._X_OF, Pose2D.from_transform(scan.X_OB)
         if before is not None:
@@ -187,11 +187,6 @@ class Mapper:
     @property
     def _current(self) -> Submap:
         return self._active[0]
-
-    def _frozen(self, scan: Scan) -> bool:
-        """Returns whether a scan repeats the last one, noise included, although the robot moved."""
-        last = self._scan
-        return last is not None and scan.repeats(last) and has_moved(last, scan)
 
     def _predict(self, step: Pose2D) -> None:
         """Moves the pose along with odometry and increases its covariance."""

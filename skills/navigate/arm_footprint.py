@@ -108,15 +108,9 @@ class ArmFootprint:
 def _link_discs(model: ArmModel, q_rad: FloatArray, tip_m: float) -> FloatArray:
     """Discs along the arm from the shoulder to the fingers."""
     points = np.vstack([model.points_B(q_rad), model.X_BH(q_rad) @ np.array([tip_m, 0.0, 0.0])])
-    lines = [_between(a[:2], b[:2]) for a, b in pairwise(points)]
-    centres = np.vstack(lines)
+    lines = [(a[:2], b[:2], 2 + int(np.linalg.norm(b[:2] - a[:2]) / _APART_M)) for a, b in pairwise(points)]
+    centres = np.vstack([np.linspace(start, end, count) for start, end, count in lines])
     return np.column_stack([centres, np.full(len(centres), LINK_RADIUS_M)])
-
-
-def _between(start: FloatArray, end: FloatArray) -> FloatArray:
-    """Points (N, 2) on a line, both ends included."""
-    count = 2 + int(np.linalg.norm(end - start) / _APART_M)
-    return np.asarray(np.linspace(start, end, count))
 
 
 def _box_discs(X_BH: RigidTransform, corners_H: FloatArray) -> FloatArray:

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import Cause, InputsT, Running, SkillContext
-from skills.patience import Patience
 from skills.robot import CommandId, CommandState
-from skills.routine import Routine, RoutineSkill, SkillFailure
+from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
 EXPIRY_S = 0.3
 """Lifetime (s) of a drive command unless the next one replaces it."""

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
-from skills.navigate.footprint import Footprint, clearance_on_grid
-from skills.navigate.obstacles import with_segments
+from skills.navigate.footprint import Footprint, clearance_on_grid, with_segments
 from skills.perception.doorway import Doorway, measure_opening
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skills.geometry import wrap
 from skills.navigate.lattice import Lattice
 from skills.navigate.motion_cost import Space, clearance_needed, drive_cost, segment_cost
-from skills.navigate.smoothing import clearances
+from skills.navigate.path import clearances
 from skills.robot import FloatArray
 
 CELL_SHARE = 0.5

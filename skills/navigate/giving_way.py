@@ -18,13 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import FreeSpace, SkillContext
-from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, clearance_on_grid, footprint_clearance_m, pose_array
-from skills.navigate.obstacles import NoObstacles, with_outlines
+from skills.navigate.footprint import (
+    SAFE_MARGIN_M,
+    Footprint,
+    NoObstacles,
+    clearance_on_grid,
+    footprint_clearance_m,
+    pose_array,
+    with_outlines,
+)
 from skills.navigate.path import progress_m
 from skills.quantities import Count, Delay, Length, Margin
 from skills.robot import FloatArray, Pose2D
 from skills.stack import LocalController
-from skills.traffic import Neighbour
+from skills.world_model import Neighbour
 
 _PATH_STEP_M = 0.12
 """Distance between the poses by which a reserved path is avoided."""

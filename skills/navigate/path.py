@@ -1,11 +1,18 @@
-"""Planned paths: closely spaced poses, and the distance along them."""
+"""Planned paths: closely spaced poses, the distance along them, and the smoothing of a lattice path.
+
+Smoothing takes shortcuts, then relaxes the path like an elastic band, with clearance checked throughout.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from skills.estimate.compiled import compiled
+from skills.navigate.footprint import clearance_at
+from skills.navigate.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost
 from skills.robot import FloatArray, Pose2D
 
 TURN_M_PER_RAD = 0.4
@@ -52,3 +59,107 @@ def path_length(path: Path) -> float:
     """Length (m) of a path without its turns."""
     steps = np.diff(path.poses[:, :2], axis=0)
     return float(np.sum(np.hypot(steps[:, 0], steps[:, 1])))
+
+
+@compiled
+def shortcut(space: Space, poses: FloatArray, window: int, sideways: bool) -> FloatArray:
+    """The cheapest subset of poses (N, 3) to join by straight lines, each skipping at most `window` poses.
+
+    The first and the last pose stay; yaws must be continuous. A base that cannot go sideways turns to each line first.
+    """
+    count = poses.shape[0]
+    best = np.full(count, np.inf)
+    came = np.full(count, -1, dtype=np.int64)
+    best[0] = 0.0
+    for j in range(1, count):
+        for i in range(max(0, j - window), j):
+            need = clearance_needed(space, poses[i, 0], poses[i, 1])
+            if sideways:
+                cost = segment_cost(space, poses[i], poses[j], need)
+            else:
+                cost = drive_cost(space, poses[i], poses[j], need)[0]
+            if j - i == 1:
+                cost = min(cost, 1e6)
+            if best[i] + cost < best[j]:
+                best[j], came[j] = best[i] + cost, i
+    chosen = np.zeros(count, dtype=np.bool_)
+    j = count - 1
+    while j >= 0:
+        chosen[j] = True
+        j = came[j]
+    return poses[chosen]
+
+
+@compiled
+def densify(poses: FloatArray, step_m: float) -> FloatArray:
+    """The same path with poses at most step_m apart (a radian counting 0.6 m)."""
+    counts = np.empty(len(poses) - 1, dtype=np.int64)
+    for n in range(len(counts)):
+        length = math.hypot(poses[n + 1, 0] - poses[n, 0], poses[n + 1, 1] - poses[n, 1])
+        counts[n] = max(1, math.ceil((length + TURNING_RADIUS_M * abs(poses[n + 1, 2] - poses[n, 2])) / step_m))
+    dense = np.empty((counts.sum() + 1, 3))
+    dense[0], row = poses[0], 1
+    for n in range(len(counts)):
+        for k in range(1, counts[n] + 1):
+            dense[row] = poses[n] + (k / counts[n]) * (poses[n + 1] - poses[n])
+            row += 1
+    return dense
+
+
+@compiled
+def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m: float) -> FloatArray:
+    """Pulls poses between their neighbours, turns them along the path, pushes them off obstacles nearer than wide_m.
+
+    The ends stay. A pose moves only where its clearance stays above margin_m or does not get smaller.
+    """
+    poses = poses.copy()
+    count = poses.shape[0]
+    clearance = np.empty(count)
+    for n in range(count):
+        clearance[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])
+    for _ in range(rounds):
+        for n in range(1, count - 1):
+            x = 0.5 * poses[n, 0] + 0.25 * (poses[n - 1, 0] + poses[n + 1, 0])
+            y = 0.5 * poses[n, 1] + 0.25 * (poses[n - 1, 1] + poses[n + 1, 1])
+            yaw = 0.5 * poses[n, 2] + 0.25 * (poses[n - 1, 2] + poses[n + 1, 2])
+            yaw += 0.1 * _off_course(poses, n, yaw)
+            if clearance[n] < wide_m:
+                gx, gy = _uphill(space, x, y, yaw)
+                push = 0.02 * (wide_m - clearance[n]) / wide_m
+                x, y = x + push * gx, y + push * gy
+            new = clearance_at(space.field, x, y, yaw)
+            if new >= min(margin_m, clearance[n]):
+                poses[n, 0], poses[n, 1], poses[n, 2], clearance[n] = x, y, yaw, new
+    return poses
+
+
+@compiled
+def _off_course(poses: FloatArray, n: int, yaw: float) -> float:
+    """Angle from yaw to the path's direction at a pose; 0 where the path does not lead roughly ahead."""
+    first, last = max(0, n - 2), min(poses.shape[0] - 1, n + 2)
+    dx, dy = poses[last, 0] - poses[first, 0], poses[last, 1] - poses[first, 1]
+    if math.hypot(dx, dy) < 0.1:
+        return 0.0
+    off = (math.atan2(dy, dx) - yaw + math.pi) % (2.0 * math.pi) - math.pi
+    return off if abs(off) < 0.8 else 0.0
+
+
+@compiled
+def _uphill(space: Space, x: float, y: float, yaw: float) -> tuple[float, float]:
+    """Direction in which the clearance grows, with a length up to 1."""
+    h = 0.03
+    gx = clearance_at(space.field, x + h, y, yaw)
+    gx -= clearance_at(space.field, x - h, y, yaw)
+    gy = clearance_at(space.field, x, y + h, yaw)
+    gy -= clearance_at(space.field, x, y - h, yaw)
+    size = max(math.hypot(gx, gy), 2.0 * h)
+    return gx / size, gy / size
+
+
+@compiled
+def clearances(space: Space, poses: FloatArray) -> FloatArray:
+    """Clearance (m) of the footprint at each of (N, 3) poses."""
+    values = np.empty(poses.shape[0])
+    for n in range(poses.shape[0]):
+        values[n] = clearance_at(space.field, poses[n, 0], poses[n, 1], poses[n, 2])
+    return values

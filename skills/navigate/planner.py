@@ -16,8 +16,7 @@ from skills.navigate.differential import CELL_SHARE, Links, courses, driven_pose
 from skills.navigate.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
 from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
 from skills.navigate.motion_cost import TURNING_RADIUS_M, Needs, Space, Weights, segment_cost
-from skills.navigate.path import Path
-from skills.navigate.smoothing import clearances, densify, relax, shortcut
+from skills.navigate.path import Path, clearances, densify, relax, shortcut
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
 

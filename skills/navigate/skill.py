@@ -17,12 +17,11 @@ from skills.navigate.follower import Drive
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
-from skills.navigate.ports import NavigateInputs, NavigatePorts
 from skills.navigate.surroundings import NavigateOptions, Surroundings
 from skills.navigate.trip_planning import TripPlanning, place_text
-from skills.patience import Patience
+from skills.ports import NavigateInputs, NavigatePorts
 from skills.robot import Pose2D
-from skills.routine import Routine, RoutineSkill, SkillFailure
+from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 from skills.stack import LocalController
 
 _STILL_THERE_M = 1.0

@@ -12,16 +12,14 @@ from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
-from skills.navigate.footprint import Footprint, disc_centres, pose_array
+from skills.navigate.footprint import Footprint, disc_centres, pose_array, with_discs
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
-from skills.navigate.obstacles import with_discs
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
-from skills.patience import PATIENCE_S
 from skills.perception.doorway import Doorway
-from skills.perception.people import SeenPerson
-from skills.perception.people_watch import PeopleOptions, PeopleWatch
+from skills.perception.people import PeopleOptions, PeopleWatch, SeenPerson
 from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
+from skills.routine import PATIENCE_S
 from skills.stack import LocalController
 
 

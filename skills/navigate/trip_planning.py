@@ -11,11 +11,10 @@ from skills.geometry import compose
 from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
-from skills.navigate.ports import NavigateInputs
 from skills.navigate.surroundings import NavigateOptions, Surroundings
-from skills.patience import Patience
+from skills.ports import NavigateInputs
 from skills.robot import Pose2D
-from skills.routine import SkillFailure
+from skills.routine import Patience, SkillFailure
 
 __all__ = ["TripPlanning", "place_text"]
 

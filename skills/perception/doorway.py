@@ -76,7 +76,7 @@ def measure_opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]])
     """
     strips = max(1, round(door.width_m / _STRIP_M))
     counts: Counts = np.array([_counts(door, strips, scan, X_WL) for scan, X_WL in scans]).sum(axis=0)
-    free, shut = (_is_clear(part, counts.sum(axis=0)) for part in counts[:2])
+    free, shut = ((part >= _FEWEST) & (part >= _CLEARLY * counts.sum(axis=0)) for part in counts[:2])
     closed = np.logical_and.accumulate(shut) | np.logical_and.accumulate(shut[::-1])[::-1]
     strip_m = door.width_m / strips
     return Opening(_longest(free) * strip_m, _longest(~closed) * strip_m, int(counts.sum()))
@@ -99,11 +99,6 @@ def _counts(door: Doorway, strips: int, scan: Scan, X_WL: RigidTransform) -> Cou
     strip = np.minimum((aside[crosses] / door.width_m * strips).astype(np.int64), strips - 1)
     goes, ends = beyond > _BEYOND_M, np.abs(beyond) <= _IN_PLANE_M
     return np.array([np.bincount(strip[kind], minlength=strips) for kind in (goes, ends, ~goes & ~ends)])
-
-
-def _is_clear(counts: Counts, total: Counts) -> Bools:
-    """Returns for which strips enough rays, and nearly all, agree."""
-    return np.asarray((counts >= _FEWEST) & (counts >= _CLEARLY * total))
 
 
 def _longest(flags: Bools) -> int:

@@ -12,12 +12,11 @@ import numpy as np
 from skills.api import Cause, LocalisationEstimate, Localiser, Running, SearchingLocaliser, Succeeded
 from skills.navigate.base import MovingSkill
 from skills.navigate.sensor_watch import WatchOptions, low_points
-from skills.patience import PATIENCE_S
-from skills.perception.tag_views import look_for_tags
+from skills.perception.fiducials import look_for_tags
+from skills.ports import RelocaliseInputs, RelocalisePorts
 from skills.quantities import Delay, Height, Length, Margin, Share, Speed, Turn, TurnRate
-from skills.relocalise.ports import RelocaliseInputs, RelocalisePorts
 from skills.robot import Capabilities, FloatArray, NoImageError, Pose2D, Scan
-from skills.routine import Routine, SkillFailure
+from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 _TAG_VARIANCES = (0.05**2, 0.05**2, 0.03**2)
 """Variances of a pose by a tag: x, y (m^2) and yaw (rad^2)."""

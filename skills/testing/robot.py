@@ -327,7 +327,9 @@ class ScriptedRobot:
         self._move_base(dt_s)
         self._move_body(dt_s)
         self._move_arm()
-        self._move_head()
+        if (head := self._commands.active("point_head")) is not None:
+            self.head_rad = head.goal
+            self._commands.finish("point_head", CommandState.DONE)
         self._move_gripper(dt_s)
         used = -dt_s / _CHARGING_S if self.docked else dt_s / _BATTERY_RUNTIME_S
         self.charge = min(1.0, max(0.0, self.charge - used))
@@ -370,12 +372,6 @@ class ScriptedRobot:
             self.q_rad = before  # the held object stands already
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
-
-    def _move_head(self) -> None:
-        active = self._commands.active("point_head")
-        if active is not None:
-            self.head_rad = active.goal
-            self._commands.finish("point_head", CommandState.DONE)
 
     def _move_gripper(self, dt_s: float) -> None:
         active = self._commands.active("set_gripper")

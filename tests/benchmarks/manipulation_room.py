@@ -11,8 +11,8 @@ import yaml
 
 from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import Plan
+from plant.diagram import OWN_PACKAGE
 from plant.models.catalogue import read_imported
-from plant.scenery import OWN_PACKAGE
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import World, WorldError, load_world
 

@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.referee.truth import align, trajectory_error_m
+from plant.referee.object_history import align, trajectory_error_m
 from plant.robots.spot.model import spot_facts
 from plant.sensors.lidar import Lidar
 from plant.sensors.proprioception import OdometryModel

@@ -18,8 +18,7 @@ from executive.words.goal import GoalCondition, GoalKind, RefereeReport, When
 from executive.words.knowledge import ANYBODY, Knowledge
 from executive.words.outlines import inside
 from plant.referee.judge import DOOR_LOOK_S, judge
-from plant.referee.object_history import ObjectHistory, ObjectSample
-from plant.referee.truth import TimedPath, Truth, extend_path, extend_stays
+from plant.referee.object_history import ObjectHistory, ObjectSample, TimedPath, Truth, extend_path, extend_stays
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from tests.executive.conftest import KNOWLEDGE, ManualClock
 

@@ -11,7 +11,7 @@ import executive
 from executive.app.evaluate.results import Case, Cases, RunSpec
 from executive.app.mission_files import request_of
 from executive.app.report import RunReport
-from executive.testing.small_room import room_knowledge
+from executive.testing.bench import room_knowledge
 from skills.files.errors import InputError
 
 ROOT = Path(__file__).parents[2]

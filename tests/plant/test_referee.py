@@ -16,7 +16,7 @@ from executive.words.goal import GoalCondition, GoalKind, Region, When
 from plant.referee import Referee
 from plant.referee.entities import Kind
 from plant.referee.judge import judge
-from plant.referee.truth import TimedPath, Truth
+from plant.referee.object_history import TimedPath, Truth
 from plant.robots.spot.kind import SPOT
 
 FRICTION = CoulombFriction(0.8, 0.8)

@@ -6,8 +6,8 @@ from typing import get_args, get_type_hints
 import pytest
 from planar_robot import Bench
 
+from executive.tree.port_values import conforms, field_types
 from executive.tree.registry import built_in_skills
-from executive.tree.types import conforms, field_types
 from skills.navigate.skill import Navigate
 from skills.quantities import base_type, bounds
 from skills.robot import Pose2D

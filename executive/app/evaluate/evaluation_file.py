@@ -17,15 +17,7 @@ from executive.mission.request import Request
 from executive.mission.scenario import NO_SCENARIO, RandomFaults, Scenario
 from executive.words.robot_config import NamedRobot, RobotConfig, robots_of_file
 from executive.words.slug import slug
-from executive.words.variation import (
-    NORMAL_LIGHT,
-    Brightness,
-    Clutter,
-    Friction,
-    MorePeople,
-    Variation,
-    parse_light,
-)
+from executive.words.variation import NORMAL_LIGHT, Brightness, Clutter, Friction, MorePeople, Variation, parse_light
 from plant.robots.robot_kind import robot_kinds
 from skills.files.errors import InputError
 from skills.files.outside import is_file, read_text

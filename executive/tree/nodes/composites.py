@@ -1,14 +1,30 @@
-"""Sequence, selector and round: composites with memory; the results of their children stay visible."""
+"""Composites with memory, and their plans: sequence, selector, round, alternatives, and parallel steps.
+
+The results of their children stay visible.
+"""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import field
+from types import MappingProxyType
+from typing import ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
+from executive.mission.gripper import held_after_either
+from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.behaviour import Conditional, MemoryComposite, cause_of, failed_for_good, message_of
-from skills.api import Cause
+from executive.tree.board import Board
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.decision_nodes import decide_plan
+from executive.tree.nodes.policies import FINAL_CAUSES
+from executive.tree.plan import Assembled, PlanBuilder
+from executive.words import steps as model
+from executive.words.expression import Value
+from skills.api import Cause, Part
+from skills.files.errors import InputError
 
 _MERELY_NOT_SO = frozenset({Cause.PRECONDITION, Cause.POSTCONDITION})
 
@@ -93,3 +109,157 @@ class MemoryRound(MemorySelector):
             return
         super()._take_over(done[-1])
         self.message = "; ".join(dict.fromkeys(map(message_of, done)))
+
+
+class Choose(MemoryComposite):
+    """Composite of a decision (the first child, which writes its answer under `key`) and one branch for each answer.
+
+    `branches` has the index of the child for each answer.
+
+    | decision | branch | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | FAILURE | idle | FAILURE with its cause |
+    | SUCCESS, answer without a branch | - | SUCCESS |
+    | SUCCESS, answer with a branch | ticked in the same tick | as the branch |
+    | halted, or its branch is halted | halted | INVALID with CANCELLED |
+    """
+
+    kind = "choose"
+    branches: Mapping[Value, int]
+    key: str
+    board: Board
+
+    def _following(self, child: Behaviour) -> int | None:
+        decided = self._index == 0 and child.status == Status.SUCCESS
+        return self.branches.get(self.board.get(self.key)) if decided else None
+
+
+def _choose_plan(assembler: Assembler, block: model.Choose, builder: PlanBuilder) -> Assembled:
+    decide, key, parts = decide_plan(assembler.flow, block.condition, builder.at("if"))
+    flow = assembler.flow
+    then, after_then = assembler.branch(block.then, builder.at("then"), "then", flow)
+    other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", flow)
+    flow.join([after_then, after_other])
+    branches = {True: 1, False: 2} if block.otherwise else {True: 1}
+    nodes = (decide, *then.nodes, *other.nodes)
+    node = builder.node("choose", f"{block.condition}?", *nodes, branches=MappingProxyType(branches), key=key)
+    return Assembled((node,), (*parts, *then.parts, *other.parts))
+
+
+class Try(MemoryComposite):
+    """Composite that runs its second child when the first fails.
+
+    | first child | second child | status |
+    |---|---|---|
+    | RUNNING, SUCCESS | idle | as the first |
+    | FAILURE with ERROR or CANCELLED | idle | FAILURE with its cause |
+    | FAILURE with another cause | ticked in the same tick | as the second, with the messages of both |
+    | halted | halted | INVALID with CANCELLED |
+    """
+
+    kind = "try"
+
+    def _following(self, child: Behaviour) -> int | None:
+        failed = child.status == Status.FAILURE and cause_of(child) not in FINAL_CAUSES
+        return 1 if self._index == 0 and failed else None
+
+    def _take_over(self, child: Behaviour) -> None:
+        super()._take_over(child)
+        if self._index == 1:
+            self.message = f"{self.message}, since {message_of(self.children[0])}"
+
+
+def _try_plan(assembler: Assembler, block: model.Try, builder: PlanBuilder) -> Assembled:
+    flow = assembler.flow
+    tried, after_tried = assembler.branch(block.steps, builder.at("try"), "try", flow)
+    midway = flow.copy()
+    if after_tried.held != flow.held:
+        midway.held, midway.opening = held_after_either(flow.held, after_tried.held), False
+    other, after_other = assembler.branch(block.otherwise, builder.at("else"), "else", midway)
+    flow.join([after_tried, after_other])
+    return Assembled((builder.node("try", "else the other", *tried.nodes, *other.nodes),), (*tried.parts, *other.parts))
+
+
+class Together(MemoryComposite):
+    """Parallel composite: each child is ticked until it ends.
+
+    | children | status |
+    |---|---|
+    | `needed` of them SUCCESS | SUCCESS; the others are halted |
+    | so many FAILURE that `needed` cannot succeed | FAILURE with the first cause; the others are halted |
+    | else | RUNNING |
+    | halted | INVALID with CANCELLED |
+    """
+
+    kind = "together"
+    needed: int
+    _failed: list[Behaviour] = field(default_factory=list, init=False)
+    _done: list[Behaviour] = field(default_factory=list, init=False)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Ticks the children that have not ended."""
+        if self.status != Status.RUNNING:
+            self._restart()
+            self._failed, self._done = [], []
+        for child in self.children:
+            if child in self._done or child in self._failed:
+                continue
+            yield from child.tick()
+            if child.status == Status.SUCCESS:
+                self._done.append(child)
+            elif child.status != Status.RUNNING:
+                self._failed.append(child)
+            if len(self._done) == self.needed or len(self.children) - len(self._failed) < self.needed:
+                break
+        self._judge()
+        yield self
+
+    def _judge(self) -> None:
+        if len(self._done) == self.needed:
+            self._finish(None, "; ".join(map(message_of, self._done)))
+        elif len(self.children) - len(self._failed) < self.needed:
+            self._finish(cause_of(self._failed[0]), "; ".join(map(message_of, self._failed)))
+        else:
+            self._go_on("; ".join(message_of(child) for child in self.children if child.status == Status.RUNNING))
+
+    def _finish(self, cause: Cause | None, message: str) -> None:
+        for child in self.children:
+            if child.status == Status.RUNNING:
+                child.stop(Status.INVALID)
+        self._end(cause, message)
+
+
+def _together_plan(assembler: Assembler, block: model.Together, builder: PlanBuilder) -> Assembled:
+    flow, made, afters = assembler.flow, [], []
+    for number, step in enumerate(block.steps, start=1):
+        branch, after = assembler.branch((step,), builder.at(f"branch-{number}"), f"branch {number}", flow)
+        made.append(branch)
+        afters.append(after)
+    _refuse_collisions([each.nodes[0] for each in made], builder)
+    everything = block.needed == len(block.steps)
+    if everything:
+        before = dict(flow.names)
+        for after in afters:
+            flow.names.update({name: named for name, named in after.names.items() if before.get(name) != named})
+    moved = [after.held for after in afters if after.held != flow.held]
+    if moved:
+        flow.held, flow.opening = (moved[0] if everything else held_after_either(flow.held, *moved)), False
+    name = "side by side" if everything else f"side by side, until {block.needed} of {len(block.steps)} are done"
+    node = builder.node("together", name, *(each.nodes[0] for each in made), needed=block.needed)
+    return Assembled((node,), tuple(part for each in made for part in each.parts))
+
+
+def _refuse_collisions(branches: Sequence[NodeSpec], builder: PlanBuilder) -> None:
+    """Raises InputError for branches that use the same part of the robot."""
+    users: dict[Part, int] = {}
+    for number, branch in enumerate(branches, start=1):
+        skills = (node.options["skill"] for node in branch.walk() if node.kind == "skill")
+        for part in sorted({part for skill in skills for part in skill.uses}, key=lambda each: each.value):
+            if users.setdefault(part, number) != number:
+                what = f"steps {users[part]} and {number} both use the {part.value}"
+                hint = "do them one after the other"
+                raise InputError.at(branch.source or builder.source, f"{what}, and cannot go together", hint=hint)
+
+
+PLANS: Final[StepPlans] = {model.Choose: _choose_plan, model.Try: _try_plan, model.Together: _together_plan}

@@ -16,9 +16,16 @@ from executive.tree.board import Binding, Constant, FromBoard
 from executive.tree.context import RunContext
 from executive.tree.goals import POSE_NEAR_M, square_region, surface_region
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
-from executive.tree.port_values import FROM_KEY, PortValueError, assign_ports, port_value
+from executive.tree.port_values import (
+    FROM_KEY,
+    PortValueError,
+    assign_ports,
+    conforms,
+    describe_type,
+    field_types,
+    port_value,
+)
 from executive.tree.registry import missing_skill
-from executive.tree.types import conforms, describe_type, field_types
 from executive.words.goal import GoalCondition, GoalKind
 from executive.words.knowledge import Knowledge, Pose
 from executive.words.leaf_steps import CallSkill

@@ -10,7 +10,6 @@ from typing import ClassVar
 import numpy as np
 
 from skills.api import FLOOR, Cause, ObjectObservation, Succeeded, Surface
-from skills.detect.ports import DetectInputs
 from skills.detect.skill import Detect
 from skills.manipulation.approach.base_placement import (
     BasePlacement,
@@ -19,12 +18,11 @@ from skills.manipulation.approach.base_placement import (
     is_comfortable,
     reachable_placements,
 )
-from skills.manipulation.approach.ports import ApproachInputs, ApproachPorts
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.grasp.candidates import why_no_candidates
 from skills.manipulation.grasp.reach import body_heights_m, choose_with_look, observed_target, reach_check
 from skills.navigate.footprint import Footprint
-from skills.navigate.ports import NavigateInputs
+from skills.ports import ApproachInputs, ApproachPorts, DetectInputs, NavigateInputs
 from skills.quantities import Count, Length, Margin, Speed, Turn
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure

@@ -94,7 +94,8 @@ class ArmScene:
         self.model, self._work = model, work
         self._capabilities, self._gripper = capabilities, capabilities.gripper
         fingers = () if self._gripper is None else tuple(self._gripper.finger_positions(0.0))
-        self._robot = _Robot(_without_visuals(capabilities.description), model, fingers)
+        without_visuals = re.sub(r"<visual\b.*?</visual>", "", capabilities.description, flags=re.DOTALL)
+        self._robot = _Robot(without_visuals, model, fingers)
         self._padding_m, self._opening = padding_m, 0.0
         self._boxes: tuple[Box, ...] = ()
         self._X_BF = RigidTransform()
@@ -407,8 +408,3 @@ def _contacts(checker: SceneGraphCollisionChecker, q_rad: FloatArray) -> tuple[t
         for a, b in zip(clearance.robot_indices(), clearance.other_indices(), strict=True)
     ]
     return tuple(bodies)
-
-
-def _without_visuals(description: str) -> str:
-    """Returns URDF text without its visual elements, whose mesh files a skill does not need."""
-    return re.sub(r"<visual\b.*?</visual>", "", description, flags=re.DOTALL)

@@ -15,11 +15,10 @@ from skills.manipulation.arm.arm_skill import ArmSkill, Goal
 from skills.manipulation.arm.collision import ArmScene
 from skills.manipulation.arm.poses import look_configuration
 from skills.manipulation.arm.solid_cells import add_picture, add_view
-from skills.patience import PATIENCE_S
 from skills.perception.detector.camera_images import is_dark, lacks_depth
-from skills.perception.visibility import APART_S, is_at_rest
+from skills.perception.point_cloud import APART_S, is_at_rest
 from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, NoImageError
-from skills.routine import Routine, SkillFailure
+from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 PICTURE_LATENCY_S = 0.1
 SETTLE_S = 0.15

@@ -114,7 +114,8 @@ def add_picture(cells: Cells, image: Image, X_WO: RigidTransform, own: Outline) 
     eye, body = X_WC.GetAsMatrix34(), own.X_WB.GetAsMatrix34()
     keys, counts = np.unique(_keys(image.depth_m, x_C, y_C, eye, body, own.low_m, own.high_m), return_counts=True)
     still = cells[~_seen_past(cells, image, X_WO)]
-    return _unique(np.vstack([still, _cells(keys[counts >= _FEWEST_POINTS])]))
+    solid = np.vstack([still, _cells(keys[counts >= _FEWEST_POINTS])])
+    return _cells(np.unique(((solid + _OFFSET) * _STRIDES).sum(axis=1)))
 
 
 @compiled
@@ -218,11 +219,6 @@ def wall_boxes(
 def cell_centres(cells: Cells) -> FloatArray:
     """Centres (N, 3) of cells (m)."""
     return np.asarray((cells + 0.5) * CELL_M, dtype=np.float64)
-
-
-def _unique(cells: Cells) -> Cells:
-    """Returns each cell once, in order."""
-    return _cells(np.unique(((cells + _OFFSET) * _STRIDES).sum(axis=1)))
 
 
 def _cells(keys: NDArray[np.int64]) -> Cells:

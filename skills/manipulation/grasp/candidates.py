@@ -102,11 +102,6 @@ def grasp_candidates(
     return sorted(found, key=lambda candidate: candidate.cost)
 
 
-def _narrowest_m(target: Target, p_BS: FloatArray) -> float | None:
-    """Least width (m) over which fingers could close on an object; None when its outline has no place for them."""
-    return min((each.width_m for each in placements(target, p_BS, _ahead_rad(target, p_BS))), default=None)
-
-
 def _ahead_rad(target: Target, p_BS: FloatArray) -> float:
     """Direction of an object from the shoulder."""
     return float(np.arctan2(target.centre_B[1] - p_BS[1], target.centre_B[0] - p_BS[0]))
@@ -247,7 +242,7 @@ def why_too_heavy(kind: ObjectKind, max_payload_kg: float) -> str | None:
 
 def why_no_candidates(target: Target, p_BS: FloatArray, gripper: GripperCapabilities, name: str) -> str:
     """Returns why an object has no candidates: too wide, too flat, or no straight outline. p_BS is the shoulder."""
-    width_m = _narrowest_m(target, p_BS)
+    width_m = min((each.width_m for each in placements(target, p_BS, _ahead_rad(target, p_BS))), default=None)
     if width_m is not None and width_m >= gripper.max_grasp_m:
         return (
             f"the {name} is too wide for the gripper: {1000 * width_m:.0f} mm where it is narrowest, "

@@ -127,8 +127,8 @@ class ReachCheck:
         """Returns the best grasp from each height; only the usual height's when that grasp is cheap enough."""
         found = []
         for height_m in heights_m:
-            cost = self._cost(at(height_m))
-            if cost is None:
+            best, cost = self._best(at(height_m))
+            if best is None:
                 continue
             if height_m == heights_m[0] and cost < _OTHER_HEIGHT_COST:
                 return [Reached(cost, height_m)]
@@ -146,10 +146,6 @@ class ReachCheck:
         along_B = np.concatenate([_along(model.points_B(q)) for q in _postures(self.scene, best, up_B(X_WB))])
         along_W = along_B @ X_WB.rotation().matrix().T + X_WB.translation()
         return np.concatenate([along_W, along_W + [0.0, 0.0, _ABOVE_ARM_M]])
-
-    def _cost(self, X_WB: RigidTransform) -> float | None:
-        best, beyond = self._best(X_WB)
-        return None if best is None else beyond
 
     def _best(self, X_WB: RigidTransform) -> tuple[GraspCandidate | None, float]:
         """Returns the best grasp that is reached from X_WB, and its cost above the cheapest candidate's."""

@@ -18,16 +18,9 @@ from skills.manipulation.arm.collision import ArmScene, box_corners
 from skills.manipulation.arm.held_object import held_box, square_hand_pose
 from skills.manipulation.arm.looking_skill import LookingSkill
 from skills.manipulation.arm.poses import TALL_M, close_viewpoints, overview_viewpoints, sees_closely
-from skills.manipulation.grasp.candidates import (
-    THIN_M,
-    GraspCandidate,
-    least_mass_kg,
-    why_no_candidates,
-    why_too_heavy,
-)
+from skills.manipulation.grasp.candidates import THIN_M, GraspCandidate, least_mass_kg, why_no_candidates, why_too_heavy
 from skills.manipulation.grasp.close_view import LOOK_HALF_SIDE_M, SURFACE_AROUND_M, CloseView, examine, square
 from skills.manipulation.grasp.planning import PREGRASPS_M, GraspPlan, Surroundings, lifts, pull_back_B
-from skills.manipulation.grasp.ports import GraspInputs, GraspPorts, TriedGrasp
 from skills.manipulation.grasp.reach import (
     WIDE,
     body_heights_m,
@@ -43,6 +36,7 @@ from skills.manipulation.grasp.tried_grasps import others_first, tried_grasp
 from skills.perception.class_forms import ANY_OBJECT
 from skills.perception.detection_3d import detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
+from skills.ports import GraspInputs, GraspPorts, TriedGrasp
 from skills.quantities import Force, Length, Margin, Turn
 from skills.robot import FloatArray, GripperKind
 from skills.routine import Routine, SkillFailure
@@ -190,15 +184,11 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """Reaches for the object and takes it; returns False when it has moved away."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-        aimed = yield from self._reach(view, plan, str(seen.kind))
+        yield from self.follow(plan.to_pregrasp, f"reaching for the {seen.kind}")
+        aimed = yield from self._aimed(view, plan, str(seen.kind))
         if aimed is not None:
             yield from self._take(*aimed, seen)
         return aimed is not None
-
-    def _reach(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
-        """Brings the hand to the pre-grasp; returns view and plan as they are aimed there (see `_aimed`)."""
-        yield from self.follow(plan.to_pregrasp, f"reaching for the {name}")
-        return (yield from self._aimed(view, plan, name))
 
     def _aimed(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
         """Corrects view and plan across the fingers by a picture from the pre-grasp; None when the object is not there.

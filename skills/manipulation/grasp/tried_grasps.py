@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.manipulation.grasp.candidates import GraspCandidate
-from skills.manipulation.grasp.ports import TriedGrasp
+from skills.ports import TriedGrasp
 from skills.robot import FloatArray
 
 _SAME_TURN_RAD = 0.35

@@ -17,16 +17,14 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import PullWatch
 from skills.manipulation.arm.hold import Grip
-from skills.manipulation.hand_over.ports import HandOverInputs, HandOverPorts
 from skills.manipulation.hand_over.verification import HandOverVerification, Release, Seen, release_of
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
-from skills.navigate.ports import NavigateInputs
-from skills.patience import Patience
 from skills.perception.people import SeenPerson, people_in_scan
+from skills.ports import HandOverInputs, HandOverPorts, NavigateInputs
 from skills.quantities import Duration, Force, Height, Length
 from skills.robot import FloatArray, Pose2D
-from skills.routine import Routine, SkillFailure
+from skills.routine import Patience, Routine, SkillFailure
 
 _FACING_RAD = 0.5
 """Largest bearing of a person who is ahead."""

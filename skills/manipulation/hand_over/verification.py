@@ -10,7 +10,6 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from skills.api import Cause, InputsT, Surface
-from skills.back_off.ports import BackOffInputs
 from skills.back_off.skill import BackOff
 from skills.manipulation.arm.collision import Box
 from skills.manipulation.arm.poses import close_viewpoints, overview_viewpoints, towards_shoulder
@@ -20,6 +19,7 @@ from skills.perception.detection_3d import Detection3D, detections_3d
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, detect_in_image
 from skills.perception.point_cloud import cloud_from_image
 from skills.perception.surface_segmentation import segment_surface
+from skills.ports import BackOffInputs
 from skills.robot import FloatArray, Image
 from skills.routine import Routine, SkillFailure
 

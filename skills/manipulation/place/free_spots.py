@@ -197,7 +197,8 @@ class SpotSearch:
 
     def free(self, view: SurfaceView) -> FloatArray:
         """Spots (N, 2) that a view shows to be free."""
-        return free_spots(view, self.spots(), self._clearance_m())
+        clearance_m = min(CLEARANCE_M, self.held.half_width_m + BESIDE_M) if self.tight else CLEARANCE_M
+        return free_spots(view, self.spots(), clearance_m)
 
     def seen(self) -> SurfaceView | None:
         """All that was seen of the surface; None before the first picture."""
@@ -232,8 +233,10 @@ class SpotSearch:
         ordered = [
             spots_W[np.argsort(cost, kind="stable")] for spots_W, cost in zip((free, unseen), costs, strict=True)
         ]
-        left = [spot for spot in np.concatenate(ordered) if not any(_near(spot, other) for other in self._tried)]
-        return spaced_spots(np.array(left).reshape(-1, 2))
+        spots = np.concatenate(ordered)
+        for tried in self._tried:
+            spots = spots[np.linalg.norm(spots - tried, axis=1) > _ANOTHER_M]
+        return spaced_spots(spots)
 
     def why_none(self) -> str:
         """Reason why the search found no spot, by all that was seen."""
@@ -246,13 +249,6 @@ class SpotSearch:
         room_m = np.minimum(clearances_m(seen, inside), _from_edge_m(self.surface, inside))
         objects = "1 object" if count == 1 else f"{count} objects"
         return f"the {name} is full: {objects}, the largest free spot is {200.0 * float(room_m.max()):.0f} cm"
-
-    def _clearance_m(self) -> float:
-        return min(CLEARANCE_M, self.held.half_width_m + BESIDE_M) if self.tight else CLEARANCE_M
-
-
-def _near(spot: FloatArray, other: FloatArray) -> bool:
-    return float(np.linalg.norm(spot - other)) <= _ANOTHER_M
 
 
 def _drive_m(spots_W: FloatArray, here_W: FloatArray) -> FloatArray:

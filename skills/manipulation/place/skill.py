@@ -25,7 +25,6 @@ from skills.manipulation.arm.poses import UP_B, tucked_configuration
 from skills.manipulation.arm.solid_cells import cell_centres
 from skills.manipulation.grasp.reach import body_heights_m
 from skills.manipulation.place.free_spots import (
-    FreeArea,
     SpotSearch,
     free_area,
     longest_edge_rad,
@@ -34,11 +33,10 @@ from skills.manipulation.place.free_spots import (
     unseen_view,
 )
 from skills.manipulation.place.placement import PrePlacePose, above_goal, clear_heights, hold_on_path, reaches
-from skills.manipulation.place.ports import PlaceInputs, PlacePorts
 from skills.manipulation.place.verification import PlaceVerification
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.ports import NavigateInputs
 from skills.perception.surface_segmentation import SurfaceView, segment_surface
+from skills.ports import NavigateInputs, PlaceInputs, PlacePorts
 from skills.quantities import Length, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure, planning_failure
@@ -337,9 +335,8 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         beside = cluster_boxes(view.clusters, X_WB)
         self.boxes = [*surface_boxes([surface], X_WB), *beside]
         along_rad = longest_edge_rad(surface) - Pose2D.from_transform(X_WB).yaw_rad
-        takes = partial(_takes, area, X_WB)
         planner, opening = self.context.stack.arm_planner, self.release_opening()
-        goal = above_goal(on_top, held, planner, beside, opening, takes, along_rad)
+        goal = above_goal(on_top, held, planner, beside, opening, lambda X_BH: area.takes(X_WB @ X_BH), along_rad)
         q_rad = yield from self._bring(goal, held, f"bringing the object over the {surface.name}")
         X_BH = self.model.X_BH(q_rad)
         return PrePlacePose(q_rad, float(X_BH.translation()[2] - on_top[0][2]) - held.drop_m(X_BH.rotation()))
@@ -385,10 +382,6 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
             except PlanningError as error:
                 why = error
         raise SkillFailure(Cause.PLANNING, str(why)) from why
-
-
-def _takes(area: FreeArea, X_WB: RigidTransform, X_BH: RigidTransform) -> bool:
-    return area.takes(X_WB @ X_BH)
 
 
 def _by_distance(points_W: FloatArray, X_WB: RigidTransform) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 
 from skills.api import Cause, Succeeded
 from skills.manipulation.arm.arm_skill import GRIPPER_FORCE_N, ArmSkill
-from skills.manipulation.pose_arm.ports import PoseArmInputs, PoseArmPorts
+from skills.ports import PoseArmInputs, PoseArmPorts
 from skills.routine import Routine, SkillFailure
 
 _THERE_RAD = 0.05

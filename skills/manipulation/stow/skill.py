@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from skills.api import Succeeded
 from skills.manipulation.arm.arm_skill import ArmSkill
-from skills.manipulation.stow.ports import StowInputs, StowPorts
+from skills.ports import StowInputs, StowPorts
 from skills.routine import Routine, planning_failure
 
 _NEAR_X_M = 0.05

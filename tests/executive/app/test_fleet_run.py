@@ -20,13 +20,12 @@ from executive.cli.fleet_command import _to_do, resumable_lines
 from executive.mission.request import Request
 from executive.record.history import read_events
 from executive.run.visitor import RunEntry
-from executive.store.assignments import GivenMissions
-from executive.store.missions import MissionStore
+from executive.store.missions import GivenMissions, MissionStore
 from executive.tree.compiler import compile_mission
 from executive.words.command import Command, Task, parse_command
 from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
-from executive.words.yaml_steps import lines_of_steps
+from executive.words.steps import lines_of_steps
 from plant.robots.robot_kind import PlacedRobot
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError

@@ -16,7 +16,7 @@ from typing import Any
 
 from executive.cli import entry
 from executive.run.tree_run import TreeRun
-from plant.pipelined_clock import PipelinedRobot
+from plant.engine import PipelinedRobot
 
 ROOT = Path(__file__).resolve().parents[3]
 SENTENCE = "fetch me a coke"

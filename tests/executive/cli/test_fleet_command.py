@@ -9,8 +9,7 @@ from executive.app import fleet_run
 from executive.cli import entry
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
-from executive.store.assignments import GivenMissions
-from executive.store.missions import MissionState, MissionStore
+from executive.store.missions import GivenMissions, MissionState, MissionStore
 from skills.files.errors import InputError
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"

@@ -11,8 +11,7 @@ from executive.words.knowledge import load_knowledge
 from executive.words.leaf_steps import Do, steps_of_commands
 from executive.words.mission import Mission
 from executive.words.step import Place
-from executive.words.steps import Loop, Repeat
-from executive.words.yaml_steps import lines_of_steps, steps_from_lines
+from executive.words.steps import Loop, Repeat, lines_of_steps, steps_from_lines
 from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource
 

@@ -22,8 +22,7 @@ from executive.tree.node import NodeSpec
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.fault_kinds import VERBS, Effect
-from skills.faults.fault_words import Fault
-from skills.faults.faulty_robot import inject_faults
+from skills.faults.faulty_robot import Fault, inject_faults
 from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 import pytest
 from pydantic import Field
 
-from executive.tree.port_values import PortValueError, assign_ports, port_value
+from executive.tree.port_values import PortValueError, assign_ports, assignable, conforms, describe_type, port_value
 from skills.api import ObjectKind, ObjectObservation, Surface
-from skills.quantities import Length, Speed
+from skills.quantities import Count, Length, Speed
 from skills.robot import Pose2D
 
 
@@ -153,3 +153,43 @@ def test_a_value_that_belongs_to_no_port_is_refused(values, inputs, says):
     with pytest.raises(PortValueError) as error:
         assign_ports(values, inputs)
     assert says in error.value.hint
+
+
+@pytest.mark.parametrize(
+    ("value", "hint", "expected"),
+    [
+        (1, float, True),
+        (True, float, False),
+        ("x", float, False),
+        ((), tuple[str, ...], True),
+        (("a", 1), tuple[str, ...], False),
+        ((1, "a"), tuple[int, str], True),
+        ((1,), tuple[int, str], False),
+        (["a"], tuple[str, ...], False),
+        (None, str | None, True),
+        (3, str | None, False),
+        (object(), Any, True),
+        (3.0, Speed, True),
+        (3.1, Speed, False),
+        ((1.0, 0.0), tuple[Speed, ...], False),
+    ],
+)
+def test_conforms(value, hint, expected):
+    assert conforms(value, hint) is expected
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "expected"),
+    [(int, float, True), (float, int, False), (float, Speed, True), (bool, int, True), (str, str | None, True),
+     (int, Any, True), (tuple[str, ...], tuple[str, ...], True), (tuple[str, ...], tuple[int, ...], False)],
+)  # fmt: skip
+def test_assignable(source, target, expected):
+    assert assignable(source, target) is expected
+
+
+def test_types_are_described_as_users_read_them():
+    assert [describe_type(hint) for hint in (float, tuple[str, ...], tuple[Speed, Count] | None)] == [
+        "number",
+        "list of text",
+        "[number above 0 and at most 3 m/s, whole number from 1 to 100000] or nothing",
+    ]

@@ -11,8 +11,8 @@ from table_scene import COKE, TABLE, scene, seen_as
 from skills.api import Detection, LocalisationEstimate
 from skills.detect.messages import coverage_message, detections_message, tracks_message
 from skills.perception.detection_3d import detections_3d
+from skills.perception.point_cloud import SurfaceShares
 from skills.perception.tracker import Tracker
-from skills.perception.visibility import SurfaceShares
 
 PLACE = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.02**2, 0.02**2, 0.0]), True)
 

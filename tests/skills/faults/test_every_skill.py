@@ -11,7 +11,7 @@ from executive.testing.skill_test import carry_out, load_skill_tests, scripted_m
 from executive.tree.registry import built_in_skills
 from skills.api import Cause
 from skills.faults.fault_kinds import STANDARD_FAULTS
-from skills.faults.fault_words import parse_fault
+from skills.faults.faulty_robot import parse_fault
 
 FOLDER = Path(__file__).parents[1]
 PARTS = ("arm", "base", "body", "set_gripper")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from skills.faults.fault_kinds import STANDARD_FAULTS, InjectedFault
-from skills.faults.fault_words import parse_fault, random_faults
-from skills.faults.faulty_robot import inject_faults
+from skills.faults.faulty_robot import inject_faults, parse_fault, random_faults
 from skills.robot import CommandState, NoImageError
 from skills.testing.blocks import ROOM
 from skills.testing.clock import VirtualClock

@@ -11,9 +11,8 @@ import pytest
 
 from executive.run.traffic_table import TrafficTable
 from skills.api import LocalisationEstimate, SkillContext
-from skills.navigate.footprint import Footprint
+from skills.navigate.footprint import Footprint, with_outlines
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions, first_suitable_pose, reachable_cells
-from skills.navigate.obstacles import with_outlines
 from skills.robot import FloatArray, Pose2D, Robot
 from skills.stack import LocalController
 

@@ -7,7 +7,7 @@ from table_scene import BLUE, CAMERA, COKE, LENS, RED, TABLE, Can, scene, seen_a
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.perception.detection_3d import detections_3d, observation, place_covariance, surface_below
-from skills.perception.visibility import depth_at_points, in_plain_view
+from skills.perception.point_cloud import depth_at_points, in_plain_view
 
 SURE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
 COKE_W = np.array([COKE.x, COKE.y, 0.8075])

@@ -9,7 +9,7 @@ import yaml
 from executive.language.structure.sentence import MOST_NESTED
 from executive.language.understand import Status, ask_until_clear, understand
 from executive.words.condition import DoorOpen
-from executive.words.yaml_steps import steps_from_yaml, steps_to_yaml
+from executive.words.steps import steps_from_yaml, steps_to_yaml
 from tests.executive.language.notation import as_noted, noted
 
 HERE = Path(__file__).parent

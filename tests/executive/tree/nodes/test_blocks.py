@@ -7,13 +7,11 @@ from py_trees.common import Status
 
 from executive.tree.behaviour import suspend
 from executive.tree.context import Endings
-from executive.tree.nodes.alternatives import Choose, Try
-from executive.tree.nodes.composites import MemorySequence
+from executive.tree.nodes.composites import Choose, MemorySequence, Together, Try
 from executive.tree.nodes.group import Always
 from executive.tree.nodes.guard import Guard
 from executive.tree.nodes.policies import Retry, Skip, Timeout
 from executive.tree.nodes.repeat import Repeat
-from executive.tree.nodes.together import Together
 from skills.api import Cause, Failed
 from tests.executive.tree.scripted import Leaf, letters, tick
 

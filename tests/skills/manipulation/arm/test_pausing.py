@@ -8,9 +8,8 @@ import pytest
 from executive.testing.bench import SkillBench
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Running, Skill, Succeeded
-from skills.patience import PATIENCE_S
 from skills.robot import ArmTrajectory
-from skills.routine import RoutineSkill, rest_of
+from skills.routine import PATIENCE_S, RoutineSkill, rest_of
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from plant.referee.truth import align, trajectory_error_m
+from plant.referee.object_history import align, trajectory_error_m
 from skills.geometry import compose
 from skills.robot import Pose2D
 

@@ -7,7 +7,7 @@ from table_scene import BLUE, GREY, RED, TABLE, Can, scene
 
 from skills.api import Surface
 from skills.manipulation.arm.poses import camera_pose
-from skills.perception.visibility import Coverage, SurfaceShares, is_at_rest
+from skills.perception.point_cloud import Coverage, SurfaceShares, is_at_rest
 
 AWAY = Surface("shelf", ((-3.0, -0.5), (-2.0, -0.5), (-2.0, 0.5), (-3.0, 0.5)), 0.75)
 

@@ -7,8 +7,20 @@ from hypothesis import strategies as st
 from executive.words.command import Command, Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Awaited, Charging, Check, Do, Dock, Set, Speak, Wait, steps_of_commands
-from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
-from executive.words.yaml_steps import steps_from_yaml, steps_to_data, steps_to_yaml
+from executive.words.steps import (
+    Ask,
+    Choose,
+    Group,
+    Handler,
+    Loop,
+    Repeat,
+    Together,
+    Try,
+    While,
+    steps_from_yaml,
+    steps_to_data,
+    steps_to_yaml,
+)
 from skills.api import ObjectKind
 
 texts = st.text(st.characters(exclude_characters="{}", exclude_categories=["C", "Z"]), min_size=1, max_size=12)

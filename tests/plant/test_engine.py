@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from executive.run.worker import WorkThread
-from executive.testing.small_room import write_small_room
+from executive.testing.bench import write_small_room
 from plant.diagram import TIME_STEP_S
-from plant.pipelined_clock import Pipeline
+from plant.engine import Pipeline
 from plant.simulation import Simulation
 from plant.worlds.world import World, load_world
 from skills.robot import ArmTrajectory, CommandState, Lease, LeaseError

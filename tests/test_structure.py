@@ -28,9 +28,9 @@ LINES = {
     "executive/app": 7565,
     "executive/cli": 4605,
     "skills": 27136,
-    "plant": 15670,
+    "plant": 15902,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 454, 68, 9
+MODULES, ONE_IMPORTER, SAME_NAME = 455, 69, 9
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

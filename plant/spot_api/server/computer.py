@@ -144,6 +144,8 @@ class Computer:
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._started_s = time.time()
         self.behind_s = 0.0
+        self.watchers: list[Callable[[], None]] = []
+        """Called before each step."""
         self._sit_command: CommandId | None = None
         self._still_at_m, self._still_since_s = 0.0, 0.0
         self.sit()
@@ -236,7 +238,9 @@ class Computer:
             self.sit()
 
     def _watch(self) -> None:
-        """Obeys the E-stop and stale leases, and finishes what takes time with the motors."""
+        """Obeys E-stop, keepalive and stale leases, and finishes what takes time with the motors."""
+        for watch in self.watchers:
+            watch()
         level = self.estop.level()
         if self.motors is not Motors.OFF:
             if level == estop_pb2.ESTOP_LEVEL_CUT:

@@ -169,6 +169,7 @@ class DirectoryService(Service):
             name: directory_pb2.ServiceEntry(name=name, type=type_name, authority=authority)
             for name, type_name, authority in entries
         }
+        self._heard_s: dict[str, float] = {}
         for entry in self._entries.values():
             entry.last_update.CopyFrom(timestamp(now()))
 
@@ -196,7 +197,16 @@ class DirectoryService(Service):
             if entry.name in self._own or (entry.name in self._entries) is new:
                 return False
             self._entries[entry.name] = entry
+            self._heard_s[entry.name] = time.monotonic()
         return True
+
+    def silent(self) -> list[str]:
+        """Names of the clients' services that have not updated their entries in time."""
+        with self._lock:
+            limits = {
+                name: self._entries[name].liveness_timeout_secs for name in self._heard_s if name in self._entries
+            }
+            return [name for name, most_s in limits.items() if 0.0 < most_s < time.monotonic() - self._heard_s[name]]
 
     def remove(self, name: str) -> bool:
         """Removes the entry of a client's service; returns False if there is none."""

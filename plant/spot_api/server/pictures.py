@@ -1,4 +1,4 @@
-"""Pictures and point clouds of the robot."""
+"""Pictures, point clouds and distances to obstacles around the robot."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from typing import Any, Final
 
 import cv2
 import numpy as np
-from bosdyn.api import image_pb2, point_cloud_pb2
+from bosdyn.api import gripper_camera_param_pb2, image_pb2, local_grid_pb2, point_cloud_pb2
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+from scipy.ndimage import distance_transform_edt
 
 from plant.spot_api.server.calls import Call, Service
-from plant.spot_api.server.computer import Computer, sensor_frame
+from plant.spot_api.server.computer import Computer, Snapshot, sensor_frame
 from plant.spot_api.server.identity import DOMAIN
 from plant.spot_api.server.messages import frame_tree, timestamp
 from skills.robot import CameraCapabilities, Image, Intrinsics, NoImageError
@@ -205,3 +207,77 @@ class PointCloudService(Service):
         made.acquisition_time.CopyFrom(timestamp(snapshot.time_s))
         made.transforms_snapshot.CopyFrom(frame_tree(snapshot.frames))
         return made
+
+
+class LocalGridService(Service):
+    """Gives the distance to the nearest obstacle in a square around the robot, by the last revolution of the LiDAR."""
+
+    name, type, authority = "local-grid-service", "bosdyn.api.LocalGridService", f"localgrid.{DOMAIN}"
+    GRID: Final = "obstacle_distance"
+    _CELLS, _CELL_M, _SCALE_M = 128, 0.03, 0.001
+    _LOW_M, _HIGH_M = 0.15, 1.0
+
+    def __init__(self, computer: Computer) -> None:
+        self._computer = computer
+
+    def GetLocalGridTypes(self, _request: Any, _call: Call) -> Any:
+        """Lists the one kind of grid."""
+        made = local_grid_pb2.GetLocalGridTypesResponse()
+        made.local_grid_type.add(name=self.GRID)
+        return made
+
+    def GetLocalGrids(self, request: Any, _call: Call) -> Any:
+        """Returns grids of 16-bit millimetres. The grid's frame is a corner of the square, turned as `odom`."""
+        made, Response = local_grid_pb2.GetLocalGridsResponse(), local_grid_pb2.LocalGridResponse
+        for each in request.local_grid_requests:
+            one, snapshot = made.local_grid_responses.add(), self._computer.snapshot
+            one.local_grid_type_name = each.local_grid_type_name
+            if each.local_grid_type_name != self.GRID:
+                one.status = Response.STATUS_NO_SUCH_GRID
+            elif snapshot.scan is None:
+                one.status = Response.STATUS_DATA_UNAVAILABLE
+            else:
+                one.status = Response.STATUS_OK
+                self._fill(one.local_grid, snapshot, (snapshot.scan.X_OB @ snapshot.scan.points_B().T).T)
+        made.num_local_grid_errors = sum(one.status != Response.STATUS_OK for one in made.local_grid_responses)
+        return made
+
+    def _fill(self, made: Any, snapshot: Snapshot, points_O: NDArray[np.float64]) -> None:
+        corner = snapshot.odometry.X_OB.translation()[:2] - 0.5 * self._CELLS * self._CELL_M
+        high = points_O[(points_O[:, 2] > self._LOW_M) & (points_O[:, 2] < self._HIGH_M)]
+        cells = np.floor((high[:, :2] - corner) / self._CELL_M).astype(int)
+        inside = cells[np.all((cells >= 0) & (cells < self._CELLS), axis=1)]
+        free = np.ones((self._CELLS, self._CELLS), dtype=bool)
+        free[inside[:, 1], inside[:, 0]] = False
+        far = np.full(free.shape, 0.5 * self._CELLS) if free.all() else distance_transform_edt(free)
+        millimetres = np.round(far * self._CELL_M / self._SCALE_M).astype(np.int16)
+        made.local_grid_type_name, made.frame_name_local_grid_data = self.GRID, f"{self.GRID}_corner"
+        made.acquisition_time.CopyFrom(timestamp(snapshot.time_s))
+        frames = {**snapshot.frames, f"{self.GRID}_corner": ("odom", RigidTransform([*corner, 0.0]))}
+        made.transforms_snapshot.CopyFrom(frame_tree(frames))
+        made.extent.cell_size, made.extent.num_cells_x, made.extent.num_cells_y = self._CELL_M, self._CELLS, self._CELLS
+        made.cell_format = local_grid_pb2.LocalGrid.CELL_FORMAT_INT16
+        made.encoding = local_grid_pb2.LocalGrid.ENCODING_RAW
+        made.cell_value_scale, made.data = self._SCALE_M, millimetres.tobytes()
+
+
+class GripperCameraParamService(Service):
+    """Stores parameters of the hand's camera; its pictures stay as they are."""
+
+    name, type, authority = "gripper-camera-param", "bosdyn.api.GripperCameraParamService", f"api.{DOMAIN}"
+
+    def __init__(self) -> None:
+        Params = gripper_camera_param_pb2.GripperCameraParams
+        self._params = Params(camera_mode=Params.MODE_640_480)
+
+    def GetParams(self, _request: Any, _call: Call) -> Any:
+        """Returns the parameters."""
+        return gripper_camera_param_pb2.GripperCameraGetParamResponse(params=self._params)
+
+    def SetParams(self, request: Any, _call: Call) -> Any:
+        """Changes those parameters that are given."""
+        changed = gripper_camera_param_pb2.GripperCameraParams()
+        changed.CopyFrom(self._params)
+        changed.MergeFrom(request.params)
+        self._params = changed
+        return gripper_camera_param_pb2.GripperCameraParamResponse()

@@ -18,6 +18,7 @@ from plant.spot_api.server.commands import PowerService, RobotCommandService
 from plant.spot_api.server.computer import Computer, Pace, Solver
 from plant.spot_api.server.estop import EstopService, Tablet
 from plant.spot_api.server.identity import DOMAIN, Credentials
+from plant.spot_api.server.keepalive import KeepaliveService
 from plant.spot_api.server.leases import LeaseService
 from skills.robot import Clock, Robot
 
@@ -33,9 +34,6 @@ LISTED: Final[Mapping[str, str]] = {
     "docking": "bosdyn.api.docking.DockingService",
     "door": "bosdyn.api.spot.DoorService",
     "graph-nav-service": "bosdyn.api.graph_nav.GraphNavService",
-    "gripper-camera-param": "bosdyn.api.GripperCameraParamService",
-    "keepalive": "bosdyn.api.keepalive.KeepaliveService",
-    "local-grid-service": "bosdyn.api.LocalGridService",
     "log-status": "bosdyn.api.log_status.LogStatusService",
     "manipulation": "bosdyn.api.ManipulationApiService",
     "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
@@ -56,11 +54,14 @@ SERVICES: Final[tuple[type[Service], ...]] = (
     identity.TimeSyncService,
     EstopService,
     LeaseService,
+    KeepaliveService,
     PowerService,
     RobotCommandService,
     state.RobotStateService,
     pictures.ImageService,
+    pictures.GripperCameraParamService,
     pictures.PointCloudService,
+    pictures.LocalGridService,
     state.InverseKinematicsService,
     state.WorldObjectService,
     state.FaultService,
@@ -76,8 +77,10 @@ MOTIONS: Final = (
 """The motions of `RobotCommand`, in words."""
 _DESCRIBED_IN: Final = (
     *("auth", "data_buffer", "directory_registration", "directory", "estop", "fault", "image", "lease", "license"),
+    *("gripper_camera_param", "local_grid"),
     *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
     "spot.inverse_kinematics",
+    "keepalive.keepalive",
 )
 """Files of the SDK that describe the services; importing them registers their descriptions."""
 
@@ -129,32 +132,38 @@ class SpotServer:
     ) -> Sequence[Service]:
         """All services that are served; the directory lists them and the others."""
         computer, clocks = self.computer, identity.TimeSyncService()
-        served: list[Service] = [
+        others = [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
+        known = [(each.name, each.type, each.authority) for each in SERVICES]
+        lacking = {state.InverseKinematicsService.name} if computer.solver is None else set()
+        if computer.capabilities.lidar_height_m is None:
+            lacking |= {pictures.PointCloudService.name, pictures.LocalGridService.name}
+        entries = [entry for entry in (*known, *others) if entry[0] not in lacking]
+        directory = identity.DirectoryService(entries, computer.now_s)
+        faults = state.FaultService(computer.now_s, directory.silent)
+        made: list[Service] = [
             auth,
-            clocks,
-            leases,
-            estop,
             identity.RobotIdService(robot_name),
+            directory,
+            identity.DirectoryRegistrationService(directory),
             identity.LicenseService(),
+            clocks,
+            estop,
+            leases,
+            KeepaliveService(computer),
             PowerService(computer, leases),
             RobotCommandService(computer, leases, clocks),
-            state.RobotStateService(computer),
+            state.RobotStateService(computer, faults.faults),
             pictures.ImageService(computer),
+            pictures.GripperCameraParamService(),
+            pictures.PointCloudService(computer),
+            pictures.LocalGridService(computer),
+            state.InverseKinematicsService(computer),
             state.WorldObjectService(),
-            state.FaultService(),
+            faults,
             state.PayloadService(),
             state.DataBufferService(),
         ]
-        if computer.solver is not None:
-            served.append(state.InverseKinematicsService(computer))
-        if computer.capabilities.lidar_height_m is not None:
-            served.append(pictures.PointCloudService(computer))
-        known = [(service.name, service.type, service.authority) for service in served]
-        own = (identity.DirectoryService, identity.DirectoryRegistrationService)
-        known += [(each.name, each.type, each.authority) for each in own]
-        known += [(name, type_name, f"api.{DOMAIN}") for name, type_name in LISTED.items()]
-        directory = identity.DirectoryService(known, computer.now_s)
-        return [*served, directory, identity.DirectoryRegistrationService(directory)]
+        return [service for service in made if service.name not in lacking]
 
     @contextmanager
     def running(self) -> Iterator[SpotServer]:

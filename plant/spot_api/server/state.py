@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from itertools import count
 from threading import Lock
 from typing import Any, Final
@@ -46,8 +47,9 @@ class RobotStateService(Service):
 
     name, type, authority = "robot-state", "bosdyn.api.RobotStateService", f"state.{DOMAIN}"
 
-    def __init__(self, computer: Computer) -> None:
-        self._computer = computer
+    def __init__(self, computer: Computer, service_faults: Callable[[], Iterable[Any]]) -> None:
+        """`service_faults` gives the faults of services."""
+        self._computer, self._service_faults = computer, service_faults
 
     def GetRobotState(self, _request: Any, _call: Call) -> Any:
         """Returns the state after the last step."""
@@ -62,6 +64,7 @@ class RobotStateService(Service):
             )
         state.behavior_fault_state.SetInParent()
         state.service_fault_state.SetInParent()
+        state.service_fault_state.faults.extend(self._service_faults())
         state.terrain_state.SetInParent()
         self._estop(state, stamp)
         self._feet(state, snapshot)
@@ -242,23 +245,38 @@ class FaultService(Service):
 
     name, type, authority = "fault", "bosdyn.api.FaultService", f"fault.{DOMAIN}"
 
-    def __init__(self) -> None:
-        self._lock, self._active = Lock(), set[tuple[str, str]]()
+    def __init__(self, now: Callable[[], float], silent: Callable[[], Iterable[str]]) -> None:
+        """`now` gives the robot's time, `silent` the registered services that have fallen silent."""
+        self._now, self._silent = now, silent
+        self._lock, self._active = Lock(), dict[tuple[str, str], Any]()
+
+    def faults(self) -> list[Any]:
+        """All faults, with those of services that have fallen silent."""
+        with self._lock:
+            made = list(self._active.values())
+        for service in self._silent():
+            fault = service_fault_pb2.ServiceFault(severity=service_fault_pb2.ServiceFault.SEVERITY_CRITICAL)
+            fault.fault_id.fault_name, fault.fault_id.service_name = "liveness", service
+            fault.error_message = f"{service} has not updated its entry in the directory in time"
+            made.append(fault)
+        return made
 
     def TriggerServiceFault(self, request: Any, _call: Call) -> Any:
         """Stores a fault."""
         Response, key = service_fault_pb2.TriggerServiceFaultResponse, _fault_key(request.fault.fault_id)
+        stored = service_fault_pb2.ServiceFault()
+        stored.CopyFrom(request.fault)
+        stored.onset_timestamp.CopyFrom(timestamp(self._now()))
         with self._lock:
             known = key in self._active
-            self._active.add(key)
+            self._active.setdefault(key, stored)
         return Response(status=Response.STATUS_FAULT_ALREADY_ACTIVE if known else Response.STATUS_OK)
 
     def ClearServiceFault(self, request: Any, _call: Call) -> Any:
         """Removes a fault."""
         Response, key = service_fault_pb2.ClearServiceFaultResponse, _fault_key(request.fault_id)
         with self._lock:
-            known = key in self._active
-            self._active.discard(key)
+            known = self._active.pop(key, None) is not None
         return Response(status=Response.STATUS_OK if known else Response.STATUS_FAULT_NOT_ACTIVE)
 
 

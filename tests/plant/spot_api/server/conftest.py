@@ -48,7 +48,7 @@ def credentials(tmp_path_factory):
 @pytest.fixture
 def served(credentials) -> Iterator[Served]:
     clock = VirtualClock()
-    scripted = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[Block(3.0, -2.0, 3.2, 2.0)])
+    scripted = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[Block(1.7, -1.5, 1.9, 1.5)])
     solver = arm_model(spot_capabilities())
     server = SpotServer(scripted, clock, solver, credentials, Options({USER: PASSWORD}, pace=Pace.REAL))
     stopping = threading.Event()

@@ -2,9 +2,17 @@
 
 import numpy as np
 import pytest
-from bosdyn.api import image_pb2, point_cloud_pb2, world_object_pb2
+from bosdyn.api import (
+    gripper_camera_param_pb2,
+    image_pb2,
+    local_grid_pb2,
+    point_cloud_pb2,
+    service_fault_pb2,
+    world_object_pb2,
+)
 from bosdyn.api.spot import inverse_kinematics_pb2
 from bosdyn.client.exceptions import InvalidRequestError
+from bosdyn.client.fault import ServiceFaultAlreadyExistsError
 from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
 from bosdyn.client.image import build_image_request, depth_image_to_pointcloud
 from bosdyn.client.inverse_kinematics import InverseKinematicsClient
@@ -107,7 +115,7 @@ def test_the_lidar_sees_the_wall_ahead(robot):
     assert answer.point_cloud.encoding == point_cloud_pb2.PointCloud.ENCODING_XYZ_32F
     points = np.frombuffer(answer.point_cloud.data, np.float32).reshape(-1, 3)
     ahead = points[np.abs(points[:, 1]) < 0.2]
-    assert np.min(ahead[ahead[:, 0] > 0.0, 0]) == pytest.approx(3.0, abs=0.1)
+    assert np.min(ahead[ahead[:, 0] > 0.0, 0]) == pytest.approx(1.7, abs=0.1)
 
 
 def test_objects_of_clients_are_added_and_deleted(robot):
@@ -152,3 +160,48 @@ def test_comments_and_events_are_taken(robot):
     robot.time_sync.wait_for_sync(timeout_sec=5.0)
     robot.operator_comment("seen")
     robot.time_sync.stop()
+
+
+def test_the_local_grid_has_the_distance_to_the_wall(robot):
+    client = robot.ensure_client("local-grid-service")
+    assert [kind.name for kind in client.get_local_grid_types()] == ["obstacle_distance"]
+    grid, none = client.get_local_grids(["obstacle_distance", "terrain"])
+    assert none.status == local_grid_pb2.LocalGridResponse.STATUS_NO_SUCH_GRID
+    grid = grid.local_grid
+    metres = np.frombuffer(grid.data, np.int16).reshape(128, 128) * grid.cell_value_scale
+    corner = get_a_tform_b(grid.transforms_snapshot, "odom", grid.frame_name_local_grid_data)
+    column = int((1.0 - corner.x) / grid.extent.cell_size)
+    assert metres[64, column] == pytest.approx(0.7, abs=0.1)
+
+
+def test_parameters_of_the_gripper_camera_are_kept(robot):
+    client = robot.ensure_client("gripper-camera-param")
+    params = gripper_camera_param_pb2.GripperCameraParams()
+    params.brightness.value = 0.25
+    client.set_camera_params(gripper_camera_param_pb2.GripperCameraParamRequest(params=params))
+    assert (
+        client.get_camera_params(gripper_camera_param_pb2.GripperCameraGetParamRequest()).params.brightness.value
+        == 0.25
+    )
+
+
+def test_a_service_that_falls_silent_is_a_fault(robot):
+    registration = robot.ensure_client("directory-registration")
+    registration.register("mine", "my.Service", "mine.spot.robot", "127.0.0.1", 5000, liveness_timeout_secs=0.2)
+    states, faults = robot.ensure_client("robot-state"), []
+    while not faults:
+        faults = states.get_robot_state().service_fault_state.faults
+    assert (faults[0].fault_id.service_name, faults[0].fault_id.fault_name) == ("mine", "liveness")
+
+
+def test_a_fault_of_a_client_is_listed_once_until_it_is_cleared(robot):
+    client, states = robot.ensure_client("fault"), robot.ensure_client("robot-state")
+    fault = service_fault_pb2.ServiceFault(error_message="tired")
+    fault.fault_id.fault_name, fault.fault_id.service_name = "tired", "mine"
+    client.trigger_service_fault(fault)
+    with pytest.raises(ServiceFaultAlreadyExistsError):
+        client.trigger_service_fault(fault)
+    (listed,) = states.get_robot_state().service_fault_state.faults
+    assert listed.error_message == "tired"
+    client.clear_service_fault(fault.fault_id)
+    assert not states.get_robot_state().service_fault_state.faults

@@ -25,8 +25,8 @@ LINES = {
     "executive/conversation": 581,
     "executive/view": 1556,
     "executive/testing": 807,
-    "executive/app": 7565,
-    "executive/cli": 4605,
+    "executive/app": 7589,
+    "executive/cli": 4629,
     "skills": 27136,
     "plant": 15902,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -31,7 +31,7 @@ from executive.record.event_log import EventLog
 from executive.record.history import Event, read_events
 from executive.run.control import Control
 from executive.run.runner import run
-from executive.run.visitor import RunSettings
+from executive.run.visitor import MissionEnd, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission
 from executive.view.foxglove import LiveServer
@@ -53,13 +53,15 @@ def run_fleet(
     page: PageView | None = None,
     live: LiveServer | None = None,
     first: Prepared | None = None,
+    ended: Callable[[], None] | None = None,
 ) -> None:
     """Runs until no mission can be assigned any more; writes log, recording and report into the folder `out`.
 
-    `page` shows the run, and `live` sends what is logged; the log begins with the map of the `first` mission. Raises
-    InputError.
+    `page` shows the run, `live` sends what is logged, and `ended` is called as each mission ends. The log begins with
+    the map of the `first` mission. Raises InputError.
     """
     backend, artifacts, begun_s = dispatch.backend, Artifacts(), dispatch.backend.clock.now()
+    watching = () if ended is None else (_EndedMissions(dispatch.store, (*dispatch.missions,), ended),)
     limit_s = TIME_LIMIT_S * max(1, len(dispatch.missions)) if time_limit_s is None else time_limit_s
     with closing(EventLog(out / "log.mcap", backend.clock, apart=True)) as log:
         dispatch.log = log
@@ -75,7 +77,7 @@ def run_fleet(
                 dispatch,
                 clock=backend.clock,
                 worker=worker,
-                visitors=(artifacts, log, *([] if page is None else [page])),
+                visitors=(artifacts, log, *watching, *([] if page is None else [page])),
                 settings=RunSettings(seed=seed, time_limit_s=limit_s),
                 control=control,
                 spare=dispatch.spare(),
@@ -87,6 +89,23 @@ def run_fleet(
     _write_report(dispatch, out, artifacts, read_events(log.path), (*facts, ("duration", lasted)))
     if page is not None:
         page.offer(recording)
+
+
+@dataclass
+class _EndedMissions(RunVisitor):
+    """Watch of the missions of these numbers: calls `ended` for each that has ended."""
+
+    store: MissionStore
+    numbers: Sequence[int]
+    ended: Callable[[], None]
+    count: int = 0
+
+    def mission_ended(self, end: MissionEnd) -> None:
+        """Counts them; the dispatch, which comes before, has stored the end of the robot's mission."""
+        states = [self.store.mission(number).state.value for number in self.numbers]
+        for _ in range(self.count, over := sum(state not in _OPEN for state in states)):
+            self.ended()
+        self.count = over
 
 
 def simulated_fleet(

@@ -99,15 +99,20 @@ class Runner(Protocol):
 
 
 def run_in_turn(
-    missions: Iterable[StoredMission], runner: Runner, *, until_cancelled: bool = True
+    missions: Iterable[StoredMission],
+    runner: Runner,
+    advance: Callable[[], None] = lambda: None,
+    *,
+    until_cancelled: bool = True,
 ) -> list[MissionResult]:
-    """Runs missions one after another; with `until_cancelled` it stops after a cancelled mission.
+    """Runs missions one after another, and calls `advance` after each.
 
-    Raises InputError if the runner does.
+    With `until_cancelled` it stops after a cancelled mission. Raises InputError if the runner does.
     """
     ended = list[MissionResult]()
     for mission in missions:
         ended.append(runner.run(mission))
+        advance()
         if until_cancelled and ended[-1].outcome == MissionState.CANCELLED.value:
             break
     return ended

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,7 +11,7 @@ import typer
 
 from executive.app.report import VERDICTS
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, VIEW, VIEW_FOR, VIEW_PORT, StartCommand, takes_request
-from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, show_table
+from executive.cli.output import NOT_ACHIEVED, console_for, finish, plain_lines, print_json, progress_bar, show_table
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore, StoredMission, store_in
 from executive.words.robot_config import find_robot
@@ -72,9 +73,10 @@ def run(
         folder = out or (queue if is_folder(queue) else store.parent) / "fleet"
         first = next(iter(next(iter(dispatch.missions.values())).options.values()))
         page = PageView(None, tell, port=view_port) if view or view_for is not None else None
-        limit_s = request.time_limit_s
-        with serve_live(foxglove, tell) as live:
-            run_fleet(dispatch, out=folder, seed=request.seed, time_limit_s=limit_s, page=page, live=live, first=first)
+        limit_s, bar = request.time_limit_s, progress_bar(console, "missions", len(dispatch.missions))
+        run_in = partial(run_fleet, dispatch, out=folder, seed=request.seed, time_limit_s=limit_s)
+        with serve_live(foxglove, tell) as live, bar as ended:
+            run_in(page=page, live=live, first=first, ended=ended)
         results = missions_json(missions, [each.id for each in queued])
         left = resumable_lines(missions, queue)
     achieved = [_achieved(each) for each in results if each["part_of"] is None]

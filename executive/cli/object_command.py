@@ -13,7 +13,7 @@ import typer
 
 from executive.cli.number_options import OutOfRangeError, quantity_argument, quantity_option
 from executive.cli.options import AS_JSON
-from executive.cli.output import console_for, new_folder, print_json, writing
+from executive.cli.output import console_for, new_folder, print_json, progress_bar, writing
 from plant.models.catalogue import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
@@ -97,7 +97,7 @@ def import_command(
     A mesh gives visual geometry, convex collision parts, and inertia from volume and mass. By photographs the robot
     recognises an object that has no mesh; a simulated world cannot place it.
     """
-    from plant.models.builder.importing import ImportOptions, ImportReports, import_object, import_photographs
+    from plant.models.builder.importing import STEPS, ImportOptions, ImportReports, import_object, import_photographs
 
     wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
@@ -105,9 +105,11 @@ def import_command(
     _refuse_mixed(mesh, wanted, sized=size is not None)
     out = Path(name) if out is None else out
     notes = list[str]()
-    with _refused(mesh), new_folder(out) as folder, _bar() as step:
+    bar = progress_bar(console_for(as_json=True), STEPS[0], len(STEPS))
+    with _refused(mesh), new_folder(out) as folder, bar as advance:
+        begin = partial(_begin, advance)
         importing = import_object if size is None else partial(import_photographs, size_m=size)
-        made = importing(mesh, wanted, folder, ImportReports(step, notes.append))
+        made = importing(mesh, wanted, folder, ImportReports(begin, notes.append))
     for note in notes:
         typer.echo(f"errand: warning: {mesh}: {note}", err=True)
     if (doubt := _unlike_its_class(made)) is not None:
@@ -176,18 +178,12 @@ def _refuse_mixed(mesh: Path, wanted: ImportOptions, *, sized: bool) -> None:
         raise InputError("--class, --scale, --up and --close-holes are for a mesh", hint="leave them out", file=mesh)
 
 
-@contextmanager
-def _bar() -> Iterator[Callable[[str], None]]:
-    """Shows a progress bar over the steps of an import, at a terminal."""
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
+def _begin(advance: Callable[[str], None], step: str) -> None:
+    """Ends the step before this one of an import."""
     from plant.models.builder.importing import STEPS
 
-    console = console_for(as_json=True)
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(STEPS[0], total=len(STEPS))
-        yield lambda step: bar.update(task, description=step, completed=STEPS.index(step))
+    if step != STEPS[0]:
+        advance(step)
 
 
 @contextmanager

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 NOT_ACHIEVED = 1
 BAD_INPUT = 2
+BAR_REFRESH_HZ: Final = 2.0
 _OF_NAMES: Final = frozenset(
     {errno.ENAMETOOLONG, errno.ENOTDIR, errno.EISDIR, errno.EACCES, errno.EPERM, errno.EROFS, errno.ELOOP, errno.EEXIST}
 )
@@ -60,13 +61,13 @@ def finish(
 
 
 @contextmanager
-def progress_bar(console: Console, what: str, total: int) -> Iterator[Callable[[], None]]:
+def progress_bar(console: Console, what: str, total: int) -> Iterator[Callable[..., None]]:
     """Shows a bar over `total` steps with the time left; nothing without a terminal, or for a single step.
 
-    The yielded function ends a step.
+    The yielded function ends a step; given a text, it names the next one.
     """
     if not console.is_terminal or total < 2:
-        yield lambda: None
+        yield lambda *_: None
         return
     from rich.progress import (
         BarColumn,
@@ -77,11 +78,11 @@ def progress_bar(console: Console, what: str, total: int) -> Iterator[Callable[[
         TimeRemainingColumn,
     )
 
-    left = TimeRemainingColumn()
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), left)
-    with Progress(*columns, TextColumn("left"), console=console, transient=True) as bar:
+    done = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (*done, TimeRemainingColumn(), TextColumn("left"))
+    with Progress(*columns, console=console, transient=True, refresh_per_second=BAR_REFRESH_HZ) as bar:
         task = bar.add_task(what, total=total)
-        yield lambda: bar.advance(task)
+        yield lambda following=None: bar.update(task, advance=1, description=following)
 
 
 def show_table(console: Console, header: Sequence[str], rows: Iterable[Sequence[str | Text]]) -> None:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import nullcontext
 from datetime import datetime, timedelta
+from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from executive.app.signals import ended_by_signals
 from executive.cli.number_options import quantity_argument, quantity_option
 from executive.cli.options import AS_JSON, FOXGLOVE, QUIET, STORE, StartCommand, takes_request
-from executive.cli.output import console_for, finish, plain_lines, show_table, terminal_answerer
+from executive.cli.output import console_for, finish, plain_lines, progress_bar, show_table, terminal_answerer
 from executive.cli.run_command import refuse_unaddressed
 from executive.mission.load import load_stack
 from executive.mission.request import Request
@@ -24,6 +25,11 @@ from executive.store.triggers import Every, Missed, OnCall, OnTopic, Timed, Trig
 from executive.store.wakeup import WakeupPipe, wake_server
 from skills.files.errors import InputError, listing
 from skills.quantities import Count, Port, Wait
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from executive.app.runs import MissionResult, Runner
 
 queue = typer.Typer(
     name="queue",
@@ -119,7 +125,7 @@ def run(
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions, each in the world that the mission before it left."""
-    from executive.app.runs import MissionRuns, queued_missions, resumable_line, run_in_turn
+    from executive.app.runs import MissionRuns, resumable_line
     from executive.cli.screen import ConsoleScreen
     from executive.view.foxglove import serve_live
 
@@ -130,7 +136,7 @@ def run(
         serve_live(foxglove, plain_lines(console)) as live,
     ):
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
-        ended = run_in_turn(queued_missions(missions), runs)
+        ended = _in_turn(missions, runs, console)
         resumable = resumable_line(missions)
     if ended:
         console.print(f"{sum(each.achieved for each in ended)} of {len(ended)} missions achieved")
@@ -139,6 +145,23 @@ def run(
     if resumable is not None:
         console.print(resumable, markup=False)
     finish({"missions": [each.to_json() for each in ended]}, as_json, good=all(each.achieved for each in ended))
+
+
+def _in_turn(
+    missions: MissionStore, runs: Runner, console: Console, first: StoredMission | None = None
+) -> list[MissionResult]:
+    """Runs the queued missions one after another with a progress bar.
+
+    Runs the mission `first` before them; alone, if it is none of a queue. Stops after a cancelled mission.
+    """
+    from executive.app.runs import queued_missions, run_in_turn
+
+    coming, total = iter(() if first is None else (first,)), int(first is not None)
+    if first is None or first.queued:
+        coming = chain(coming, queued_missions(missions))
+        total += sum(each.queued for each in missions.missions(MissionState.QUEUED))
+    with progress_bar(console, "missions", total) as advance:
+        return run_in_turn(coming, runs, advance)
 
 
 def _row(mission: StoredMission, standing: Mapping[int, StandingMission]) -> tuple[str, ...]:
@@ -258,12 +281,12 @@ def resume(
         missions.claim(),
         serve_live(foxglove, plain_lines(console)) as live,
     ):
-        from executive.app.runs import MissionRuns, queued_missions, run_in_turn
+        from executive.app.runs import MissionRuns
         from executive.cli.screen import ConsoleScreen
 
         chosen = _interrupted(missions, mission)
         runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
-        ended = [runs.run(chosen), *(run_in_turn(queued_missions(missions), runs) if chosen.queued else ())]
+        ended = _in_turn(missions, runs, console, chosen)
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))
 

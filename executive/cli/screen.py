@@ -169,6 +169,8 @@ WRITTEN: Final[Mapping[str, str]] = {
 REFRESH_S = 0.2
 BAR_CELLS = 20
 FEWEST_ROWS = 5
+BAR_ROWS: Final = 1
+"""Rows that a queue's progress bar takes above the tree."""
 _SHOWN_KINDS = frozenset({"skill", "fallen"})
 _UNDER_WAY = (Styles.IDLE.value, Styles.RUNNING.value)
 PROMPT_STYLE, HELP_STYLE = "bold yellow", "dim"
@@ -245,7 +247,7 @@ class _Picture(RunVisitor):
             Text(line, style=HELP_STYLE if line.startswith(HELP) else PROMPT_STYLE, overflow="fold")
             for line in self._prompt(progress.now_s)
         ]
-        below = sum(len(text.split("\n")) for text in (*lines, *prompt))
+        below = BAR_ROWS + sum(len(text.split("\n")) for text in (*lines, *prompt))
         rows = max(FEWEST_ROWS, (self._live.console.height - below) // max(1, len(pictures)))
         shown = [visible_rows(picture, rows) for picture in pictures]
         self._live.update(Group(*shown, *lines, *prompt), refresh=True)

@@ -75,7 +75,7 @@ class Fleet:
         self.unable, self.cannot = set(), lambda name, command: False
         self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
-        self.shares, self.since_s = [], []
+        self.shares, self.since_s, self.ended = [], [], []
         self.tables, self.slower_s = None, 0.5
 
     def entry(self, tree, durable):
@@ -129,7 +129,7 @@ class Fleet:
             docks,
             offers=lambda *of: ScriptedOffers(self, *of),
         )
-        run_fleet(dispatch, out=self.out, seed=3, page=page)
+        run_fleet(dispatch, out=self.out, seed=3, page=page, ended=lambda: self.ended.append(len(dispatch.over)))
         self.rows = rows = missions_json(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
 
@@ -172,6 +172,7 @@ def test_three_missions_are_done_by_two_robots(fleet, script):
         fleet.queue(line)
     assert fleet.run() == [("Alice", "success", 0), ("Bob", "success", 0), ("Alice", "success", 0)]
     assert script.begun == ["navigate"] * 3
+    assert fleet.ended == [1, 2, 3] or fleet.ended == [2, 2, 3]
     assert sorted(fleet.judged) == [("Alice", "success"), ("Alice", "success"), ("Bob", "success")]
     assert [robot.holder for robot in fleet.robots.values()] == [None, None]
 

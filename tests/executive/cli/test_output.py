@@ -1,11 +1,14 @@
 """What becomes of errors on the command line: one line, exit status 2."""
 
+import io
+
 import pytest
 import typer
+from rich.console import Console
 from typer.testing import CliRunner
 
 from executive.cli import entry
-from executive.cli.output import refuse
+from executive.cli.output import progress_bar, refuse
 
 
 @pytest.mark.parametrize("option", ["--out", "--store", "--stack", "--world", ""])
@@ -29,3 +32,30 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path, capsys):
     with pytest.raises(typer.Exit):
         refuse(found.value)
     assert "file/below: cannot use it (Not a directory); name another" in capsys.readouterr().err
+
+
+@pytest.fixture
+def terminal():
+    return Console(file=io.StringIO(), force_terminal=True, width=100)
+
+
+def test_a_bar_counts_steps_names_them_and_says_the_time_left(terminal):
+    with progress_bar(terminal, "reading", 3) as advance:
+        advance()
+        advance("writing")
+    shown = terminal.file.getvalue()
+    assert "reading" in shown and "writing" in shown and "2/3" in shown and "left" in shown
+
+
+@pytest.mark.parametrize("total", [0, 1])
+def test_a_single_step_has_no_bar(terminal, total):
+    with progress_bar(terminal, "runs", total) as advance:
+        advance("on")
+    assert terminal.file.getvalue() == ""
+
+
+def test_a_file_gets_no_bar():
+    plain = Console(file=io.StringIO())
+    with progress_bar(plain, "runs", 5) as advance:
+        advance()
+    assert plain.file.getvalue() == ""

@@ -1,5 +1,6 @@
 """Queue and resume on the command line, without a plant: what is kept, in which order it is run, what is refused."""
 
+import io
 import json
 import signal
 import time
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from py_trees.common import Status
+from rich.console import Console
 from typer.testing import CliRunner
 
 from executive.app.mission_run import FinishedRun
@@ -278,6 +280,28 @@ def test_resume_goes_on_with_what_was_killed_and_then_with_the_queue(errand, mis
         ("second", "log.mcap", None),
     ]
     assert states() == ["success", "success"]
+
+
+def test_a_bar_counts_the_missions_of_run_and_resume(errand, mission, plant, monkeypatch):
+    terminal = Console(file=io.StringIO(), force_terminal=True, width=200)
+    monkeypatch.setattr("executive.cli.queue_command.console_for", lambda as_json: terminal)
+    for name in ("first", "second", "third"):
+        errand("queue", "add", mission(name))
+    plant.outcomes = ["success", "cancelled"]
+    errand("queue", "run", "--quiet")
+    assert "missions" in terminal.file.getvalue() and "2/3" in terminal.file.getvalue()
+    terminal.file.truncate(0)
+    assert errand("resume", "--quiet").exit_code == 0
+    assert "2/2" in terminal.file.getvalue()
+
+
+def test_a_resumed_mission_that_is_cancelled_again_ends_the_run_of_the_queue(errand, mission, plant, states):
+    plant.outcomes = ["cancelled", "cancelled"]
+    errand("queue", "add", mission("first"))
+    errand("queue", "add", mission("second"))
+    errand("queue", "run", "--quiet")
+    assert errand("resume", "--quiet").exit_code == 1
+    assert states() == ["cancelled", "queued"]
 
 
 def test_a_killed_run_is_resumed_with_its_own_seed_and_folder(errand, mission, plant, states):

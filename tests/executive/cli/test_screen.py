@@ -8,6 +8,7 @@ from py_trees.common import Status
 from rich.console import Console
 from rich.text import Text
 
+from executive.cli.output import progress_bar
 from executive.cli.screen import SILENCE, SpeechOutput, live_view, visible_rows, voice_for
 from executive.run.control import Control
 from executive.run.visitor import Progress
@@ -77,6 +78,17 @@ def test_the_tree_under_way_is_drawn_on_a_small_terminal(compiled, make):
         view.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": aside}))
     assert "at it" in screen.getvalue()
     assert "fetch drink" not in screen.getvalue()
+
+
+def test_the_bar_of_a_queue_stands_above_the_tree(compiled, make):
+    tree = compiled(*make.FETCH)
+    states = {path_id: NodeState(Status.RUNNING, message="at it") for path_id in tree.path_ids}
+    console = Console(file=io.StringIO(), force_terminal=True, width=80, height=14)
+    with progress_bar(console, "missions", 3), live_view(console, Control()) as view:
+        view.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
+        shown = console.file.getvalue().rpartition("missions")[2]
+    rows = [row for row in shown.split("\n") if row.strip()]
+    assert "0/3" in rows[0] and "at it" in rows[-1] and len(rows) <= console.height
 
 
 def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compiled, make):

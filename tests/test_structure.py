@@ -26,7 +26,7 @@ LINES = {
     "executive/view": 1556,
     "executive/testing": 807,
     "executive/app": 7589,
-    "executive/cli": 4629,
+    "executive/cli": 4626,
     "skills": 27136,
     "plant": 15902,
 }

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -18,9 +18,6 @@ from plant.models.catalogue import ImportedObject, read_imported
 from skills.files.errors import InputError, count_text
 from skills.perception.class_forms import class_forms
 from skills.quantities import Factor, Mass, TagNumber, TagSize
-
-if TYPE_CHECKING:
-    from plant.models.builder.importing import ImportOptions
 
 PICTURE_PX = (640, 480)
 _SIDES = re.compile(r"\s*x\s*".join([r"(\d{1,6}(?:\.\d{1,6})?)"] * 3) + r"\s*(mm|cm|m)?")
@@ -102,7 +99,7 @@ def import_command(
     wanted = ImportOptions(name, mass, class_name, scale, up, close_holes)
     with _refused():
         wanted.check()
-    _refuse_mixed(mesh, wanted, sized=size is not None)
+    _refuse_mixed(mesh, sized=size is not None, for_mesh=wanted != ImportOptions(name, mass))
     out = Path(name) if out is None else out
     notes = list[str]()
     bar = progress_bar(console_for(as_json=True), STEPS[0], len(STEPS))
@@ -168,13 +165,13 @@ def tag(
     typer.echo(f"{out}: for knowledge.yaml, under 'tags': {{id: {number}, size: {size:g}, {carrier}}}")
 
 
-def _refuse_mixed(mesh: Path, wanted: ImportOptions, *, sized: bool) -> None:
+def _refuse_mixed(mesh: Path, *, sized: bool, for_mesh: bool) -> None:
     """Raises InputError for options that do not fit to a folder of photographs, or to a mesh."""
     if sized != mesh.is_dir():
         what = "it is no folder of photographs" if sized else "photographs show no size"
         hint = "leave --size out for a mesh" if sized else "give it by --size, for example 80x80x95 for mm"
         raise InputError(what, hint=hint, file=mesh)
-    if sized and (wanted.class_name or wanted.up or wanted.close_holes or wanted.scale != 1.0):
+    if sized and for_mesh:
         raise InputError("--class, --scale, --up and --close-holes are for a mesh", hint="leave them out", file=mesh)
 
 

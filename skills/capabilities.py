@@ -200,6 +200,7 @@ class Capabilities:
 
     @property
     def object_camera(self) -> CameraCapabilities | None:
-        """Camera that looks for objects: the one on the hand, else the one on the head; None without either."""
+        """Camera that looks for objects: on the hand, else on the head, else ahead on the body; None without one."""
         on_head = (camera for camera in self.cameras if camera.mount is Mount.HEAD)
-        return self.hand_camera or next(on_head, None)
+        ahead = (camera for camera in self.cameras if camera.mount is Mount.BODY and camera.looks_towards(0.0))
+        return self.hand_camera or next(on_head, None) or next(ahead, None)

@@ -36,7 +36,7 @@ HOMES = (
 """The homes of executive, the lowest first."""
 BUILDERS = ("plant.models.builder", "plant.worlds.builder")
 """What makes models and worlds; at run time only the commands import it that make them."""
-USES_BUILDERS = (*BUILDERS, "executive.cli.object_command", "executive.cli.world_command")
+USES_BUILDERS = (*BUILDERS, "executive.cli.new_command", "executive.cli.object_command", "executive.cli.world_command")
 FOR_COMMANDS = ("executive.cli.number_options", "executive.cli.output")
 """What a command of any distribution may use of the command line."""
 

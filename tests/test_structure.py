@@ -24,13 +24,13 @@ LINES = {
     "executive/store": 1672,
     "executive/conversation": 581,
     "executive/view": 1556,
-    "executive/testing": 807,
+    "executive/testing": 818,
     "executive/app": 7589,
-    "executive/cli": 4626,
-    "skills": 27136,
-    "plant": 15902,
+    "executive/cli": 4725,
+    "skills": 27329,
+    "plant": 17410,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 455, 69, 9
+MODULES, ONE_IMPORTER, SAME_NAME = 467, 71, 10
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

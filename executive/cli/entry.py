@@ -92,7 +92,7 @@ COMMANDS: Final[Mapping[str, _Command]] = {
     "warm-up": _Command(
         "robot_command", "warm_up", "Compile the numeric code for this machine, so that runs begin at once."
     ),
-    "new-skill": _Command("missions_command", "new_skill", "Write an installable package with a skill and tests."),
+    "new": _Command("new_command", "new", "Write an installable package with a skill, or with a robot from a URDF."),
 }
 """Commands of Errand by name, in the order of the help; commands of plug-ins follow them."""
 

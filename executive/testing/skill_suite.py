@@ -23,7 +23,14 @@ import pytest
 from py_trees.common import Status
 
 from executive.testing.bench import SkillBench, SkillRun, scripted_bench
-from executive.testing.skill_test import BenchMakers, SkillTestFile, bench_of_setup, carry_out, load_skill_tests
+from executive.testing.skill_test import (
+    BenchMakers,
+    SkillTestFile,
+    bench_of_setup,
+    carry_out,
+    load_skill_tests,
+    scripted_maker,
+)
 from skills.api import Cause, Skill
 from skills.faults.fault_kinds import SENSE_VERBS, STANDARD_FAULTS, VERBS, Call, Effect, FaultKind, InjectedFault
 from skills.faults.faulty_robot import Fault
@@ -214,6 +221,10 @@ class SkillTestSettings:
     def __init__(self, skills: Mapping[str, type[Skill[Any]]], makers: BenchMakers, capabilities: Capabilities) -> None:
         self.skills, self.makers, self.capabilities = dict(skills), dict(makers), capabilities
         self.fault_kinds: list[FaultKind] = [*STANDARD_FAULTS]
+
+    def use_robot(self, capabilities: Capabilities) -> None:
+        """Lets the scripted robot of all tests, and of the suite, have these capabilities."""
+        self.capabilities, self.makers["scripted"] = capabilities, scripted_maker(capabilities)
 
 
 class SkillTestModule(pytest.File):

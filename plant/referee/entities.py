@@ -114,7 +114,7 @@ class Entities:
             classes={placed.name: placed.class_name for placed in loose},
             persons={name: _bodies(plant, name)[0] for name in persons},
             bases=bases,
-            hands=_links(plant, {name: kind.gripper_links[0] for name, kind in robots.items()}),
+            hands=_links(plant, {name: kind.hand_link for name, kind in robots.items()}),
         )
 
 

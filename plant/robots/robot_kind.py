@@ -95,8 +95,8 @@ class RobotBody(ABC):
 
     @property
     def hand(self) -> RigidBody:
-        """Last link of the arm."""
-        return self.plant.GetBodyByName(self.kind.gripper_links[0], self.instance)
+        """Last link of the arm; the body on a robot without one."""
+        return self.plant.GetBodyByName(self.kind.hand_link, self.instance)
 
     def outline_W(self, context: Context) -> FloatArray:
         """Footprint (K, 2) of the body in the world, from above."""
@@ -188,6 +188,11 @@ class RobotKind:
     add: Callable[[MultibodyPlant, PlacedRobot, bool], RobotBody]
     drive: Callable[[RobotBody, SensorOptions], PlantRobot]
     stack: Path | None = None
+
+    @property
+    def hand_link(self) -> str:
+        """Last link of the arm; the body on a robot without one."""
+        return (*self.gripper_links, "body")[0]
 
 
 @cache

@@ -32,8 +32,8 @@ class ActuatedJoints:
         actuators = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices(instance)]
         joints = [actuator.joint() for actuator in actuators]
         self.names = tuple(joint.name() for joint in joints)
-        self.positions = np.array([joint.position_start() for joint in joints])
-        self.velocities = np.array([joint.velocity_start() for joint in joints])
+        self.positions = np.array([joint.position_start() for joint in joints], dtype=np.int64)
+        self.velocities = np.array([joint.velocity_start() for joint in joints], dtype=np.int64)
         self.efforts = np.array([actuator.effort_limit() for actuator in actuators])
         self.lower = np.array([joint.position_lower_limits()[0] for joint in joints])
         self.upper = np.array([joint.position_upper_limits()[0] for joint in joints])
@@ -43,7 +43,7 @@ class ActuatedJoints:
 
     def numbers(self, names: Sequence[str]) -> Indices:
         """Numbers of joints, in the order of `names`."""
-        return np.array([self.names.index(name) for name in names])
+        return np.array([self.names.index(name) for name in names], dtype=np.int64)
 
     def rates_of(self, numbers: Indices) -> Indices:
         """Indices of the joints' velocities in the desired state."""

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -140,7 +141,7 @@ class SensorSuite(
 ):
     """All sensors of one robot: `update` takes the readings, which are attributes; `image` takes pictures.
 
-    Each kind of robot implements the reading of its gripper and the frames of its links.
+    Each kind of robot implements the reading of its gripper.
     """
 
     def __init__(
@@ -232,9 +233,20 @@ class SensorSuite(
     def _X_BL(self) -> RigidTransform:
         """Pose of the LiDAR in the body frame, as the robot knows it."""
 
-    @abstractmethod
+    @cached_property
+    def _chains(self) -> Mapping[str, tuple[str, tuple[str, ...]]]:
+        """Links of hand and head, each with the name of its frame and the joints that move it."""
+        can, plant, instance = self._body.kind.capabilities(), self._body.plant, self._body.instance
+        chains = {"hand": can.arm.joint_names if can.arm else (), "head": can.head.joint_names if can.head else ()}
+        moved = {frame: joints for frame, joints in chains.items() if joints}
+        last = {frame: plant.GetJointByName(joints[-1], instance) for frame, joints in moved.items()}
+        return {last[frame].child_body().name(): (frame, joints) for frame, joints in moved.items()}
+
     def _frames_of_links(self) -> Mapping[str, tuple[str, RigidTransform]]:
-        """Frames of the hand and of links with cameras, by link: name of the frame and its pose in the body frame."""
+        """Frames of hand and head, by link: name of the frame and its pose in the body frame."""
+        joints = tuple(name for _, names in self._chains.values() for name in names)
+        poses = zip(self._chains.items(), self._X_BLinks(joints, tuple(self._chains)), strict=True)
+        return {link: (frame, X_BF) for (link, (frame, _)), X_BF in poses}
 
     def _efforts(self, positions: FloatArray, rates: FloatArray) -> FloatArray:
         """Efforts of the motors: the servo law with limits, as the solver applies it at the end of a step."""

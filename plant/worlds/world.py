@@ -287,12 +287,12 @@ class World:
         return tuple(sorted(self._maps.glob("*scan.yaml")))
 
     def scan_map_seen_from(self, height_m: float | None) -> Path:
-        """Path of the grid with the narrowest band around the height of a LiDAR, else `scan_map_path`."""
-        if height_m is None:
-            return self.scan_map_path
+        """Path of the grid whose band is nearest to the height of a LiDAR, the narrowest of several around it."""
         bands = {path: _band_m(path) for path in self.scan_map_paths}
-        fitting = [(high - low, path) for path, (low, high) in bands.items() if low <= height_m <= high]
-        return min(fitting)[1] if fitting else self.scan_map_path
+        if height_m is None or all(low > high for low, high in bands.values()):
+            return self.scan_map_path
+        off_m = {path: max(low - height_m, height_m - high, 0.0) for path, (low, high) in bands.items()}
+        return min(bands, key=lambda path: (off_m[path], bands[path][1] - bands[path][0]))
 
     @property
     def keepout_map_path(self) -> Path:

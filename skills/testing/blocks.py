@@ -150,9 +150,9 @@ FRONT_CAMERAS = tuple(CameraCapabilities(name, _AT_FRONT) for name in ("frontlef
 """Cameras of a body without an arm."""
 
 
-def mount_of(camera: CameraCapabilities) -> CameraMount:
-    """Mount of a robot's camera, with a lens of this module."""
-    lens = _BODY_LENS if camera.mount is Mount.BODY else _HAND_LENS
+def mount_of(camera: CameraCapabilities, *, fine: bool = False) -> CameraMount:
+    """Mount of a robot's camera, with a lens of this module: fine for a camera that looks for objects."""
+    lens = _HAND_LENS if fine or camera.mount is not Mount.BODY else _BODY_LENS
     return CameraMount(camera.mount.value, camera.X_FC, lens)
 
 

@@ -176,7 +176,7 @@ class ScriptedRobot:
         camera = cameras.get(source)
         if camera is None:
             raise ValueError(f"{self._name} has no camera '{source}'; it has {', '.join(cameras)}")
-        mount = mount_of(camera)
+        mount = mount_of(camera, fine=camera is self._capabilities.object_camera)
         edges = {"body": ("odom", self._X_OB())}
         if self._capabilities.arm is not None:
             edges["hand"] = ("body", self.arm.X_BH(self.q_rad))

@@ -51,7 +51,7 @@ def test_every_group_of_entry_points_is_named():
 
 
 def test_the_template_of_a_skill_uses_only_the_public_api():
-    (template,) = (ROOT / "executive/cli/skill_template").rglob("skill.py.template")
+    (template,) = (ROOT / "executive/cli/new/skill").rglob("skill.py.template")
     modules = {line.split()[1] for line in template.read_text().splitlines() if line.startswith("from skills")}
     assert modules
     assert modules <= set(public_names())

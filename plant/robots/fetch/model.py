@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import ModelInstanceIndex
 from pydrake.systems.framework import Context
 
 from plant.robots.fetch.description import (
@@ -13,16 +11,14 @@ from plant.robots.fetch.description import (
     HEAD_JOINTS,
     LIFT_JOINT,
     WHEELS,
-    arm_joint_names,
     fetch_facts,
     fetch_urdf,
 )
 from plant.robots.fetch.wheels import WheelLimits
+from plant.robots.jointed_robot import FINGER_GAINS, JointIndex
 from plant.robots.robot_kind import PlacedRobot, RobotBody
-from plant.robots.servos import ActuatedJoints
-from skills.robot import Pose2D
+from skills.robot import GripperKind, Pose2D
 
-FINGER_GAIN_N_M = 2e4
 _GAINS = {
     **dict.fromkeys(WHEELS, (20.0, 15.0)),
     LIFT_JOINT: (4e4, 3e3),
@@ -34,7 +30,7 @@ _GAINS = {
     "forearm_roll": (300.0, 12.0),
     "wrist_flex": (300.0, 12.0),
     "wrist_roll": (100.0, 4.0),
-    **dict.fromkeys(FINGERS, (FINGER_GAIN_N_M, 200.0)),
+    **dict.fromkeys(FINGERS, FINGER_GAINS[GripperKind.PARALLEL]),
 }
 
 
@@ -62,13 +58,11 @@ class FetchModel(RobotBody):
         self.plant.SetFreeBodyPose(context, self.base, (pose or self.robot.start).transform())
 
 
-class JointIndex(ActuatedJoints):
-    """Joints of Fetch: the numbers of wheels, lift, head, arm and fingers."""
+class FetchJoints(JointIndex):
+    """Joints of Fetch: those of head, arm and fingers, the wheels, and the lift."""
 
-    def __init__(self, plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
-        super().__init__(plant, instance)
-        self.wheels, self.head = self.numbers(WHEELS), self.numbers(HEAD_JOINTS)
-        self.arm, self.fingers = self.numbers(arm_joint_names()), self.numbers(FINGERS)
-        self.lift = self.names.index(LIFT_JOINT)
-        speeds = {part["link"]: part["velocity"] for part in fetch_facts()["arm"]}
-        self.fastest_arm_rad_s = np.array([speeds[name] for name in arm_joint_names()])
+    def __init__(self, body: RobotBody) -> None:
+        facts = fetch_facts()
+        speeds = {part["link"]: part["velocity"] for part in (*facts["arm"], *facts["head"])}
+        super().__init__(body, {**speeds, **dict.fromkeys(FINGERS, facts["finger"]["velocity"])})
+        self.wheels, self.lift = self.numbers(WHEELS), self.names.index(LIFT_JOINT)

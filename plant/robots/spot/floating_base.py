@@ -60,10 +60,15 @@ _GAINS = {"x": (8e3, 2e3), "y": (8e3, 2e3), "yaw": (2e3, 4e2), "height": (6e4, 3
 class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
     """Floating base of one robot: drives the body to a velocity and a posture with limited force and acceleration."""
 
-    def __init__(self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits) -> None:
-        """Adds the joints to `plant` (before Finalize); the last joint carries `body`."""
+    def __init__(
+        self, plant: MultibodyPlant, name: str, body: RigidBody, limits: FloatingBaseLimits, *, heavier: float = 1.0
+    ) -> None:
+        """Adds the joints to `plant` (before Finalize); the last joint carries `body`.
+
+        Forces and gains are for a Spot; `heavier` multiplies them.
+        """
         self._plant = plant
-        self._limits = limits
+        self._limits, self._heavier = limits, heavier
         self.instance: ModelInstanceIndex = plant.AddModelInstance(f"{name}_floating_base")
         self._joints = self._add_joints(name, body)
         self._velocity = Velocity()
@@ -72,7 +77,7 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
 
     def _add_joints(self, name: str, body: RigidBody) -> Sequence[Joint]:
         directions = {"x": (1, 0, 0), "y": (0, 1, 0), "yaw": (0, 0, 1), "height": (0, 0, 1), "pitch": (0, 1, 0)}
-        limits, inertia = self._limits, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
+        limits, heavier, inertia = self._limits, self._heavier, SpatialInertia.SolidSphereWithMass(0.05, 0.05)
         efforts = {
             "x": limits.force_n,
             "y": limits.force_n,
@@ -92,8 +97,9 @@ class FloatingBase(Stateful, saved=("_velocity", "_target", "_posture")):
             kind = RevoluteJoint if axis in ("yaw", "pitch") else PrismaticJoint
             direction = np.array(directions[axis], dtype=np.float64)
             joint = self._plant.AddJoint(kind(f"{name}_floating_base_{axis}", *frames, direction))
-            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_floating_base_{axis}", joint, efforts[axis])
-            actuator.set_controller_gains(PdControllerGains(p=_GAINS[axis][0], d=_GAINS[axis][1]))
+            effort, (p, d) = heavier * efforts[axis], _GAINS[axis]
+            actuator: JointActuator = self._plant.AddJointActuator(f"{name}_floating_base_{axis}", joint, effort)
+            actuator.set_controller_gains(PdControllerGains(p=heavier * p, d=heavier * d))
             joints.append(joint)
             parent = child
         return joints

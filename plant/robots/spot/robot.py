@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -12,7 +12,7 @@ from plant.robots.command_table import Part, Velocity
 from plant.robots.commanded_robot import CommandedRobot
 from plant.robots.robot_kind import SensorOptions
 from plant.robots.servos import GripperTolerances, gripper_set_point
-from plant.robots.spot.description import CAMERAS, HAND_LINK, arm_joint_names, spot_facts
+from plant.robots.spot.description import CAMERAS, spot_facts
 from plant.robots.spot.legs import BodyMotion, LegServos, Trot, nominal_footholds
 from plant.robots.spot.model import JointIndex, SpotModel
 from plant.sensors.camera_spec import load_cameras
@@ -50,10 +50,6 @@ class SpotSensors(SensorSuite):
 
     def _X_BL(self) -> RigidTransform:
         return self._X_BL_mounted
-
-    def _frames_of_links(self) -> Mapping[str, tuple[str, RigidTransform]]:
-        (X_BH,) = self._X_BLinks(tuple(arm_joint_names()), (HAND_LINK,))
-        return {HAND_LINK: ("hand", X_BH)}
 
 
 _GRIPPER_TOLERANCES = GripperTolerances(arrived=0.03, stall_rate=0.03)

@@ -70,7 +70,7 @@ def touching(
     shapes, any_touch = kinds.shape[0], False
     R_BS, p_BS, placed = np.empty((shapes, 3, 3)), np.empty((shapes, 3)), np.zeros(shapes, dtype=np.int64)
     for k in range(path_rad.shape[0]):
-        _place_links(R, p, path_rad[k], axes, R_PF, p_PF)
+        place_links(R, p, path_rad[k], axes, R_PF, p_PF)
         first = 0
         for g in range(groups):
             link, last = group_joints[g] + 1, group_ends[g]
@@ -100,7 +100,7 @@ def touching(
 
 
 @compiled
-def _place_links(
+def place_links(
     R: FloatArray, p: FloatArray, q_rad: FloatArray, axes: FloatArray, R_PF: FloatArray, p_PF: FloatArray
 ) -> None:
     """Writes the poses of body and J links, in the body frame, into R (J + 1, 3, 3) and p (J + 1, 3)."""

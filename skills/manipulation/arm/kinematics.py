@@ -1,9 +1,9 @@
-"""Kinematics of two families of arms, read from the robot's own URDF.
+"""Kinematics of an arm, read from the robot's own URDF.
 
-One has a shoulder yaw, two parallel pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see
-`seven_joints`). All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z
-along their closing. The inverse is solved in closed form, every branch and no seeds, or by the solver of the robot's
-capabilities.
+All poses are in the body frame B; the hand frame H is the last arm link's, x along the fingers, z along their closing.
+The inverse of two families is solved in closed form, every branch and no seeds: one has a shoulder yaw, two parallel
+pitch joints and a spherical roll-pitch-roll wrist; the other seven joints (see `seven_joints`). That of other arms is
+iterated (see `any_joints`), or solved by the solver of the robot's capabilities.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.geometry import wrap
+from skills.manipulation.arm.any_joints import AnyJoints
 from skills.manipulation.arm.seven_joints import AXES, JOINTS, SevenJoints
 from skills.robot import Capabilities, FloatArray, InverseKinematics
 
@@ -46,6 +47,7 @@ class ArmModel:
 
     joints: tuple[ChainJoint, ...]
     stowed_rad: FloatArray
+    closed_form: bool = True
     solver: InverseKinematics | None = None
 
     @property
@@ -114,24 +116,29 @@ class ArmModel:
     def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> tuple[FloatArray, ...]:
         """Returns joint angles that put the hand at X_BH and keep margin_rad from the limits; empty when out of reach.
 
-        For six joints these are all solutions, for seven a choice.
+        In the family of six joints these are all solutions, else a choice.
         """
-        if self._seven is not None:
-            return tuple(self._seven.solutions(X_BH, margin_rad))
+        if self._own is not None:
+            return tuple(self._own.solutions(X_BH, margin_rad))
         solutions = self._closed_form(X_BH) if self.solver is None else self.solver(X_BH)
         return tuple(q for q in solutions if self.within_limits(q, margin_rad))
 
     def reaches(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> bool:
         """Returns whether there are joint angles that put the hand at X_BH and keep margin_rad from the limits."""
-        if self._seven is not None:
-            return self._seven.reaches(X_BH, margin_rad)
+        if self._own is not None:
+            return self._own.reaches(X_BH, margin_rad)
         return bool(self.inverse(X_BH, margin_rad))
 
     @cached_property
-    def _seven(self) -> SevenJoints | None:
-        """Solver of an arm with seven joints."""
-        if self.solver is not None or len(self.joints) != JOINTS:
+    def _own(self) -> SevenJoints | AnyJoints | None:
+        """Solver of an arm that is not of the family with six joints."""
+        if self.solver is not None or (self.closed_form and len(self.joints) != JOINTS):
             return None
+        if not self.closed_form:
+            X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in self.joints])
+            R_PF, p_PF = np.ascontiguousarray(X_PF[:, :, :3]), np.ascontiguousarray(X_PF[:, :, 3])
+            axes = np.array([joint.axis for joint in self.joints], dtype=float)
+            return AnyJoints(R_PF, p_PF, axes, self.lower_rad, self.upper_rad)
         x, _, z = np.array([joint.X_PF.translation() for joint in self.joints]).T
         return SevenJoints(
             self.p_BS,
@@ -155,8 +162,8 @@ class ArmModel:
         self, X_BH: RigidTransform, q_near_rad: FloatArray, margin_rad: float = 0.03
     ) -> FloatArray | None:
         """Returns the inverse solution nearest to q_near_rad, or None when out of reach."""
-        if self._seven is not None:
-            return self._seven.nearest(X_BH, q_near_rad, margin_rad)
+        if self._own is not None:
+            return self._own.nearest(X_BH, q_near_rad, margin_rad)
         solutions = self.inverse(X_BH, margin_rad)
         return min(solutions, key=lambda q: float(np.max(np.abs(q - q_near_rad))), default=None)
 
@@ -180,13 +187,17 @@ class ArmModel:
 
 
 def _axis_rotation(axis: tuple[float, ...], angle_rad: float) -> NDArray[np.float64]:
-    """Rotation matrix about one of the coordinate axes."""
+    """Rotation matrix about a unit axis."""
     c, s = math.cos(angle_rad), math.sin(angle_rad)
-    if axis[2]:
+    if axis == (0, 0, 1):
         return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-    if axis[1]:
+    if axis == (0, 1, 0):
         return np.array([[c, 0, s], [0, 1.0, 0], [-s, 0, c]])
-    return np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
+    if axis == (1, 0, 0):
+        return np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
+    x, y, z = axis
+    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.asarray(np.eye(3) + s * across + (1.0 - c) * across @ across)
 
 
 def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:
@@ -225,35 +236,34 @@ def _read_joint(element: ElementTree.Element) -> ChainJoint:
     lower, upper = (
         (limit.get("lower", "0"), limit.get("upper", "0")) if limit is not None and not endless else ("-inf", "inf")
     )
+    x, y, z = _floats(axis.get("xyz", "1 0 0"))
+    length = math.hypot(x, y, z)
     return ChainJoint(
         name=element.get("name", ""),
         child=child.get("link", ""),
         X_PF=RigidTransform(RollPitchYaw(np.array(rpy)), np.array(xyz)),
-        axis=_floats(axis.get("xyz", "1 0 0")),
+        axis=(x / length, y / length, z / length),
         lower_rad=float(lower),
         upper_rad=float(upper),
     )
 
 
-def _check_structure(joints: tuple[ChainJoint, ...]) -> None:
-    """Raises ValueError when the closed-form inverse does not fit the chain."""
-    axes = tuple(tuple(round(a) for a in joint.axis) for joint in joints)
+def _has_closed_form(joints: tuple[ChainJoint, ...]) -> bool:
+    """Returns whether a closed-form inverse fits the chain."""
+    axes = tuple(joint.axis for joint in joints)
     offsets = [joint.X_PF.translation() for joint in joints]
     turns = [joint.X_PF.rotation() for joint in joints]
     if len(joints) == JOINTS:  # a hand that is turned about the last axis makes no other arm
         turns[-1] = turns[-1].MakeXRotation(-_roll(turns[-1])) @ turns[-1]
-    turned = any(not turn.IsNearlyIdentity(1e-6) for turn in turns)
-    names = [joint.name for joint in joints]
+    if any(not turn.IsNearlyIdentity(1e-6) for turn in turns):
+        return False
     if len(joints) == JOINTS:
-        straight = np.allclose([offsets[1][1], *(p for k in range(2, JOINTS) for p in offsets[k][1:])], 0, atol=1e-6)
-        if axes != AXES or turned or not straight:
-            raise ValueError(f"arm {names}: not seven joints z-y-x-y-x-y-x in a straight line; axes {axes}")
-        return
-    straight = all(np.allclose(offsets[k], 0, atol=1e-6) for k in (1, 4, 5)) and np.allclose(
-        [offsets[2][1], offsets[2][2], offsets[3][1]], 0, atol=1e-6
-    )
-    if axes != _EXPECTED_AXES or turned or not straight:
-        raise ValueError(f"arm {names}: not a z-y-y arm with an x-y-x wrist; axes {axes}")
+        aside = [offsets[1][1], *(p for k in range(2, JOINTS) for p in offsets[k][1:])]
+        return axes == AXES and np.allclose(aside, 0, atol=1e-6)
+    if axes != _EXPECTED_AXES:
+        return False
+    at_one_point = all(np.allclose(offsets[k], 0, atol=1e-6) for k in (1, 4, 5))
+    return at_one_point and np.allclose([offsets[2][1], offsets[2][2], offsets[3][1]], 0, atol=1e-6)
 
 
 @lru_cache(maxsize=4)
@@ -261,7 +271,6 @@ def _read_model(
     description: str,
     names: tuple[str, ...],
     stowed: tuple[float, ...],
-    closed_form: bool,
 ) -> ArmModel:
     robot = ElementTree.fromstring(description.replace("drake:", "drake-"))  # the prefix is often left undeclared
     elements = {element.get("name"): element for element in robot.findall("joint")}
@@ -269,18 +278,13 @@ def _read_model(
     if missing:
         raise ValueError(f"URDF of the robot: no joint {', '.join(missing)}")
     joints = tuple(_read_joint(elements[name]) for name in names)
-    if closed_form:
-        _check_structure(joints)
-    return ArmModel(joints, np.array(stowed))
+    return ArmModel(joints, np.array(stowed), _has_closed_form(joints))
 
 
 def arm_model(capabilities: Capabilities) -> ArmModel:
-    """Returns the arm described by a robot's capabilities.
-
-    Raises ValueError when there is none, or one of another structure without a solver of its own.
-    """
+    """Returns the arm described by a robot's capabilities. Raises ValueError when there is none."""
     if capabilities.arm is None:
         raise ValueError("the robot has no arm")
     names, stowed, solver = capabilities.arm.joint_names, capabilities.arm.stowed_rad, capabilities.arm.inverse
-    model = _read_model(capabilities.description, names, stowed[: len(names)], solver is None)
+    model = _read_model(capabilities.description, names, stowed[: len(names)])
     return model if solver is None else replace(model, solver=solver)

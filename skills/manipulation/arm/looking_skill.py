@@ -1,4 +1,4 @@
-"""Base of the skills that take pictures with the camera on the hand or the head."""
+"""Base of the skills that take pictures with the camera on the hand, the head or the body."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from skills.manipulation.arm.poses import look_configuration
 from skills.manipulation.arm.solid_cells import add_picture, add_view
 from skills.perception.detector.camera_images import is_dark, lacks_depth
 from skills.perception.point_cloud import APART_S, is_at_rest
-from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, NoImageError
+from skills.robot import CameraCapabilities, FloatArray, HeadCapabilities, Image, Mount, NoImageError
 from skills.routine import PATIENCE_S, Routine, SkillFailure
 
 PICTURE_LATENCY_S = 0.1
@@ -35,6 +35,10 @@ _HEAD_TURNS = 6
 """Steps of the iteration for the head's angles."""
 _OFF_AXIS_RAD = 0.2
 """Largest angle between the optical axis and the point to look at."""
+_IN_VIEW_RAD = 0.5
+"""The same for a camera that is fixed to the body."""
+_NO_HEAD = HeadCapabilities(("", ""), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+"""Stands for a head that does not move."""
 _NEAREST_M = 0.25
 """Least distance from the head's camera to the point to look at."""
 _ARM_WITHIN_M = 1.6
@@ -51,7 +55,7 @@ class LookingSkill(ArmSkill[InputsT]):
         """The camera that looks for objects. Raises SkillFailure with cause PRECONDITION when there is none."""
         camera = self.context.robot.capabilities().object_camera
         if camera is None:
-            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on its hand or head")
+            raise SkillFailure(Cause.PRECONDITION, "the robot has no camera on hand or head, or ahead on its body")
         return camera
 
     def look_at(
@@ -65,10 +69,12 @@ class LookingSkill(ArmSkill[InputsT]):
         """Points the object camera at p_BT.
 
         A hand camera goes to the first viewpoint that is within reach and free. For a head camera the arm leaves the
-        view, and the body rises by `raised_m` where that is given. Raises SkillFailure.
+        view, and the body rises by `raised_m` where that is given; so it is for a camera of the body, which must have
+        p_BT in view. Raises SkillFailure.
         """
-        camera, head = self.object_camera, self.context.robot.capabilities().head
-        if camera.on_hand or head is None:
+        camera, can = self.object_camera, self.context.robot.capabilities()
+        head = can.head if camera.mount is Mount.HEAD else None
+        if camera.on_hand:
 
             def goal(scene: ArmScene, q: FloatArray) -> FloatArray:
                 return look_configuration(scene, camera.X_FC, viewpoints_B, p_BT, q)
@@ -79,11 +85,13 @@ class LookingSkill(ArmSkill[InputsT]):
         if not self.context.robot.gripper().holding:
             yield from self.stow(message)
         if raised_m is not None:
-            yield from self.stand_at(self.context.robot.capabilities().standing_height_m + raised_m, message)
+            yield from self.stand_at(can.standing_height_m + raised_m, message)
         try:
-            pan_rad, tilt_rad = head_angles(head, camera, self.X_WB().inverse() @ p_WT)
+            pan_rad, tilt_rad = head_angles(head or _NO_HEAD, camera, self.X_WB().inverse() @ p_WT)
         except PlanningError as error:
             raise SkillFailure(Cause.PLANNING, str(error)) from error
+        if head is None:
+            return
         context = self.context
 
         def attempt() -> Routine[None]:
@@ -166,8 +174,10 @@ def head_angles(head: HeadCapabilities, camera: CameraCapabilities, p_BT: FloatA
         x, y, z = (head.X_BF(pan_rad, tilt_rad) @ camera.X_FC).inverse() @ p_BT
         off_rad = math.atan2(math.hypot(x, y), z)
         pan_rad, tilt_rad = pan_rad - math.atan2(x, max(z, _NEAREST_M)), tilt_rad + math.atan2(y, max(z, _NEAREST_M))
-    if off_rad > _OFF_AXIS_RAD or math.hypot(x, y, z) < _NEAREST_M:
-        raise PlanningError(f"the head does not turn to the point {np.round(p_BT, 2).tolist()} of the body")
+    most_rad = _OFF_AXIS_RAD if camera.mount is Mount.HEAD else _IN_VIEW_RAD
+    if off_rad > most_rad or math.hypot(x, y, z) < _NEAREST_M:
+        who = f"the {camera.mount.value}" if camera.mount is Mount.HEAD else "the camera of the body"
+        raise PlanningError(f"{who} does not turn to the point {np.round(p_BT, 2).tolist()} of the body")
     return _within(pan_rad, head.pan_range_rad), _within(tilt_rad, head.tilt_range_rad)
 
 

@@ -6,16 +6,17 @@ import itertools
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.manipulation.arm.collision import ArmScene
-from skills.manipulation.arm.kinematics import ArmModel
-from skills.robot import ArmCapabilities, FloatArray, GripperCapabilities
+from skills.manipulation.arm.kinematics import ArmModel, arm_model
+from skills.robot import ArmCapabilities, Capabilities, FloatArray, GripperCapabilities, Mount
 from skills.world_model import PlanningError
 
 UP_B = np.array([0.0, 0.0, 1.0])
-_JOINT_WEIGHTS = np.array([1.0, 1.0, 1.0, 2.0, 1.0, 1.0])
-"""Cost of each joint's turn among configurations that look at a point."""
+_FOREARM_ROLL = 3
+"""Joint whose turn costs twice that of another, among configurations that look at a point."""
 _CARRY_PITCHES_RAD = ((-0.25,), (0.0,), (0.4, 0.8))
 """Pitches of the hand that carries when it cannot keep the object upright, in groups, the best first."""
 _HANGS_M = 0.03
@@ -35,6 +36,15 @@ _BELOW_RAD = (0.45, 1.05)
 """Range of angles below level of a view that counts as close."""
 _OFF_AXIS_RAD = 0.12
 """Largest angle off the optical axis in a view that counts as close."""
+
+_TRIES = 3000
+"""Configurations that are tried to stow an arm."""
+_LOW = 0.1
+"""Cost of a metre of height of a stowed arm, in metres beyond the footprint."""
+_WIDE = 0.75
+"""Tangent of half the angle of a wide view."""
+_THICK_M = 0.1
+"""Distance by which an arm reaches into a view beside its joints."""
 
 
 def camera_pose(p_BC: FloatArray, p_BT: FloatArray) -> RigidTransform:
@@ -56,7 +66,8 @@ def look_configuration(
         solutions = scene.model.inverse(camera_pose(p_BC, p_BT) @ X_HC.inverse())
         free = [q for q in solutions if scene.free(q)]
         if free:
-            return min(free, key=lambda q: float(np.abs(q - q_near_rad) @ _JOINT_WEIGHTS))
+            weights = 1.0 + (np.arange(len(q_near_rad)) == _FOREARM_ROLL)
+            return min(free, key=lambda q: float(np.abs(q - q_near_rad) @ weights))
     raise PlanningError(f"no arm pose looks at the point {np.round(p_BT, 2).tolist()} ahead of the body")
 
 
@@ -208,3 +219,30 @@ def hand_rotation(tilt_rad: float, azimuth_rad: float, side: float) -> RotationM
     x_axis, z_axis = [ahead * c, ahead * s, -down], [-side * s, side * c, 0.0]
     y_axis = [-side * down * c, -side * down * s, -side * ahead]
     return RotationMatrix(np.array([x_axis, y_axis, z_axis]).T)
+
+
+def compact_configuration(can: Capabilities) -> FloatArray:
+    """Angles (J,) at which the arm sticks out least over the footprint and into views, free of contact; by a search."""
+    model = arm_model(can)
+    scene = ArmScene(can, model, {})
+    low, high = np.maximum(model.lower_rad, -np.pi), np.minimum(model.upper_rad, np.pi)
+    tries = low + np.random.default_rng(0).random((_TRIES, len(low))) * (high - low)
+    tip_H = np.array([0.0 if can.gripper is None else can.gripper.tip_x_m, 0.0, 0.0])
+    outline = np.array(can.footprint_m)
+    X_BF = RigidTransform() if can.head is None else can.head.X_BF(0.0, 0.0)
+    cameras = [X_BF @ each.X_FC if each.mount is Mount.HEAD else each.X_FC for each in can.body_cameras]
+
+    def cost(q_rad: FloatArray) -> float:
+        points = np.vstack([model.points_B(q_rad), model.X_BH(q_rad) @ tip_H])
+        beyond = np.maximum(points[:, :2] - outline.max(axis=0), outline.min(axis=0) - points[:, :2])
+        along = np.vstack([points, (points[1:] + points[:-1]) / 2.0])
+        seen = sum(float(np.mean(_in_view(X_BC.inverse() @ along.T))) for X_BC in cameras)
+        return float(beyond.max()) + _LOW * float(np.abs(points[:, 2]).max()) + seen
+
+    return next((q_rad for q_rad in sorted(tries, key=cost) if scene.free(q_rad)), tries[0])
+
+
+def _in_view(points_C: FloatArray) -> NDArray[np.bool_]:
+    """Returns which points (3, N) of a camera's frame a wide view shows."""
+    x, y, z = points_C
+    return np.asarray(np.hypot(x, y) < _WIDE * z + _THICK_M)

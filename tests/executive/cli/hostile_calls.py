@@ -57,7 +57,8 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
     "object import": {"mesh": "good.stl", "--name": "tool", "--mass": "0.5", "--out": "made"},
     "object show": {"folder": "object"},
     "object tag": {"number": "7", "--out": "made.svg"},
-    "new-skill": {"name": "wave", "folder": "made"},
+    "new skill": {"name": "wave", "folder": "made"},
+    "new robot": {"name": "rover", "--urdf": "good.urdf", "--out": "made"},
 }
 """What each command is called with beside the hostile text; no key, no need."""
 WORK: Final = (

@@ -26,7 +26,7 @@ IMPORTS = [
     (["evaluate", "--help"], set()),
     (["queue", "--help"], {"pydrake"}),
     (["log", "--help"], set()),
-    (["new-skill", "--help"], set()),
+    (["new", "skill", "--help"], set()),
 ]
 
 

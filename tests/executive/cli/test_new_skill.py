@@ -1,8 +1,8 @@
-"""errand new-skill: what is written, and which names and folders are refused."""
+"""errand new skill: what is written, and which names and folders are refused."""
 
 import pytest
 
-from executive.cli.missions_command import render_skill
+from executive.cli.new_command import render_skill
 from skills.files.errors import InputError
 
 

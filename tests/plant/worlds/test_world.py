@@ -172,5 +172,5 @@ def test_routes_are_added_and_take_the_place_of_who_stands() -> None:
 def test_a_lidar_near_the_floor_has_a_map_of_its_own():
     """Bands: scan 0.7 to 1.3 m, low_scan 0.27 to 0.31 m."""
     flat = load_world("flat")
-    names = [flat.scan_map_seen_from(height_m).name for height_m in (0.92, 0.288, 2.0, None)]
-    assert names == ["scan.yaml", "low_scan.yaml", "scan.yaml", "scan.yaml"]
+    names = [flat.scan_map_seen_from(height_m).name for height_m in (0.92, 0.288, 0.35, 2.0, None)]
+    assert names == ["scan.yaml", "low_scan.yaml", "low_scan.yaml", "scan.yaml", "scan.yaml"]

@@ -155,7 +155,7 @@ def import_content(
     bearing = feet(body.solid.points, mass.com, convex)
     files = [f"{options.name}_part_{number}.obj" for number in range(len(parts))]
     for file, part in zip(files, parts, strict=True):
-        write_text(folder / file, _hull_text(part))
+        write_text(folder / file, hull_text(part))
     model = Model(
         options.name,
         f"{options.name}.obj",
@@ -165,7 +165,7 @@ def import_content(
         maker="`errand object import`",
     )
     write_text(folder / f"{options.name}.sdf", model_sdf(model))
-    _write_appearance(folder, options.name, body.patches)
+    write_appearance(folder, options.name, body.patches)
     made = _facts(options, body, mass, len(parts))
     recognition_model(made.class_name, body.patches, body.solid.points, mass.com).write(folder)
     write_imported(folder, made)
@@ -260,7 +260,7 @@ def _shrunk(part: FloatArray, points: FloatArray) -> FloatArray:
     return np.asarray(np.clip(smaller, points.min(axis=0) + inset, points.max(axis=0) - inset))
 
 
-def _hull_text(points: FloatArray) -> str:
+def hull_text(points: FloatArray) -> str:
     """Convex hull of points as OBJ text, with outward triangles."""
     hull = hull_of(points)
     corners, faces = points[hull.vertices], np.searchsorted(hull.vertices, hull.simplices)
@@ -271,7 +271,7 @@ def _hull_text(points: FloatArray) -> str:
     return "\n".join([*lines, *(f"f {i} {j} {k}" for i, j, k in faces + 1)]) + "\n"
 
 
-def _write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None:
+def write_appearance(folder: Path, name: str, patches: Sequence[Patch]) -> None:
     """Writes the visual geometry with its pictures; equal colours or pictures are one material."""
     materials, pictures = dict[str, Material](), dict[str, Picture]()
     mesh, known = Mesh(materials), dict[Colour | bytes, str]()

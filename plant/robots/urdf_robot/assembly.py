@@ -1,0 +1,301 @@
+"""URDF text of a robot as the plant and the planner of arm motions need it: few links, joined by the driven joints.
+
+All links that no driven joint moves are one link `body`, whose frame is B. The arm's frames are parallel to B at zero
+where the axes allow; the last is the hand frame H.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from plant.models import urdf as urdf_text
+from plant.robots.urdf_robot.robot_file import GripperFile, HandFile, RobotFile
+from plant.robots.urdf_robot.urdf_file import UrdfFile, UrdfJoint
+from skills.files.errors import InputError, suggestion
+from skills.files.yaml_source import KeyPath
+from skills.robot import FloatArray, GripperKind
+
+BODY: Final = "body"
+PACKAGE: Final = "robot"
+_STRAIGHT: Final = 1e-4
+_OFF_AXIS_M: Final = 0.01
+_PAD_RADIUS_M: Final = 0.005
+_PAD_PROUD_M: Final = 0.001
+_PAD_STEP_M: Final = 0.006
+_PAD_FRICTION: Final = 1.0
+_PAD_STIFFNESS_N_M: Final = 8000.0
+_PAD_LENGTH_M: Final = 0.045
+
+
+@dataclass(frozen=True)
+class _Mass:
+    """Mass (kg), centre of mass (3,) and moments (3, 3) about it, in one frame."""
+
+    mass_kg: float
+    com: FloatArray
+    moments: FloatArray
+
+
+class Assembly:
+    """A robot's URDF, with the names of its file resolved; `carriers` are the links of the text."""
+
+    def __init__(self, file: RobotFile) -> None:
+        """Reads the URDF and puts links together. Raises InputError with the place in either file."""
+        self.file = file
+        self.urdf = UrdfFile(file.source.path.parent / file.urdf)
+        self._check_names()
+        closed = {} if file.gripper is None else dict.fromkeys(file.gripper.joints, 0.0) | file.gripper.closed
+        self._zero: Mapping[str, float] = dict.fromkeys(file.moving, 0.0) | file.held | closed
+        X_RL = self.urdf.poses(self._zero)
+        X_BR = X_RL[file.base.link].inverse()
+        self.X_BL = {link: X_BR @ X for link, X in X_RL.items()}
+        self.joints = {joint.child: joint for joint in self.urdf.order if joint.name in file.moving}
+        self._carrier = {self.urdf.root: BODY}
+        for joint in self.urdf.order:
+            driven = joint.child in self.joints
+            self._carrier[joint.child] = self._name(joint.child) if driven else self._carrier[joint.parent]
+        self._X_BC = {BODY: RigidTransform()}
+        for joint in self.joints.values():
+            X_BF = self.X_BL[joint.parent] @ joint.X_PF
+            self._X_BC[self._name(joint.child)] = RigidTransform(self._rotation(joint, X_BF), X_BF.translation())
+        self._check_hand()
+
+    def _name(self, link: str) -> str:
+        return f"{link}_link" if link == BODY else link
+
+    def carrier(self, link: str) -> str:
+        """The link of the text that a link of the file is part of."""
+        return self._carrier[link]
+
+    def X_CL(self, link: str) -> RigidTransform:
+        """Pose of a link of the file in its carrier."""
+        return self._X_BC[self.carrier(link)].inverse() @ self.X_BL[link]
+
+    @property
+    def hand_link(self) -> str | None:
+        """The arm's last link, whose frame is H; None without an arm."""
+        arm = self.file.arm
+        return None if arm is None else self._name(self.urdf.joints[arm.joints[-1]].child)
+
+    # -- checks ---------------------------------------------------------------------------------------------------
+
+    def error(self, path: KeyPath, message: str, hint: str) -> InputError:
+        """Error at a key of the robot's file."""
+        return self.file.source.error(path, message, hint)
+
+    def _check_names(self) -> None:
+        file = self.file
+        links: list[tuple[KeyPath, str]] = [(("base", "link"), file.base.link), (("lidar", "link"), file.lidar.link)]
+        links += [(("cameras", name, "link"), camera.link) for name, camera in file.cameras.items()]
+        joints: list[tuple[KeyPath, str]] = [(("head", k), name) for k, name in enumerate(file.head or ())]
+        if file.arm is not None:
+            links.append((("arm", "hand", "link"), file.arm.hand.link))
+            joints += [(("arm", "joints", k), name) for k, name in enumerate(file.arm.joints)]
+        joints += [(("gripper", "joints", name), name) for name in (file.gripper.joints if file.gripper else ())]
+        joints += [(("held", name), name) for name in file.held]
+        for what, named, known in (("link", links, self.urdf.links), ("joint", joints, self.urdf.joints)):
+            for path, name in named:
+                if name not in known:
+                    hint = suggestion(name, known)
+                    raise self.error(path, f"there is no {what} '{name}' in {file.urdf}", hint)
+        self.urdf.need_limits(file.moving)
+
+    def _check_hand(self) -> None:
+        arm = self.file.arm
+        if arm is None:
+            return
+        for k, (before, after) in enumerate(zip(arm.joints, arm.joints[1:], strict=False)):
+            driven = [each.name for each in self.urdf.chain(self.urdf.joints[after].child) if each.name in arm.joints]
+            if driven[-2:-1] != [before]:
+                what = f"joint {after} does not follow {before}"
+                raise self.error(("arm", "joints", k + 1), what, "list the arm's joints from the shoulder on")
+        if self.hand_link not in (self.carrier(arm.hand.link), *self._parents(arm.hand.link)):
+            what = f"link {arm.hand.link} is not behind the arm's last joint"
+            raise self.error(("arm", "hand", "link"), what, "name a link of the hand")
+
+    def _parents(self, link: str) -> list[str]:
+        return [self.carrier(joint.parent) for joint in self.urdf.chain(link)]
+
+    # -- frames ---------------------------------------------------------------------------------------------------
+
+    def _rotation(self, joint: UrdfJoint, X_BF: RigidTransform) -> RotationMatrix:
+        """Rotation of a carrier's frame in B: that of the hand for the hand and behind it, else B's where it can be."""
+        arm = self.file.arm
+        behind = {each.name for each in self.urdf.chain(joint.child)}
+        if arm is not None and arm.joints[-1] in behind:
+            return self._hand_rotation(arm.hand)
+        axis_B = X_BF.rotation() @ joint.axis
+        return RotationMatrix() if np.max(np.abs(axis_B)) > 1.0 - _STRAIGHT else X_BF.rotation()
+
+    def _hand_rotation(self, hand: HandFile) -> RotationMatrix:
+        along, closing = (_unit(axis) for axis in (hand.along, hand.closing))
+        if abs(along @ closing) > 0.5:
+            raise self.error(("arm", "hand", "closing"), "is the same axis as along", "name another axis")
+        R_LH = RotationMatrix(np.column_stack([along, np.cross(closing, along), closing]))
+        return self.X_BL[hand.link].rotation() @ R_LH
+
+    # -- text -----------------------------------------------------------------------------------------------------
+
+    def text(self, *, pads: bool = False, meshes: bool = True) -> str:
+        """URDF text; without `meshes` their boxes are the collision shapes, and nothing is drawn."""
+        robot = Element("robot", name=self.file.name)
+        for carrier, X_BC in self._X_BC.items():
+            members = [link for link, own in self._carrier.items() if own == carrier]
+            element = ElementTree.SubElement(robot, "link", name=carrier)
+            self._add_inertial(element, carrier, members)
+            for link in members:
+                self._add_shapes(element, link, meshes=meshes)
+            if pads and self.file.gripper is not None and self.file.gripper.pads:
+                self._add_pads(element, carrier, X_BC, self.file.gripper)
+        for joint in self.joints.values():
+            self._add_joint(robot, joint)
+        ElementTree.indent(robot)
+        return ElementTree.tostring(robot, encoding="unicode")
+
+    def _add_joint(self, robot: Element, joint: UrdfJoint) -> None:
+        parent, child = self.carrier(joint.parent), self._name(joint.child)
+        X_PF = self._X_BC[parent].inverse() @ self._X_BC[child]
+        axis_C = self._X_BC[child].rotation().inverse() @ (self.X_BL[joint.parent] @ joint.X_PF).rotation() @ joint.axis
+        zero = self._zero[joint.name] if self._closes(joint) else 0.0
+        part = {
+            "offset": X_PF.translation(),
+            "rpy": RollPitchYaw(X_PF.rotation()).vector(),
+            "axis": np.round(axis_C, 9) + 0.0,
+            "range": (joint.lower - zero, joint.upper - zero),
+            "effort": joint.effort,
+        }
+        urdf_text.add_joint(robot, joint.name, parent, child, part, joint.kind)
+
+    def _closes(self, joint: UrdfJoint) -> bool:
+        return self.file.gripper is not None and joint.name in self.file.gripper.joints
+
+    def _add_shapes(self, element: Element, link: str, *, meshes: bool) -> None:
+        X_CL = self.X_CL(link)
+        for role in ("visual", "collision") if meshes else ("collision",):
+            for shape in self.urdf.shapes(link, role):
+                copied = ElementTree.SubElement(element, role, name=f"{link}_{role}_{len(element)}")
+                geometry, X_CS = shape.find("geometry"), X_CL @ self.urdf.origin(shape)
+                assert geometry is not None
+                mesh = geometry.find("mesh")
+                if mesh is not None and not meshes:
+                    geometry, X_CS = self._box_of(mesh, X_CS)
+                _add_origin(copied, X_CS)
+                copied.append(geometry)
+                if (material := shape.find("material")) is not None:
+                    copied.append(self._with_colour(material))
+
+    def _with_colour(self, material: Element) -> Element:
+        """A material with its colour, which may stand at the top of the file."""
+        named = (each for each in self.urdf.robot.findall("material") if each.get("name") == material.get("name"))
+        return material if len(material) else next(named, material)
+
+    def _box_of(self, mesh: Element, X_CS: RigidTransform) -> tuple[Element, RigidTransform]:
+        """Geometry of a mesh's bounding box, and its pose."""
+        points = mesh_points(self.mesh_path(mesh)) * self.urdf.numbers(mesh, "scale", "1 1 1")
+        low, high = points.min(axis=0), points.max(axis=0)
+        geometry = Element("geometry")
+        ElementTree.SubElement(geometry, "box", size=urdf_text.text(np.maximum(high - low, 1e-3)))
+        return geometry, X_CS @ RigidTransform((low + high) / 2.0)
+
+    def mesh_path(self, mesh: Element) -> Path:
+        """File of a mesh of the package. Raises InputError when there is none."""
+        name = mesh.get("filename", "")
+        path = self.urdf.path.parent / name.removeprefix(f"package://{PACKAGE}/")
+        if not name.startswith(f"package://{PACKAGE}/") or not path.is_file():
+            hint = "make the package by `errand new robot`, which copies meshes"
+            raise self.urdf.error(mesh, f"there is no mesh {name[:100]}", hint)
+        return path
+
+    def _add_pads(self, element: Element, carrier: str, X_BC: RigidTransform, gripper: GripperFile) -> None:
+        """Adds rubber pads to the inner face of a finger that slides: spheres that stand a little proud of it."""
+        joint = next((each for each in self.joints.values() if self._name(each.child) == carrier), None)
+        if joint is None or joint.name not in gripper.joints or gripper.kind is not GripperKind.PARALLEL:
+            return
+        assert self.hand_link is not None
+        p_HC = (self._X_BC[self.hand_link].inverse() @ X_BC).translation()
+        opens_C = X_BC.rotation().inverse() @ (self.X_BL[joint.parent] @ joint.X_PF).rotation() @ joint.axis
+        side = math.copysign(1.0, float(opens_C[2]) * gripper.joints[joint.name])
+        z = gripper.closing_z - float(p_HC[2]) + side * (_PAD_RADIUS_M - _PAD_PROUD_M)
+        first = max(gripper.palm_x, gripper.tip_x - _PAD_LENGTH_M) + _PAD_RADIUS_M
+        rows = np.arange(first, gripper.tip_x - _PAD_RADIUS_M + 1e-9, _PAD_STEP_M) - float(p_HC[0])
+        half = max(0.0, gripper.half_breadth - _PAD_RADIUS_M)
+        grid = {"radius": _PAD_RADIUS_M, "xz": [(x, z) for x in rows], "y": np.array([-half, 0.0, half]) - p_HC[1]}
+        for k, (shape, contact) in enumerate(urdf_text.pad_shapes([grid], _PAD_FRICTION, _PAD_STIFFNESS_N_M)):
+            urdf_text.add_collision(element, f"{carrier}_pad_{k}", shape, contact)
+
+    # -- masses ---------------------------------------------------------------------------------------------------
+
+    def _add_inertial(self, element: Element, carrier: str, members: list[str]) -> None:
+        whole = _joined([mass for link in members if (mass := self._mass(link)) is not None])
+        line = int(self.urdf.links[members[0]].get("line", "1"))
+        if whole is None:
+            hint = "write <inertial> with mass and inertia into it"
+            raise self.urdf.error(line, f"link {carrier} moves and has no mass", hint)
+        inertial = ElementTree.SubElement(element, "inertial")
+        ElementTree.SubElement(inertial, "origin", xyz=urdf_text.text(whole.com))
+        ElementTree.SubElement(inertial, "mass", value=f"{whole.mass_kg:.9g}")
+        (xx, xy, xz), (_, yy, yz), (_, _, zz) = whole.moments
+        moments = {"ixx": xx, "iyy": yy, "izz": zz, "ixy": xy, "ixz": xz, "iyz": yz}
+        ElementTree.SubElement(inertial, "inertia", {key: f"{value:.9g}" for key, value in moments.items()})
+
+    def _mass(self, link: str) -> _Mass | None:
+        """Mass of a link in its carrier's frame; None without one. Raises InputError when no body can have it."""
+        inertial = self.urdf.links[link].find("inertial")
+        if inertial is None:
+            return None
+        (mass_kg,) = self.urdf.numbers(inertial.find("mass"), "value", "0")
+        inertia, X_CI = inertial.find("inertia"), self.X_CL(link) @ self.urdf.origin(inertial)
+        xx, yy, zz, xy, xz, yz = (
+            self.urdf.numbers(inertia, f"i{axes}", "0")[0] for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
+        moments = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        low, middle, high = np.linalg.eigvalsh(moments)
+        if mass_kg < 0.0 or (mass_kg > 0.0 and not 0.0 < high <= (low + middle) * (1.0 + 1e-6)):
+            what = f"link {link} has a zero inertia" if high <= 0.0 else f"link {link} has an inertia that no body has"
+            hint = "write the moments of its mass about its centre; a box has m (y^2 + z^2) / 12 about x"
+            raise self.urdf.error(inertial, what, hint)
+        R = X_CI.rotation().matrix()
+        return _Mass(mass_kg, X_CI.translation(), R @ moments @ R.T) if mass_kg else None
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of the whole robot."""
+        return sum(mass.mass_kg for link in self.urdf.links if (mass := self._mass(link)) is not None)
+
+
+def _joined(masses: list[_Mass]) -> _Mass | None:
+    """Mass of several bodies that are one; None when there is none."""
+    total = sum(each.mass_kg for each in masses)
+    if not total:
+        return None
+    com = np.sum([each.mass_kg * each.com for each in masses], axis=0) / total
+    moments = np.zeros((3, 3))
+    for each in masses:
+        d = each.com - com
+        moments += each.moments + each.mass_kg * (d @ d * np.eye(3) - np.outer(d, d))
+    return _Mass(total, com, moments)
+
+
+def _unit(axis: str) -> FloatArray:
+    """Unit vector (3,) of an axis such as "-y"."""
+    return np.asarray((-1.0 if axis.startswith("-") else 1.0) * np.eye(3)["xyz".index(axis[-1])])
+
+
+def _add_origin(element: Element, X: RigidTransform) -> None:
+    rpy = RollPitchYaw(X.rotation()).vector()
+    ElementTree.SubElement(element, "origin", xyz=urdf_text.text(X.translation()), rpy=urdf_text.text(rpy))
+
+
+def mesh_points(path: Path) -> FloatArray:
+    """Vertices (N, 3) of an OBJ file."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return np.asarray(np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=np.float64))

@@ -1,0 +1,41 @@
+"""Kind of a robot that a URDF and a `robot.yaml` describe."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from plant.robots.robot_kind import PlacedRobot, PlantRobot, RobotBody, RobotKind, SensorOptions
+from plant.robots.urdf_robot.description import Description
+
+if TYPE_CHECKING:
+    from pydrake.multibody.plant import MultibodyPlant
+
+
+def urdf_kind(path: Path) -> RobotKind:
+    """Returns the kind of robot that a `robot.yaml` describes. Raises InputError with the place in its files."""
+    description = Description(path)
+
+    def add(plant: MultibodyPlant, robot: PlacedRobot, visuals: bool) -> RobotBody:
+        from plant.robots.urdf_robot.robot import UrdfBody
+
+        return UrdfBody(plant, robot, description)
+
+    def drive(body: RobotBody, options: SensorOptions) -> PlantRobot:
+        from plant.robots.urdf_robot.robot import UrdfBody, UrdfRobot
+
+        assert isinstance(body, UrdfBody)
+        return UrdfRobot(body, options)
+
+    stack = path.with_name("stack.yaml")
+    return RobotKind(
+        name=description.file.name,
+        gripper_links=description.gripper_links,
+        trunk_links=("body", *description.head_links),
+        leg_links=(),
+        facts=path,
+        capabilities=lambda: description.capabilities,
+        add=add,
+        drive=drive,
+        stack=stack if stack.is_file() else None,
+    )

@@ -1,0 +1,211 @@
+"""URDF files of robots: their links, joints and poses, with the line of each error."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+
+from skills.files.errors import InputError, suggestion
+from skills.files.outside import read_text
+from skills.robot import FloatArray
+
+MOVING: Final = ("revolute", "continuous", "prismatic")
+MOST_BYTES: Final = 20_000_000
+_LINE: Final = "line"
+_XACRO: Final = "expand it by `xacro FILE > robot.urdf`, and give that file"
+_LIMIT: Final = 'write <limit lower="..." upper="..." effort="..." velocity="..."/> into it'
+
+
+@dataclass(frozen=True)
+class UrdfJoint:
+    """Joint: X_PF is its frame in the parent link, `axis` (3,) a unit vector in F; limits in rad or m.
+
+    `mimics` says whether it follows another joint.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    X_PF: RigidTransform
+    axis: FloatArray
+    lower: float
+    upper: float
+    effort: float
+    velocity: float
+    mimics: bool
+    line: int
+
+    @property
+    def moves(self) -> bool:
+        """Returns whether it has one degree of freedom."""
+        return self.kind in MOVING
+
+    def X_FC(self, position: float) -> RigidTransform:
+        """Pose of the child link in F at a position (rad, m)."""
+        if self.kind == "prismatic":
+            return RigidTransform(position * self.axis)
+        return RigidTransform(turn_about(self.axis, position), np.zeros(3))
+
+    def clipped(self, position: float) -> float:
+        """The position nearest to a given one within the limits."""
+        return min(max(position, self.lower), self.upper)
+
+
+def turn_about(axis: FloatArray, angle_rad: float) -> RotationMatrix:
+    """Rotation about an axis (3,)."""
+    from pydrake.common.eigen_geometry import AngleAxis
+
+    return RotationMatrix(AngleAxis(angle_rad, axis / np.linalg.norm(axis)))
+
+
+class UrdfFile:
+    """URDF file. Its errors name file and line."""
+
+    def __init__(self, path: Path) -> None:
+        """Reads the file. Raises InputError when it is no URDF, or its links are no tree."""
+        self.path = path
+        text = read_text(path, most_bytes=MOST_BYTES, hint="check the path")
+        if path.suffix == ".xacro" or "xmlns:xacro" in text:
+            raise InputError("it is a xacro file, not URDF", hint=_XACRO, file=path)
+        robot = _parse(path, text)
+        if robot.tag != "robot":
+            raise self.error(robot, f"it begins with <{robot.tag}>, not with <robot>", "give the URDF of a robot")
+        self.robot = robot
+        self.links = self._by_name(robot.findall("link"))
+        self.joints = {name: self._joint(each) for name, each in self._by_name(robot.findall("joint")).items()}
+        self._to = {joint.child: joint for joint in self.joints.values()}
+        roots = [name for name in self.links if name not in self._to]
+        if len(roots) != 1 or len(self._to) != len(self.joints):
+            names = ", ".join(roots) or "none"
+            raise InputError(f"its links are no tree; links without a parent: {names}", hint="join them", file=path)
+        self.root = roots[0]
+        _ = self.order
+        simulated = ((each.get("reference", ""), each.iter("sensor")) for each in robot.findall("gazebo"))
+        self.sensors = [(link, sensor.get("type", "")) for link, sensors in simulated for sensor in sensors]
+
+    def error(self, where: Element | int, message: str, hint: str) -> InputError:
+        """Error at an element or a line."""
+        line = where if isinstance(where, int) else int(where.get(_LINE, "1"))
+        return InputError(message, hint=hint, file=self.path, line=line)
+
+    def _by_name(self, elements: Iterable[Element]) -> dict[str, Element]:
+        found = dict[str, Element]()
+        for each in elements:
+            name = each.get("name", "")
+            if not name or name in found:
+                what = f"two of <{each.tag}> are named '{name}'" if name else f"<{each.tag}> has no name"
+                raise self.error(each, what, "give each a name of its own")
+            found[name] = each
+        return found
+
+    def _joint(self, element: Element) -> UrdfJoint:
+        name, kind = element.get("name", ""), element.get("type", "")
+        parent, child = (self._named(element, tag, "link") for tag in ("parent", "child"))
+        limit, axis = element.find("limit"), element.find("axis")
+        axis_F = np.array(self.numbers(axis, "xyz", "1 0 0"))
+        if kind not in (*MOVING, "fixed", "floating", "planar") or not np.linalg.norm(axis_F):
+            what = f"joint {name} has type '{kind}'" if np.linalg.norm(axis_F) else f"joint {name} has a zero axis"
+            raise self.error(element, what, f"use one of {', '.join(MOVING)} and fixed, with an axis")
+        ends = {key: self.numbers(limit, key, "0")[0] for key in ("lower", "upper", "effort", "velocity")}
+        if kind not in ("revolute", "prismatic"):
+            ends |= {"lower": -math.inf, "upper": math.inf}
+        mimics, line = element.find("mimic") is not None, int(element.get(_LINE, "1"))
+        X_PF, axis_F = self.origin(element), axis_F / np.linalg.norm(axis_F)
+        return UrdfJoint(name, kind, parent, child, X_PF, axis_F, **ends, mimics=mimics, line=line)
+
+    def _named(self, element: Element, tag: str, key: str) -> str:
+        """Link that a joint names. Raises InputError when there is none."""
+        found = element.find(tag)
+        name = "" if found is None else found.get(key, "")
+        if name not in self.links:
+            what = f"joint {element.get('name')}: there is no link '{name}' for its {tag}"
+            raise self.error(element, what, suggestion(name, self.links))
+        return name
+
+    def numbers(self, element: Element | None, key: str, default: str) -> list[float]:
+        """Numbers of an attribute, as many as the default has. Raises InputError."""
+        text = default if element is None else element.get(key, default)
+        try:
+            found = [float(word) for word in text.split()]
+        except ValueError:
+            found = []
+        if len(found) != len(default.split()) or not np.isfinite(found).all():
+            assert element is not None
+            count = len(default.split())
+            raise self.error(element, f"<{element.tag} {key}='{text[:60]}'> is not {count} numbers", "correct it")
+        return found
+
+    def origin(self, element: Element) -> RigidTransform:
+        """Pose in the `origin` of an element."""
+        origin = element.find("origin")
+        xyz, rpy = (np.array(self.numbers(origin, key, "0 0 0")) for key in ("xyz", "rpy"))
+        return RigidTransform(RollPitchYaw(rpy), xyz)
+
+    @cached_property
+    def order(self) -> Sequence[UrdfJoint]:
+        """All joints, each after those between it and the root. Raises InputError when some form a loop."""
+        children, order, reached = list(self.joints.values()), list[UrdfJoint](), {self.root}
+        while children:
+            ready = [joint for joint in children if joint.parent in reached]
+            if not ready:
+                raise self.error(children[0].line, f"joint {children[0].name} is in a loop", "let the links be a tree")
+            order += ready
+            reached |= {joint.child for joint in ready}
+            children = [joint for joint in children if joint.child not in reached]
+        return tuple(order)
+
+    def chain(self, link: str) -> list[UrdfJoint]:
+        """Joints from the root to a link."""
+        joints = list[UrdfJoint]()
+        while (joint := self._to.get(link)) is not None:
+            joints.append(joint)
+            link = joint.parent
+        return joints[::-1]
+
+    def poses(self, positions: Mapping[str, float]) -> dict[str, RigidTransform]:
+        """Poses of all links in the root link, with joints at positions (rad, m), else at 0 or the nearest limit."""
+        X = {self.root: RigidTransform()}
+        for joint in self.order:
+            position = positions.get(joint.name, joint.clipped(0.0)) if joint.moves else 0.0
+            X[joint.child] = X[joint.parent] @ joint.X_PF @ joint.X_FC(position)
+        return X
+
+    def need_limits(self, names: Collection[str]) -> None:
+        """Raises InputError for the first of some joints that lacks limits."""
+        for joint in (self.joints[name] for name in names):
+            lacking = [key for key in ("effort", "velocity") if getattr(joint, key) <= 0.0]
+            if not joint.lower < joint.upper:
+                lacking.insert(0, "lower and upper")
+            if lacking:
+                raise self.error(joint.line, f"joint {joint.name} has no limit of {', '.join(lacking)}", _LIMIT)
+
+    def shapes(self, link: str, role: str) -> list[Element]:
+        """The `visual` or `collision` elements of a link."""
+        return [each for each in self.links[link].findall(role) if each.find("geometry") is not None]
+
+
+def _parse(path: Path, text: str) -> Element:
+    """Parses XML; each element has its line as attribute `line`. Raises InputError."""
+    parser, builder = expat.ParserCreate(), TreeBuilder()
+
+    def begin(tag: str, attributes: dict[str, str]) -> None:
+        builder.start(tag, {**attributes, _LINE: str(parser.CurrentLineNumber)})
+
+    parser.StartElementHandler, parser.EndElementHandler = begin, builder.end
+    parser.CharacterDataHandler = builder.data
+    try:
+        parser.Parse(text.encode(), True)
+        return builder.close()
+    except expat.ExpatError as wrong:
+        what = f"broken XML: {expat.ErrorString(wrong.code)}"
+        raise InputError(what, hint="correct it here", file=path, line=wrong.lineno) from wrong

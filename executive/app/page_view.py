@@ -66,7 +66,7 @@ class PageView(RunVisitor):
         """Serves the page and shows its address. Raises InputError if the port is taken."""
         from executive.view.server import PageContent, serve
 
-        log.listen(lambda each: self._feed(each.channel.topic, each.stamp_s, each.values))
+        log.listen(lambda each: self._feed(each.topic, each.stamp_s, each.values))
         self._scene = scene
         sentences: dict[str, Action] = {}
         if self.conversations is not None:

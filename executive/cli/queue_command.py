@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from datetime import datetime, timedelta
 from itertools import chain
 from pathlib import Path
@@ -29,7 +29,7 @@ from skills.quantities import Count, Port, Wait
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from executive.app.runs import MissionResult, Runner
+    from executive.app.runs import MissionResult, MissionRuns
 
 queue = typer.Typer(
     name="queue",
@@ -125,17 +125,10 @@ def run(
     as_json: AS_JSON = False,
 ) -> None:
     """Runs all queued missions, each in the world that the mission before it left."""
-    from executive.app.runs import MissionRuns, resumable_line
-    from executive.cli.screen import ConsoleScreen
-    from executive.view.foxglove import serve_live
+    from executive.app.runs import resumable_line
 
     console = console_for(as_json)
-    with (
-        MissionStore(store or store_in(out), create=False) as missions,
-        missions.claim(),
-        serve_live(foxglove, plain_lines(console)) as live,
-    ):
-        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
+    with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
         ended = _in_turn(missions, runs, console)
         resumable = resumable_line(missions)
     if ended:
@@ -147,8 +140,23 @@ def run(
     finish({"missions": [each.to_json() for each in ended]}, as_json, good=all(each.achieved for each in ended))
 
 
+@contextmanager
+def _runs(
+    store: Path, console: Console, quiet: bool, foxglove: str | None
+) -> Iterator[tuple[MissionStore, MissionRuns]]:
+    """Claims a store for the block, and yields it with the runner of its missions."""
+    with MissionStore(store, create=False) as missions, missions.claim():
+        from executive.app.runs import MissionRuns
+        from executive.cli.screen import ConsoleScreen
+        from executive.view.foxglove import serve_live
+
+        with serve_live(foxglove, plain_lines(console)) as live:
+            screen = ConsoleScreen(console, quiet=quiet, live=live)
+            yield missions, MissionRuns(missions, screen, ask=terminal_answerer())
+
+
 def _in_turn(
-    missions: MissionStore, runs: Runner, console: Console, first: StoredMission | None = None
+    missions: MissionStore, runs: MissionRuns, console: Console, first: StoredMission | None = None
 ) -> list[MissionResult]:
     """Runs the queued missions one after another with a progress bar.
 
@@ -234,23 +242,16 @@ def serve(
 ) -> None:
     """Queues missions at times, on a full battery, calls and messages, and runs them, until Ctrl-C."""
     from executive.app.queue_server import CallAddress, Listeners, QueueServer
-    from executive.app.runs import MissionRuns, resumable_line
-    from executive.cli.screen import ConsoleScreen
-    from executive.view.foxglove import serve_live
+    from executive.app.runs import resumable_line
 
     console = console_for(as_json)
     tell = plain_lines(console)
-    with MissionStore(store or store_in(out), create=False) as missions, missions.claim():
+    with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
         end = None if for_s is None else missions.now() + timedelta(seconds=min(for_s, _LONGEST_S))
         address = CallAddress(host, port, token)
-        with (
-            WakeupPipe(missions) as wakeup,
-            Listeners(missions.path, address, tell) as listeners,
-            serve_live(foxglove, tell) as live,
-        ):
+        with WakeupPipe(missions) as wakeup, Listeners(missions.path, address, tell) as listeners:
             standing = StandingMissions(missions)
-            runner = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
-            server = QueueServer(missions, standing, wakeup, runner, follow=listeners.follow, tell=tell)
+            server = QueueServer(missions, standing, wakeup, runs, follow=listeners.follow, tell=tell)
             with ended_by_signals(server.stop):
                 tell(f"Standing missions: {len(standing.missions())} ({missions.path}). Ctrl-C ends.")
                 ended = server.serve(end=end, until_idle=until_idle)
@@ -273,20 +274,9 @@ def resume(
     foxglove: FOXGLOVE = None,
 ) -> None:
     """Resumes an interrupted or cancelled mission from its last finished step; then runs its queue."""
-    from executive.view.foxglove import serve_live
-
     console = console_for(as_json)
-    with (
-        MissionStore(store or store_in(out), create=False) as missions,
-        missions.claim(),
-        serve_live(foxglove, plain_lines(console)) as live,
-    ):
-        from executive.app.runs import MissionRuns
-        from executive.cli.screen import ConsoleScreen
-
-        chosen = _interrupted(missions, mission)
-        runs = MissionRuns(missions, ConsoleScreen(console, quiet=quiet, live=live), ask=terminal_answerer())
-        ended = _in_turn(missions, runs, console, chosen)
+    with _runs(store or store_in(out), console, quiet, foxglove) as (missions, runs):
+        ended = _in_turn(missions, runs, console, _interrupted(missions, mission))
     values = {**ended[0].to_json(), "then": [each.to_json() for each in ended[1:]]}
     finish(values, as_json, good=all(each.achieved for each in ended))
 

@@ -57,27 +57,23 @@ Message = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Channel:
-    """Channel of a log: its name, the topic, which the name has behind a robot's, and the schema."""
+class LoggedMessage:
+    """Message as it is logged: channel, topic, schema, the robot's clock (s), JSON values, and the same as text.
 
-    name: str
+    The channel of one of several robots has its name before the topic.
+    """
+
+    channel: str
     topic: str
     schema: Schema
-
-    @property
-    def metadata(self) -> dict[str, str]:
-        """Metadata of one robot's channel; {} if its name is the topic."""
-        return {} if self.name == self.topic else {TOPIC: self.topic}
-
-
-@dataclass(frozen=True)
-class LoggedMessage:
-    """Message as it is logged: channel, the robot's clock (s), JSON values, and the same as text."""
-
-    channel: Channel
     stamp_s: float
     values: Message
     data: bytes
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """Metadata of the channel."""
+        return {} if self.channel == self.topic else {TOPIC: self.topic}
 
 
 Listener = Callable[[LoggedMessage], None]
@@ -103,7 +99,7 @@ class EventLog(RunVisitor):
         self._file: BinaryIO = path.open("wb")
         self._writer: Any = Writer(self._file)
         self._writer.start(profile="", library=LIBRARY)
-        self._channels: dict[tuple[str, str, str], tuple[Channel, int]] = {}
+        self._channels: dict[tuple[str, str], int] = {}
         self._schemas: dict[str, int] = {}
         self._flushed_s = -math.inf
         self._sequence = 0
@@ -169,10 +165,11 @@ class EventLog(RunVisitor):
         stamp_ns, self._sequence = round(now_s * 1e9), self._sequence + 1
         data = json.dumps(plain, allow_nan=False, separators=(",", ":")).encode()
         self.bytes += len(data) if topic != WALL else 0
-        channel, number = self._channel(topic, schema_of(topic, plain), robot)
-        self._writer.add_message(number, stamp_ns, data, stamp_ns, self._sequence)
+        channel = f"{slug(robot)}/{topic}" if robot else topic
+        message = LoggedMessage(channel, topic, schema_of(topic, plain), now_s, plain, data)
+        self._writer.add_message(self._channel(message), stamp_ns, data, stamp_ns, self._sequence)
         for listener in self._listeners:
-            listener(LoggedMessage(channel, now_s, plain, data))
+            listener(message)
 
     def flush(self) -> None:
         """Writes all buffered messages to the file."""
@@ -188,16 +185,16 @@ class EventLog(RunVisitor):
             if not broken:
                 self._writer.finish()
 
-    def _channel(self, topic: str, schema: Schema, robot: str) -> tuple[Channel, int]:
-        """Returns the channel of a topic with its number in the file."""
-        key = (topic, schema.name, robot)
+    def _channel(self, message: LoggedMessage) -> int:
+        schema, key = message.schema, (message.channel, message.schema.name)
         if key not in self._channels:
             if schema.name not in self._schemas:
                 data = json.dumps(schema.json()).encode()
                 self._schemas[schema.name] = self._writer.register_schema(schema.name, "jsonschema", data)
-            channel = Channel(f"{slug(robot)}/{topic}" if robot else topic, topic, schema)
-            number = self._writer.register_channel(channel.name, "json", self._schemas[schema.name], channel.metadata)
-            self._channels[key] = channel, number
+            number = self._writer.register_channel(
+                message.channel, "json", self._schemas[schema.name], message.metadata
+            )
+            self._channels[key] = number
         return self._channels[key]
 
 

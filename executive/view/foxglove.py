@@ -67,14 +67,11 @@ class LiveServer:
         stopping.join(_CLOSE_S)
 
     def _send(self, message: LoggedMessage) -> None:
-        key, stamp_ns = (message.channel.name, message.channel.schema.name), round(message.stamp_s * 1e9)
+        key, stamp_ns = (message.channel, message.schema.name), round(message.stamp_s * 1e9)
         if (channel := self._channels.get(key)) is None:
-            channel = self._channels[key] = self._new_channel(
-                message.channel.name,
-                schema=message.channel.schema.json(),
-                metadata=message.channel.metadata,
-                context=self._context,
-            )
+            schema, metadata = message.schema.json(), message.metadata
+            channel = self._new_channel(message.channel, schema=schema, metadata=metadata, context=self._context)
+            self._channels[key] = channel
         about = (str(message.values.get("robot", "")), str(message.values.get("node", "")))
         with self._lock:
             self._newest.setdefault(channel.id(), {})[about] = message.data, stamp_ns

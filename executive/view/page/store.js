@@ -7,6 +7,7 @@
     success: { symbol: "✓", word: "success" },
     skipped: { symbol: "⊘", word: "skipped" },
     failure: { symbol: "✗", word: "failure" },
+    expected: { symbol: "–", word: "found nothing" },
     cancelled: { symbol: "⊘", word: "cancelled" },
   };
   const BY_STATUS = { RUNNING: "running", SUCCESS: "success", FAILURE: "failure" };

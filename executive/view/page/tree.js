@@ -2,7 +2,7 @@
 // The tree as nested lists, for eyes, keyboard and screen readers: the steps of the mission as its author wrote them,
 // each with its policy in one row, and of the nodes that carry them out those that run or failed.
 (() => {
-  const { LOOKS, lookOf } = window.errand;
+  const { LOOKS, lookOf } = window.errand, SEEKERS = ["detect", "find_people"];
 
   function element(tag, name, text) {
     const made = document.createElement(tag);
@@ -19,6 +19,17 @@
       if (next) chain.push(next);
     }
     return chain;
+  }
+
+  // The expected failures, by the rule of `executive.tree.node_view`; returns whether the node is one, null if it did not fail.
+  function findExpected(node, states, inside, found) {
+    const state = states.get(node.id), look = lookOf(state), failed = look === "failure";
+    const here = look === "success" || (look === "running" && node.type === "selector") || (inside && failed && !node.step);
+    const below = node.children.map((child) => findExpected(child, states, here, found)).filter((each) => each !== null);
+    const none = failed && SEEKERS.includes(node.name) && state.cause === "POSTCONDITION";
+    const expected = failed && here && (none || (below.length > 0 && below.every(Boolean)));
+    if (expected) found.add(node.id);
+    return failed ? expected : null;
   }
 
   class TreePanel {
@@ -111,8 +122,10 @@
     }
 
     lookOf(entry) {
-      const look = lookOf(this.rowState(entry));
-      return look === "success" && entry.chain.some((each) => lookOf(this.stateOf(each.id)) === "failure") ? "skipped" : look;
+      const look = lookOf(this.rowState(entry)), expected = (each) => this.expected.has(each.id) && each.id !== this.decisive;
+      if (look === "failure" && entry.chain.some(expected)) return "expected";
+      const skipped = (each) => lookOf(this.stateOf(each.id)) === "failure" && !expected(each);
+      return look === "success" && entry.chain.some(skipped) ? "skipped" : look;
     }
 
     forgetFolds() { for (const entry of this.nodes.values()) entry.chosen = undefined; }
@@ -135,6 +148,8 @@
 
     redraw() {
       if (!this.view) return;
+      this.expected = new Set();
+      for (const root of this.drawn) findExpected(root, this.view.states, false, this.expected);
       for (const root of this.drawn) this.interesting(this.nodes.get(root.id));
       for (const entry of this.nodes.values()) this.paint(entry);
       if (this.follow.checked) this.showRunning();
@@ -143,7 +158,7 @@
     paint(entry) {
       const state = this.rowState(entry), look = this.lookOf(entry), has = (id) => entry.chain.some((each) => each.id === id);
       const progress = this.progress && has(this.progress.node) && look === "running" ? this.progress : null;
-      const note = this.noteOf(entry, state, progress), cause = (state && state.cause) || "";
+      const note = this.noteOf(entry, state, progress), cause = (look !== "expected" && state && state.cause) || "";
       const done = progress && typeof progress.progress === "number" ? progress.progress : null;
       const stops = this.breakpoints ? entry.chain.some((each) => this.breakpoints.has(each.id)) : null;
       const span = entry.step && look !== "idle" ? this.view.spans.get(entry.chain[0].id) : null;

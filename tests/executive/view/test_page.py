@@ -165,6 +165,21 @@ def test_states_causes_and_sentences_stand_on_the_nodes(page, live):
     assert "failure, PLANNING" in (page.locator(f'li[data-id="{second}"]').get_attribute("aria-label") or "")
 
 
+@pytest.mark.parametrize(("search", "symbol"), [("RUNNING", "–"), ("FAILURE", "✗")])
+def test_a_look_that_found_nothing_has_a_dash_while_the_search_goes_on(page, live, search, symbol):
+    feed, tree, url = live
+    find = next(node for node in tree.root.walk() if node.kind == "selector" and node.name.startswith("find the"))
+    look = next(node for node in find.children if node.kind == "sequence")
+    leaf = look.children[-1].path_id
+    page.goto(url)
+    page.select_option("#nodes", "all")
+    change(feed, find.path_id, search, 1.0)
+    for node in (look.path_id, leaf):
+        change(feed, node, "FAILURE", 1.0, "no coke seen", "POSTCONDITION")
+    playwright_api.expect(row(page, leaf)).to_contain_text("no coke seen")
+    playwright_api.expect(row(page, leaf).locator(".symbol")).to_have_text(symbol)
+
+
 def test_the_message_of_a_running_node_is_on_the_node_and_in_the_events(page, live):
     feed, tree, url = live
     node = leaf_ids(tree)[0]

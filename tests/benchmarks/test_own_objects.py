@@ -1,5 +1,7 @@
 """The measure of own objects asks and counts."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ from executive.app.worlds import open_world
 from skills.detection import NoDetector
 from skills.perception.model_detector import ModelDetector
 from tests.benchmarks import own_objects
-from tests.benchmarks.own_objects import Asked, ask, imported, scene, summary
+from tests.benchmarks.own_objects import Asked, ask, by_photographs, generated, imported, scene, summary
 
 
 def test_a_generated_object_is_asked_for_among_others(tmp_path, monkeypatch):
@@ -20,6 +22,20 @@ def test_a_generated_object_is_asked_for_among_others(tmp_path, monkeypatch):
     assert made is not None and made.absent in {model.name for model in pool[1:5]}
     asked = ask(made, 0, pool[0].name, ModelDetector(NoDetector(), pool[:5]), tmp_path, 4802)
     assert (asked.there, asked.mistaken) == (True, False), asked.message
+
+
+def test_photographs_of_an_object_become_a_model_of_its_size(tmp_path, monkeypatch):
+    pytest.importorskip("trimesh")
+    monkeypatch.setattr(own_objects, "foreign", lambda folder, half: [])
+    monkeypatch.setattr(own_objects, "generated", lambda folder, half: islice(generated(folder, half), 1))
+    monkeypatch.setattr(own_objects, "STANDING", 3)
+    monkeypatch.setattr(own_objects, "LYING", 1)
+    (mug,) = imported(tmp_path, 0)
+    (seen,) = by_photographs(tmp_path, [mug])
+    assert np.ptp(seen.points, axis=0) == pytest.approx(np.ptp(mug.points, axis=0), abs=3e-3)
+    assert len(seen.views) == 6
+    blue = seen.views[seen.views[..., 3] > 127][:, :3].mean(axis=0)
+    assert blue[2] > 1.5 * blue[0]
 
 
 def test_shares_count_found_and_mistaken_objects():

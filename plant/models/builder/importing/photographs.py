@@ -77,7 +77,7 @@ def cut_out(file: Path) -> Rgba:
     be read, the background is not plain, there is no object before it, or it is too small or cut by the border.
     """
     bgr, pixels = read_pixels(file, flags=cv2.IMREAD_COLOR), read_pixels(file)
-    alpha = pixels[..., 3] if pixels.shape[2:] == (4,) else np.zeros(bgr.shape[:2])
+    alpha = pixels[..., 3] if pixels.shape == (*bgr.shape[:2], 4) else np.zeros(bgr.shape[:2])
     scale = min(1.0, _LONGEST_PX / max(bgr.shape[:2]))
     bgr, alpha = (cv2.resize(each, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) for each in (bgr, alpha))
     rgb = np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)

@@ -5,8 +5,6 @@ into a temporary plant, and the shapes of its welded models, the scenery, are re
 a moving part stays a model.
 """
 
-from __future__ import annotations
-
 import logging
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -5,8 +5,6 @@ the step under way is done: one period late, as over a radio link. Readings are 
 calls give the same run, whether a thread does the steps or `advance` itself.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future

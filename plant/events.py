@@ -5,8 +5,6 @@ touches robots and loose objects, passes through the scenery, and waits while a 
 moved object jumps from one step to the next, because no hand is simulated.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -19,8 +19,6 @@ wrench spin ever faster, and a can that turns by radians in a step penetrates a 
 bodies spin no faster, after any step, than the next step can follow.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final

@@ -1,7 +1,5 @@
 """Rendering for the cameras: the scene at any positions of the plant, and the lights of a world."""
 
-from __future__ import annotations
-
 import os
 from typing import Final
 

@@ -1,7 +1,5 @@
 """Saved state of the plant: each stateful part names the attributes that change from step to step."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from functools import cache

@@ -4,8 +4,6 @@ Pictures are (H, W, 3) uint8 RGB arrays until `save_png` writes them. Drawing is
 that it is legible on any ground. All lengths in metres, all poses in the world frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The simulation: a world with robots, objects and people in motion, and the referee who observes the true state."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Durations as people write them: `90 s`, `1 h 30 min`, `PT5M`, or a plain number of seconds."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Planar geometry: angles, poses and polygons."""
 
-from __future__ import annotations
-
 import math
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Inputs, outputs and causes of the skills with heavy imports, from which trees are compiled without them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar

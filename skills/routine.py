@@ -1,7 +1,5 @@
 """Base of skills that are written as a routine: a generator that yields `Running` and returns `Succeeded`."""
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from collections.abc import Callable, Generator, Mapping

@@ -1,7 +1,5 @@
 """Pictures of a run: detections of the hand camera, answers to questions, grasps, hand-overs, and a map with paths."""
 
-from __future__ import annotations
-
 import base64
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence

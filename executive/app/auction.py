@@ -1,7 +1,5 @@
 """Auction of missions among robots: each mission goes to the robot that finishes it first."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Splits a mission that no robot can do alone into two parts for two robots, with a table as the hand-over point."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Checks missions without running them: errors, warnings, and estimates of time, path and charge."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from graphlib import TopologicalSorter

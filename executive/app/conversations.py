@@ -1,7 +1,5 @@
 """Conversations during a run: one with each robot, and the choice of the robot that a sentence is for."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Assigns queued missions to the robots of a fleet by an auction; stores who does each, and how it ended."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Checks whether a mission can be done: routes on the map, and the abilities of the robot."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

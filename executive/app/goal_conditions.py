@@ -1,7 +1,5 @@
 """Judges an ended mission: its goal conditions at the times of the run, and its speech."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Compiles the numeric code of driving, scans, arms and maps into numba's cache by short runs of each."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

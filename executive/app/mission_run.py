@@ -1,7 +1,5 @@
 """Runs one request on a backend and writes log, tree, report and pictures into its folder."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 from collections import Counter

@@ -1,7 +1,5 @@
 """The live page of a run (`--view`), which stays as a replay after the end."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path

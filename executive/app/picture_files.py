@@ -1,7 +1,5 @@
 """Reads and writes picture files, loads the detector for them, and draws its detections."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final

@@ -1,7 +1,5 @@
 """Writes `report.html` with request, verdicts, steps, answers and pictures into a run's folder."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

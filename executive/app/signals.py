@@ -1,7 +1,5 @@
 """Signals that end a run in order: Ctrl-C, SIGTERM, and the end of the terminal."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

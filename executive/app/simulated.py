@@ -1,7 +1,5 @@
 """Simulated backend: robots with their estimators in the plant of a world, with referee and recorder."""
 
-from __future__ import annotations
-
 import logging
 import subprocess
 import sys

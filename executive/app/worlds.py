@@ -1,7 +1,5 @@
 """Opens worlds and their knowledge by name; loads nothing of the simulation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

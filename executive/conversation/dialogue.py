@@ -1,7 +1,5 @@
 """Conversation with a robot during a run: addressing, follow-ups, questions, and missions."""
 
-from __future__ import annotations
-
 import enum
 import re
 import threading

@@ -1,7 +1,5 @@
 """Replies of a robot in conversation, and its answers to remarks about the run."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Actions: the robot's work that each clause asks for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile

@@ -1,7 +1,5 @@
 """Spoken numbers, spans of time, times of day and shares."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Final

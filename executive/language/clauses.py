@@ -1,7 +1,5 @@
 """Splitter of a sentence into clauses, each with its addressee, its cue and its words."""
 
-from __future__ import annotations
-
 import enum
 import re
 from collections.abc import Iterable, Iterator

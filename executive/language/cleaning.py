@@ -5,8 +5,6 @@ beginning and at the end of a sentence, and after a pause; the bare name calls a
 story ("Hey, Alice told me ...", "my sister, Alice") does not call.
 """
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Collection, Iterator

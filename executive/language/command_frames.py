@@ -1,7 +1,5 @@
 """Command frames: resolved actions as commands with spoken names, one to take an object and one to carry it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest

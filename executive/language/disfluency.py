@@ -1,7 +1,5 @@
 """Repair of disfluencies: corrections ("the wrench, no, the hammer") and negations ("not the coke")."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Explanations of how a sentence became its commands: JSON values, lines of text, a drawing of the dependencies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 They amend the commands of the earlier request; names are grounded before.
 """
 
-from __future__ import annotations
-
 import enum
 import re
 from collections.abc import Mapping, Sequence

@@ -4,8 +4,6 @@ A name is looked up as it stands, then by its synonyms, then by its noun alone; 
 question.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise

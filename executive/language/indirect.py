@@ -1,7 +1,5 @@
 """Indirect requests: questions and statements that ask for an action."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise

@@ -4,8 +4,6 @@ Parsers err most in the attachment of prepositions; the row keeps the order of t
 which place has which role.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest

@@ -1,7 +1,5 @@
 """Limits of the robot: harm, unsupported routes and relations, and objects and places out of reach."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Final

@@ -1,7 +1,5 @@
 """Pipeline from a cleaned sentence to its commands, with the trace of its steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final

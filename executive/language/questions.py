@@ -3,8 +3,6 @@
 The answer is inserted into the sentence, which is then understood again by the same steps.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass

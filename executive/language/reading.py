@@ -1,7 +1,5 @@
 """Reader of the words of a sentence, from left to right, as a row of items."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace

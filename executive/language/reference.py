@@ -1,7 +1,5 @@
 """Reference resolution: the meanings of "it", "one" and "there", and the places of objects in statements."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Understanding for several robots: a part for each, the order of the parts, and objects that change hands."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

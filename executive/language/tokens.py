@@ -5,8 +5,6 @@ and "look" in "go to the counter look for the bowl" as a noun. `repairs.yaml` ha
 as in Brill, "A simple rule-based part of speech tagger" (1992).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -5,8 +5,6 @@ range, and between them. Any other part of a condition may be true or false. Par
 condition of numbers and truths alone is not checked.
 """
 
-from __future__ import annotations
-
 import ast
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Object in the gripper during a mission, if all commands succeed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Final
 

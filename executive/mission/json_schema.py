@@ -1,7 +1,5 @@
 """JSON Schema of mission files, for editors."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType

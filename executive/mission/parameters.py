@@ -6,8 +6,6 @@ A value that is only `${name}` takes the parameter's own type, so that `timeout:
 longer text the parameter's text is inserted.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """State that a run's control shows, and the requests that it makes to the runner."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """History of a mission: the executions of its parts, its findings, its speech, and the text of its claim."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence

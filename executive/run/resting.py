@@ -1,7 +1,5 @@
 """Robots without work in a run of several: each stands where it is, and clears paths that others reserve."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Robot in a run: every verb is guarded by the watchdog and the lease, and its answer is checked."""
 
-from __future__ import annotations
-
 import functools
 import math
 import threading

@@ -1,7 +1,5 @@
 """One robot's missions in a run: their turns, their ticks, and the orderly end."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace

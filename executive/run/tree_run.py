@@ -1,7 +1,5 @@
 """Run of one mission's tree: ticks, suspension, stops, the log of its changes, and its result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Voice activity detection: the probability of speech in frames of 32 ms, and utterances between pauses."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Understanding of recognised speech: the robot that is called, the commands, and misheard words."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace

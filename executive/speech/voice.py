@@ -1,7 +1,5 @@
 """Voice of the robot: speaks its answers where a synthesiser is installed."""
 
-from __future__ import annotations
-
 import queue
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Missions in the store: their requests, states and progress, and their assignments to the robots of a fleet."""
 
-from __future__ import annotations
-
 import enum
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence

@@ -5,8 +5,6 @@ composites see the same results as before. Guards read the robot's present state
 instead of `begin`, so that it checks the world before it changes it. Counts of attempts begin at one.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Container, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Standing missions: each waits in the store with its trigger; when the trigger fires, a queued copy is added."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Sequence
 from dataclasses import dataclass

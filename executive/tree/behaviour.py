@@ -8,8 +8,6 @@ nodes that are `Suspendable` stop; each continues when it is ticked the next tim
 suspended does not count against its limit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType

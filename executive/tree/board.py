@@ -1,7 +1,5 @@
 """Blackboard of one run, whose keys begin with the robot's name, and the last known places of objects on it."""
 
-from __future__ import annotations
-
 import enum
 import math
 from collections.abc import Iterable, Iterator, Mapping

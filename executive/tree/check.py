@@ -1,7 +1,5 @@
 """Check of a mission before it runs: errors that make it impossible, warnings, and its estimate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Context that the nodes of one robot's tree share while they run."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields

@@ -1,7 +1,5 @@
 """Goal conditions of commands and skills in the known world."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Final

@@ -5,8 +5,6 @@ fields, whose units may be omitted ("yaw" for "yaw_rad"). A pose may also be the
 of a surface, several surfaces the name of a room, an `ObjectKind` its words ("red wrench").
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import functools

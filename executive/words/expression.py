@@ -5,8 +5,6 @@ brackets; and the functions of `FUNCTIONS`. The grammar is a closed part of Pyth
 executed. The types of its names are checked before a mission runs, and its value is computed while the mission runs.
 """
 
-from __future__ import annotations
-
 import ast
 import enum
 import functools

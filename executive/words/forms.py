@@ -1,7 +1,5 @@
 """Declarations with models: mappings in a file, unions of models by key, and options of the command line."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

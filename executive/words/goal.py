@@ -1,7 +1,5 @@
 """Goal conditions: what must hold when a mission ends, as plain data that a referee judges."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Robots of a run: their names, kinds, starts, docks and stacks."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ The first key of a step selects its model. A resolved step is of the same model,
 names replaced by those of the world. As lines of text, commands have their text form and other steps are YAML.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Variations of a world from run to run: light, clutter, walking people, friction."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType

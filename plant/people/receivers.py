@@ -6,8 +6,6 @@ it touches robots and loose objects, and is hidden in the torso while unused. Th
 ends as soon as the gripper gives way.
 """
 
-from __future__ import annotations
-
 import enum
 import math
 from collections.abc import Collection, Mapping, Sequence

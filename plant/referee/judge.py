@@ -1,7 +1,5 @@
 """Judges goal conditions by the recorded truth. Pure functions: the same record gives the same verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 An object's history has its resting places, lifts and drops; a path also gives the error of a trajectory.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

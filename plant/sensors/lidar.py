@@ -6,8 +6,6 @@ begins: indoors walls hide most of the rest. Ranges are along the ray; `NO_RETUR
 the kernels use fast arithmetic).
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection
 from dataclasses import dataclass

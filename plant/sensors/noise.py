@@ -4,8 +4,6 @@ Grain comes from tiles that are drawn once from the seed and cropped at random, 
 picture would cost more than rendering it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

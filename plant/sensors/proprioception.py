@@ -1,7 +1,5 @@
 """Proprioceptive sensors with bias and noise: joints, inertial measurement unit, battery, odometry, gripper."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

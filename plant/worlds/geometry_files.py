@@ -4,8 +4,6 @@ Drake opens every file that another file names: a pipe, an address, the same fil
 are checked first. Files of the plant itself are trusted.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """The back_off skill: drives a short distance to where there is more clearance."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

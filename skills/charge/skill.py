@@ -1,7 +1,5 @@
 """The charge skill: stands on the dock until the battery is charged."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """The check_door skill: looks from where the robot stands whether a doorway is open."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar

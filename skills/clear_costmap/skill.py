@@ -1,7 +1,5 @@
 """The skill that clears the obstacle layer of the costmap, which the sensors then fill again."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Descriptions of objects in words, and the union of the objects of several searches."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 

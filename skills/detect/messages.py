@@ -1,7 +1,5 @@
 """Messages of the detect skill in the event log."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Selection among tracks and clusters: the objects that a search counts, and those worth a closer view."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """The detect skill: searches surfaces with the hand camera, and confirms each object from a second viewpoint."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Camera targets on surfaces, and boxes about surfaces and clusters for the arm's collision checks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import cv2

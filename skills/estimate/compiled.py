@@ -1,7 +1,5 @@
 """Compilation of inner loops to machine code, cached on disk between runs, and the loops that several modules share."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 After Thrun, Burgard and Fox, Probabilistic Robotics, chapter 8: augmented Monte Carlo localisation.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Kinds of faults that can be injected by name: patterns of words, and their effects on a robot's verbs."""
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import re

@@ -5,8 +5,6 @@ A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at the
 (always).
 """
 
-from __future__ import annotations
-
 import difflib
 import inspect
 import math

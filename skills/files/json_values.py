@@ -4,8 +4,6 @@ A value without a form in JSON carries its kind, so that it is read back equal a
 among the loaded modules; nothing is imported, and only constructors of dataclasses are called.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import json

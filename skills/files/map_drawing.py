@@ -3,8 +3,6 @@
 Pictures are (H, W, 3) uint8 arrays; colours have the order of the picture's channels.
 """
 
-from __future__ import annotations
-
 import unicodedata
 from collections.abc import Iterable, Sequence
 from itertools import product

@@ -1,7 +1,5 @@
 """Guarded reading of foreign input: plain files below a size, texts that a user types or says, and JSON."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

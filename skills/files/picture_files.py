@@ -1,7 +1,5 @@
 """Guarded reading of picture files: the header gives the number of pixels before anything is decoded."""
 
-from __future__ import annotations
-
 import os
 import re
 import struct

@@ -1,7 +1,5 @@
 """Loading of entry points of other distributions, with a time limit and one error for all that they raise."""
 
-from __future__ import annotations
-
 import os
 import sys
 import threading

@@ -1,7 +1,5 @@
 """Checks YAML documents against pydantic models; errors name the line and what would fit."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from itertools import pairwise

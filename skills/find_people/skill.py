@@ -1,7 +1,5 @@
 """The find_people skill: turns in place and looks for people in an area."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

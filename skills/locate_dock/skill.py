@@ -1,7 +1,5 @@
 """The locate_dock skill: finds by the dock's tag where the dock stands, before the robot drives onto it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from contextlib import suppress

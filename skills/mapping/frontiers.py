@@ -1,7 +1,5 @@
 """Frontiers between free and unseen ground (Yamauchi, A Frontier-Based Approach, 1997)."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ A beam that passes over a low table does not touch the table's layer, so both st
 the robot needs are bands of its layers.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Final, NamedTuple
 

@@ -1,7 +1,5 @@
 """The pose graph of the keyframes and the measurements between pairs of them, solved by GTSAM."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

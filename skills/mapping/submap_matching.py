@@ -10,8 +10,6 @@ is a point nearer to a surface than its distance at the middle less half the dia
 Closure in 2D LIDAR SLAM, 2016, use a pyramid of grids).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

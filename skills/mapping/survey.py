@@ -1,7 +1,5 @@
 """Survey: the robot maps while it drives to frontiers or along a route."""
 
-from __future__ import annotations
-
 import enum
 import math
 from collections.abc import Sequence

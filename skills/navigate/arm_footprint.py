@@ -1,7 +1,5 @@
 """The footprint of a robot with its arm and the held object, projected onto the floor."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

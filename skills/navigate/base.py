@@ -1,7 +1,5 @@
 """Drive commands for skills: each one is short-lived, and the last one ends with the skill."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -3,8 +3,6 @@
 The guard uses the last LiDAR revolution only, and stops as hard as the robot can.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Paths of a differential base: straights ahead or back, turns on the spot, and arcs that round corners."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

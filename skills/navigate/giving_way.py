@@ -6,8 +6,6 @@ Prioritised planning (Erdmann and Lozano-Perez, "On Multiple Moving Objects", 19
 that robot cannot, the two swap priorities. Waiting poses lie off all reserved paths.
 """
 
-from __future__ import annotations
-
 import enum
 import math
 from collections import deque

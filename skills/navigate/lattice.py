@@ -1,7 +1,5 @@
 """A* over a lattice of cells and headings, deterministic and compiled."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Cost of short motions: seconds at the usual speeds, more near obstacles. Search, smoothing and shortcuts share it."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 Smoothing takes shortcuts, then relaxes the path like an elastic band, with clearance checked throughout.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Path planning for the whole footprint, over position and heading."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

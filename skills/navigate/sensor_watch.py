@@ -1,7 +1,5 @@
 """Watches over the sensors that driving relies on: health of the LiDAR, low obstacles from depth cameras."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Perception of the navigate skill: obstacles, people, doors, other robots, and the robot's own footprint."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Path planning of one trip: requests plans, and decides what to try after a plan failed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The detector component of the stack."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """General knowledge of object classes and attributes: `class_forms.yaml` and `colour_words.yaml`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Detections in 3D: position, size, surface and colours of detected objects in the world."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ The frame of a tag (T) is at its middle: x to the right and y up on the upright 
 tag is the side of its black square. A detector recognises objects by the tags on them, beside all that another finds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

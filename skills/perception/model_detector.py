@@ -1,7 +1,5 @@
 """Detector that knows own objects by their models, besides the classes of its networks."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable

@@ -4,8 +4,6 @@ A cluster moves when it has left cells and entered others. One that only shows a
 neither.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ points above the plane are clustered; the hypothesis with the cluster that fills
 z of the level frame O of the picture's frame tree.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

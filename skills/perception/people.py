@@ -4,8 +4,6 @@ In a scan, a person is an upright cluster as wide as shoulders that stands alone
 legs, or one leg, that stands alone.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 from collections.abc import Sequence

@@ -6,8 +6,6 @@ detection begins no track, but supports one. A segment without a label (`ANY_OBJ
 of a class, unless `ANY_OBJECT` is among the tracker's names: then it says that the segment is none of the others.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

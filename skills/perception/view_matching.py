@@ -5,8 +5,6 @@ gradients in each part of a view tells its edges and its shading (Dalal and Trig
 for Human Detection", 2005).
 """
 
-from __future__ import annotations
-
 from typing import Any, Final
 
 import cv2

@@ -1,7 +1,5 @@
 """The relocalise skill: searches the whole map for the robot's pose, standing, then turning, then driving a little."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from dataclasses import dataclass, field

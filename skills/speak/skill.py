@@ -1,7 +1,5 @@
 """The speak skill: says a sentence to the people around."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final

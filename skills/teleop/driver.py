@@ -3,8 +3,6 @@
 Dead-man's switch: keys count for `life_s` on the robot's clock. All commands expire by then, or end at rest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Keys and sticks of teleoperation: values from -1 to 1 by the name of an axis."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any, Final

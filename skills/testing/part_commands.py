@@ -1,7 +1,5 @@
 """Commands of the scripted robot: one at a time for each part, with expiry."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Distributes the runs of an evaluation to workers, and stores each result with evidence of failures."""
 
-from __future__ import annotations
-
 import base64
 import os
 import platform

@@ -1,7 +1,5 @@
 """Draws random missions in English that make sense in a world, one for each seed."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass

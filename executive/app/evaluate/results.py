@@ -1,7 +1,5 @@
 """Runs of an evaluation as plain data, their results, and the SQLite file of both."""
 
-from __future__ import annotations
-
 import enum
 import hashlib
 import json

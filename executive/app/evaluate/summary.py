@@ -1,7 +1,5 @@
 """Summarises results: success by mission, world, robot and variation, causes, times; compares two results."""
 
-from __future__ import annotations
-
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace

@@ -1,7 +1,5 @@
 """Spoken conditions: "there is a beer in the kitchen", "the battery is low"."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace

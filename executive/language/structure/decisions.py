@@ -1,7 +1,5 @@
 """Builder of conditional and repeated steps: "if", "otherwise", "whatever happens", "every hour"."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Special requests: waiting, charging, speech, questions, deliveries to everyone, and searches of all rooms."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Builder of the steps of a mission from the clauses of a sentence."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Moving aside an object that blocks every grasp of the wanted one, on the surface where it stands."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import ClassVar, Final

@@ -8,8 +8,6 @@
 | it is not where it was put or handed over | the camera, the gripper | the same |
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import field, replace

@@ -1,7 +1,5 @@
 """Clearing a place: the robot takes away one object after the other, until a look finds none."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

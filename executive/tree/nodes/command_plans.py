@@ -1,7 +1,5 @@
 """Plans of commands: grasp, find, carry, go, wait, charge; and of pairs of commands with trips or rounds."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Annotated, Final

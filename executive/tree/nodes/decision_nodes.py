@@ -3,8 +3,6 @@
 A decision is true, false, or not known yet (None) before a look that it needs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Charging at the dock: plans of the command and of the block."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Final

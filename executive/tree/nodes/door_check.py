@@ -3,8 +3,6 @@
 A closed door may bar the path to its viewpoint, so the robot also looks from the pose where its drive ended.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import product

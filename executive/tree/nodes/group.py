@@ -1,7 +1,5 @@
 """Groups of steps with `when`, `while` and `always`: the plan and its node."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Final
 

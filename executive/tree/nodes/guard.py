@@ -4,8 +4,6 @@ They stand in a compiled tree as plain data; each run uses copies of its own. A 
 `Failed` when it does not, and `Waiting` when that is not known yet.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from abc import ABC, abstractmethod

@@ -6,8 +6,6 @@ A monitor that is violated ends the mission. An interrupt that is called suspend
 charges at the dock, or localises the robot); then the mission continues where it was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import field
 from typing import Any, ClassVar, Final

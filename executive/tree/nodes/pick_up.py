@@ -5,8 +5,6 @@ Other recoveries stand with their work: of drives in `executive.tree.plan`, of s
 `executive.tree.nodes.dock`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final

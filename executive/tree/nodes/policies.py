@@ -4,8 +4,6 @@ From the inside: the subtree, its timeout, its retries, its guards, and the acti
 So each attempt has its own time, and a violated guard ends all attempts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import field
 from typing import ClassVar, Final

@@ -1,7 +1,5 @@
 """Repetition of steps in rounds: the plan and its node."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import field, replace
 from typing import ClassVar, Final, Literal

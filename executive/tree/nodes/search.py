@@ -1,7 +1,5 @@
 """Search for objects and people: viewpoints in order, and the answer whether they are there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field, replace

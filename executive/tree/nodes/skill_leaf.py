@@ -1,7 +1,5 @@
 """Leaf of every skill: it binds the ports, limits the time, turns defects into failures, and always ends the skill."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field

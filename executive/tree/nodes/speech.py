@@ -1,7 +1,5 @@
 """Speech: saying a text, and asking a question whose answer the mission uses; the plans and the node."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field

@@ -1,7 +1,5 @@
 """Computed values of a mission: the plan and its node."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, Final

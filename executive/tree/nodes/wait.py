@@ -1,7 +1,5 @@
 """Waiting for a duration, for a time of day, or until a condition holds: the plan and its nodes."""
 
-from __future__ import annotations
-
 from typing import Final
 
 from py_trees.common import Status

@@ -1,7 +1,5 @@
 """Adds furniture, objects, people, a dock and names of rooms to the folder of a world."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Builds the folder of a world from the map of a building, or from upright cylinders."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final

@@ -6,8 +6,6 @@ no wider than the corridors; equal clearances are ordered by the Euclidean dista
 door.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Base placement: poses of the body from which the arm reaches a point on a surface."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """The approach skill: drives to where the arm can grasp a seen object, and looks at the object again."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

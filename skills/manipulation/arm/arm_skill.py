@@ -1,7 +1,5 @@
 """Base of the skills that move the arm: planned motions, contact, weighing, carrying, stowing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar

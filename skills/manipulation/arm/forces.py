@@ -1,7 +1,5 @@
 """Forces at the hand from the efforts of the arm's joints: the mass of a held object, and a pull at the hand."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Object in the hand: where its corners are, and how the hand must be turned for the object to stand again."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

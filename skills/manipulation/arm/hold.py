@@ -1,7 +1,5 @@
 """Watch over the object in the gripper: recognises a loss and a slip from the gripper's readings, within 0.3 s."""
 
-from __future__ import annotations
-
 import enum
 from dataclasses import dataclass, field
 from typing import Final

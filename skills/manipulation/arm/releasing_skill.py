@@ -1,7 +1,5 @@
 """Base of the skills that release the held object: they open the gripper, feel that it is off, and leave it there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

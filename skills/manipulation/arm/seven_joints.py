@@ -6,8 +6,6 @@ links where they are. Therefore solutions have elbow and wrist bent to the posit
 a given one.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

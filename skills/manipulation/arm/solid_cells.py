@@ -1,7 +1,5 @@
 """Solid cells of the world within the arm's reach, from depth pictures and the map, and boxes around them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace

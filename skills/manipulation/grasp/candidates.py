@@ -4,8 +4,6 @@ The gripper closes along the hand's z axis, which is kept level: from the side w
 objects, from above for low ones and for the tops of upright ones.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ A grasp is reached when the arm gets to it, to its pre-grasp and to the end of a
 known.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """The grasp skill: looks closely, chooses a grasp, takes and lifts the object, and checks that it is held."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Grasps that were tried already, so that the next attempt takes another."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

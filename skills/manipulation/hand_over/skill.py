@@ -1,7 +1,5 @@
 """The hand-over skill: holds the object out to a person, and lets go when they pull at it or the operator says so."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

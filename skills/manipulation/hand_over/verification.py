@@ -1,7 +1,5 @@
 """Check that a person has the released object, by the gripper and the camera."""
 
-from __future__ import annotations
-
 import enum
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

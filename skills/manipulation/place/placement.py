@@ -1,7 +1,5 @@
 """Placement of a held object: arm angles that put it down on a free spot of a surface."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

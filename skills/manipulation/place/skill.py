@@ -1,7 +1,5 @@
 """The place skill: finds a free spot on a surface, lowers the object until it stands, lets go, and checks the spot."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Release of an object on a surface, and the check by gripper, arm and camera that it rests there."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The pose_arm skill: moves the arm to joint angles, such as `errand teleop` saves."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from skills.api import Cause, Succeeded

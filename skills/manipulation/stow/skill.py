@@ -1,7 +1,5 @@
 """The stow skill: folds the arm onto the body, or holds an object in the gripper near the body."""
 
-from __future__ import annotations
-
 from skills.api import Succeeded
 from skills.manipulation.arm.arm_skill import ArmSkill
 from skills.ports import StowInputs, StowPorts

@@ -118,7 +118,12 @@ def render_robot(name: str, urdf: Path, folder: Path, *, packages: Mapping[str, 
     with progress_bar(console_for(as_json=True), "meshes", count) as advance:
         for _ in copy_meshes(source, packages, home):
             advance()
-    can, notes = write_robot_file(source, name, home, compact_configuration)
+    try:
+        can, notes = write_robot_file(source, name, home, compact_configuration)
+    except InputError as error:
+        if error.file != home / "robot.urdf":
+            raise
+        raise InputError(error.message, hint=error.hint, file=urdf, line=error.line) from error
     omni = can.base_kind.value == "omnidirectional"
     words["controller"] = "mppi" if omni else "path_follower"
     height_m = can.lidar_height_m or 0.0

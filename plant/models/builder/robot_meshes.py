@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Final
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -19,7 +19,7 @@ from plant.robots.urdf_robot.urdf_file import UrdfFile
 from skills.robot import FloatArray
 
 MESHES: Final = "meshes"
-_KEPT: Final = ("link", "joint", "material")
+_MESH: Final = re.compile(r"""<!--.*?-->|(<mesh\b[^>]*?\bfilename\s*=\s*)(?:"[^"]*"|'[^']*')""", re.DOTALL)
 
 
 def copy_meshes(urdf: UrdfFile, packages: Mapping[str, Path], folder: Path) -> Iterator[str]:
@@ -42,17 +42,14 @@ def copy_meshes(urdf: UrdfFile, packages: Mapping[str, Path], folder: Path) -> I
                         known[key] = f"{name}/{name}.obj"
                         _convert(urdf, mesh, path, folder / MESHES / known[key], key[2])
                     mesh.set("filename", f"package://{PACKAGE}/{MESHES}/{known[key]}")
-    _write(urdf.robot, folder / "robot.urdf")
+    _write(urdf, folder / "robot.urdf")
 
 
-def _write(robot: Element, path: Path) -> None:
-    """Writes links, joints and materials; what simulators and drivers add is left out."""
-    for element in [each for each in robot if each.tag not in _KEPT]:
-        robot.remove(element)
-    for element in robot.iter():
-        element.attrib.pop("line", None)
-    ElementTree.indent(robot)
-    path.write_text(ElementTree.tostring(robot, encoding="unicode") + "\n", encoding="utf-8")
+def _write(urdf: UrdfFile, path: Path) -> None:
+    """Writes the text with the present names of its meshes; lines and comments stay, so that errors name the same."""
+    names = iter([mesh.get("filename", "") for mesh in urdf.robot.iter("mesh")])
+    text = _MESH.sub(lambda found: f'{found[1]}"{next(names)}"' if found[1] else found[0], urdf.text)
+    path.write_text(text, encoding="utf-8")
 
 
 def _path(urdf: UrdfFile, mesh: Element, packages: Mapping[str, Path]) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 import numpy as np
+from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.files.errors import InputError, suggestion
@@ -21,7 +23,8 @@ from skills.robot import FloatArray
 MOVING: Final = ("revolute", "continuous", "prismatic")
 MOST_BYTES: Final = 20_000_000
 _LINE: Final = "line"
-_XACRO: Final = "expand it by `xacro FILE > robot.urdf`, and give that file"
+_XACRO: Final = re.compile(r"<xacro:|\$\{")
+_EXPAND: Final = "expand it by `xacro FILE > robot.urdf`, and give that file"
 _LIMIT: Final = 'write <limit lower="..." upper="..." effort="..." velocity="..."/> into it'
 
 
@@ -54,18 +57,13 @@ class UrdfJoint:
         """Pose of the child link in F at a position (rad, m)."""
         if self.kind == "prismatic":
             return RigidTransform(position * self.axis)
-        return RigidTransform(turn_about(self.axis, position), np.zeros(3))
+        if not self.moves:
+            return RigidTransform()
+        return RigidTransform(RotationMatrix(AngleAxis(position, self.axis)), np.zeros(3))
 
     def clipped(self, position: float) -> float:
         """The position nearest to a given one within the limits."""
         return min(max(position, self.lower), self.upper)
-
-
-def turn_about(axis: FloatArray, angle_rad: float) -> RotationMatrix:
-    """Rotation about an axis (3,)."""
-    from pydrake.common.eigen_geometry import AngleAxis
-
-    return RotationMatrix(AngleAxis(angle_rad, axis / np.linalg.norm(axis)))
 
 
 class UrdfFile:
@@ -75,12 +73,12 @@ class UrdfFile:
         """Reads the file. Raises InputError when it is no URDF, or its links are no tree."""
         self.path = path
         text = read_text(path, most_bytes=MOST_BYTES, hint="check the path")
-        if path.suffix == ".xacro" or "xmlns:xacro" in text:
-            raise InputError("it is a xacro file, not URDF", hint=_XACRO, file=path)
+        if path.suffix == ".xacro" or _XACRO.search(text) is not None:
+            raise InputError("it is a xacro file, not URDF", hint=_EXPAND, file=path)
         robot = _parse(path, text)
         if robot.tag != "robot":
             raise self.error(robot, f"it begins with <{robot.tag}>, not with <robot>", "give the URDF of a robot")
-        self.robot = robot
+        self.robot, self.text = robot, text
         self.links = self._by_name(robot.findall("link"))
         self.joints = {name: self._joint(each) for name, each in self._by_name(robot.findall("joint")).items()}
         self._to = {joint.child: joint for joint in self.joints.values()}
@@ -113,14 +111,15 @@ class UrdfFile:
         parent, child = (self._named(element, tag, "link") for tag in ("parent", "child"))
         limit, axis = element.find("limit"), element.find("axis")
         axis_F = np.array(self.numbers(axis, "xyz", "1 0 0"))
-        if kind not in (*MOVING, "fixed", "floating", "planar") or not np.linalg.norm(axis_F):
-            what = f"joint {name} has type '{kind}'" if np.linalg.norm(axis_F) else f"joint {name} has a zero axis"
+        known, length = (*MOVING, "fixed", "floating", "planar"), float(np.linalg.norm(axis_F))
+        if kind not in known or (kind in MOVING and not length):
+            what = f"joint {name} has type '{kind}'" if kind not in known else f"joint {name} has a zero axis"
             raise self.error(element, what, f"use one of {', '.join(MOVING)} and fixed, with an axis")
         ends = {key: self.numbers(limit, key, "0")[0] for key in ("lower", "upper", "effort", "velocity")}
         if kind not in ("revolute", "prismatic"):
             ends |= {"lower": -math.inf, "upper": math.inf}
         mimics, line = element.find("mimic") is not None, int(element.get(_LINE, "1"))
-        X_PF, axis_F = self.origin(element), axis_F / np.linalg.norm(axis_F)
+        X_PF, axis_F = self.origin(element), axis_F / (length or 1.0)
         return UrdfJoint(name, kind, parent, child, X_PF, axis_F, **ends, mimics=mimics, line=line)
 
     def _named(self, element: Element, tag: str, key: str) -> str:

@@ -68,8 +68,8 @@ class LookingSkill(ArmSkill[InputsT]):
     ) -> Routine[None]:
         """Points the object camera at p_BT.
 
-        A hand camera goes to the first viewpoint that is within reach and free. For a head camera the arm leaves the
-        view, and the body rises by `raised_m` where that is given; so it is for a camera of the body, which must have
+        A hand camera goes to the first viewpoint that is within reach and free. For another camera the arm leaves the
+        view, and the body rises by `raised_m` where that is given, as far as it can; a camera of the body must have
         p_BT in view. Raises SkillFailure.
         """
         camera, can = self.object_camera, self.context.robot.capabilities()
@@ -85,7 +85,8 @@ class LookingSkill(ArmSkill[InputsT]):
         if not self.context.robot.gripper().holding:
             yield from self.stow(message)
         if raised_m is not None:
-            yield from self.stand_at(can.standing_height_m + raised_m, message)
+            low_m, high_m = can.height_range_m
+            yield from self.stand_at(min(max(can.standing_height_m + raised_m, low_m), high_m), message)
         try:
             pan_rad, tilt_rad = head_angles(head or _NO_HEAD, camera, self.X_WB().inverse() @ p_WT)
         except PlanningError as error:

@@ -108,4 +108,4 @@ def test_a_urdf_that_the_plant_cannot_use_is_refused_with_its_line(rover_urdf, t
     rover_urdf.write_text(text.replace(old, new, 1))
     with pytest.raises(InputError, match=message) as refused:
         render_robot("rover", rover_urdf, tmp_path / "made", packages={})
-    assert refused.value.line and refused.value.hint
+    assert refused.value.file == rover_urdf and refused.value.line and refused.value.hint

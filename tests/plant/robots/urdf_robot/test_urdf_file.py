@@ -41,11 +41,21 @@ def test_a_file_that_is_no_urdf_is_refused_with_its_line(tmp_path, text, line, m
 
 @pytest.mark.parametrize(
     ("name", "text"),
-    [("robot.urdf.xacro", "<robot/>"), ("robot.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"/>')],
+    [
+        ("robot.urdf.xacro", "<robot/>"),
+        ("robot.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm/></robot>'),
+    ],
 )
 def test_a_xacro_file_is_named_so(tmp_path, name, text):
     with pytest.raises(InputError, match=r"it is a xacro file.*`xacro FILE > robot.urdf`"):
         UrdfFile(written(tmp_path, text, name))
+
+
+def test_traces_of_xacro_and_the_axis_of_a_fixed_joint_do_no_harm(tmp_path):
+    fixed = JOINT.replace("revolute", "fixed").replace("0 0 2", "0 0 0")
+    xacro = 'xmlns:xacro="http://ros.org/wiki/xacro"'
+    urdf = UrdfFile(written(tmp_path, f'<robot {xacro}><link name="a"/><link name="b"/>{fixed}</robot>'))
+    assert urdf.poses({})["b"].IsExactlyIdentity()
 
 
 def test_links_in_a_loop_are_refused(tmp_path):

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 7549,
     "executive/cli": 4720,
-    "skills": 27174,
+    "skills": 27178,
     "plant": 17370,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 467, 71, 10

@@ -69,6 +69,7 @@ def test_an_impossible_request_is_not_run(tmp_path):
 
 
 @pytest.mark.mission
+@pytest.mark.nightly  # the notebook `five_lines` does the same in `make test`
 def test_a_sentence_is_run_and_judged_and_its_report_shows_itself(tmp_path):
     report = executive.run_mission("go to the kitchen", out=tmp_path / "out", record=False)
     assert (report.achieved, report.seen.success) == (True, True)

@@ -182,11 +182,15 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         """Reaches for the object and takes it; returns False when it has moved away."""
         seen = inputs.observation
         self._tried = (*inputs.avoid, tried_grasp(plan.candidate, view.target.centre_B, view.X_WB))
-        yield from self.follow(plan.to_pregrasp, f"reaching for the {seen.kind}")
-        aimed = yield from self._aimed(view, plan, str(seen.kind))
+        aimed = yield from self._reach(view, plan, str(seen.kind))
         if aimed is not None:
             yield from self._take(*aimed, seen)
         return aimed is not None
+
+    def _reach(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
+        """Brings the hand to the pre-grasp; returns view and plan as they are aimed there (see `_aimed`)."""
+        yield from self.follow(plan.to_pregrasp, f"reaching for the {name}")
+        return (yield from self._aimed(view, plan, name))
 
     def _aimed(self, view: CloseView, plan: GraspPlan, name: str) -> Routine[tuple[CloseView, GraspPlan] | None]:
         """Corrects view and plan across the fingers by a picture from the pre-grasp; None when the object is not there.

@@ -262,8 +262,8 @@ class Robot(Protocol):
     def odometry(self) -> Odometry:
         """Returns the latest dead reckoning."""
 
-    def imu(self) -> Imu:
-        """Returns the latest inertial measurement."""
+    def imu(self) -> Imu | None:
+        """Returns the latest inertial measurement; None if the robot gives none."""
 
     def scan(self) -> Scan | None:
         """Returns the latest LiDAR revolution, None before the first."""

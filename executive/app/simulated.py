@@ -32,7 +32,7 @@ from skills.files.object_model import read_model
 from skills.manipulation.arm.solid_cells import wall_columns
 from skills.navigate.lattice import search
 from skills.perception.model_detector import ModelDetector, models_of
-from skills.robot import Clock, Pose2D
+from skills.robot import Clock, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 
 _LOG: Final = logging.getLogger(__name__)
@@ -82,7 +82,9 @@ class SimulatedBackend:
         known, believed = robot.start_known, None
         if durable is not None:
             known, believed = robot.start_known and not durable.take_up, durable.poses.get(tree.robot_name)
-        entry = run_entry(self._simulation, self._world, tree, robot_stack(robot), believed=believed, start_known=known)
+        start = believed or (self._simulation.starts[tree.robot_name] if known else None)
+        simulated, stack = self._simulation.robots[tree.robot_name], robot_stack(robot)
+        entry = run_entry(simulated, self._world, tree, stack, start=start, surely=known and believed is None)
         if durable is not None:
             durable.journals[tree.robot_name].keep_world = self._world_keeper(durable)
         return replace(entry, robot=self._pipeline.robots[tree.robot_name])
@@ -183,34 +185,32 @@ def simulate(
 
 
 def run_entry(
-    simulation: Simulation,
+    robot: Robot,
     world: World,
     tree: CompiledTree,
     stack: RobotStack | None = None,
     *,
-    believed: Pose2D | None = None,
-    start_known: bool = True,
+    start: Pose2D | None = None,
+    surely: bool = True,
 ) -> RunEntry:
-    """Returns the robot of a tree with the components of its stack.
+    """Returns a robot with the components of its stack and the maps of a world.
 
-    `believed` is the estimated pose before a restart; the robot then localises in a wide circle around it. Without it
-    and unless `start_known` it localises on the whole map.
+    The robot localises around `start`: `surely` there, or in a wide circle; without a start on the whole map.
 
     Raises:
         InputError: the world's maps or the detector's model cannot be read.
     """
     stack = stack or default_stack()
-    seen_from_m = simulation.robots[tree.robot_name].capabilities().lidar_height_m
+    seen_from_m = robot.capabilities().lidar_height_m
     scan_map, keepout_map = load_grid_map(world.scan_map_seen_from(seen_from_m)), load_grid_map(world.keepout_map_path)
     scan_maps = [load_grid_map(path) for path in world.scan_map_paths]
-    start = believed or (simulation.starts[tree.robot_name] if start_known else None)
     try:
-        localiser = stack.localiser.build(scan_map, start, surely=start_known and believed is None)
+        localiser = stack.localiser.build(scan_map, start, surely=surely and start is not None)
     except InputError as error:
         raise InputError(error.message, hint=error.hint, file=world.scan_map_path) from error
     return RunEntry(
         tree=tree,
-        robot=simulation.robots[tree.robot_name],
+        robot=robot,
         localiser=localiser,
         costmap=stack.costmap.build(keepout_map),
         detector=_detector(stack, world),

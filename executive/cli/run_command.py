@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -50,8 +51,22 @@ def run(
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
+    robot: Annotated[
+        str | None,
+        grouped(Group.SPOT, "--robot", metavar="spot://HOST[:PORT]", help="Drive this robot, in the map of --world."),
+    ] = None,
+    user: Annotated[str | None, grouped(Group.SPOT, "--user", help="User; by default $BOSDYN_CLIENT_USERNAME.")] = None,
+    certificate: Annotated[
+        Path | None, grouped(Group.SPOT, "--certificate", help="Certificate of a server; by default the SDK's own.")
+    ] = None,
+    power_on: Annotated[
+        bool, grouped(Group.SPOT, "--power-on", help="Switch the motors on, and off at the end.")
+    ] = False,
+    take: Annotated[
+        bool, grouped(Group.SPOT, "--take", help="Take the lease from its holder, after a typed yes.")
+    ] = False,
 ) -> None:
-    """Runs a sentence or a mission file in the simulated world."""
+    """Runs a sentence or a mission file in the simulated world, or with a real Spot."""
     refuse_unaddressed(request)
     from executive.app.checker import prepare_checked
     from executive.app.page_view import PageView, queue_function
@@ -78,9 +93,18 @@ def run(
         screen = ConsoleScreen(
             console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, live=live, profile=timing
         )
-        with MissionStore(kept_in) as missions, missions.claim():
+        with ExitStack() as stack:
+            missions = stack.enter_context(MissionStore(kept_in))
+            stack.enter_context(missions.claim())
+            runner = None
+            if robot is not None:
+                from executive.app.real_spot import spot_runner
+                from executive.cli.spot_command import spot_access
+
+                access = spot_access(robot, user, certificate, power_on=power_on, take=take)
+                runner = stack.enter_context(spot_runner(prepared, access))
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
-            ended = MissionRuns(missions, screen).run(mission, prepared)
+            ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)
     if timing is not None:
         for line in lines(timing.table()):
             console.print(line, markup=False)

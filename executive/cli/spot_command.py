@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -20,11 +21,13 @@ from skills.files.errors import InputError
 from skills.quantities import Port, Seed
 
 if TYPE_CHECKING:
+    from executive.app.real_spot import Access
     from plant.spot_api.server.server import SpotServer
 
 USER: Final = "user"
 PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
 _FOLDER: Final = "spot-api"
+_SPOT: Final = re.compile(r"spot://(?P<host>[A-Za-z0-9.-]+)(:(?P<port>\d{1,5}))?")
 WORLD = Annotated[str, typer.Option("--world", help="A world by name or folder.")]
 SEED = Annotated[int, quantity_option(Seed, help="Seed of the objects and of all noise.")]
 NO_TABLET = Annotated[
@@ -101,8 +104,7 @@ def _environment(server: SpotServer) -> dict[str, str]:
 @contextmanager
 def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotServer]:
     """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
-    if find_spec("bosdyn") is None:
-        raise InputError("Spot's SDK is not installed", hint="install it: pip install 'spot-errand[spot]'")
+    _need_sdk()
     from executive.app.placed_robots import only_robot
     from executive.app.simulated import compile_first, simulate
     from executive.app.worlds import open_world
@@ -124,3 +126,40 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
         raise InputError(str(error), hint="name another --port, or 0 for a free one") from error
     with server.running():
         yield server
+
+
+def spot_access(url: str, user: str | None, certificate: Path | None, *, power_on: bool, take: bool) -> Access:
+    """Returns the access to a robot; asks for what is missing at a terminal. Raises InputError."""
+    _need_sdk()
+    from executive.app.real_spot import Access
+    from plant.spot_api.adapter.connection import Address
+
+    found = _SPOT.fullmatch(url)
+    if found is None or not 0 <= (port := int(found["port"] or 443)) <= 65_535:
+        raise InputError(f"--robot {url[:60]}: is no address of a Spot", hint="write spot://192.168.80.3, for example")
+    if certificate is not None and not certificate.is_file():
+        raise InputError(f"--certificate {certificate}: there is no such file", hint="name a .pem file")
+    name = user or os.environ.get("BOSDYN_CLIENT_USERNAME")
+    if not name:
+        raise InputError("the user of the robot is missing", hint="give --user, or BOSDYN_CLIENT_USERNAME")
+    password = os.environ.get("BOSDYN_CLIENT_PASSWORD") or _asked_password(name)
+    if take and not _confirmed(f"Take the lease of {url} from its holder? Type yes: "):
+        raise InputError("--take: the lease is not taken without a yes", hint="type yes at the terminal")
+    return Access(Address(found["host"], port, certificate), name, password, power_on=power_on, take=take)
+
+
+def _asked_password(user: str) -> str:
+    """Asks for the password at a terminal; it is never stored. Raises InputError without a terminal."""
+    if not sys.stdin.isatty():
+        raise InputError("the robot's password is missing", hint="set BOSDYN_CLIENT_PASSWORD, or run at a terminal")
+    return str(typer.prompt(f"Password of {user}", hide_input=True))
+
+
+def _confirmed(question: str) -> bool:
+    """Asks for a typed yes at a terminal."""
+    return sys.stdin.isatty() and typer.prompt(question, prompt_suffix="").strip().lower() == "yes"
+
+
+def _need_sdk() -> None:
+    if find_spec("bosdyn") is None:
+        raise InputError("Spot's SDK is not installed", hint="install it: pip install 'spot-errand[spot]'")

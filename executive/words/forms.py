@@ -79,6 +79,7 @@ class OptionGroup(enum.StrEnum):
     REQUEST = "Request"
     WORLD = "World"
     ROBOTS = "Robots"
+    SPOT = "A real Spot"
     DISTURBANCES = "Faults and variations"
     OUTPUT = "Output"
     PAGE = "Live page"

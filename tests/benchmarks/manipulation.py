@@ -191,7 +191,7 @@ def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: 
     mission = Mission(name="trial", world=str(world.folder), robot=ROBOT, steps=steps)
     tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
     spot = LastSpot()
-    entry = run_entry(simulation, world, tree)
+    entry = run_entry(simulation.robots[tree.robot_name], world, tree, start=simulation.starts[tree.robot_name])
     clock, notes = simulation.clock, list[tuple[float, Mapping[str, Any]]]()
 
     def note(topic: str, message: Mapping[str, Any]) -> None:

@@ -63,7 +63,7 @@ def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
     plant, said = simulation.Simulation(shelf, seed=SEED, visuals=False), list[str]()
     with LockStepWorker(plant.clock) as worker:
         result = run(
-            [run_entry(plant, shelf, tree)],
+            [run_entry(plant.robots[tree.robot_name], shelf, tree, start=plant.starts[tree.robot_name])],
             clock=plant.clock,
             worker=worker,
             visitors=[OnMessage(lambda topic, message: said.append(str(message.get("message"))))],

@@ -57,7 +57,12 @@ class FlatMission:
             Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
         )
         self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
-        self.entry = run_entry(self.simulation, self.world, self.tree)
+        self.entry = run_entry(
+            self.simulation.robots[self.tree.robot_name],
+            self.world,
+            self.tree,
+            start=self.simulation.starts[self.tree.robot_name],
+        )
         self.transitions: list[dict[str, Any]] = []
         self.seed = seed
 

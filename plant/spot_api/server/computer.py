@@ -196,6 +196,11 @@ class Computer:
             self.behind_s = max(self.behind_s, time.monotonic() - due_s)
             self.step()
 
+    def serve(self, stopping: Event) -> None:
+        """Does the work of clients until `stopping` is set; one of them steps the clock, by `do(step)`."""
+        while not stopping.is_set():
+            self._work_until(time.monotonic() + _LATE_S)
+
     def step(self) -> None:
         """Does the waiting work, steps the clock and goes on with all motions."""
         self._work_until(0.0)

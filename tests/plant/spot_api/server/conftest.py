@@ -40,11 +40,6 @@ class Served:
         return robot
 
 
-@pytest.fixture(scope="session")
-def credentials(tmp_path_factory):
-    return SpotServer.credentials(tmp_path_factory.mktemp("credentials"))
-
-
 @pytest.fixture
 def served(credentials) -> Iterator[Served]:
     clock = VirtualClock()

@@ -1,0 +1,1 @@
+"""Adapter: a robot of this project that drives a Spot through its API."""

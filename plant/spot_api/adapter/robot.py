@@ -1,0 +1,475 @@
+"""A Spot behind the Robot protocol, driven through its API.
+
+Readings are those of the last `poll`; commands are sent at once and followed by `poll`. The robot's clock of the
+protocol begins when the connection is made.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field
+from threading import Event, Lock
+from typing import Any, Final, Protocol
+
+import numpy as np
+from bosdyn.api import (
+    arm_command_pb2,
+    basic_command_pb2,
+    gripper_command_pb2,
+    image_pb2,
+    lease_pb2,
+    mobility_command_pb2,
+    point_cloud_pb2,
+    robot_command_pb2,
+)
+from bosdyn.client.robot_command import RobotCommandBuilder
+from bosdyn.geometry import EulerZXY
+from pydrake.math import RigidTransform
+
+from plant.spot_api.adapter.connection import Connection, LostError
+from plant.spot_api.adapter.readings import TIP_RADIUS_M, Readings, frames_of, picture, pose_between, readings, scan
+from skills.robot import (
+    ArmTrajectory,
+    Battery,
+    Capabilities,
+    CommandId,
+    CommandState,
+    CommandStatus,
+    FrameTree,
+    Gripper,
+    Image,
+    Imu,
+    Joints,
+    Lease,
+    LeaseError,
+    NoImageError,
+    Odometry,
+    Scan,
+)
+
+DRIVE_EXPIRY_S: Final = 0.6
+FASTEST_M_S, FASTEST_RAD_S = 0.8, 1.0
+OLD_STATE_S, SILENT_S = 0.5, 3.0
+_SYNCHRONISED_EVERY_S: Final = 10.0
+_RETAIN_S: Final = 1.0
+_SCAN_S: Final = 0.09
+_MOST_POINTS: Final = 250
+_LIDAR: Final = "velodyne-point-cloud"
+Progress = basic_command_pb2.RobotCommandFeedbackStatus
+Answer = robot_command_pb2.RobotCommandResponse
+
+
+class RobotClock(Protocol):
+    """Clock of the robot for an adapter: the protocol's clock, and the robot's time."""
+
+    def now(self) -> float:
+        """Seconds since the connection was made."""
+
+    def robot_time_s(self) -> float:
+        """The robot's time (s since 1970)."""
+
+
+class WallClock:
+    """Clock of a real robot: wall time; `advance` waits, and `after` is called after each wait."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection, self._began_s, self._due_s = connection, time.monotonic(), 0.0
+        self.after: list[Any] = []
+
+    def now(self) -> float:
+        """Seconds since the connection was made."""
+        return time.monotonic() - self._began_s
+
+    def robot_time_s(self) -> float:
+        """The robot's time (s since 1970)."""
+        return self._connection.robot_time_s()
+
+    def advance(self, dt_s: float) -> None:
+        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
+        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
+        Event().wait(max(0.0, self._due_s - self.now()))
+        for each in self.after:
+            each()
+
+
+@dataclass
+class _Sent:
+    """A command that was sent: its number at the robot and the part that it moves; `status` is the last known."""
+
+    number: int
+    part: str
+    status: CommandStatus = field(default_factory=lambda: CommandStatus(CommandState.RUNNING))
+    until_s: float = math.inf
+
+
+class ApiRobot:
+    """Spot, through a connection. Implements `skills.robot.Robot`."""
+
+    def __init__(self, name: str, connection: Connection, clock: RobotClock, capabilities: Capabilities) -> None:
+        """Reads the robot's first state. Raises LostError."""
+        self._name, self._connection, self._clock, self._capabilities = name, connection, clock, capabilities
+        self._lock = Lock()
+        self._sent: dict[CommandId, _Sent] = {}
+        self._next, self._lease_number, self._retained_s, self._synchronised_s = 1, 0, -math.inf, clock.now()
+        self._current: Lease | None = None
+        self._posture = (capabilities.standing_height_m, 0.0)
+        self._scan: Scan | None = None
+        self._readings = self._read()
+
+    # -- know and sense ----------------------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self._name
+
+    def capabilities(self) -> Capabilities:
+        """Capabilities of Spot."""
+        return self._capabilities
+
+    def odometry(self) -> Odometry:
+        """Latest dead reckoning."""
+        return self._readings.odometry
+
+    def imu(self) -> Imu | None:
+        """Returns None: the API gives no inertial readings in its state."""
+        return None
+
+    def scan(self) -> Scan | None:
+        """Latest LiDAR revolution, None before the first."""
+        return self._scan
+
+    def joints(self) -> Joints:
+        """Latest joint state."""
+        return self._readings.joints
+
+    def gripper(self) -> Gripper:
+        """Latest gripper state."""
+        return self._readings.gripper
+
+    def battery(self) -> Battery:
+        """Latest battery state."""
+        return self._readings.battery
+
+    @property
+    def powered(self) -> bool:
+        """Returns whether the motors have power."""
+        return self._readings.powered
+
+    def faults(self) -> tuple[str, ...]:
+        """Present faults, with a pressed E-stop and a robot that does not answer."""
+        stopped = () if self._readings.released else ("the E-stop is pressed",)
+        silent_s = self._clock.now() - self._readings.stamp_s
+        silent = (f"the robot has not answered for {silent_s:.0f} s",) if silent_s > SILENT_S else ()
+        return (*self._readings.faults, *stopped, *silent)
+
+    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
+        """Takes a picture with depth, or only one of the two. Raises ValueError and NoImageError."""
+        camera = next((each for each in self._capabilities.cameras if each.source == source), None)
+        if camera is None:
+            raise ValueError(f"there is no camera {source!r}")
+        hand = source == "hand"
+        names = ["hand_color_image" if hand else f"{source}_fisheye_image"] if visual else []
+        names += ["hand_depth_in_hand_color_frame" if hand else f"{source}_depth"] if depth else []
+        Pixels = image_pb2.Image
+        request = image_pb2.GetImageRequest()
+        for name in names:
+            is_depth = "_depth" in name
+            form = Pixels.FORMAT_RAW if is_depth else Pixels.FORMAT_JPEG
+            request.image_requests.add(image_source_name=name, image_format=form, quality_percent=95.0)
+        try:
+            answers = self._connection.call("image", "GetImage", request, timeout_s=2.0).image_responses
+        except LostError as error:
+            raise NoImageError(str(error)) from error
+        first = answers[0].shot
+        frames = self._frame_tree(frames_of(first.transforms_snapshot))
+        stamp_s = self._stamp(first.acquisition_time)
+        return picture(source, f"{source}_camera", answers, stamp_s, frames, coloured=hand)
+
+    def _frame_tree(self, frames: Any) -> FrameTree:
+        """The protocol's frames from those of the API; heights are over the feet."""
+        X_OB = self._readings.odometry.X_OB if "odom" not in frames else pose_between(frames, "odom", "body")
+        x, y, _ = X_OB.translation()
+        X_OB.set_translation([x, y, self._readings.odometry.X_OB.translation()[2]])
+        made = {"body": ("odom", X_OB)}
+        if "arm0.link_wr1" in frames:
+            made["hand"] = ("body", pose_between(frames, "body", "arm0.link_wr1"))
+        for camera in self._capabilities.cameras:
+            made[f"{camera.source}_camera"] = ("hand" if camera.on_hand else "body", camera.X_FC)
+        return FrameTree(made)
+
+    # -- act ---------------------------------------------------------------------------------------------------------
+
+    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Drives at a body-frame velocity; the robot stops by itself at `until_s`, or 0.6 s from now."""
+        if not all(map(math.isfinite, (vx, vy, wz))):
+            return self._refused(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
+        end_s = min(until_s, self._clock.now() + DRIVE_EXPIRY_S)
+        command = RobotCommandBuilder.synchro_velocity_command(vx, vy, wz, params=self._params())
+        return self._send(command, "base", lease, end_s=end_s)
+
+    def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Holds the body origin at a height above the floor and a pitch."""
+        self._posture = (height_m, pitch_rad)
+        return self._send(RobotCommandBuilder.synchro_stand_command(params=self._params()), "posture", lease, until_s)
+
+    def sit(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Lowers the body to the floor."""
+        return self._send(RobotCommandBuilder.synchro_sit_command(), "posture", lease, until_s)
+
+    def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
+        """Follows a joint trajectory; done when the robot says so."""
+        keep = np.unique(np.linspace(0, len(trajectory.times_s) - 1, _MOST_POINTS).astype(int))
+        times, positions = trajectory.times_s[keep], trajectory.positions_rad[keep]
+        made = arm_command_pb2.ArmJointMoveCommand.Request()
+        for time_s, q in zip(times, positions, strict=True):
+            point = made.trajectory.points.add()
+            point.time_since_reference.FromNanoseconds(round(max(0.0, float(time_s)) * 1e9))
+            for joint, value in zip(("sh0", "sh1", "el0", "el1", "wr0", "wr1"), q, strict=True):
+                getattr(point.position, joint).value = float(value)
+        made.trajectory.maximum_velocity.value, made.trajectory.maximum_acceleration.value = 2.5, 15.0
+        made.trajectory.reference_time.FromNanoseconds(round(self._clock.robot_time_s() * 1e9))
+        command = robot_command_pb2.RobotCommand()
+        command.synchronized_command.arm_command.arm_joint_move_command.CopyFrom(made)
+        return self._send(command, "arm", lease, until_s)
+
+    def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: Spot has no head."""
+        return self._refused("point_head: the robot has no head")
+
+    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
+        """Moves the gripper to an opening with at most force_n at its tip."""
+        made = gripper_command_pb2.ClawGripperCommand.Request()
+        made.trajectory.points.add(point=-opening)
+        made.maximum_torque.value = force_n * TIP_RADIUS_M
+        command = robot_command_pb2.RobotCommand()
+        command.synchronized_command.gripper_command.claw_gripper_command.CopyFrom(made)
+        return self._send(command, "gripper", lease, until_s)
+
+    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
+        """Stops base and arm, or only the part of a command; the gripper keeps its clamp force."""
+        with self._lock:
+            part = self._sent[only].part if only is not None and only in self._sent else None
+            running = only is None or (part is not None and self._sent[only].status.state is CommandState.RUNNING)
+        if not running:
+            return self._noted(CommandStatus(CommandState.DONE))
+        command = robot_command_pb2.RobotCommand()
+        if part in (None, "base", "posture"):
+            stop = mobility_command_pb2.MobilityCommand.Request(stop_request=basic_command_pb2.StopCommand.Request())
+            command.synchronized_command.mobility_command.CopyFrom(stop)
+        if part in (None, "arm"):
+            command.synchronized_command.arm_command.arm_stop_command.SetInParent()
+        if not command.HasField("synchronized_command"):
+            return self._noted(CommandStatus(CommandState.DONE))
+        stopped = self._send(command, part or "all", lease, math.inf)
+        with self._lock:
+            for sent in self._sent.values():
+                mine = sent.part == part if part else sent.part != "gripper"
+                if mine and sent.status.state is CommandState.RUNNING:
+                    sent.status = CommandStatus(CommandState.STOPPED, "stopped by command")
+            if self._sent[stopped].status.state is CommandState.STOPPED:
+                self._sent[stopped].status = CommandStatus(CommandState.DONE)
+        return stopped
+
+    def command_status(self, command: CommandId) -> CommandStatus:
+        """Returns the last known status of a command. Raises KeyError for an unknown id."""
+        with self._lock:
+            return self._sent[command].status
+
+    # -- own ---------------------------------------------------------------------------------------------------------
+
+    def lease_holder(self) -> Lease | None:
+        """Lease that counts now, as far as the robot has said."""
+        return self._current
+
+    def acquire_lease(self, holder: str) -> Lease:
+        """Takes the lease within this program, and acquires the robot's. Raises LeaseError when another has it."""
+        if self._current is not None:
+            raise LeaseError(f"{self._name}: the lease is held by {self._current.holder!r}")
+        return self._own(holder, take=False)
+
+    def take_lease(self, holder: str) -> Lease:
+        """Takes the lease from its holder, another client included. Raises LeaseError when the robot refuses."""
+        return self._own(holder, take=True)
+
+    def _own(self, holder: str, *, take: bool) -> Lease:
+        try:
+            if self._connection.lease is None:
+                self._connection.acquire(take=take)
+        except LostError as error:
+            raise LeaseError(f"{self._name}: {error}") from error
+        self._lease_number += 1
+        self._current = Lease(self._name, holder, self._lease_number)
+        return self._current
+
+    def return_lease(self, lease: Lease) -> None:
+        """Returns the lease; the robot stops. The robot's own lease is kept until the connection is closed."""
+        if lease == self._current:
+            self.stop(lease=lease)
+            self._current = None
+
+    # -- upkeep ------------------------------------------------------------------------------------------------------
+
+    def poll(self) -> None:
+        """Reads state and LiDAR, follows the commands that run, and retains lease and clock.
+
+        What the robot does not answer keeps its last value: old readings stop the drive, and are a fault later.
+        """
+        with suppress(LostError):
+            self._readings = self._read()
+            if self._connection.has_lidar and (self._scan is None or self._clock.now() - self._scan.stamp_s > _SCAN_S):
+                self._scan = self._read_scan()
+            with self._lock:
+                running = [sent for sent in self._sent.values() if sent.status.state is CommandState.RUNNING]
+            for sent in running:
+                self._follow(sent)
+            now_s = self._clock.now()
+            if self._connection.lease is not None and now_s - self._retained_s > _RETAIN_S:
+                self._retained_s = now_s
+                if not self._connection.retain():
+                    self._current, self._connection.lease = None, None
+            if now_s - self._synchronised_s > _SYNCHRONISED_EVERY_S:
+                self._connection.synchronise()
+                self._synchronised_s = now_s
+
+    def _read(self) -> Readings:
+        state = self._connection.state()
+        return readings(state, self._stamp(state.kinematic_state.acquisition_timestamp), self._capabilities)
+
+    def _stamp(self, message: Any) -> float:
+        """Time of a message on the protocol's clock."""
+        return self._clock.now() - (self._clock.robot_time_s() - float(message.seconds) - float(message.nanos) * 1e-9)
+
+    def _read_scan(self) -> Scan | None:
+        request = point_cloud_pb2.GetPointCloudRequest()
+        request.point_cloud_requests.add(
+            point_cloud_source_name=_LIDAR, cloud_type=point_cloud_pb2.PointCloudRequest.CLOUD_TYPE_POINTS
+        )
+        (answer,) = self._connection.call(_LIDAR, "GetPointCloud", request).point_cloud_responses
+        if answer.status != point_cloud_pb2.PointCloudResponse.STATUS_OK:
+            return self._scan
+        cloud, source = answer.point_cloud, answer.point_cloud.source
+        frames = frames_of(source.transforms_snapshot)
+        points = np.frombuffer(cloud.data, np.float32).reshape(-1, 3).astype(np.float64)
+        X_BF = pose_between(frames, "body", source.frame_name_sensor)
+        X_BL = self._X_BL()
+        points_L = (X_BL.inverse() @ X_BF @ points.T).T
+        X_OB = pose_between(frames, "odom", "body")
+        return scan(points_L, self._stamp(source.acquisition_time), X_BL, X_OB)
+
+    def _X_BL(self) -> RigidTransform:
+        """Pose of the LiDAR on the rear rails, as in the description."""
+        height_m = (self._capabilities.lidar_height_m or 0.0) - self._capabilities.standing_height_m
+        return RigidTransform([-0.2, 0.0, height_m])
+
+    def _follow(self, sent: _Sent) -> None:
+        """Reads how far a command has come."""
+        request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=sent.number)
+        answer = self._connection.call("robot-command", "RobotCommandFeedback", request).feedback
+        status = _status_of(answer.synchronized_feedback, sent.part)
+        if status.state is CommandState.RUNNING and self._clock.now() >= sent.until_s:
+            status = CommandStatus(CommandState.STOPPED, "expired before it was done")
+        with self._lock:
+            if sent.status.state is CommandState.RUNNING:
+                sent.status = status
+
+    # -- inside ------------------------------------------------------------------------------------------------------
+
+    def _params(self) -> Any:
+        """Mobility parameters with the posture last asked for, and limits of speed."""
+        height_m, pitch_rad = self._posture
+        params = RobotCommandBuilder.mobility_params(
+            body_height=height_m - self._capabilities.standing_height_m, footprint_R_body=EulerZXY(pitch=pitch_rad)
+        )
+        for limit, sign in ((params.vel_limit.max_vel, 1.0), (params.vel_limit.min_vel, -1.0)):
+            limit.linear.x = limit.linear.y = sign * FASTEST_M_S
+            limit.angular = sign * FASTEST_RAD_S
+        return params
+
+    def _send(
+        self, command: Any, part: str, lease: Lease, until_s: float = math.inf, *, end_s: float | None = None
+    ) -> CommandId:
+        if lease != self._current:
+            return self._refused(f"{part}: lease {lease.number} of {lease.holder!r} no longer counts")
+        now_s = self._clock.now()
+        if min(until_s, math.inf if end_s is None else end_s) <= now_s:
+            return self._refused(f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already")
+        if part == "base" and end_s is not None:
+            if now_s - self._readings.stamp_s > OLD_STATE_S:
+                return self._refused(f"drive: the last state is {now_s - self._readings.stamp_s:.1f} s old")
+            end = self._clock.robot_time_s() + end_s - now_s
+            given = command.synchronized_command.mobility_command.se2_velocity_request
+            given.end_time.FromNanoseconds(round(end * 1e9))
+        request = robot_command_pb2.RobotCommandRequest(
+            lease=self._connection.lease, command=command, clock_identifier=self._connection.clock_identifier
+        )
+        try:
+            answer = self._connection.call("robot-command", "RobotCommand", request)
+        except LostError as error:
+            return self._refused(f"{part}: {error}")
+        if answer.lease_use_result.status not in (0, lease_pb2.LeaseUseResult.STATUS_OK):
+            owner = answer.lease_use_result.owner.client_name or "another client"
+            self._current, self._connection.lease = None, None
+            return self._refused(f"{part}: the lease is held by {owner}")
+        if answer.status != Answer.STATUS_OK:
+            return self._refused(f"{part}: {answer.message or Answer.Status.Name(answer.status)}")
+        made = _Sent(answer.robot_command_id, part, until_s=until_s if end_s is None else math.inf)
+        with self._lock:
+            for sent in self._sent.values():
+                base = {"base", "posture"}
+                same = sent.part == part or {sent.part, part} <= base
+                if same and sent.status.state is CommandState.RUNNING:
+                    sent.status = CommandStatus(CommandState.STOPPED, "replaced by another command")
+            return self._kept(made)
+
+    def _refused(self, reason: str) -> CommandId:
+        return self._noted(CommandStatus(CommandState.REFUSED, reason))
+
+    def _noted(self, status: CommandStatus) -> CommandId:
+        with self._lock:
+            return self._kept(_Sent(0, "", status))
+
+    def _kept(self, sent: _Sent) -> CommandId:
+        number, self._next = CommandId(self._next), self._next + 1
+        self._sent[number] = sent
+        while len(self._sent) > 1000:
+            del self._sent[next(iter(self._sent))]
+        return number
+
+
+def _status_of(feedback: Any, part: str) -> CommandStatus:
+    """The protocol's status of the part of a command, by its feedback."""
+    field = {"arm": "arm_command_feedback", "gripper": "gripper_command_feedback"}.get(
+        part, "mobility_command_feedback"
+    )
+    given = getattr(feedback, field)
+    if given.status == Progress.STATUS_COMMAND_TIMED_OUT:
+        return CommandStatus(CommandState.DONE)
+    if given.status == Progress.STATUS_COMMAND_OVERRIDDEN:
+        return CommandStatus(CommandState.STOPPED, "replaced by another command")
+    if given.status == Progress.STATUS_ROBOT_FROZEN:
+        return CommandStatus(CommandState.STOPPED, "the robot is frozen")
+    if part == "arm":
+        return _arm_status(given)
+    if part == "gripper":
+        part_status, Claw = given.claw_gripper_feedback.status, gripper_command_pb2.ClawGripperCommand.Feedback
+        if part_status == Claw.STATUS_AT_GOAL:
+            return CommandStatus(CommandState.DONE)
+        if part_status == Claw.STATUS_APPLYING_FORCE:
+            return CommandStatus(CommandState.DONE, "stopped by an object in the gripper")
+        return CommandStatus(CommandState.RUNNING)
+    standing = given.stand_feedback.status == basic_command_pb2.StandCommand.Feedback.STATUS_IS_STANDING
+    sitting = given.sit_feedback.status == basic_command_pb2.SitCommand.Feedback.STATUS_IS_SITTING
+    return CommandStatus(CommandState.DONE if standing or sitting else CommandState.RUNNING)
+
+
+def _arm_status(given: Any) -> CommandStatus:
+    Move = arm_command_pb2.ArmJointMoveCommand.Feedback
+    moved = given.arm_joint_move_feedback
+    if given.HasField("arm_stop_feedback") or moved.status == Move.STATUS_COMPLETE:
+        return CommandStatus(CommandState.DONE)
+    if moved.status == Move.STATUS_STALLED:
+        return CommandStatus(CommandState.STOPPED, "the arm is stalled")
+    return CommandStatus(CommandState.RUNNING)

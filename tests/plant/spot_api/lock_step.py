@@ -1,0 +1,78 @@
+"""A server whose clock a client steps, in a thread of its own, and an adapter's robot in lock-step with it."""
+
+import gc
+import threading
+from collections.abc import Callable
+
+from plant.robots.spot.kind import spot_capabilities
+from plant.spot_api.adapter.connection import Address, Connection
+from plant.spot_api.adapter.robot import ApiRobot
+from plant.spot_api.server.computer import PERIOD_S, Pace
+from plant.spot_api.server.server import Options, SpotServer
+from skills.manipulation.arm.kinematics import arm_model
+from skills.robot import Clock, Robot
+
+USER, PASSWORD = "user", "right"
+
+
+class LockStep:
+    """The server in its thread, the clock that steps it, and the adapter's robot.
+
+    `build` makes robot and clock in the server's thread, to which a renderer belongs.
+    """
+
+    def __init__(self, build: Callable[[], tuple[Robot, Clock]], credentials) -> None:
+        self._build, self._credentials = build, credentials
+        self._ready, self._stopping = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._serve)
+        self._thread.start()
+        self._ready.wait()
+        self.connection = Connection(Address("127.0.0.1", self.server.port, credentials.certificate), USER, PASSWORD)
+        self.connection.synchronise()
+        self.robot = ApiRobot("Alice", self.connection, self, spot_capabilities())
+
+    def _serve(self) -> None:
+        robot, clock = self._build()
+        solver, options = arm_model(robot.capabilities()), Options({USER: PASSWORD}, pace=Pace.CLIENT)
+        self.server = SpotServer(robot, clock, solver, self._credentials, options)
+        self.served = robot
+        with self.server.running():
+            self._ready.set()
+            self.server.computer.serve(self._stopping)
+        del robot, clock, self.served, self._build, self.server
+        gc.collect()  # a renderer ends in the thread in which it began
+
+    def now(self) -> float:
+        return self.server.computer.clock.now()
+
+    def robot_time_s(self) -> float:
+        return self.server.computer.now_s()
+
+    def advance(self, dt_s: float) -> None:
+        computer = self.server.computer
+        steps = max(1, round(dt_s / PERIOD_S))
+        computer.do(lambda: [computer.step() for _ in range(steps)]).result()
+        self.robot.poll()
+
+    def until(self, true: Callable[[], bool], most_s: float = 10.0) -> bool:
+        """Advances until a condition holds; returns whether it did in time."""
+        until_s = self.now() + most_s
+        while not true() and self.now() < until_s:
+            self.advance(0.05)
+        return true()
+
+    def done(self, command) -> bool:
+        """Advances until a command has ended."""
+        return self.until(lambda: self.robot.command_status(command).state.value != "running")
+
+    def stand_up(self) -> None:
+        """Switches the motors on and stands up."""
+        lease = self.robot.acquire_lease("test")
+        self.connection.power(True)
+        assert self.until(lambda: self.robot.powered)
+        assert self.done(self.robot.stand(0.52, 0.0, until_s=self.now() + 10.0, lease=lease))
+        self.robot.return_lease(lease)
+
+    def close(self) -> None:
+        self._stopping.set()
+        self._thread.join()

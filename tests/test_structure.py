@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2987,
+    "executive/words": 2988,
     "executive/language": 7725,
     "executive/speech": 1582,
     "executive/mission": 1590,
@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 7549,
-    "executive/cli": 4720,
+    "executive/app": 7720,
+    "executive/cli": 4809,
     "skills": 27178,
-    "plant": 17370,
+    "plant": 18216,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 467, 71, 10
+MODULES, ONE_IMPORTER, SAME_NAME = 472, 75, 10
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

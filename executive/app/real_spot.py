@@ -23,8 +23,8 @@ from executive.run.visitor import RunEntry
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from plant.robots.spot.kind import spot_capabilities
-from plant.spot_api.adapter.connection import Address, Connection, LostError
-from plant.spot_api.adapter.robot import ApiRobot, WallClock
+from plant.spot_api.adapter.connection import Address, Connection, LostError, WallClock
+from plant.spot_api.adapter.robot import ApiRobot
 from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.robot import Clock, CommandId, CommandState, LeaseError, Pose2D, Robot

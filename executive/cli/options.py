@@ -53,6 +53,16 @@ VIEW_FOR = Annotated[
 ]
 VIEW_PORT = Annotated[int, quantity_option(Port, help="Port of the page; 0 takes a free one.", group=Group.PAGE)]
 
+ROBOT = Annotated[
+    str | None,
+    grouped(Group.SPOT, "--robot", metavar="spot://HOST[:PORT]", help="Drive this robot, in the map of --world."),
+]
+USER = Annotated[str | None, grouped(Group.SPOT, "--user", help="User; by default $BOSDYN_CLIENT_USERNAME.")]
+CERTIFICATE = Annotated[
+    Path | None, grouped(Group.SPOT, "--certificate", help="Certificate of a server; by default the SDK's own.")
+]
+POWER_ON = Annotated[bool, grouped(Group.SPOT, "--power-on", help="Switch the motors on, and off at the end.")]
+TAKE = Annotated[bool, grouped(Group.SPOT, "--take", help="Take the lease from its holder, after a typed yes.")]
 FOXGLOVE = Annotated[
     str | None,
     grouped(

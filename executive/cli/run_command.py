@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from contextlib import ExitStack
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -14,9 +13,14 @@ import typer
 from executive.cli.options import (
     ANYWAY,
     AS_JSON,
+    CERTIFICATE,
     FOXGLOVE,
+    POWER_ON,
     QUIET,
+    ROBOT,
     STORE,
+    TAKE,
+    USER,
     VIEW,
     VIEW_FOR,
     VIEW_PORT,
@@ -31,7 +35,11 @@ from skills.files.outside import is_file
 from skills.files.yaml_source import read_yaml
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from executive.app.prepared import Prepared
+    from executive.app.report import RunReport
+    from executive.record.work import Profile
 
 
 @takes_request()
@@ -51,20 +59,11 @@ def run(
     view_for: VIEW_FOR = None,
     view_port: VIEW_PORT = 0,
     foxglove: FOXGLOVE = None,
-    robot: Annotated[
-        str | None,
-        grouped(Group.SPOT, "--robot", metavar="spot://HOST[:PORT]", help="Drive this robot, in the map of --world."),
-    ] = None,
-    user: Annotated[str | None, grouped(Group.SPOT, "--user", help="User; by default $BOSDYN_CLIENT_USERNAME.")] = None,
-    certificate: Annotated[
-        Path | None, grouped(Group.SPOT, "--certificate", help="Certificate of a server; by default the SDK's own.")
-    ] = None,
-    power_on: Annotated[
-        bool, grouped(Group.SPOT, "--power-on", help="Switch the motors on, and off at the end.")
-    ] = False,
-    take: Annotated[
-        bool, grouped(Group.SPOT, "--take", help="Take the lease from its holder, after a typed yes.")
-    ] = False,
+    robot: ROBOT = None,
+    user: USER = None,
+    certificate: CERTIFICATE = None,
+    power_on: POWER_ON = False,
+    take: TAKE = False,
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real Spot."""
     refuse_unaddressed(request)
@@ -73,7 +72,8 @@ def run(
     from executive.app.runs import MissionRuns
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
-    from executive.record.work import Profile, lines
+    from executive.cli.spot_command import spot_runner
+    from executive.record.work import Profile
     from executive.store.missions import MissionStore, store_in
     from executive.view.foxglove import serve_live
 
@@ -93,28 +93,26 @@ def run(
         screen = ConsoleScreen(
             console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, live=live, profile=timing
         )
-        with ExitStack() as stack:
-            missions = stack.enter_context(MissionStore(kept_in))
-            stack.enter_context(missions.claim())
-            runner = None
-            if robot is not None:
-                from executive.app.real_spot import spot_runner
-                from executive.cli.spot_command import spot_access
-
-                access = spot_access(robot, user, certificate, power_on=power_on, take=take)
-                runner = stack.enter_context(spot_runner(prepared, access))
+        spot = spot_runner(prepared, robot, user, certificate, power_on=power_on, take=take)
+        with MissionStore(kept_in) as missions, missions.claim(), spot as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)
-    if timing is not None:
-        for line in lines(timing.table()):
-            console.print(line, markup=False)
-    if as_json:
-        assert ended.report is not None  # only a mission of a queue is set aside
-        print_json(ended.report.to_json())
+    _tell(console, timing, ended.report if as_json else None)
     if screen.shown_page is not None:
         screen.shown_page.stay(0.0 if ended.hung_up else view_for)
     if not ended.achieved:
         raise typer.Exit(NOT_ACHIEVED)
+
+
+def _tell(console: Console, timing: Profile | None, report: RunReport | None) -> None:
+    """Prints the CPU times and the report as JSON, if they are wanted."""
+    from executive.record.work import lines
+
+    if timing is not None:
+        for line in lines(timing.table()):
+            console.print(line, markup=False)
+    if report is not None:
+        print_json(report.to_json())
 
 
 def refuse_unaddressed(request: Request) -> None:

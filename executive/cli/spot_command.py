@@ -6,7 +6,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -21,6 +21,8 @@ from skills.files.errors import InputError
 from skills.quantities import Port, Seed
 
 if TYPE_CHECKING:
+    from executive.app.mission_run import FinishedRun
+    from executive.app.prepared import Prepared
     from executive.app.real_spot import Access
     from plant.spot_api.server.server import SpotServer
 
@@ -110,6 +112,7 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     from executive.app.worlds import open_world
     from plant.models.catalogue import user_cache
     from plant.spot_api.server.estop import Tablet
+    from plant.spot_api.server.identity import credentials
     from plant.spot_api.server.server import Options, SpotServer
     from skills.manipulation.arm.kinematics import arm_model
 
@@ -120,12 +123,27 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     robot = simulation.robots["Alice"]
     options = Options({USER: PASSWORD}, port, tablet=Tablet.TABLET if tablet else Tablet.NONE)
     try:
-        credentials = SpotServer.credentials(user_cache() / _FOLDER)
-        server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), credentials, options)
+        held = credentials(user_cache() / _FOLDER)
+        server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), held, options)
     except OSError as error:
         raise InputError(str(error), hint="name another --port, or 0 for a free one") from error
     with server.running():
         yield server
+
+
+@contextmanager
+def spot_runner(
+    prepared: Prepared, url: str | None, user: str | None, certificate: Path | None, *, power_on: bool, take: bool
+) -> Iterator[Callable[..., FinishedRun] | None]:
+    """Connects to the Spot at a URL, and yields a function that runs a mission with it; None without a URL."""
+    if url is None:
+        yield None
+        return
+    access = spot_access(url, user, certificate, power_on=power_on, take=take)
+    from executive.app import real_spot
+
+    with real_spot.spot_runner(prepared, access) as run:
+        yield run
 
 
 def spot_access(url: str, user: str | None, certificate: Path | None, *, power_on: bool, take: bool) -> Access:

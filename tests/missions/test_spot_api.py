@@ -20,7 +20,7 @@ from executive.app.prepare import prepare
 from executive.app.real_spot import ApiBackend
 from executive.app.simulated import simulate
 from executive.mission.request import Request
-from plant.spot_api.server.server import SpotServer
+from plant.spot_api.server.identity import credentials
 from skills.stack import default_stack
 
 
@@ -52,7 +52,7 @@ def test_a_mission_through_the_api_is_fulfilled(request_made, tmp_path):
         made.append(simulate(prepared.world, prepared.robots, seed=request_made.seed, record=False))
         return made[0].robots["Alice"], made[0].clock
 
-    step = LockStep(build, SpotServer.credentials(tmp_path / "credentials"))
+    step = LockStep(build, credentials(tmp_path / "credentials"))
     try:
         step.stand_up()
         report = run_request(prepared, Judged(step, made[0], prepared)).report

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Event
 from typing import Any, Final
 
 import bosdyn.client
@@ -170,6 +171,29 @@ class Connection:
     def state(self) -> Any:
         """Returns the robot's state. Raises LostError."""
         return self.call("robot-state", "GetRobotState", robot_state_pb2.RobotStateRequest()).robot_state
+
+
+class WallClock:
+    """Clock of a real robot: wall time; `advance` waits, and `after` is called after each wait."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection, self._began_s, self._due_s = connection, time.monotonic(), 0.0
+        self.after: list[Callable[[], None]] = []
+
+    def now(self) -> float:
+        """Seconds since the connection was made."""
+        return time.monotonic() - self._began_s
+
+    def robot_time_s(self) -> float:
+        """The robot's time (s since 1970)."""
+        return self._connection.robot_time_s()
+
+    def advance(self, dt_s: float) -> None:
+        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
+        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
+        Event().wait(max(0.0, self._due_s - self.now()))
+        for each in self.after:
+            each()
 
 
 def _cause(error: Exception) -> str:

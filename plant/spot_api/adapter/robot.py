@@ -7,10 +7,9 @@ protocol begins when the connection is made.
 from __future__ import annotations
 
 import math
-import time
 from contextlib import suppress
 from dataclasses import dataclass, field
-from threading import Event, Lock
+from threading import Lock
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -69,29 +68,6 @@ class RobotClock(Protocol):
 
     def robot_time_s(self) -> float:
         """The robot's time (s since 1970)."""
-
-
-class WallClock:
-    """Clock of a real robot: wall time; `advance` waits, and `after` is called after each wait."""
-
-    def __init__(self, connection: Connection) -> None:
-        self._connection, self._began_s, self._due_s = connection, time.monotonic(), 0.0
-        self.after: list[Any] = []
-
-    def now(self) -> float:
-        """Seconds since the connection was made."""
-        return time.monotonic() - self._began_s
-
-    def robot_time_s(self) -> float:
-        """The robot's time (s since 1970)."""
-        return self._connection.robot_time_s()
-
-    def advance(self, dt_s: float) -> None:
-        """Waits until dt_s have passed since the last advance; a late program goes on at once."""
-        self._due_s = max(self._due_s + dt_s, self.now() - dt_s)
-        Event().wait(max(0.0, self._due_s - self.now()))
-        for each in self.after:
-            each()
 
 
 @dataclass
@@ -261,7 +237,7 @@ class ApiRobot:
             command.synchronized_command.mobility_command.CopyFrom(stop)
         if part in (None, "arm"):
             command.synchronized_command.arm_command.arm_stop_command.SetInParent()
-        if not command.HasField("synchronized_command"):
+        if part == "gripper":
             return self._noted(CommandStatus(CommandState.DONE))
         stopped = self._send(command, part or "all", lease, math.inf)
         with self._lock:
@@ -418,8 +394,7 @@ class ApiRobot:
         made = _Sent(answer.robot_command_id, part, until_s=until_s if end_s is None else math.inf)
         with self._lock:
             for sent in self._sent.values():
-                base = {"base", "posture"}
-                same = sent.part == part or {sent.part, part} <= base
+                same = sent.part == part or {sent.part, part} <= {"base", "posture"}
                 if same and sent.status.state is CommandState.RUNNING:
                     sent.status = CommandStatus(CommandState.STOPPED, "replaced by another command")
             return self._kept(made)

@@ -14,7 +14,6 @@ from bosdyn.api import (
     estop_pb2,
     full_body_command_pb2,
     lease_pb2,
-    mobility_command_pb2,
     power_pb2,
     robot_command_pb2,
 )
@@ -328,6 +327,3 @@ def _whole_motion(request: Any) -> _Whole:
         made.safe_power_off_feedback.status = basic_command_pb2.SafePowerOffCommand.Feedback.STATUS_IN_PROGRESS
         return _PowerOff(made)
     raise mobility.UnsupportedError(f"full_body_command: {which or 'no command'} is not simulated")
-
-
-__all__ = ["PowerService", "RobotCommandService", "mobility_command_pb2"]

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import grpc
@@ -176,8 +175,3 @@ class SpotServer:
             yield self
         finally:
             self._grpc.stop(0.5).wait()
-
-    @staticmethod
-    def credentials(folder: Path) -> Credentials:
-        """Returns the credentials in a folder; see `identity.credentials`."""
-        return identity.credentials(folder)

@@ -44,6 +44,7 @@ GOOD: Final[Mapping[str, Mapping[str, str]]] = {
     "fleet status": {"queue": "queue"},
     "evaluate": {"--say": "go to the hall", "--seeds": "1-2"},
     "report": {"results": "results.sqlite"},
+    "sdk": {"script": "good.py"},
     "detect": {"images": "good.png"},
     "dataset score": {"--data": "data/val.json"},
     "dataset train": {"--data": "data", "--out": "made"},
@@ -112,6 +113,7 @@ def prepare(folder: Path) -> None:
         b"free_thresh: 0.196\n",
         "m.pgm": cv2.imencode(".pgm", grey)[1].tobytes(),
         "good.png": cv2.imencode(".png", grey)[1].tobytes(),
+        "good.py": b"raise SystemExit(0)\n",
         "good.json": b'{"cylinders": [[1, 1, 0.2, 1]]}',
         "good.stl": b"solid\n" + b"".join(_facet(corners) for corners in ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))),
     }

@@ -16,6 +16,7 @@ from bosdyn.client.exceptions import UnauthenticatedError
 from bosdyn.client.robot_state import RobotStateClient
 from bosdyn.client.sdk import _DEFAULT_SERVICE_CLIENTS
 
+from plant.spot_api.server import identity
 from plant.spot_api.server.calls import Call
 from plant.spot_api.server.identity import SERIAL, AuthService, TimeSyncService
 from plant.spot_api.server.messages import duration, seconds, timestamp
@@ -133,9 +134,7 @@ def test_the_sdk_synchronises_its_clock(served):
 
 
 def test_a_certificate_of_another_server_is_not_trusted(served, tmp_path):
-    from plant.spot_api.server.server import SpotServer
-
-    other = SpotServer.credentials(tmp_path)
+    other = identity.credentials(tmp_path)
     sdk = bosdyn.client.create_standard_sdk("test", cert_resource_glob=str(other.certificate))
     robot = sdk.create_robot("127.0.0.1")
     robot.update_secure_channel_port(served.server.port)

@@ -91,7 +91,7 @@ def followed(page):
 def test_a_tutorial_does_what_it_says(page, tmp_path):
     reader = Reader(tmp_path)
     if page.name == "own-robot.md":
-        write_package(reader.folder)
+        write_package(reader.folder, with_head=True)
     for block in blocks(page):
         reader.follow(block)
 

@@ -259,7 +259,7 @@ def arm_places(x_m: float, z_m: float, reach_m: float, tip_m: float, front_m: fl
 
     return {
         "max_reach": _rounded(reach_m),
-        "max_payload": 0.5,
+        "max_payload": 2.0,
         "standing": ahead((0.64, 0.675, 0.605, 0.71, 0.57, 0.535, 0.745, 0.78)),
         "nearer": ahead((0.53, 0.495, 0.46, 0.425)),
         "carry_x": [_rounded(x_m + share * whole) for share in (0.42, 0.375, 0.33, 0.465, 0.51)],

@@ -64,8 +64,18 @@ def gripper():
         )  # fmt: skip
 
 
-def urdf(*, with_arm=True, with_gripper=True):
-    """The robot's URDF text."""
+def head():
+    """Joints of pan and tilt on the mast."""
+    yield link("pan_link", 0.3, box("0.05 0.05 0.05"))
+    yield joint("head_pan", "revolute", "mast", "pan_link", "0.05 0 0.9", axis="0 0 1", limit=(-1.5, 1.5, 5, 1.5))
+    yield joint(
+        "head_tilt", "revolute", "pan_link", "camera_link", "0.05 0 0.03", axis="0 1 0", limit=(-0.7, 1.4, 5, 1.5)
+    )
+
+
+def urdf(*, with_arm=True, with_gripper=True, with_head=False):
+    """The robot's URDF text; without a head its camera is fixed to the mast."""
+    fixed = joint("camera_mount", "fixed", "mast", "camera_link", "0.05 0 0.9", "0 0.6 0")
     wheel = '<cylinder radius="0.08" length="0.03"/>'
     parts = [
         link("base_link", 40, mesh("base.stl"), "0 0 0.12", size=0.4),
@@ -79,7 +89,7 @@ def urdf(*, with_arm=True, with_gripper=True):
         link("mast", 3.0, mesh("mast.obj"), "0 0 0.45"),
         joint("mast_mount", "fixed", "base_link", "mast", "-0.15 0 0.22"),
         link("camera_link", 0.2, mesh("eye.dae")),
-        joint("camera_mount", "fixed", "mast", "camera_link", "0.05 0 0.9", "0 0.6 0"),
+        *(head() if with_head else (fixed,)),
         '<link name="camera_optical_frame"/>',
         joint("camera_optical", "fixed", "camera_link", "camera_optical_frame", "0.02 0 0", "-1.5707963 0 -1.5707963"),
     ]

@@ -49,6 +49,13 @@ def test_the_arm_is_stowed_over_the_footprint_out_of_the_cameras_view(rover_kind
     assert np.all(np.hypot(x, y) > 0.5 * z)
 
 
+def test_joints_of_pan_and_tilt_are_a_head_that_carries_the_camera(tmp_path):
+    render_robot("rover", write_package(tmp_path, with_head=True), tmp_path / "made", packages={})
+    can = Description(tmp_path / "made/errand_robot_rover/robot.yaml").capabilities
+    assert can.head is not None and can.head.joint_names == ("head_pan", "head_tilt")
+    assert np.allclose(can.head.p_BP_m, [-0.10, 0.0, 1.12]) and can.object_camera.mount is Mount.HEAD
+
+
 @pytest.mark.parametrize("options", [{"with_gripper": False}, {"with_arm": False}])
 def test_a_robot_may_have_no_gripper_or_no_arm(tmp_path, options):
     render_robot("rover", write_package(tmp_path, **options), tmp_path / "made", packages={})

@@ -4,6 +4,7 @@ import json
 import signal
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -117,7 +118,7 @@ class Fleet:
         self.shares += [(share.tree.robot_name, share.done) for share in before]
         self.since_s.append(since_s)
 
-    def run(self, page=None):
+    def run(self, page=None, live=None):
         placed = {name: PlacedRobot(name, "spot", START) for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
         dispatch = Dispatch(
@@ -129,9 +130,13 @@ class Fleet:
             docks,
             offers=lambda *of: ScriptedOffers(self, *of),
         )
-        run_fleet(dispatch, out=self.out, seed=3, page=page, ended=lambda: self.ended.append(len(dispatch.over)))
+        ended = partial(self._note_end, dispatch)
+        run_fleet(dispatch, out=self.out, seed=3, page=page, live=live, ended=ended)
         self.rows = rows = missions_json(self.store, list(self.missions))
         return [(row["robot"], row["outcome"], row["reassigned"]) for row in rows]
+
+    def _note_end(self, dispatch):
+        self.ended.append(len(dispatch.over))
 
     def _docking(self, name):
         step = Do.from_command(Command(task=Task.CHARGE))
@@ -175,6 +180,13 @@ def test_three_missions_are_done_by_two_robots(fleet, script):
     assert fleet.ended == [1, 2, 3] or fleet.ended == [2, 2, 3]
     assert sorted(fleet.judged) == [("Alice", "success"), ("Alice", "success"), ("Bob", "success")]
     assert [robot.holder for robot in fleet.robots.values()] == [None, None]
+
+
+def test_the_log_of_a_fleet_is_sent_live(fleet):
+    fleet.queue(KITCHEN)
+    followed = []
+    fleet.run(live=SimpleNamespace(follow=followed.append))
+    assert [log.path for log in followed] == [fleet.out / "log.mcap"]
 
 
 def test_the_mission_of_a_robot_that_dies_is_done_by_the_other(fleet, script):

@@ -15,6 +15,7 @@ from executive.app.report import ReportedAnswer, ReportedObject, RunReport
 from executive.app.report_file import step_rows
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
+from executive.record.history import read_events
 from executive.run.outcome import Said
 from executive.run.visitor import RunEntry
 from executive.tree.node import NodeState
@@ -55,6 +56,15 @@ def test_speech_is_in_report_and_page(talk):
     assert "<i>" not in page
     assert page.count("said &#34;") >= 2
     assert "The map, with the path of the robot" in page
+
+
+def test_messages_of_a_run_are_sent_live_from_its_beginning(talk):
+    sent = []
+    live = SimpleNamespace(follow=lambda log: log.listen(lambda message: sent.append((message.topic, message.data))))
+    run_request(talk, ScriptedBackend(), live=live)
+    events = read_events(talk.request.out / "log.mcap")
+    assert [(topic, json.loads(data)) for topic, data in sent] == [(event.topic, event.data) for event in events]
+    assert sent[0][0] == "map"
 
 
 def test_the_report_is_the_same_after_json():

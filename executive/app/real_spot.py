@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -164,6 +165,7 @@ def spot_runner(prepared: Prepared, access: Access) -> Iterator[Callable[..., Fi
     if prepared.several:
         raise InputError("a real robot runs alone", hint="leave --robots out")
     compile_first()
+    logging.getLogger("drake").setLevel(logging.WARNING)
     start = prepared.request.start
     with connected(prepared.tree.robot_name, access) as (robot, clock):
         stack = robot_stack(prepared.robots[robot.name])

@@ -27,6 +27,7 @@ LISTED: Final[Mapping[str, str]] = {
     "arm-surface-contact": "bosdyn.api.ArmSurfaceContactService",
     "auto-return": "bosdyn.api.auto_return.AutoReturnService",
     "autowalk-service": "bosdyn.api.autowalk.AutowalkService",
+    "choreography": "bosdyn.api.spot.ChoreographyService",
     "data": "bosdyn.api.DataService",
     "data-acquisition": "bosdyn.api.DataAcquisitionService",
     "data-acquisition-store": "bosdyn.api.DataAcquisitionStoreService",
@@ -40,6 +41,7 @@ LISTED: Final[Mapping[str, str]] = {
     "ray-cast": "bosdyn.api.RayCastService",
     "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
     "robot-command-streaming": "bosdyn.api.RobotCommandStreamingService",
+    "robot-mission": "bosdyn.api.mission.MissionService",
     "robot-state-streaming": "bosdyn.api.RobotStateStreamingService",
     "spot-check": "bosdyn.api.spot.SpotCheckService",
 }

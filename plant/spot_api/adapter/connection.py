@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import bosdyn.client
 import grpc
@@ -171,6 +171,16 @@ class Connection:
     def state(self) -> Any:
         """Returns the robot's state. Raises LostError."""
         return self.call("robot-state", "GetRobotState", robot_state_pb2.RobotStateRequest()).robot_state
+
+
+class RobotClock(Protocol):
+    """Clock of the robot for an adapter: the protocol's clock, and the robot's time."""
+
+    def now(self) -> float:
+        """Seconds since the connection was made."""
+
+    def robot_time_s(self) -> float:
+        """The robot's time (s since 1970)."""
 
 
 class WallClock:

@@ -10,7 +10,7 @@ import math
 from contextlib import suppress
 from dataclasses import dataclass, field
 from threading import Lock
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 from bosdyn.api import (
@@ -27,7 +27,7 @@ from bosdyn.client.robot_command import RobotCommandBuilder
 from bosdyn.geometry import EulerZXY
 from pydrake.math import RigidTransform
 
-from plant.spot_api.adapter.connection import Connection, LostError
+from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
 from plant.spot_api.adapter.readings import TIP_RADIUS_M, Readings, frames_of, picture, pose_between, readings, scan
 from skills.robot import (
     ArmTrajectory,
@@ -58,16 +58,6 @@ _MOST_POINTS: Final = 250
 _LIDAR: Final = "velodyne-point-cloud"
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
 Answer = robot_command_pb2.RobotCommandResponse
-
-
-class RobotClock(Protocol):
-    """Clock of the robot for an adapter: the protocol's clock, and the robot's time."""
-
-    def now(self) -> float:
-        """Seconds since the connection was made."""
-
-    def robot_time_s(self) -> float:
-        """The robot's time (s since 1970)."""
 
 
 @dataclass
@@ -110,7 +100,7 @@ class ApiRobot:
         return self._readings.odometry
 
     def imu(self) -> Imu | None:
-        """Returns None: the API gives no inertial readings in its state."""
+        """Returns None: the API gives no inertial readings."""
         return None
 
     def scan(self) -> Scan | None:
@@ -236,7 +226,7 @@ class ApiRobot:
             stop = mobility_command_pb2.MobilityCommand.Request(stop_request=basic_command_pb2.StopCommand.Request())
             command.synchronized_command.mobility_command.CopyFrom(stop)
         if part in (None, "arm"):
-            command.synchronized_command.arm_command.arm_stop_command.SetInParent()
+            command.MergeFrom(_arm_stop())
         if part == "gripper":
             return self._noted(CommandStatus(CommandState.DONE))
         stopped = self._send(command, part or "all", lease, math.inf)
@@ -348,8 +338,11 @@ class ApiRobot:
         if status.state is CommandState.RUNNING and self._clock.now() >= sent.until_s:
             status = CommandStatus(CommandState.STOPPED, "expired before it was done")
         with self._lock:
-            if sent.status.state is CommandState.RUNNING:
-                sent.status = status
+            if sent.status.state is not CommandState.RUNNING:
+                return
+            sent.status = status
+        if status.state is CommandState.STOPPED and sent.part == "arm" and self._current is not None:
+            self._send(_arm_stop(), "arm", self._current)  # the API's arm commands have no end of their own
 
     # -- inside ------------------------------------------------------------------------------------------------------
 
@@ -412,6 +405,12 @@ class ApiRobot:
         while len(self._sent) > 1000:
             del self._sent[next(iter(self._sent))]
         return number
+
+
+def _arm_stop() -> Any:
+    command = robot_command_pb2.RobotCommand()
+    command.synchronized_command.arm_command.arm_stop_command.SetInParent()
+    return command
 
 
 def _status_of(feedback: Any, part: str) -> CommandStatus:

@@ -140,6 +140,10 @@ def test_a_command_that_is_not_done_in_time_is_stopped(standing):
     command = standing.robot.move_arm(trajectory, until_s=standing.now() + 0.3, lease=standing.lease)
     assert standing.done(command)
     assert "expired" in standing.robot.command_status(command).reason
+    standing.advance(0.2)
+    held = standing.served.q_rad.copy()
+    standing.advance(1.0)
+    assert standing.served.q_rad == pytest.approx(held, abs=1e-3)
 
 
 def test_the_gripper_goes_to_an_opening(standing):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -93,7 +94,7 @@ def run(
         screen = ConsoleScreen(
             console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, live=live, profile=timing
         )
-        spot = spot_runner(prepared, robot, user, certificate, power_on=power_on, take=take)
+        spot = spot_runner(prepared, robot, user, certificate, power_on=power_on, take=take) if robot else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), spot as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)

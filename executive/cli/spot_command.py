@@ -133,12 +133,9 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
 
 @contextmanager
 def spot_runner(
-    prepared: Prepared, url: str | None, user: str | None, certificate: Path | None, *, power_on: bool, take: bool
-) -> Iterator[Callable[..., FinishedRun] | None]:
-    """Connects to the Spot at a URL, and yields a function that runs a mission with it; None without a URL."""
-    if url is None:
-        yield None
-        return
+    prepared: Prepared, url: str, user: str | None, certificate: Path | None, *, power_on: bool, take: bool
+) -> Iterator[Callable[..., FinishedRun]]:
+    """Connects to the Spot at a URL, and yields a function that runs a mission with it."""
     access = spot_access(url, user, certificate, power_on=power_on, take=take)
     from executive.app import real_spot
 

@@ -12,7 +12,7 @@ from pydrake.common.eigen_geometry import AngleAxis, Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.interpolate import PchipInterpolator
 
-from plant.spot_api.server.computer import HAND_X_M, Computer, Snapshot
+from plant.spot_api.server.computer import HAND_X_M, Computer, Snapshot, Solver
 from plant.spot_api.server.messages import InvalidRequestError, duration, finite, seconds, transform, vector
 from plant.spot_api.server.mobility import UnknownFrameError
 from skills.robot import ArmTrajectory, CommandState, FloatArray
@@ -29,6 +29,7 @@ _SETTLING_S, _STILL_RAD_S = 1.0, 0.05
 _STEPS: Final = 20
 _SAMPLE_S: Final = 0.05
 _PER_SEGMENT: Final = 6
+_FARTHEST_M: Final = 2.0
 X_HAND: Final = RigidTransform([HAND_X_M, 0.0, 0.0])
 """Pose of the API's frame `hand` in `link_wr1`, the default tool."""
 
@@ -393,9 +394,15 @@ def _known(frame: str, snapshot: Snapshot) -> str:
     return frame
 
 
+def solutions(solver: Solver, X_BW: RigidTransform) -> list[FloatArray]:
+    """Joint angles that put the wrist at a pose; none for one that is far away."""
+    near = float(np.abs(X_BW.translation()).max()) < _FARTHEST_M
+    return list(solver.inverse(X_BW)) if near else []
+
+
 def _posture_at(computer: Computer, X_BW: RigidTransform, near_rad: FloatArray) -> FloatArray | None:
     """Joint angles that put the wrist at a pose, the nearest to a posture; None out of reach."""
-    found = [] if computer.solver is None else list(computer.solver.inverse(X_BW))
+    found = [] if computer.solver is None else solutions(computer.solver, X_BW)
     return min(found, key=lambda q: float(np.abs(q - near_rad).max()), default=None)
 
 

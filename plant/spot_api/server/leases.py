@@ -182,7 +182,7 @@ class LeaseService(Service):
         if claim is None:
             return int(Result.STATUS_REVOKED if leaf in self._freed else Result.STATUS_INVALID_LEASE)
         newest, given = list(claim.lease.sequence), list(lease.sequence)
-        if given[0] > newest[0]:
+        if not given or lease.epoch != self.epoch or given[0] > newest[0]:
             return int(Result.STATUS_INVALID_LEASE)
         shorter = min(len(newest), len(given))
         return int(Result.STATUS_OK if given[:shorter] >= newest[:shorter] else Result.STATUS_OLDER)

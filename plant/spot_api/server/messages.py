@@ -60,9 +60,10 @@ def transform(message: geometry_pb2.SE3Pose, field: str) -> RigidTransform:
     """Returns the transform of a pose; a rotation that was left out is none. Raises InvalidRequestError."""
     q = message.rotation
     wxyz = np.array([finite(getattr(q, name), f"{field}.rotation.{name}") for name in "wxyz"])
+    if (largest := float(np.abs(wxyz).max())) < 1e-6:
+        wxyz, largest = np.array([1.0, 0.0, 0.0, 0.0]), 1.0
+    wxyz = wxyz / largest
     length = float(np.linalg.norm(wxyz))
-    if length < 1e-6:
-        wxyz, length = np.array([1.0, 0.0, 0.0, 0.0]), 1.0
     return RigidTransform(RotationMatrix(Quaternion(wxyz / length)), vector(message.position, f"{field}.position"))
 
 

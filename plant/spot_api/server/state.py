@@ -18,7 +18,7 @@ from bosdyn.api import (
 )
 from bosdyn.api.spot import inverse_kinematics_pb2
 
-from plant.spot_api.server.arm import JOINTS, READY_RAD, X_HAND
+from plant.spot_api.server.arm import JOINTS, READY_RAD, X_HAND, solutions
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Motors, Snapshot
 from plant.spot_api.server.identity import DOMAIN
@@ -229,7 +229,7 @@ class InverseKinematicsService(Service):
         )
         X_RTool = X_RT @ transform(request.tool_pose_task.task_tform_desired_tool, "task_tform_desired_tool")
         X_BW = snapshot.X_AB("body", request.root_frame_name) @ X_RTool @ X_WT.inverse()
-        found = list(solver.inverse(X_BW))
+        found = solutions(solver, X_BW)
         if not found:
             return Response(status=Response.STATUS_NO_SOLUTION_FOUND)
         best = min(found, key=lambda q: float(np.abs(q - np.array(READY_RAD)).max()))

@@ -93,6 +93,14 @@ def test_a_lease_that_no_longer_counts_is_not_returned(service):
     assert returned.status == lease_pb2.ReturnLeaseResponse.STATUS_NOT_ACTIVE_LEASE
 
 
+@pytest.mark.parametrize("change", [{"sequence": []}, {"epoch": "before"}])
+def test_a_lease_that_was_never_given_is_not_returned(service, change):
+    mine = acquired(service).lease
+    facts = {"resource": mine.resource, "epoch": mine.epoch, "sequence": list(mine.sequence), **change}
+    returned = service.ReturnLease(lease_pb2.ReturnLeaseRequest(lease=lease_pb2.Lease(**facts)), ME)
+    assert returned.status == lease_pb2.ReturnLeaseResponse.STATUS_NOT_ACTIVE_LEASE
+
+
 def test_a_sub_lease_counts_and_so_does_the_lease_above_it(service):
     mine = acquired(service).lease
     child = lease_pb2.Lease(resource="body", epoch=mine.epoch, sequence=[*mine.sequence, 7])

@@ -36,6 +36,11 @@ def test_a_rotation_that_was_left_out_is_none():
     assert transform(geometry_pb2.SE3Pose(), "pose").IsExactlyIdentity()
 
 
+def test_a_huge_quaternion_is_normalised():
+    message = geometry_pb2.SE3Pose(rotation=geometry_pb2.Quaternion(w=1e300, z=1e300))
+    assert transform(message, "pose").rotation().ToRollPitchYaw().yaw_angle() == pytest.approx(math.pi / 2)
+
+
 @pytest.mark.parametrize("field", ["position.x", "rotation.w"])
 def test_a_value_that_is_not_finite_is_named(field):
     message = geometry_pb2.SE3Pose()

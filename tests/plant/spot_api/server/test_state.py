@@ -129,7 +129,7 @@ def test_objects_of_clients_are_added_and_deleted(robot):
     assert answer.status == world_object_pb2.MutateWorldObjectResponse.STATUS_INVALID_MUTATION_ID
 
 
-@pytest.mark.parametrize(("x_m", "reached"), [(0.75, True), (2.5, False)])
+@pytest.mark.parametrize(("x_m", "reached"), [(0.75, True), (2.5, False), (1e300, False)])
 def test_inverse_kinematics_says_what_is_in_reach(robot, x_m, reached):
     Request = inverse_kinematics_pb2.InverseKinematicsRequest
     robot.service_client_factories_by_type[InverseKinematicsClient.service_type] = InverseKinematicsClient

@@ -134,8 +134,10 @@ def connected(name: str, access: Access) -> Iterator[tuple[ApiRobot, WallClock]]
         raise InputError(str(error), hint="try again; --take takes the lease from another client") from error
     finally:
         with suppress(LostError):
-            if powered_here and connection.lease is not None:
-                connection.power_off_safely()
+            if connection.lease is not None:
+                connection.stop()
+                if powered_here:
+                    connection.power_off_safely()
             connection.give_back()
 
 

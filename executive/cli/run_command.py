@@ -73,7 +73,7 @@ def run(
     from executive.app.runs import MissionRuns
     from executive.cli.listen_command import hear_request
     from executive.cli.screen import ConsoleScreen, voice_for
-    from executive.cli.spot_command import spot_runner
+    from executive.cli.spot_command import connected_spot
     from executive.record.work import Profile
     from executive.store.missions import MissionStore, store_in
     from executive.view.foxglove import serve_live
@@ -94,7 +94,7 @@ def run(
         screen = ConsoleScreen(
             console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, live=live, profile=timing
         )
-        spot = spot_runner(prepared, robot, user, certificate, power_on=power_on, take=take) if robot else nullcontext()
+        spot = connected_spot(prepared, robot, user, certificate, power_on, take) if robot else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), spot as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)

@@ -132,8 +132,8 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
 
 
 @contextmanager
-def spot_runner(
-    prepared: Prepared, url: str, user: str | None, certificate: Path | None, *, power_on: bool, take: bool
+def connected_spot(
+    prepared: Prepared, url: str, user: str | None, certificate: Path | None, power_on: bool, take: bool
 ) -> Iterator[Callable[..., FinishedRun]]:
     """Connects to the Spot at a URL, and yields a function that runs a mission with it."""
     access = spot_access(url, user, certificate, power_on=power_on, take=take)

@@ -33,7 +33,7 @@ from skills.files.errors import InputError
 CLIENT: Final = "errand"
 CALL_S: Final = 0.5
 _SLOW_S: Final = 5.0
-_OFF_S: Final = 15.0
+_OFF_S, _LOOK_S = 15.0, 0.1
 _ROUND_TRIPS: Final = 5
 _STUBS: Final[Mapping[str, Callable[[Any], Any]]] = {
     "estop": estop_service_pb2_grpc.EstopServiceStub,
@@ -157,16 +157,30 @@ class Connection:
             raise LostError(f"the motors stay off: {power_pb2.PowerCommandStatus.Name(answer.status)}")
         return int(answer.power_command_id)
 
+    def stop(self) -> None:
+        """Stops base and arm. Raises LostError."""
+        command = robot_command_pb2.RobotCommand()
+        command.full_body_command.stop_request.SetInParent()
+        self.command(command)
+
     def power_off_safely(self) -> None:
         """Lets the robot sit down and switch its motors off. Raises LostError."""
-        request = robot_command_pb2.RobotCommandRequest(lease=self.lease, clock_identifier=self.clock_identifier)
-        request.command.full_body_command.safe_power_off_request.SetInParent()
-        self.call("robot-command", "RobotCommand", request)
+        command = robot_command_pb2.RobotCommand()
+        command.full_body_command.safe_power_off_request.SetInParent()
+        self.command(command)
         until_s = time.monotonic() + _OFF_S
         while self.state().power_state.motor_power_state == robot_state_pb2.PowerState.MOTOR_POWER_STATE_ON:
             if time.monotonic() > until_s:
                 raise LostError("the motors do not switch off")
             self.retain()
+            Event().wait(_LOOK_S)
+
+    def command(self, command: Any) -> Any:
+        """Sends a command with the lease; returns the answer. Raises LostError."""
+        request = robot_command_pb2.RobotCommandRequest(
+            lease=self.lease, command=command, clock_identifier=self.clock_identifier
+        )
+        return self.call("robot-command", "RobotCommand", request)
 
     def state(self) -> Any:
         """Returns the robot's state. Raises LostError."""

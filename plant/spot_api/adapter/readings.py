@@ -10,9 +10,10 @@ import cv2
 import numpy as np
 from bosdyn.api import image_pb2
 from numpy.typing import NDArray
-from pydrake.common.eigen_geometry import Quaternion
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
+from plant.robots.spot.description import spot_facts
+from plant.spot_api.messages import Frames, frames_of, our_joint, pose_between
 from skills.robot import (
     Battery,
     Capabilities,
@@ -27,7 +28,8 @@ from skills.robot import (
     Scan,
 )
 
-TIP_RADIUS_M: Final = 0.118
+TIP_RADIUS_M: Final = float(spot_facts()["gripper"]["tip_radius"])
+"""Distance of the fingertip from the hinge of the finger."""
 _RINGS_DEG: Final = np.arange(-15.0, 16.0, 2.0)
 _COLUMNS: Final = 900
 _NO_DEPTH: Final = (0, 65535)
@@ -35,7 +37,7 @@ _NO_DEPTH: Final = (0, 65535)
 
 @dataclass(frozen=True)
 class Readings:
-    """Readings of one state message; `stamp_s` is on the robot's clock, `frames` are child -> (parent, X_PC)."""
+    """Readings of one state message; `stamp_s` is on the robot's clock."""
 
     stamp_s: float
     odometry: Odometry
@@ -43,45 +45,9 @@ class Readings:
     gripper: Gripper
     battery: Battery
     faults: tuple[str, ...]
-    frames: Mapping[str, tuple[str, RigidTransform]]
+    frames: Frames
     powered: bool
     released: bool
-
-    def X_AB(self, a: str, b: str) -> RigidTransform:
-        """Pose of frame `b` in frame `a`. Raises KeyError for an unknown frame."""
-        return pose_between(self.frames, a, b)
-
-
-def pose_between(frames: Mapping[str, tuple[str, RigidTransform]], a: str, b: str) -> RigidTransform:
-    """Pose of frame `b` in frame `a` of a tree child -> (parent, X_PC). Raises KeyError for an unknown frame."""
-    return _from_root(frames, a).inverse() @ _from_root(frames, b)
-
-
-def _from_root(frames: Mapping[str, tuple[str, RigidTransform]], frame: str) -> RigidTransform:
-    X = RigidTransform()
-    while frame:
-        parent, X_PF = frames[frame]
-        X, frame = X_PF @ X, parent
-    return X
-
-
-def transform(message: Any) -> RigidTransform:
-    """Returns the transform of an SE3Pose."""
-    q, p = message.rotation, message.position
-    rotation = RotationMatrix(Quaternion(np.array([q.w, q.x, q.y, q.z]) / np.linalg.norm([q.w, q.x, q.y, q.z])))
-    return RigidTransform(rotation, [p.x, p.y, p.z])
-
-
-def frames_of(message: Any) -> Mapping[str, tuple[str, RigidTransform]]:
-    """Returns a frame tree, child -> (parent, X_PC); roots have an empty parent."""
-    edges = message.child_to_parent_edge_map
-    return {child: (edge.parent_frame_name, transform(edge.parent_tform_child)) for child, edge in edges.items()}
-
-
-def our_joint(name: str) -> str:
-    """Name of a joint in the description: `fl.hx` is `fl_hx`, `arm0.sh0` is `arm_sh0`."""
-    limb, _, joint = name.partition(".")
-    return f"{'arm' if limb == 'arm0' else limb}_{joint}"
 
 
 def readings(state: Any, stamp_s: float, capabilities: Capabilities) -> Readings:

@@ -28,7 +28,8 @@ from bosdyn.geometry import EulerZXY
 from pydrake.math import RigidTransform
 
 from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
-from plant.spot_api.adapter.readings import TIP_RADIUS_M, Readings, frames_of, picture, pose_between, readings, scan
+from plant.spot_api.adapter.readings import TIP_RADIUS_M, Readings, picture, readings, scan
+from plant.spot_api.messages import frames_of, pose_between
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -371,11 +372,8 @@ class ApiRobot:
             end = self._clock.robot_time_s() + end_s - now_s
             given = command.synchronized_command.mobility_command.se2_velocity_request
             given.end_time.FromNanoseconds(round(end * 1e9))
-        request = robot_command_pb2.RobotCommandRequest(
-            lease=self._connection.lease, command=command, clock_identifier=self._connection.clock_identifier
-        )
         try:
-            answer = self._connection.call("robot-command", "RobotCommand", request)
+            answer = self._connection.command(command)
         except LostError as error:
             return self._refused(f"{part}: {error}")
         if answer.lease_use_result.status not in (0, lease_pb2.LeaseUseResult.STATUS_OK):

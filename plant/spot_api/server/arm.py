@@ -8,13 +8,15 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 from bosdyn.api import arm_command_pb2, basic_command_pb2, gripper_command_pb2
-from pydrake.common.eigen_geometry import AngleAxis, Quaternion
+from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
 
+from plant.robots.spot.description import spot_facts
+from plant.spot_api.messages import InvalidRequestError, duration, finite, seconds, transform, vector
 from plant.spot_api.server.computer import HAND_X_M, Computer, Snapshot, Solver
-from plant.spot_api.server.messages import InvalidRequestError, duration, finite, seconds, transform, vector
-from plant.spot_api.server.mobility import UnknownFrameError
+from plant.spot_api.server.mobility import unknown_frame
 from skills.robot import ArmTrajectory, CommandState, FloatArray
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
@@ -23,9 +25,9 @@ READY_RAD: Final = (0.0, -0.9, 1.8, 0.0, -0.9, 0.0)
 CARRY_RAD: Final = (0.0, -2.6, 2.2, 0.0, 0.4, 0.0)
 """Named postures of the arm; the robot's own are near these."""
 _FASTEST_RAD_S: Final = 2.5
-_USUAL_RAD_S, _USUAL_M_S, _USUAL_TURN_RAD_S = 1.5, 0.4, 1.0
+_USUAL_RAD_S, _USUAL_M_S = 1.5, 0.4
 _LEAST_S: Final = 0.2
-_SETTLING_S, _STILL_RAD_S = 1.0, 0.05
+_SETTLING_S, _STILL_RAD_S, _NEAR_RAD = 1.0, 0.05, 0.1
 _STEPS: Final = 20
 _SAMPLE_S: Final = 0.05
 _PER_SEGMENT: Final = 6
@@ -39,27 +41,38 @@ class ArmMotion:
 
     field: ClassVar[str]
     """Field of the feedback."""
-    complete: ClassVar[int]
     going: ClassVar[int]
-    """Statuses within that field, at the goal and before it."""
+    complete: ClassVar[int]
+    stalled: ClassVar[int]
+    """Statuses within that field: before the goal, at it, and when it is not reached."""
 
     def __init__(self) -> None:
         self.status: int = Status.STATUS_PROCESSING
-        self.feedback = self._made(done=False)
         self._command: Any = None
         self._joints: Sequence[str] = ()
-        self._ends_s = 0.0
+        self._goal_rad, self._ends_s = np.zeros(0), 0.0
+        self.feedback = self._made(self.going)
 
     def begin(self, computer: Computer) -> None:
         """Starts it."""
 
     def tick(self, computer: Computer) -> None:
-        """Reports whether the arm is at its goal, or rests as near as its load lets it."""
+        """Reports whether the arm is at its goal, nearly there and held back by its load, or stalled."""
         if self._command is not None and self.status == Status.STATUS_PROCESSING:
-            done = computer.robot.command_status(self._command).state is CommandState.DONE
-            late_s = computer.clock.now() - self._ends_s
-            rests = max(abs(computer.snapshot.joints.velocity_rad_s[name]) for name in self._joints) < _STILL_RAD_S
-            self.feedback = self._made(done=done or (late_s > _SETTLING_S and rests))
+            self.feedback = self._made(self._progress(computer))
+
+    def _progress(self, computer: Computer) -> int:
+        """Status within the field, by the robot's word and its joints."""
+        state, joints = computer.robot.command_status(self._command).state, computer.snapshot.joints
+        if state is CommandState.DONE:
+            return self.complete
+        if state is not CommandState.RUNNING:
+            return self.stalled
+        moves = max(abs(joints.velocity_rad_s[name]) for name in self._joints) > _STILL_RAD_S
+        if moves or computer.clock.now() - self._ends_s < _SETTLING_S:
+            return self.going
+        near = np.abs(computer.arm_rad(joints) - self._goal_rad).max() < _NEAR_RAD
+        return self.complete if near else self.stalled
 
     def end(self, status: int) -> None:
         """Ends it with a status."""
@@ -69,9 +82,10 @@ class ArmMotion:
         made.status = status
         self.feedback = made
 
-    def _made(self, *, done: bool) -> Any:
+    def _made(self, progress: int) -> Any:
+        """The message of a status within the field."""
         made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
-        getattr(made, self.field).status = self.complete if done else self.going
+        getattr(made, self.field).status = progress
         return made
 
     def _follow(self, computer: Computer, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> None:
@@ -80,10 +94,8 @@ class ArmMotion:
         assert solver is not None
         trajectory = smooth(np.clip(computer.arm_rad(), solver.lower_rad, solver.upper_rad), times_s, positions_rad)
         assert computer.capabilities.arm is not None
-        self._joints, self._ends_s = (
-            computer.capabilities.arm.joint_names,
-            computer.clock.now() + trajectory.times_s[-1],
-        )
+        self._joints, self._goal_rad = computer.capabilities.arm.joint_names, trajectory.positions_rad[-1]
+        self._ends_s = computer.clock.now() + float(trajectory.times_s[-1])
         until_s = computer.forever()
         self._command = computer.robot.move_arm(trajectory, until_s=until_s, lease=computer.lease)
 
@@ -113,6 +125,7 @@ class JointMove(ArmMotion):
     field = "arm_joint_move_feedback"
     complete = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_COMPLETE
     going = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_IN_PROGRESS
+    stalled = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_STALLED
 
     def __init__(self, request: Any, now_rad: FloatArray, now_s: float) -> None:
         trajectory = request.trajectory
@@ -139,11 +152,11 @@ class JointMove(ArmMotion):
         """Starts to move."""
         self._follow(computer, self._times_s, self._positions)
 
-    def _made(self, *, done: bool) -> Any:
-        made = super()._made(done=done)
+    def _made(self, progress: int) -> Any:
+        made = super()._made(progress)
         part = made.arm_joint_move_feedback
         part.planner_status = arm_command_pb2.ArmJointMoveCommand.Feedback.PLANNER_STATUS_SUCCESS
-        part.time_to_goal.CopyFrom(duration(0.0 if done else max(0.0, self._times_s[-1])))
+        part.time_to_goal.CopyFrom(duration(max(0.0, self._times_s[-1]) if progress == self.going else 0.0))
         return made
 
 
@@ -163,6 +176,7 @@ class Named(ArmMotion):
     field = "named_arm_position_feedback"
     complete = arm_command_pb2.NamedArmPositionsCommand.Feedback.STATUS_COMPLETE
     going = arm_command_pb2.NamedArmPositionsCommand.Feedback.STATUS_IN_PROGRESS
+    stalled = arm_command_pb2.NamedArmPositionsCommand.Feedback.STATUS_STALLED_HOLDING_ITEM
 
     def __init__(self, request: Any) -> None:
         names = arm_command_pb2.NamedArmPositionsCommand
@@ -205,7 +219,6 @@ class Cartesian(ArmMotion):
         self._times_s = [max(0.0, offset_s + seconds(point.time_since_reference)) for point in points]
         X_OR = snapshot.X_AB("odom", frame)
         self._X_OW = [X_OR @ X_RT @ transform(point.pose, "pose") @ X_WT.inverse() for point in points]
-        self._out_of_reach = False
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
@@ -222,12 +235,11 @@ class Cartesian(ArmMotion):
                     times.append(time_s + share * (end_s - time_s))
                     postures.append(posture)
                     before = posture
-            self._out_of_reach = self._out_of_reach or posture is None
+            if posture is None:  # nothing moves unless all goals are in reach
+                self.feedback = self._made(self.stalled)
+                return
             X_OW, time_s = X_OGoal, end_s
-        if self._out_of_reach:
-            self.feedback = self._made(done=False)
-        else:
-            self._follow(computer, times, postures)
+        self._follow(computer, times, postures)
 
     def tick(self, computer: Computer) -> None:
         """Reports how far the hand is from its goal."""
@@ -239,12 +251,6 @@ class Cartesian(ArmMotion):
         made.arm_cartesian_feedback.measured_rot_distance_to_goal = X_WG.rotation().ToAngleAxis().angle()
         self.feedback = made
 
-    def _made(self, *, done: bool) -> Any:
-        made = super()._made(done=done)
-        if self._out_of_reach:
-            made.arm_cartesian_feedback.status = self.stalled
-        return made
-
 
 class Gaze(ArmMotion):
     """Turns the hand's camera to a point, where the hand is or at a pose of its tool."""
@@ -252,6 +258,7 @@ class Gaze(ArmMotion):
     field = "arm_gaze_feedback"
     complete = arm_command_pb2.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
     going = arm_command_pb2.GazeCommand.Feedback.STATUS_IN_PROGRESS
+    stalled = arm_command_pb2.GazeCommand.Feedback.STATUS_TOOL_TRAJECTORY_STALLED
 
     def __init__(self, request: Any, snapshot: Snapshot) -> None:
         frame = _known(request.frame1_name, snapshot)
@@ -280,9 +287,10 @@ class Gaze(ArmMotion):
             if (posture := _posture_at(computer, X_BW, now)) is not None:
                 self._follow(computer, [1.5 * float(np.abs(posture - now).max()) / _USUAL_RAD_S], [posture])
                 return
+        self.feedback = self._made(self.stalled)
 
-    def _made(self, *, done: bool) -> Any:
-        made = super()._made(done=done)
+    def _made(self, progress: int) -> Any:
+        made, done = super()._made(progress), progress == self.complete
         part = made.arm_gaze_feedback
         part.gazing_at_target = part.hand_position_at_goal = part.hand_roll_at_goal = done
         return made
@@ -306,7 +314,7 @@ def _looking(away: FloatArray) -> RotationMatrix:
 class Moving(ArmMotion):
     """Moves the hand at a velocity until its end."""
 
-    field = "arm_velocity_feedback"
+    field, going = "arm_velocity_feedback", 0
 
     def __init__(self, request: Any, snapshot: Snapshot, end_s: float) -> None:
         self._end_s, self._frame = end_s, "odom"
@@ -334,7 +342,7 @@ class Moving(ArmMotion):
         step_s, X_BW = 0.1, computer.solver.X_BH(self._q) if computer.solver else RigidTransform()
         X_BHand = X_BW @ X_HAND
         moved = RigidTransform(
-            X_BHand.rotation() @ _turned(np.array(self._angular) * step_s),
+            X_BHand.rotation() @ RotationMatrix(Rotation.from_rotvec(np.array(self._angular) * step_s).as_matrix()),
             X_BHand.translation() + step_s * self._velocity_B(computer, X_BHand),
         )
         posture = _posture_at(computer, moved @ X_HAND.inverse(), self._q)
@@ -356,24 +364,16 @@ class Moving(ArmMotion):
         out, aside = np.array([math.cos(heading), math.sin(heading)]), np.array([-math.sin(heading), math.cos(heading)])
         return np.array([*(r * out + theta * radius * aside), z])
 
-    def _made(self, *, done: bool) -> Any:
+    def _made(self, _progress: int) -> Any:
         made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
         made.arm_velocity_feedback.SetInParent()
         return made
 
 
-def _turned(rotation_vector: FloatArray) -> RotationMatrix:
-    angle = float(np.linalg.norm(rotation_vector))
-    if angle < 1e-9:
-        return RotationMatrix()
-    x, y, z = rotation_vector / angle * math.sin(angle / 2)
-    return RotationMatrix(Quaternion(math.cos(angle / 2), x, y, z))
-
-
 class ArmHalt(ArmMotion):
     """Holds the arm where it is."""
 
-    field = "arm_stop_feedback"
+    field, going = "arm_stop_feedback", 0
 
     def begin(self, computer: Computer) -> None:
         """Holds the present posture."""
@@ -381,16 +381,16 @@ class ArmHalt(ArmMotion):
         until_s = computer.clock.now() + 1.0
         computer.robot.move_arm(ArmTrajectory(np.array([0.1]), now[None]), until_s=until_s, lease=computer.lease)
 
-    def _made(self, *, done: bool) -> Any:
+    def _made(self, _progress: int) -> Any:
         made = arm_command_pb2.ArmCommand.Feedback(status=self.status)
         made.arm_stop_feedback.SetInParent()
         return made
 
 
 def _known(frame: str, snapshot: Snapshot) -> str:
-    """Returns a frame of the tree. Raises UnknownFrameError."""
+    """Returns a frame of the tree. Raises RefusedError."""
     if frame not in snapshot.frames:
-        raise UnknownFrameError(f"frame {frame!r} is unknown")
+        raise unknown_frame(frame)
     return frame
 
 
@@ -409,14 +409,14 @@ def _posture_at(computer: Computer, X_BW: RigidTransform, near_rad: FloatArray) 
 class Claw:
     """Opens or closes the gripper. Its feedback is replaced whole."""
 
-    def __init__(self, request: Any, widest: float, most_force_n: float, tip_radius_m: float) -> None:
+    def __init__(self, request: Any, widest: float, most_force_n: float) -> None:
         """Takes a trajectory of angles, of which the last is the goal: 0 closed, negative open (rad)."""
         if not request.trajectory.points:
             raise InvalidRequestError("claw_gripper_command.trajectory has no points")
         goal = finite(request.trajectory.points[-1].point, "claw_gripper_command.trajectory.point")
         self._opening = min(max(-goal, 0.0), widest)
         torque = request.maximum_torque.value if request.HasField("maximum_torque") else 5.5
-        force = finite(torque, "claw_gripper_command.maximum_torque") / tip_radius_m
+        force = finite(torque, "claw_gripper_command.maximum_torque") / float(spot_facts()["gripper"]["tip_radius"])
         self._force_n = min(max(force, 1.0), most_force_n)
         self.status: int = Status.STATUS_PROCESSING
         self._command: Any = None
@@ -433,10 +433,10 @@ class Claw:
             return
         part = gripper_command_pb2.ClawGripperCommand.Feedback
         status = computer.robot.command_status(self._command)
-        if status.state is CommandState.RUNNING:
-            self.feedback = self._made(part.STATUS_IN_PROGRESS)
-        else:
+        if status.state is CommandState.DONE:
             self.feedback = self._made(part.STATUS_APPLYING_FORCE if status.reason else part.STATUS_AT_GOAL)
+        elif status.state is not CommandState.RUNNING:
+            self.feedback = self._made(part.STATUS_UNKNOWN)
 
     def end(self, status: int) -> None:
         """Ends it with a status."""

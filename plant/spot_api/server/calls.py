@@ -17,7 +17,7 @@ from google.protobuf import descriptor_pool
 from google.protobuf.message import DecodeError, Message
 from google.protobuf.message_factory import GetMessageClass
 
-from plant.spot_api.server.messages import InvalidRequestError, timestamp
+from plant.spot_api.messages import InvalidRequestError, timestamp
 
 _LOG: Final = logging.getLogger(__name__)
 _MALFORMED: Final = object()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass
 from itertools import count
 from threading import Lock
@@ -18,18 +20,18 @@ from bosdyn.api import (
     robot_command_pb2,
 )
 
+from plant.spot_api.messages import InvalidRequestError
 from plant.spot_api.server import arm, mobility
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Motion, Motors, Snapshot
 from plant.spot_api.server.identity import DOMAIN, TimeSyncService
 from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
-from plant.spot_api.server.messages import InvalidRequestError
 
 Status = robot_command_pb2.RobotCommandResponse
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
+_LOG: Final = logging.getLogger(__name__)
 _ALL: Final = (MOBILITY, ARM, GRIPPER)
 _REMEMBERED: Final = 1000
-TIP_RADIUS_M: Final = 0.118
 
 
 class PowerService(Service):
@@ -41,10 +43,10 @@ class PowerService(Service):
         self._computer, self._leases, self._ids = computer, leases, count(1)
         self._wanted: dict[int, Motors] = {}
 
-    def PowerCommand(self, request: Any, call: Call) -> Any:
+    def PowerCommand(self, request: Any, _call: Call) -> Any:
         """Takes a command for the motors; the power of the computer, ports and radio cannot be switched."""
         Response, Request = power_pb2.PowerCommandResponse, power_pb2.PowerCommandRequest
-        used = self._leases.use(request.lease, _ALL, call)
+        used = self._leases.use(request.lease, _ALL)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Response(lease_use_result=used, status=power_pb2.STATUS_UNKNOWN)
         if request.request == Request.REQUEST_ON_MOTORS:
@@ -109,25 +111,17 @@ class RobotCommandService(Service):
         self._ids, self._lock = count(1), Lock()
         self._commands: OrderedDict[int, _Commanded] = OrderedDict()
 
-    def RobotCommand(self, request: Any, call: Call) -> Any:
+    def RobotCommand(self, request: Any, _call: Call) -> Any:
         """Starts a command; commands for other parts go on."""
         parts = _parts_of(request.command)
-        used = self._leases.use(request.lease, parts, call)
+        used = self._leases.use(request.lease, parts)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Status(lease_use_result=used, status=Status.STATUS_UNKNOWN)
         status, message, number = Status.STATUS_OK, "", 0
         try:
             number = self._start(request)
-        except _RefusedError as refused:
+        except mobility.RefusedError as refused:
             status, message = refused.status, str(refused)
-        except mobility.ExpiredError as expired:
-            status, message = Status.STATUS_EXPIRED, str(expired)
-        except mobility.TooDistantError as distant:
-            status, message = Status.STATUS_TOO_DISTANT, str(distant)
-        except mobility.UnknownFrameError as unknown:
-            status, message = Status.STATUS_UNKNOWN_FRAME, str(unknown)
-        except mobility.UnsupportedError as unsupported:
-            status, message = Status.STATUS_UNSUPPORTED, str(unsupported)
         except InvalidRequestError as invalid:
             status, message = Status.STATUS_INVALID_REQUEST, str(invalid)
         return Status(lease_use_result=used, status=status, message=message, robot_command_id=number)
@@ -140,23 +134,23 @@ class RobotCommandService(Service):
             raise InvalidRequestError(f"robot_command_id: there is no command {request.robot_command_id}")
         return robot_command_pb2.RobotCommandFeedbackResponse(feedback=commanded.feedback())
 
-    def ClearBehaviorFault(self, request: Any, call: Call) -> Any:
+    def ClearBehaviorFault(self, request: Any, _call: Call) -> Any:
         """Answers that there is no such fault: the simulated robot has none."""
         Response = robot_command_pb2.ClearBehaviorFaultResponse
-        used = self._leases.use(request.lease, _ALL, call)
+        used = self._leases.use(request.lease, _ALL)
         return Response(lease_use_result=used, status=Response.STATUS_NOT_CLEARED)
 
     def _start(self, request: Any) -> int:
-        """Starts a command and returns its number. Raises _RefusedError, and the errors of the motions."""
+        """Starts a command and returns its number. Raises RefusedError or InvalidRequestError."""
         command, computer = request.command, self._computer
         snapshot = computer.snapshot
         whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
         if snapshot.motors is not Motors.ON and not isinstance(whole, _PowerOff | _StopAll):
-            raise _RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+            raise mobility.RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
         parts: Mapping[str, Any] = {}
         if whole is None:
             if _has_end_time(command) and not self._clocks.knows(request.clock_identifier):
-                raise _RefusedError(Status.STATUS_NO_TIMESYNC, "the client has not synchronised its clock")
+                raise mobility.RefusedError(Status.STATUS_NO_TIMESYNC, "the client has not synchronised its clock")
             parts = self._motions(command.synchronized_command, snapshot)
         commanded = _Commanded(parts, whole)
         with self._lock:
@@ -164,7 +158,8 @@ class RobotCommandService(Service):
             self._commands[number] = commanded
             while len(self._commands) > _REMEMBERED:
                 self._commands.popitem(last=False)
-        computer.do(lambda: computer.move(parts) if whole is None else whole.begin_alone(computer))
+        begun = computer.do(lambda: computer.move(parts) if whole is None else whole.begin_alone(computer))
+        begun.add_done_callback(_log_failure)
         return number
 
     def _motions(self, command: Any, snapshot: Snapshot) -> Mapping[str, Motion]:
@@ -175,25 +170,23 @@ class RobotCommandService(Service):
             made[MOBILITY] = _base_motion(command.mobility_command, self._computer, snapshot, now_s)
         if command.HasField("arm_command"):
             if self._computer.solver is None:
-                raise mobility.UnsupportedError("the robot has no arm")
+                raise mobility.unsupported("arm_command of a robot without an arm")
             made[ARM] = _arm_motion(command.arm_command, self._computer, snapshot, now_s)
         if command.HasField("gripper_command"):
             gripper = self._computer.capabilities.gripper
             if gripper is None:
-                raise mobility.UnsupportedError("the robot has no gripper")
+                raise mobility.unsupported("gripper_command of a robot without a gripper")
             request = command.gripper_command.claw_gripper_command
-            made[GRIPPER] = arm.Claw(request, gripper.widest, gripper.max_force_n, TIP_RADIUS_M)
+            made[GRIPPER] = arm.Claw(request, gripper.widest, gripper.max_force_n)
         if not made:
             raise InvalidRequestError("command: it names no part of the robot")
         return made
 
 
-class _RefusedError(Exception):
-    """A command that is refused with a status of the API."""
-
-    def __init__(self, status: int, message: str) -> None:
-        self.status = status
-        super().__init__(message)
+def _log_failure(begun: Future[None]) -> None:
+    """Logs the error of a command that could not begin, which no client waits for."""
+    if (error := begun.exception()) is not None:
+        _LOG.error("a command could not begin", exc_info=error)
 
 
 def _parts_of(command: Any) -> tuple[str, ...]:
@@ -241,7 +234,7 @@ def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: fl
         "freeze_request": lambda: mobility.Halt("freeze_feedback"),
     }
     if which not in made:
-        raise mobility.UnsupportedError(f"mobility_command: {which or 'no command'} is not simulated")
+        raise mobility.unsupported(f"mobility_command: {which or 'no command'}")
     return made[which]()
 
 
@@ -264,7 +257,7 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
         "arm_stop_command": arm.ArmHalt,
     }
     if which not in made:
-        raise mobility.UnsupportedError(f"arm_command: {which or 'no command'} is not simulated")
+        raise mobility.unsupported(f"arm_command: {which or 'no command'}")
     return made[which]()
 
 
@@ -312,7 +305,7 @@ class _PowerOff(_Whole):
 
 
 def _whole_motion(request: Any) -> _Whole:
-    """Motion of the whole body. Raises UnsupportedError."""
+    """Motion of the whole body. Raises RefusedError."""
     made, which = full_body_command_pb2.FullBodyCommand.Feedback(), request.WhichOneof("command")
     if which == "stop_request":
         made.stop_feedback.SetInParent()
@@ -326,4 +319,4 @@ def _whole_motion(request: Any) -> _Whole:
     if which == "safe_power_off_request":
         made.safe_power_off_feedback.status = basic_command_pb2.SafePowerOffCommand.Feedback.STATUS_IN_PROGRESS
         return _PowerOff(made)
-    raise mobility.UnsupportedError(f"full_body_command: {which or 'no command'} is not simulated")
+    raise mobility.unsupported(f"full_body_command: {which or 'no command'}")

@@ -18,6 +18,7 @@ import numpy as np
 from bosdyn.api import basic_command_pb2, estop_pb2
 from pydrake.math import RigidTransform
 
+from plant.spot_api.messages import Frames, pose_between
 from plant.spot_api.server.estop import EstopService
 from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
 from skills.robot import (
@@ -40,7 +41,7 @@ T = TypeVar("T")
 PERIOD_S: Final = 0.025
 POWER_ON_S: Final = 1.0
 _LATE_S: Final = 0.3
-_STILL_M, _STILL_S = 0.01, 1.0
+_STILL_M, _STILL_S, _NEAR_M = 0.01, 1.0, 0.05
 OVERRIDDEN: Final = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN
 _FOREVER_S: Final = 1e7
 HAND_X_M: Final = 0.19557
@@ -82,7 +83,7 @@ class Pace(Enum):
 
 @dataclass(frozen=True)
 class Snapshot:
-    """Readings after a step. `time_s` is the robot's time (s since 1970); frames are child -> (parent, X_PC)."""
+    """Readings after a step. `time_s` is the robot's time (s since 1970)."""
 
     time_s: float
     odometry: Odometry
@@ -93,18 +94,11 @@ class Snapshot:
     faults: tuple[str, ...]
     motors: Motors
     sitting: bool
-    frames: Mapping[str, tuple[str, RigidTransform]]
+    frames: Frames
 
     def X_AB(self, a: str, b: str) -> RigidTransform:
         """Pose of frame `b` in frame `a`. Raises KeyError for an unknown frame."""
-        return self._from_root(a).inverse() @ self._from_root(b)
-
-    def _from_root(self, frame: str) -> RigidTransform:
-        X = RigidTransform()
-        while frame != "body":
-            frame, X_PF = self.frames[frame]
-            X = X_PF @ X
-        return X
+        return pose_between(self.frames, a, b)
 
 
 class Motion(Protocol):
@@ -143,7 +137,6 @@ class Computer:
         self._motions: dict[str, Motion] = {}
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._started_s = time.time()
-        self.behind_s = 0.0
         self.watchers: list[Callable[[], None]] = []
         """Called before each step."""
         self._sit_command: CommandId | None = None
@@ -193,7 +186,6 @@ class Computer:
         while not stopping.is_set():
             due_s = max(due_s + PERIOD_S, time.monotonic() - _LATE_S)
             self._work_until(due_s)
-            self.behind_s = max(self.behind_s, time.monotonic() - due_s)
             self.step()
 
     def serve(self, stopping: Event) -> None:
@@ -287,16 +279,21 @@ class Computer:
         self._sit_command, self._still_since_s = None, self.clock.now()
         return self.robot.stand(height_m, pitch_rad, until_s=self.forever(), lease=self.lease)
 
-    def at_rest(self, command: CommandId) -> bool:
-        """Returns whether a posture is reached: exactly, or as far as the load on the arm lets the body go."""
-        still_s = self.clock.now() - self._still_since_s
-        return self.robot.command_status(command).state is CommandState.DONE or still_s > _STILL_S
+    def stands(self, command: CommandId, height_m: float) -> bool:
+        """Returns whether a height is reached: exactly, or nearly, when a load lets the body go no further."""
+        state = self.robot.command_status(command).state
+        near = abs(self._still_at_m - height_m) < _NEAR_M and self.clock.now() - self._still_since_s > _STILL_S
+        return state is CommandState.DONE or (state is CommandState.RUNNING and near)
 
     def _sits(self, height_m: float) -> bool:
         """Returns whether the robot sits, after it has measured the height of its body."""
         if abs(height_m - self._still_at_m) > _STILL_M:
             self._still_at_m, self._still_since_s = height_m, self.clock.now()
-        return self._sit_command is not None and self.at_rest(self._sit_command)
+        if self._sit_command is None:
+            return False
+        state = self.robot.command_status(self._sit_command).state
+        low = height_m < self.capabilities.height_range_m[0] - _NEAR_M
+        return state is CommandState.DONE or (low and self.clock.now() - self._still_since_s > _STILL_S)
 
     # -- sensing -----------------------------------------------------------------------------------------------------
 
@@ -315,7 +312,7 @@ class Computer:
             self._frames(odometry, joints),
         )
 
-    def _frames(self, odometry: Odometry, joints: Joints) -> Mapping[str, tuple[str, RigidTransform]]:
+    def _frames(self, odometry: Odometry, joints: Joints) -> Frames:
         """The frame tree as a real Spot gives it: the root is `body`; `odom` and `vision` are the same here."""
         X_BO = odometry.X_OB.inverse()
         X_OF = odometry.pose.transform(float(odometry.X_OB.translation()[2]))

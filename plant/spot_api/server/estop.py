@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from bosdyn.api import estop_pb2
 
+from plant.spot_api.messages import duration, seconds
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.identity import DOMAIN
-from plant.spot_api.server.messages import duration, seconds
 
 _MASK: Final = (1 << 64) - 1
 _SETTLE_S: Final = 3.0

@@ -26,8 +26,8 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
+from plant.spot_api.messages import duration, seconds, timestamp
 from plant.spot_api.server.calls import Call, Service
-from plant.spot_api.server.messages import duration, seconds, timestamp
 
 DOMAIN: Final = "spot.robot"
 SERIAL: Final = "errand-simulated"

@@ -11,11 +11,11 @@ from typing import Any, ClassVar, Final
 
 from bosdyn.api.keepalive import keepalive_pb2
 
+from plant.spot_api.messages import InvalidRequestError, seconds, timestamp
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer
 from plant.spot_api.server.identity import DOMAIN
 from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY
-from plant.spot_api.server.messages import InvalidRequestError, seconds, timestamp
 
 _STATUS: Final = keepalive_pb2.GetStatusResponse
 

@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from bosdyn.api import lease_pb2
 
+from plant.spot_api.messages import timestamp
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.identity import DOMAIN
-from plant.spot_api.server.messages import timestamp
 
 ROOT, BODY, MOBILITY, FULL_ARM, ARM, GRIPPER = "all-leases", "body", "mobility", "full-arm", "arm", "gripper"
 PARTS: Final[Mapping[str, Sequence[str]]] = {ROOT: (BODY,), BODY: (MOBILITY, FULL_ARM), FULL_ARM: (ARM, GRIPPER)}
@@ -105,9 +105,9 @@ class LeaseService(Service):
         self._lost(mine)
         return Response(status=Response.STATUS_OK)
 
-    def RetainLease(self, request: Any, call: Call) -> Any:
+    def RetainLease(self, request: Any, _call: Call) -> Any:
         """Keeps a lease from becoming stale."""
-        return lease_pb2.RetainLeaseResponse(lease_use_result=self.use(request.lease, (), call))
+        return lease_pb2.RetainLeaseResponse(lease_use_result=self.use(request.lease, ()))
 
     def ListLeases(self, request: Any, _call: Call) -> Any:
         """Lists the resources with their claims."""
@@ -119,7 +119,7 @@ class LeaseService(Service):
 
     # -- for commands ------------------------------------------------------------------------------------------------
 
-    def use(self, lease: Any, parts: Sequence[str], _call: Call) -> Any:
+    def use(self, lease: Any, parts: Sequence[str]) -> Any:
         """Uses a lease for smallest parts (all of its own if empty), and returns the result of the API."""
         made = Result(attempted_lease=lease)
         if not lease.resource or not lease.sequence or not _exists(lease.resource):

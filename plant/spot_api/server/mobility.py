@@ -7,15 +7,16 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Final
 
 import numpy as np
-from bosdyn.api import basic_command_pb2, mobility_command_pb2
+from bosdyn.api import basic_command_pb2, mobility_command_pb2, robot_command_pb2
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from pydrake.math import RigidTransform
 
+from plant.spot_api.messages import InvalidRequestError, finite, seconds, transform
 from plant.spot_api.server.computer import Computer, Snapshot
-from plant.spot_api.server.messages import InvalidRequestError, finite, seconds, transform
 from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
+Answer = robot_command_pb2.RobotCommandResponse
 Feedback = mobility_command_pb2.MobilityCommand.Feedback
 LONGEST_S: Final = 600.0
 _GAIN_1_S: Final = 1.5
@@ -26,31 +27,34 @@ FLAT_FRAMES: Final = ("odom", "vision", "body", "flat_body", "gpe")
 """Frames in which a planar motion may be given."""
 
 
-class ExpiredError(ValueError):
-    """A command whose end time has passed."""
+class RefusedError(Exception):
+    """A command that is refused with a status of the API, and why."""
+
+    def __init__(self, status: int, message: str) -> None:
+        self.status = status
+        super().__init__(message)
 
 
-class TooDistantError(ValueError):
-    """A command whose end time is too far ahead."""
+def unsupported(command: str) -> RefusedError:
+    """Returns the error of a command that the simulated robot cannot do."""
+    return RefusedError(Answer.STATUS_UNSUPPORTED, f"{command} is not simulated")
 
 
-class UnknownFrameError(ValueError):
-    """A command in a frame that the robot does not know."""
-
-
-class UnsupportedError(ValueError):
-    """A command that the simulated robot cannot do."""
+def unknown_frame(name: str) -> RefusedError:
+    """Returns the error of a command in a frame that the robot does not know."""
+    return RefusedError(Answer.STATUS_UNKNOWN_FRAME, f"frame {name!r} is unknown")
 
 
 def end_of(message: Any, now_s: float, name: str) -> float:
-    """Returns a command's end time (robot time). Raises ExpiredError, TooDistantError or InvalidRequestError."""
+    """Returns a command's end time (robot time). Raises RefusedError or InvalidRequestError."""
     if not message.HasField("end_time"):
         raise InvalidRequestError(f"{name}: end_time is missing")
     end_s = seconds(message.end_time)
     if end_s <= now_s:
-        raise ExpiredError(f"{name}: end_time was {now_s - end_s:.2f} s ago")
+        raise RefusedError(Answer.STATUS_EXPIRED, f"{name}: end_time was {now_s - end_s:.2f} s ago")
     if end_s > now_s + LONGEST_S:
-        raise TooDistantError(f"{name}: end_time is {end_s - now_s:.0f} s ahead; at most {LONGEST_S:.0f} s are allowed")
+        said = f"{name}: end_time is {end_s - now_s:.0f} s ahead; at most {LONGEST_S:.0f} s are allowed"
+        raise RefusedError(Answer.STATUS_TOO_DISTANT, said)
     return end_s
 
 
@@ -103,7 +107,7 @@ class Stand(BaseMotion):
 
     def tick(self, computer: Computer) -> None:
         """Reports whether the robot stands."""
-        done = computer.at_rest(self._command)
+        done = computer.stands(self._command, self._height_m)
         part = basic_command_pb2.StandCommand.Feedback
         self.feedback = self._made(
             part(
@@ -263,9 +267,9 @@ def _yaw(X_AB: RigidTransform) -> float:
 
 
 def known_frame(name: str) -> str:
-    """Returns the frame of a planar motion. Raises UnknownFrameError."""
+    """Returns the frame of a planar motion. Raises RefusedError."""
     if name not in FLAT_FRAMES:
-        raise UnknownFrameError(f"frame {name!r} is not one of {', '.join(FLAT_FRAMES)}")
+        raise unknown_frame(name)
     return name
 
 

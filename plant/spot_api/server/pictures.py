@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 from scipy.ndimage import distance_transform_edt
 
+from plant.spot_api.messages import frame_tree, timestamp
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Snapshot, sensor_frame
 from plant.spot_api.server.identity import DOMAIN
-from plant.spot_api.server.messages import frame_tree, timestamp
 from skills.robot import CameraCapabilities, Image, Intrinsics, NoImageError
 
 _PICTURE_TIMEOUT_S: Final = 5.0

@@ -18,12 +18,9 @@ from bosdyn.api import (
 )
 from bosdyn.api.spot import inverse_kinematics_pb2
 
-from plant.spot_api.server.arm import JOINTS, READY_RAD, X_HAND, solutions
-from plant.spot_api.server.calls import Call, Service
-from plant.spot_api.server.computer import Computer, Motors, Snapshot
-from plant.spot_api.server.identity import DOMAIN
-from plant.spot_api.server.messages import (
+from plant.spot_api.messages import (
     InvalidRequestError,
+    api_joint,
     duration,
     frame_tree,
     timestamp,
@@ -31,15 +28,13 @@ from plant.spot_api.server.messages import (
     vec3,
     velocity,
 )
+from plant.spot_api.server.arm import JOINTS, READY_RAD, X_HAND, solutions
+from plant.spot_api.server.calls import Call, Service
+from plant.spot_api.server.computer import Computer, Motors, Snapshot
+from plant.spot_api.server.identity import DOMAIN
 
 RUNTIME_S: Final = 5400.0
 _FEET: Final = ("fl", "fr", "hl", "hr")
-
-
-def api_joint(name: str) -> str:
-    """Name of a joint in the API: `fl_hx` is `fl.hx`, `arm_sh0` is `arm0.sh0`."""
-    limb, _, joint = name.partition("_")
-    return f"{'arm0' if limb == 'arm' else limb}.{joint}"
 
 
 class RobotStateService(Service):

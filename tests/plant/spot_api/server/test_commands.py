@@ -15,6 +15,7 @@ from bosdyn.api import (
     arm_command_pb2,
     basic_command_pb2,
     geometry_pb2,
+    gripper_command_pb2,
     mobility_command_pb2,
     robot_command_pb2,
     synchronized_command_pb2,
@@ -25,7 +26,7 @@ from bosdyn.client.math_helpers import SE3Pose
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.geometry import EulerZXY
 
-from plant.spot_api.server.messages import timestamp
+from plant.spot_api.messages import timestamp
 
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
 
@@ -227,3 +228,53 @@ def test_the_camera_looks_at_a_point(spot):
     assert rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(command), timeout_sec=8.0)
     hand_target = get_a_tform_b(spot.tree, "hand", "odom") * target
     assert math.atan2(math.hypot(hand_target.y, hand_target.z), hand_target.x) < 0.1
+
+
+def arm_feedback(spot, command_id):
+    return spot.commands.robot_command_feedback(command_id).feedback.synchronized_feedback.arm_command_feedback
+
+
+def test_an_arm_that_refuses_is_stalled_and_not_complete(spot):
+    spot.served.scripted.refuse_because["move_arm"] = "a fault"
+    command = spot.commands.robot_command(Build.arm_ready_command())
+    stalled = arm_command_pb2.NamedArmPositionsCommand.Feedback.STATUS_STALLED_HOLDING_ITEM
+    assert wait_until(lambda: arm_feedback(spot, command).named_arm_position_feedback.status == stalled)
+
+
+def test_a_robot_that_does_not_stand_up_is_not_standing(spot):
+    spot.served.scripted.refuse_because["stand"] = "a fault"
+    command = spot.commands.robot_command(Build.synchro_stand_command(body_height=-0.1))
+    time.sleep(1.3)
+    standing = basic_command_pb2.StandCommand.Feedback.STATUS_IS_STANDING
+    assert base_feedback(spot, command).stand_feedback.status != standing
+
+
+def test_a_gripper_that_refuses_applies_no_force(spot):
+    spot.served.scripted.refuse_because["set_gripper"] = "a fault"
+    command = spot.commands.robot_command(Build.claw_gripper_open_command())
+    time.sleep(0.3)
+    found = spot.commands.robot_command_feedback(command).feedback.synchronized_feedback.gripper_command_feedback
+    assert found.claw_gripper_feedback.status == gripper_command_pb2.ClawGripperCommand.Feedback.STATUS_UNKNOWN
+
+
+def test_a_gaze_that_no_posture_has_is_stalled(spot, monkeypatch):
+    monkeypatch.setattr("plant.spot_api.server.arm.solutions", lambda solver, X_BW: [])
+    command = spot.commands.robot_command(Build.arm_gaze_command(2.0, 0.0, 0.5, "body"))
+    stalled = arm_command_pb2.GazeCommand.Feedback.STATUS_TOOL_TRAJECTORY_STALLED
+    assert wait_until(lambda: arm_feedback(spot, command).arm_gaze_feedback.status == stalled)
+
+
+def test_the_hand_moves_at_a_velocity_until_its_end(spot):
+    rc.block_until_arm_arrives(spot.commands, spot.commands.robot_command(Build.arm_ready_command()), timeout_sec=8.0)
+    before = get_a_tform_b(spot.tree, "body", "hand")
+    velocity = arm_command_pb2.ArmVelocityCommand.CartesianVelocity(frame_name="body")
+    velocity.velocity_in_frame_name.z = 0.1
+    command = robot_command_pb2.RobotCommand()
+    command.synchronized_command.arm_command.arm_velocity_command.cartesian_velocity.CopyFrom(velocity)
+    command.synchronized_command.arm_command.arm_velocity_command.angular_velocity_of_hand_rt_odom_in_hand.x = 0.2
+    sent(spot, command, ahead_s=1.0)
+    time.sleep(1.3)
+    after = get_a_tform_b(spot.tree, "body", "hand")
+    assert after.z - before.z == pytest.approx(0.1, abs=0.05)
+    assert abs(after.y - before.y) < 0.03
+    assert after.rot.to_roll() - before.rot.to_roll() == pytest.approx(0.2, abs=0.1)

@@ -10,10 +10,10 @@ released                  none; silent beyond its time: settle, later cut
 import pytest
 from bosdyn.api import estop_pb2
 
+from plant.spot_api.messages import duration
 from plant.spot_api.server import estop
 from plant.spot_api.server.calls import Call
 from plant.spot_api.server.estop import EstopService, Tablet
-from plant.spot_api.server.messages import duration
 
 CALL = Call("user", "me", 0.0)
 CUT, SETTLE, NONE = estop_pb2.ESTOP_LEVEL_CUT, estop_pb2.ESTOP_LEVEL_SETTLE_THEN_CUT, estop_pb2.ESTOP_LEVEL_NONE

@@ -16,10 +16,10 @@ from bosdyn.client.exceptions import UnauthenticatedError
 from bosdyn.client.robot_state import RobotStateClient
 from bosdyn.client.sdk import _DEFAULT_SERVICE_CLIENTS
 
+from plant.spot_api.messages import duration, seconds, timestamp
 from plant.spot_api.server import identity
 from plant.spot_api.server.calls import Call
 from plant.spot_api.server.identity import SERIAL, AuthService, TimeSyncService
-from plant.spot_api.server.messages import duration, seconds, timestamp
 from plant.spot_api.server.server import LISTED
 
 

@@ -9,10 +9,10 @@ import pytest
 from bosdyn.api import lease_pb2
 from bosdyn.api.keepalive import keepalive_pb2
 
+from plant.spot_api.messages import InvalidRequestError, duration
 from plant.spot_api.server import keepalive
 from plant.spot_api.server.calls import Call
 from plant.spot_api.server.keepalive import KeepaliveService
-from plant.spot_api.server.messages import InvalidRequestError, duration
 
 CALL = Call("user", "me", 0.0)
 Action = keepalive_pb2.ActionAfter

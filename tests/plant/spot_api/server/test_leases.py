@@ -33,7 +33,7 @@ def acquired(service, resource="body", call=ME):
 
 
 def status(service, lease, *parts):
-    return service.use(lease, parts, ME).status
+    return service.use(lease, parts).status
 
 
 def test_the_body_has_three_smallest_parts():

@@ -19,7 +19,7 @@ from bosdyn.client.inverse_kinematics import InverseKinematicsClient
 from bosdyn.client.math_helpers import SE3Pose
 from bosdyn.client.world_object import make_add_world_object_req, make_delete_world_object_req
 
-from plant.spot_api.server.state import api_joint
+from plant.spot_api.messages import api_joint, our_joint
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def test_the_state_has_the_joints_and_frames_of_a_spot(robot):
 
 @pytest.mark.parametrize(("ours", "theirs"), [("fl_hx", "fl.hx"), ("hr_kn", "hr.kn"), ("arm_f1x", "arm0.f1x")])
 def test_joints_have_the_names_of_the_api(ours, theirs):
-    assert api_joint(ours) == theirs
+    assert (api_joint(ours), our_joint(theirs)) == (theirs, ours)
 
 
 def test_faults_of_the_robot_are_system_faults(served, robot):

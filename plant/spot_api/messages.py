@@ -15,6 +15,10 @@ from pydrake.math import RigidTransform, RotationMatrix
 _NANOS = 1_000_000_000
 
 
+Frames = Mapping[str, tuple[str, RigidTransform]]
+"""Frame tree: child -> (parent, X_parent_child); the root's parent is empty."""
+
+
 class InvalidRequestError(ValueError):
     """A request with a value that the API does not allow; the message names the field."""
 
@@ -78,11 +82,42 @@ def velocity(linear: Iterable[float], angular: Iterable[float]) -> geometry_pb2.
     return geometry_pb2.SE3Velocity(linear=vec3(linear), angular=vec3(angular))
 
 
-def frame_tree(edges: Mapping[str, tuple[str, RigidTransform]]) -> geometry_pb2.FrameTreeSnapshot:
-    """Returns the message of a frame tree: child -> (parent, X_parent_child). The root's parent is empty."""
+def frame_tree(frames: Frames) -> geometry_pb2.FrameTreeSnapshot:
+    """Returns the message of a frame tree."""
     made = geometry_pb2.FrameTreeSnapshot()
-    for child, (parent, X_PC) in edges.items():
+    for child, (parent, X_PC) in frames.items():
         edge = made.child_to_parent_edge_map[child]
         edge.parent_frame_name = parent
         edge.parent_tform_child.CopyFrom(pose(X_PC))
     return made
+
+
+def frames_of(message: geometry_pb2.FrameTreeSnapshot) -> Frames:
+    """Returns the frame tree of a message."""
+    edges = message.child_to_parent_edge_map
+    return {name: (edge.parent_frame_name, transform(edge.parent_tform_child, name)) for name, edge in edges.items()}
+
+
+def pose_between(frames: Frames, a: str, b: str) -> RigidTransform:
+    """Pose of frame `b` in frame `a`. Raises KeyError for an unknown frame."""
+    return _from_root(frames, a).inverse() @ _from_root(frames, b)
+
+
+def _from_root(frames: Frames, frame: str) -> RigidTransform:
+    X = RigidTransform()
+    while frame:
+        parent, X_PF = frames[frame]
+        X, frame = X_PF @ X, parent
+    return X
+
+
+def api_joint(name: str) -> str:
+    """Name of a joint in the API: `fl_hx` is `fl.hx`, `arm_sh0` is `arm0.sh0`."""
+    limb, _, joint = name.partition("_")
+    return f"{'arm0' if limb == 'arm' else limb}.{joint}"
+
+
+def our_joint(name: str) -> str:
+    """Name of an API's joint in the robot's description: `fl.hx` is `fl_hx`, `arm0.sh0` is `arm_sh0`."""
+    limb, _, joint = name.partition(".")
+    return f"{'arm' if limb == 'arm0' else limb}_{joint}"

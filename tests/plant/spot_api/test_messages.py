@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.spot_api.server.messages import (
+from plant.spot_api.messages import (
     InvalidRequestError,
     frame_tree,
     pose,

@@ -25,7 +25,7 @@ LINES = {
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 7724,
+    "executive/app": 7738,
     "executive/cli": 4807,
     "skills": 27178,
     "plant": 18237,

@@ -31,7 +31,7 @@ _DRIVES: Final = (
     ("fetch", None),
 )
 """Kinds of robots, and the components in place of their default ones."""
-STEPS: Final = len(_DRIVES) + 3
+STEPS: Final = len(_DRIVES) + 4
 TICK_S: Final = 0.05
 _DRIVEN_S: Final = 2.5
 _SURVEYED_S: Final = 4.0
@@ -58,7 +58,7 @@ def compile_kernels(advance: Callable[[], None] = lambda: None) -> None:
         for number, (kind, stack) in enumerate(_DRIVES):
             _drive(kind, stack, Path(folder) / str(number))
             advance()
-    for step in (_solve_arm, _map_cells, _survey):
+    for step in (_solve_arm, _map_cells, _survey, _see_blocks):
         step()
         advance()
 
@@ -125,3 +125,17 @@ def _survey() -> None:
         clock.advance(TICK_S)
         survey.tick(clock.now())
     mapper.find_in(mapper.submaps[0], mapper.keyframes[0].points_F, mapper.pose, Window(0.5, 0.1))
+
+
+def _see_blocks() -> None:
+    """Takes a scan and a picture with the scripted robot: threads of the tests of skills would all compile at once."""
+    from plant.robots.robot_kind import robot_kind
+    from skills.testing.blocks import Block
+    from skills.testing.clock import VirtualClock
+    from skills.testing.robot import ScriptedRobot
+
+    clock = VirtualClock()
+    robot = ScriptedRobot(clock, capabilities=robot_kind("spot").capabilities(), blocks=[Block(1.0, -1.0, 1.2, 1.0)])
+    clock.advance(0.2)
+    robot.scan()
+    robot.image("hand")

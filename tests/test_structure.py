@@ -28,9 +28,9 @@ LINES = {
     "executive/app": 7738,
     "executive/cli": 4807,
     "skills": 27178,
-    "plant": 18237,
+    "plant": 18334,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 472, 75, 10
+MODULES, ONE_IMPORTER, SAME_NAME = 473, 76, 10
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -16,6 +16,7 @@ from plant.spot_api.server.calls import Service, handlers
 from plant.spot_api.server.commands import PowerService, RobotCommandService
 from plant.spot_api.server.computer import Computer, Pace, Solver
 from plant.spot_api.server.estop import EstopService, Tablet
+from plant.spot_api.server.faults import Switchboard
 from plant.spot_api.server.identity import DOMAIN, Credentials
 from plant.spot_api.server.keepalive import KeepaliveService
 from plant.spot_api.server.leases import LeaseService
@@ -111,8 +112,10 @@ class SpotServer:
         self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
         services = self._services(leases, estop, auth, robot.name)
+        self.faults = Switchboard()
         self._grpc = grpc.server(
             ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
+            interceptors=[self.faults],
             options=[
                 ("grpc.max_receive_message_length", _MOST_BYTES),
                 ("grpc.max_send_message_length", _MOST_BYTES),

@@ -14,7 +14,10 @@ import json
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Final
 
@@ -90,16 +93,21 @@ def _ended(report: Any, began_s: float) -> Ended:
     )
 
 
+def both(name: str, seed: int, *, api_only: bool) -> tuple[Ended, Ended | None]:
+    """Runs a mission, or a sentence, through the API and in process."""
+    with tempfile.TemporaryDirectory() as out:
+        what: dict[str, Any] = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
+        request = Request(**what, seed=seed, record=False, time_of_day=TIME_OF_DAY, out=Path(out) / "run")
+        api = through_api(request, Path(out) / "credentials")
+        return api, None if api_only else in_process(replace(request, out=Path(out) / "in_process"))
+
+
 def compared(names: list[str], seeds: range, *, api_only: bool) -> dict[str, Any]:
-    """Runs each mission with each seed both ways, or only through the API."""
+    """Runs each mission with each seed, each in a process of its own: a renderer must end in the thread it began in."""
     runs: dict[str, Any] = {}
-    for name in names:
-        for seed in seeds:
-            with tempfile.TemporaryDirectory() as out:
-                what = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
-                request = Request(**what, seed=seed, record=False, time_of_day=TIME_OF_DAY, out=Path(out) / "run")
-                api = through_api(request, Path(out) / "credentials")
-                here = None if api_only else in_process(replace(request, out=Path(out) / "in_process"))
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as pool:
+        for name, seed in product(names, seeds):
+            api, here = pool.submit(both, name, seed, api_only=api_only).result()
             runs[f"{name} {seed}"] = {"api": vars(api), "in_process": None if here is None else vars(here)}
             sys.stderr.write(f"{name} {seed}: {api} {here or ''}\n")
     ended = [run["api"] for run in runs.values()]

@@ -170,7 +170,8 @@ class Capabilities:
     `footprint_m` is the standing outline in the body frame as (x, y) corners. `description` is the robot's URDF text
     with collision shapes and a free base (link `body`). `height_range_m` is the range of the body origin's height while
     the robot walks. `lidar_height_m` is the LiDAR's height over the floor while the robot stands as usual: maps differ
-    by it.
+    by it. Joints and gripper give a new reading every `sensor_period_s`. A drive that is renewed at each tick expires
+    after `drive_expiry_s`: longer than a tick and the way of a command to the robot, and no longer than is safe.
     """
 
     footprint_m: tuple[tuple[float, float], ...]
@@ -187,6 +188,8 @@ class Capabilities:
     head: HeadCapabilities | None = None
     lift_joint: str | None = None
     lidar_height_m: float | None = None
+    sensor_period_s: float = 0.05
+    drive_expiry_s: float = 0.3
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:

@@ -222,21 +222,43 @@ class CommandState(enum.Enum):
     REFUSED = "refused"  # never started: lease, limits, fault
 
 
+class CommandCause(enum.Enum):
+    """Cause for which a command did not succeed; it says what can be done about it."""
+
+    NONE = "none"  # it runs, or it succeeded
+    INVALID = "invalid"  # its values are not allowed: command something else
+    UNSUPPORTED = "unsupported"  # the robot has no such part or ability
+    NO_LEASE = "no lease"  # another holds the lease
+    STOPPED = "stopped"  # another command replaced or stopped it
+    LATE = "late"  # its time was over before it was done
+    BLOCKED = "blocked"  # something is in the way, or the goal is out of reach
+    UNPOWERED = "unpowered"  # the motors have no power
+    ESTOPPED = "estopped"  # an E-stop is pressed
+    FAULT = "fault"  # the robot has a fault, or has fallen: a person must see to it
+    NO_ANSWER = "no answer"  # the robot does not answer: it may have moved
+    REFUSED = "refused"  # any other refusal
+
+
 @dataclass(frozen=True)
 class CommandStatus:
-    """State of a command, and the reason when it did not succeed."""
+    """State of a command, with the reason and its cause when it did not succeed."""
 
     state: CommandState
     reason: str = ""
+    cause: CommandCause = CommandCause.NONE
 
 
 @dataclass(frozen=True)
 class Lease:
-    """Right to move a robot. The one with the highest `number` counts."""
+    """Right to move a robot. Of an epoch the one with the highest `number` counts.
+
+    The robot's computer chooses another `epoch` whenever it starts: a lease of an earlier one never counts again.
+    """
 
     robot_name: str
     holder: str
     number: int = 0
+    epoch: str = ""
 
 
 class Clock(Protocol):

@@ -19,7 +19,7 @@ LINES = {
     "executive/speech": 1582,
     "executive/mission": 1590,
     "executive/tree": 7704,
-    "executive/run": 3082,
+    "executive/run": 3087,
     "executive/record": 1377,
     "executive/store": 1666,
     "executive/conversation": 577,
@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 7738,
     "executive/cli": 4807,
-    "skills": 27178,
-    "plant": 18334,
+    "skills": 27237,
+    "plant": 18381,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 473, 76, 10
+MODULES, ONE_IMPORTER, SAME_NAME = 474, 77, 10
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

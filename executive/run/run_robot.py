@@ -25,6 +25,7 @@ from skills.navigate.footprint import Footprint
 from skills.robot import (
     Battery,
     Capabilities,
+    CommandCause,
     CommandState,
     CommandStatus,
     Gripper,
@@ -314,6 +315,12 @@ def _image(it: Image) -> str | None:
     return None
 
 
+def _status(it: CommandStatus) -> str | None:
+    if not isinstance(it.state, CommandState):
+        return f"a state of {it.state!r:.40}"
+    return None if isinstance(it.cause, CommandCause) else f"a cause of {it.cause!r:.40}"
+
+
 _COMMAND: Final = _typed(int)
 _LEASE: Final = _typed(Lease)
 _CHECKS: Final[Mapping[str, Check]] = {
@@ -327,9 +334,7 @@ _CHECKS: Final[Mapping[str, Check]] = {
     "battery": _reading(Battery, lambda it: None if 0.0 <= it.charge <= 1.0 else f"a charge of {it.charge}"),
     "faults": _typed(tuple, lambda it: None if all(isinstance(one, str) for one in it) else f"faults {it!r:.80}"),
     **dict.fromkeys(("drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "stop"), _COMMAND),
-    "command_status": _typed(
-        CommandStatus, lambda it: None if isinstance(it.state, CommandState) else f"a state of {it.state!r:.40}"
-    ),
+    "command_status": _typed(CommandStatus, _status),
     "lease_holder": _or_none(_LEASE),
     "acquire_lease": _LEASE,
     "take_lease": _LEASE,

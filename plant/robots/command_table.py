@@ -6,7 +6,7 @@ import enum
 from dataclasses import dataclass
 from typing import Final, Generic, TypeVar
 
-from skills.robot import CommandId, CommandState, CommandStatus
+from skills.robot import CommandCause, CommandId, CommandState, CommandStatus
 
 PayloadT = TypeVar("PayloadT")
 
@@ -62,7 +62,7 @@ class CommandStatuses:
         known = self._statuses.get(command)
         if known is None and not 0 < command <= self._given:
             raise KeyError(command)
-        return known or CommandStatus(CommandState.STOPPED, "it was over long ago")
+        return known or CommandStatus(CommandState.STOPPED, "it was over long ago", CommandCause.STOPPED)
 
     def add(self, status: CommandStatus) -> CommandId:
         """Adds a command with a status and returns its id."""
@@ -89,23 +89,25 @@ class CommandTable(CommandStatuses):
     def begin(self, part: Part, payload: object, now_s: float, until_s: float) -> CommandId:
         """Begins a command, which replaces the running command of the part."""
         command = self.add(CommandStatus(CommandState.RUNNING))
-        self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
+        self.finish(part, CommandState.STOPPED, f"replaced by command {command}", CommandCause.STOPPED)
         self._running[part] = Active(command, payload, now_s, until_s)
         return command
 
-    def refuse(self, reason: str) -> CommandId:
+    def refuse(self, reason: str, cause: CommandCause = CommandCause.INVALID) -> CommandId:
         """Adds a command that is refused for a reason."""
-        return self.add(CommandStatus(CommandState.REFUSED, reason))
+        return self.add(CommandStatus(CommandState.REFUSED, reason, cause))
 
     def note(self, state: CommandState, reason: str = "") -> CommandId:
         """Adds a command that has ended already."""
         return self.add(CommandStatus(state, reason))
 
-    def finish(self, part: Part, state: CommandState, reason: str = "") -> None:
+    def finish(
+        self, part: Part, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE
+    ) -> None:
         """Ends the running command of a part, if there is one."""
         active = self._running.pop(part, None)
         if active is not None:
-            self.change(active.id, CommandStatus(state, reason))
+            self.change(active.id, CommandStatus(state, reason, cause))
 
     def running(self, part: Part) -> Active[object] | None:
         """Running command of a part, or None."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from typing import TypeVar
+from uuid import uuid4
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -18,6 +19,7 @@ from skills.robot import (
     ArmTrajectory,
     Battery,
     Capabilities,
+    CommandCause,
     CommandId,
     CommandState,
     CommandStatus,
@@ -40,7 +42,7 @@ class LeaseManager:
     """Manager of one robot's lease; only the lease with the highest number counts."""
 
     def __init__(self, robot_name: str) -> None:
-        self._robot_name = robot_name
+        self._robot_name, self._epoch = robot_name, uuid4().hex
         self._number = 0
         self._current: Lease | None = None
 
@@ -60,7 +62,7 @@ class LeaseManager:
     def take(self, holder: str) -> Lease:
         """Gives the lease to `holder`, also while another holder has it."""
         self._number += 1
-        self._current = Lease(self._robot_name, holder, self._number)
+        self._current = Lease(self._robot_name, holder, self._number, self._epoch)
         return self._current
 
     def give_back(self, lease: Lease) -> bool:
@@ -153,7 +155,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         """Turns the head to a pan (positive to the left) and a tilt (positive looks down)."""
         head = self._capabilities.head
         if head is None:
-            return self._commands.refuse("point_head: the robot has no head")
+            return self._commands.refuse("point_head: the robot has no head", CommandCause.UNSUPPORTED)
         (left, right), (up, down) = head.pan_range_rad, head.tilt_range_rad
         if not (left <= pan_rad <= right and up <= tilt_rad <= down):
             return self._commands.refuse(
@@ -171,7 +173,7 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         """Moves the gripper to an opening with at most force_n at its tip; the force stays after the command's end."""
         gripper = self._capabilities.gripper
         if gripper is None:
-            return self._commands.refuse("set_gripper: the robot has no gripper")
+            return self._commands.refuse("set_gripper: the robot has no gripper", CommandCause.UNSUPPORTED)
         if not (0.0 <= opening <= gripper.widest and 0.0 < force_n <= gripper.max_force_n):
             unit = "rad" if gripper.kind is GripperKind.HINGED else "m"
             return self._commands.refuse(
@@ -187,10 +189,10 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         """Stops all motion, or only the given command if it still runs."""
         refusal = self._leases.refusal(lease)
         if refusal:
-            return self._commands.refuse(f"stop: {refusal}")
+            return self._commands.refuse(f"stop: {refusal}", CommandCause.NO_LEASE)
         part = self._commands.part_of(only) if only is not None else None
         for candidate in Part if only is None else ([part] if part else []):
-            self._halt(candidate, "stopped by command")
+            self._halt(candidate, "stopped by command", CommandCause.STOPPED)
         return self._commands.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
@@ -209,13 +211,13 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
 
     def take_lease(self, holder: str) -> Lease:
         """Takes the lease from its holder; the robot stops."""
-        self._halt_all("the lease was taken by " + repr(holder))
+        self._halt_all("the lease was taken by " + repr(holder), CommandCause.NO_LEASE)
         return self._leases.take(holder)
 
     def return_lease(self, lease: Lease) -> None:
         """Returns the lease; the robot stops. A lease that no longer counts is ignored."""
         if self._leases.give_back(lease):
-            self._halt_all("the lease was returned")
+            self._halt_all("the lease was returned", CommandCause.NO_LEASE)
 
     # -- called by the simulation ---------------------------------------------------------------------------------
 
@@ -305,24 +307,24 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     def _begin(self, part: Part, payload: object, until_s: float, lease: Lease) -> CommandId:
         refusal = self._leases.refusal(lease)
         if refusal:
-            return self._commands.refuse(f"{part.value}: {refusal}")
+            return self._commands.refuse(f"{part.value}: {refusal}", CommandCause.NO_LEASE)
         if until_s <= self._now_s:
             return self._commands.refuse(
-                f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already"
+                f"{part.value}: expires at {until_s:.2f} s, and it is {self._now_s:.2f} s already", CommandCause.LATE
             )
         return self._commands.begin(part, payload, self._now_s, until_s)
 
     def _runs(self, command: CommandId) -> bool:
         return self._commands.status(command).state is CommandState.RUNNING
 
-    def _halt_all(self, reason: str) -> None:
+    def _halt_all(self, reason: str, cause: CommandCause) -> None:
         for part in Part:
-            self._halt(part, reason)
+            self._halt(part, reason, cause)
 
-    def _halt(self, part: Part, reason: str) -> None:
+    def _halt(self, part: Part, reason: str, cause: CommandCause) -> None:
         if self._commands.running(part) is not None:
             self._hold_still(part)
-        self._commands.finish(part, CommandState.STOPPED, reason)
+        self._commands.finish(part, CommandState.STOPPED, reason, cause)
 
     def _expire(self) -> None:
         for part in Part:
@@ -332,4 +334,4 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             if part is Part.VELOCITY:
                 self._commands.finish(part, CommandState.DONE)
             else:
-                self._halt(part, "expired before it was done")
+                self._halt(part, "expired before it was done", CommandCause.LATE)

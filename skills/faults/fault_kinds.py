@@ -12,7 +12,17 @@ from pydrake.math import RigidTransform
 
 from skills.manipulation.arm.forces import levers_m
 from skills.manipulation.arm.kinematics import arm_model
-from skills.robot import Capabilities, CommandState, CommandStatus, FrameTree, Image, Joints, NoImageError, Robot
+from skills.robot import (
+    Capabilities,
+    CommandCause,
+    CommandState,
+    CommandStatus,
+    FrameTree,
+    Image,
+    Joints,
+    NoImageError,
+    Robot,
+)
 
 THIEF: Final = "the tablet"
 """Name of the holder in "lease taken"."""
@@ -286,7 +296,9 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         r"(?P<verb>\w+) refuses",
         "arm refuses",
         "a motion verb refuses its commands",
-        lambda match: _answer(match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order")),
+        lambda match: _answer(
+            match, CommandStatus(CommandState.REFUSED, f"{match['verb']} is out of order", CommandCause.FAULT)
+        ),
         "{motion} refuses {span}",
     ),
     FaultKind(
@@ -300,7 +312,7 @@ STANDARD_FAULTS: Final[tuple[FaultKind, ...]] = (
         r"(?P<verb>\w+) is stopped",
         "arm is stopped at 1 s",
         "commands are stopped at once",
-        lambda match: _answer(match, CommandStatus(CommandState.STOPPED, "an emergency stop")),
+        lambda match: _answer(match, CommandStatus(CommandState.STOPPED, "an emergency stop", CommandCause.ESTOPPED)),
         "{motion} is stopped {span}",
     ),
     FaultKind(

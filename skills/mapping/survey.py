@@ -16,7 +16,6 @@ from skills.geometry import relative_pose
 from skills.mapping.frontiers import Frontier, Ground
 from skills.mapping.mapper import Mapper
 from skills.mapping.occupancy import LayeredOccupancy
-from skills.navigate.base import EXPIRY_S
 from skills.navigate.follower import FollowerOptions, PathFollower
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
@@ -364,7 +363,9 @@ class Survey:
             self._replan(now_s)
             return
         self._last = np.array(drive.velocity)
-        command = self._robot.drive(*drive.velocity, until_s=now_s + EXPIRY_S, lease=self._lease)
+        command = self._robot.drive(
+            *drive.velocity, until_s=now_s + self._robot.capabilities().drive_expiry_s, lease=self._lease
+        )
         status = self._robot.command_status(command)
         if status.state is CommandState.REFUSED:
             self.trouble, self.done = f"the robot refused to drive: {status.reason}", True

@@ -9,7 +9,6 @@ from skills.api import Cause, InputsT, Running, SkillContext
 from skills.robot import CommandId, CommandState
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
-EXPIRY_S = 0.3
 """Lifetime (s) of a drive command unless the next one replaces it."""
 
 
@@ -27,8 +26,8 @@ class Base:
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
 
     def drive(self, velocity: tuple[float, float, float]) -> None:
-        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call, EXPIRY_S at the longest."""
-        until_s = self._context.clock.now() + EXPIRY_S
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call; without one the drive expires."""
+        until_s = self._context.clock.now() + self._context.robot.capabilities().drive_expiry_s
         self._command = self._context.robot.drive(*velocity, until_s=until_s, lease=self._context.lease)
         self.last_velocity = np.array(velocity)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from skills.robot import CommandId, CommandState, CommandStatus
+from skills.robot import CommandCause, CommandId, CommandState, CommandStatus
 
 
 @dataclass(frozen=True)
@@ -32,28 +32,30 @@ class Commands:
     def begin(self, part: str, goal: Any, now_s: float, until_s: float) -> CommandId:
         """Begins a command, which replaces the part's running one."""
         command = self.add(CommandStatus(CommandState.RUNNING))
-        self.finish(part, CommandState.STOPPED, f"replaced by command {command}")
+        self.finish(part, CommandState.STOPPED, f"replaced by command {command}", CommandCause.STOPPED)
         self._active[part] = ActiveCommand(command, goal, now_s, until_s)
         return command
 
-    def finish(self, part: str, state: CommandState, reason: str = "") -> None:
+    def finish(self, part: str, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE) -> None:
         """Ends the part's running command, if any."""
         active = self._active.pop(part, None)
         if active is not None:
-            self._statuses[active.id] = CommandStatus(state, reason)
+            self._statuses[active.id] = CommandStatus(state, reason, cause)
 
-    def stop(self, only: CommandId | None) -> None:
+    def stop(self, only: CommandId | None, cause: CommandCause = CommandCause.STOPPED) -> None:
         """Stops all running commands, or only one."""
         for part, active in list(self._active.items()):
             if only in (None, active.id):
-                self.finish(part, CommandState.STOPPED, "stopped")
+                self.finish(part, CommandState.STOPPED, "stopped", cause)
 
     def expire(self, now_s: float) -> None:
         """Ends the commands whose time is over: a drive is done, any other is stopped short of its goal."""
         for part, active in list(self._active.items()):
             if now_s > active.until_s:
-                late = (CommandState.DONE, "expired") if part == "drive" else (CommandState.STOPPED, "expired")
-                self.finish(part, *late)
+                if part == "drive":
+                    self.finish(part, CommandState.DONE, "expired")
+                else:
+                    self.finish(part, CommandState.STOPPED, "expired", CommandCause.LATE)
 
     def active(self, part: str) -> ActiveCommand | None:
         """Running command of a part, if any."""

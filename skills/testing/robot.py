@@ -17,6 +17,7 @@ from skills.robot import (
     BaseKind,
     Battery,
     Capabilities,
+    CommandCause,
     CommandId,
     CommandState,
     CommandStatus,
@@ -47,6 +48,8 @@ _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
 _FINGER_M = 0.03
 _LEAST_CLAMP_N = 2.0
+_LACKS = frozenset({"there is no arm", "there is no head", "there is no gripper"})
+_EPOCH = "scripted"
 
 BASE_ONLY = Capabilities(
     footprint_m=((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)),
@@ -116,6 +119,7 @@ class ScriptedRobot:
         self.charge, self.docked, self._pulled_at_s = start.charge, start.docked, start.pulled_at_s
         self.present_faults: tuple[str, ...] = ()
         self.refuse_because: dict[str, str] = {}
+        self.refusal_cause = CommandCause.REFUSED
         self.calls: list[str] = []
         self._commands = Commands()
         self._lease_number = 0
@@ -264,7 +268,9 @@ class ScriptedRobot:
         """Stops all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
         if lease != self._lease:
-            return self._commands.add(CommandStatus(CommandState.REFUSED, "the lease was taken away"))
+            return self._commands.add(
+                CommandStatus(CommandState.REFUSED, "the lease was taken away", CommandCause.NO_LEASE)
+            )
         self._commands.stop(only)
         return self._commands.add(CommandStatus(CommandState.DONE))
 
@@ -281,16 +287,16 @@ class ScriptedRobot:
 
     def take_lease(self, holder: str) -> Lease:
         """Takes the lease from any holder; the robot stops."""
-        self._commands.stop(None)
+        self._commands.stop(None, CommandCause.NO_LEASE)
         self._lease_number += 1
-        self._lease = Lease(self._name, holder, self._lease_number)
+        self._lease = Lease(self._name, holder, self._lease_number, _EPOCH)
         return self._lease
 
     def return_lease(self, lease: Lease) -> None:
         """Returns the lease; the robot stops."""
         self.calls.append("return_lease")
         if lease == self._lease:
-            self._commands.stop(None)
+            self._commands.stop(None, CommandCause.NO_LEASE)
             self._lease = None
 
     def lease_holder(self) -> Lease | None:
@@ -308,9 +314,14 @@ class ScriptedRobot:
     ) -> CommandId:
         verb = verb or part
         self.calls.append(verb)
-        refusal = "the lease was taken away" if lease != self._lease else fault or self.refuse_because.get(verb, "")
-        if refusal:
-            return self._commands.add(CommandStatus(CommandState.REFUSED, refusal))
+        causes = (
+            (CommandCause.NO_LEASE, "the lease was taken away" if lease != self._lease else ""),
+            (CommandCause.UNSUPPORTED if fault in _LACKS else CommandCause.INVALID, fault),
+            (self.refusal_cause, self.refuse_because.get(verb, "")),
+        )
+        for cause, refusal in causes:
+            if refusal:
+                return self._commands.add(CommandStatus(CommandState.REFUSED, refusal, cause))
         return self._commands.begin(part, goal, self._clock.now(), until_s)
 
     def _X_WB(self) -> RigidTransform:

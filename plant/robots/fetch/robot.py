@@ -16,7 +16,7 @@ from plant.robots.jointed_robot import JointedRobot, JointedSensors, gripper_noi
 from plant.robots.robot_kind import SensorOptions
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.suite import LidarMount
-from skills.robot import CommandId, CommandState, FloatArray, Lease
+from skills.robot import CommandCause, CommandId, CommandState, FloatArray, Lease
 
 _LIDAR_SIGMA_M = 0.015
 
@@ -119,7 +119,9 @@ class FetchRobot(JointedRobot, saved=("_wheels", "_lift", "_lift_goal")):
         """Lowers the torso; driving stops."""
         command = self._begin(Part.POSTURE, _LiftGoal(self._capabilities.height_range_m[0]), until_s, lease)
         if self._runs(command):
-            self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot lowers its torso")
+            self._commands.finish(
+                Part.VELOCITY, CommandState.STOPPED, "the robot lowers its torso", CommandCause.STOPPED
+            )
         return command
 
     # -- inside ---------------------------------------------------------------------------------------------------

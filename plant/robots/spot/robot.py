@@ -18,7 +18,7 @@ from plant.robots.spot.model import JointIndex, SpotModel
 from plant.sensors.camera_spec import load_cameras
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.suite import LidarMount, SensorSuite
-from skills.robot import CommandId, CommandState, FloatArray, Lease
+from skills.robot import CommandCause, CommandId, CommandState, FloatArray, Lease
 
 _LIDAR_PERIOD_S = 0.1
 _GRIPPER_MOVES_RAD_S = 0.05
@@ -88,7 +88,7 @@ class SpotRobot(CommandedRobot, saved=("_posture", "_leg_servos", "_trot", "_flo
         """Lowers the body to the floor; driving stops."""
         command = self._begin(Part.POSTURE, (spot_facts()["capabilities"]["sitting_height"], 0.0), until_s, lease)
         if self._runs(command):
-            self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")
+            self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down", CommandCause.STOPPED)
         return command
 
     # -- inside ---------------------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from plant.robots.urdf_robot.assembly import PACKAGE
 from plant.robots.urdf_robot.description import Description
 from plant.sensors.lidar import LidarSpec
 from plant.sensors.suite import LidarMount
-from skills.robot import CommandId, CommandState, FloatArray, Lease, Pose2D
+from skills.robot import CommandCause, CommandId, CommandState, FloatArray, Lease, Pose2D
 
 _GAIN_PER_EFFORT = 12.0
 """Stiffness of a joint's servo over its effort limit, per rad: the limit is reached at five degrees."""
@@ -135,7 +135,7 @@ class UrdfRobot(JointedRobot, saved=("_floating_base",)):
         """Stops to drive, since the base cannot be lowered."""
         command = self._begin(Part.POSTURE, self._height_m, until_s, lease)
         if self._runs(command):
-            self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down")
+            self._commands.finish(Part.VELOCITY, CommandState.STOPPED, "the robot sits down", CommandCause.STOPPED)
         return command
 
     def _desired(self, joints: FloatArray, rates: FloatArray, dt_s: float) -> FloatArray:

@@ -14,6 +14,7 @@ import grpc
 from bosdyn.api import (
     estop_pb2,
     estop_service_pb2_grpc,
+    header_pb2,
     image_service_pb2_grpc,
     lease_pb2,
     lease_service_pb2_grpc,
@@ -29,6 +30,7 @@ from bosdyn.api import (
 )
 
 from skills.files.errors import InputError
+from skills.robot import CommandCause
 
 CLIENT: Final = "errand"
 CALL_S: Final = 0.5
@@ -49,6 +51,10 @@ _STUBS: Final[Mapping[str, Callable[[Any], Any]]] = {
 
 class LostError(RuntimeError):
     """A call that the robot did not answer, or answered with an error; the message names call and cause."""
+
+    def __init__(self, message: str, cause: CommandCause = CommandCause.NO_ANSWER) -> None:
+        super().__init__(message)
+        self.cause = cause
 
 
 @dataclass(frozen=True)
@@ -94,7 +100,9 @@ class Connection:
         except (grpc.RpcError, KeyError) as error:
             raise LostError(f"{service}/{name}: {_cause(error)}") from error
         if answer.header.error.code not in (0, 1):
-            raise LostError(f"{service}/{name}: {answer.header.error.message or answer.header.error.code}")
+            invalid = answer.header.error.code == header_pb2.CommonError.CODE_INVALID_REQUEST
+            cause = CommandCause.INVALID if invalid else CommandCause.FAULT
+            raise LostError(f"{service}/{name}: {answer.header.error.message or answer.header.error.code}", cause)
         return answer
 
     # -- clock -------------------------------------------------------------------------------------------------------
@@ -129,7 +137,8 @@ class Connection:
         else:
             answer = self.call("lease", "AcquireLease", lease_pb2.AcquireLeaseRequest(resource="body"))
         if answer.status != 1:
-            raise LostError(f"the lease is held by {answer.lease_owner.client_name or 'another client'}")
+            holder = answer.lease_owner.client_name or "another client"
+            raise LostError(f"the lease is held by {holder}", CommandCause.NO_LEASE)
         self.lease = answer.lease
 
     def retain(self) -> bool:
@@ -154,7 +163,8 @@ class Connection:
         wanted = Request.REQUEST_ON_MOTORS if on else Request.REQUEST_OFF_MOTORS
         answer = self.call("power", "PowerCommand", Request(lease=self.lease, request=wanted))
         if answer.status not in (power_pb2.STATUS_IN_PROGRESS, power_pb2.STATUS_SUCCESS):
-            raise LostError(f"the motors stay off: {power_pb2.PowerCommandStatus.Name(answer.status)}")
+            name = power_pb2.PowerCommandStatus.Name(answer.status)
+            raise LostError(f"the motors stay off: {name}", CommandCause.UNPOWERED)
         return int(answer.power_command_id)
 
     def stop(self) -> None:

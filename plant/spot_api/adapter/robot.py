@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import Any, Final
 
@@ -27,6 +27,7 @@ from bosdyn.client.robot_command import RobotCommandBuilder
 from bosdyn.geometry import EulerZXY
 from pydrake.math import RigidTransform
 
+from plant.spot_api.adapter.answers import CAUSES, status_of
 from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
 from plant.spot_api.adapter.readings import TIP_RADIUS_M, Readings, picture, readings, scan
 from plant.spot_api.messages import frames_of, pose_between
@@ -34,6 +35,7 @@ from skills.robot import (
     ArmTrajectory,
     Battery,
     Capabilities,
+    CommandCause,
     CommandId,
     CommandState,
     CommandStatus,
@@ -57,7 +59,6 @@ _RETAIN_S: Final = 1.0
 _SCAN_S: Final = 0.09
 _MOST_POINTS: Final = 250
 _LIDAR: Final = "velodyne-point-cloud"
-Progress = basic_command_pb2.RobotCommandFeedbackStatus
 Answer = robot_command_pb2.RobotCommandResponse
 
 
@@ -76,7 +77,8 @@ class ApiRobot:
 
     def __init__(self, name: str, connection: Connection, clock: RobotClock, capabilities: Capabilities) -> None:
         """Reads the robot's first state. Raises LostError."""
-        self._name, self._connection, self._clock, self._capabilities = name, connection, clock, capabilities
+        self._name, self._connection, self._clock = name, connection, clock
+        self._capabilities = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S)
         self._lock = Lock()
         self._sent: dict[CommandId, _Sent] = {}
         self._next, self._lease_number, self._retained_s, self._synchronised_s = 1, 0, -math.inf, clock.now()
@@ -172,7 +174,7 @@ class ApiRobot:
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Drives at a body-frame velocity; the robot stops by itself at `until_s`, or 0.6 s from now."""
         if not all(map(math.isfinite, (vx, vy, wz))):
-            return self._refused(f"drive: velocity ({vx}, {vy}, {wz}) is not finite")
+            return self._refused(f"drive: velocity ({vx}, {vy}, {wz}) is not finite", CommandCause.INVALID)
         end_s = min(until_s, self._clock.now() + DRIVE_EXPIRY_S)
         command = RobotCommandBuilder.synchro_velocity_command(vx, vy, wz, params=self._params())
         return self._send(command, "base", lease, end_s=end_s)
@@ -204,7 +206,7 @@ class ApiRobot:
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: Spot has no head."""
-        return self._refused("point_head: the robot has no head")
+        return self._refused("point_head: the robot has no head", CommandCause.UNSUPPORTED)
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper to an opening with at most force_n at its tip."""
@@ -235,7 +237,7 @@ class ApiRobot:
             for sent in self._sent.values():
                 mine = sent.part == part if part else sent.part != "gripper"
                 if mine and sent.status.state is CommandState.RUNNING:
-                    sent.status = CommandStatus(CommandState.STOPPED, "stopped by command")
+                    sent.status = CommandStatus(CommandState.STOPPED, "stopped by command", CommandCause.STOPPED)
             if self._sent[stopped].status.state is CommandState.STOPPED:
                 self._sent[stopped].status = CommandStatus(CommandState.DONE)
         return stopped
@@ -268,7 +270,7 @@ class ApiRobot:
         except LostError as error:
             raise LeaseError(f"{self._name}: {error}") from error
         self._lease_number += 1
-        self._current = Lease(self._name, holder, self._lease_number)
+        self._current = Lease(self._name, holder, self._lease_number, self._connection.lease.epoch)
         return self._current
 
     def return_lease(self, lease: Lease) -> None:
@@ -335,9 +337,9 @@ class ApiRobot:
         """Reads how far a command has come."""
         request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=sent.number)
         answer = self._connection.call("robot-command", "RobotCommandFeedback", request).feedback
-        status = _status_of(answer.synchronized_feedback, sent.part)
+        status = status_of(answer.synchronized_feedback, sent.part)
         if status.state is CommandState.RUNNING and self._clock.now() >= sent.until_s:
-            status = CommandStatus(CommandState.STOPPED, "expired before it was done")
+            status = CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
         with self._lock:
             if sent.status.state is not CommandState.RUNNING:
                 return
@@ -362,36 +364,42 @@ class ApiRobot:
         self, command: Any, part: str, lease: Lease, until_s: float = math.inf, *, end_s: float | None = None
     ) -> CommandId:
         if lease != self._current:
-            return self._refused(f"{part}: lease {lease.number} of {lease.holder!r} no longer counts")
+            gone = f"{part}: lease {lease.number} of {lease.holder!r} no longer counts"
+            return self._refused(gone, CommandCause.NO_LEASE)
         now_s = self._clock.now()
         if min(until_s, math.inf if end_s is None else end_s) <= now_s:
-            return self._refused(f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already")
+            late = f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already"
+            return self._refused(late, CommandCause.LATE)
         if part == "base" and end_s is not None:
             if now_s - self._readings.stamp_s > OLD_STATE_S:
-                return self._refused(f"drive: the last state is {now_s - self._readings.stamp_s:.1f} s old")
+                old = f"drive: the last state is {now_s - self._readings.stamp_s:.1f} s old"
+                return self._refused(old, CommandCause.NO_ANSWER)
             end = self._clock.robot_time_s() + end_s - now_s
             given = command.synchronized_command.mobility_command.se2_velocity_request
             given.end_time.FromNanoseconds(round(end * 1e9))
         try:
             answer = self._connection.command(command)
         except LostError as error:
-            return self._refused(f"{part}: {error}")
+            return self._refused(f"{part}: {error}", error.cause)
         if answer.lease_use_result.status not in (0, lease_pb2.LeaseUseResult.STATUS_OK):
             owner = answer.lease_use_result.owner.client_name or "another client"
             self._current, self._connection.lease = None, None
-            return self._refused(f"{part}: the lease is held by {owner}")
+            return self._refused(f"{part}: the lease is held by {owner}", CommandCause.NO_LEASE)
         if answer.status != Answer.STATUS_OK:
-            return self._refused(f"{part}: {answer.message or Answer.Status.Name(answer.status)}")
+            why = answer.message or Answer.Status.Name(answer.status)
+            return self._refused(f"{part}: {why}", CAUSES.get(answer.status, CommandCause.REFUSED))
         made = _Sent(answer.robot_command_id, part, until_s=until_s if end_s is None else math.inf)
         with self._lock:
             for sent in self._sent.values():
                 same = sent.part == part or {sent.part, part} <= {"base", "posture"}
                 if same and sent.status.state is CommandState.RUNNING:
-                    sent.status = CommandStatus(CommandState.STOPPED, "replaced by another command")
+                    sent.status = CommandStatus(
+                        CommandState.STOPPED, "replaced by another command", CommandCause.STOPPED
+                    )
             return self._kept(made)
 
-    def _refused(self, reason: str) -> CommandId:
-        return self._noted(CommandStatus(CommandState.REFUSED, reason))
+    def _refused(self, reason: str, cause: CommandCause) -> CommandId:
+        return self._noted(CommandStatus(CommandState.REFUSED, reason, cause))
 
     def _noted(self, status: CommandStatus) -> CommandId:
         with self._lock:
@@ -409,39 +417,3 @@ def _arm_stop() -> Any:
     command = robot_command_pb2.RobotCommand()
     command.synchronized_command.arm_command.arm_stop_command.SetInParent()
     return command
-
-
-def _status_of(feedback: Any, part: str) -> CommandStatus:
-    """The protocol's status of the part of a command, by its feedback."""
-    field = {"arm": "arm_command_feedback", "gripper": "gripper_command_feedback"}.get(
-        part, "mobility_command_feedback"
-    )
-    given = getattr(feedback, field)
-    if given.status == Progress.STATUS_COMMAND_TIMED_OUT:
-        return CommandStatus(CommandState.DONE)
-    if given.status == Progress.STATUS_COMMAND_OVERRIDDEN:
-        return CommandStatus(CommandState.STOPPED, "replaced by another command")
-    if given.status == Progress.STATUS_ROBOT_FROZEN:
-        return CommandStatus(CommandState.STOPPED, "the robot is frozen")
-    if part == "arm":
-        return _arm_status(given)
-    if part == "gripper":
-        part_status, Claw = given.claw_gripper_feedback.status, gripper_command_pb2.ClawGripperCommand.Feedback
-        if part_status == Claw.STATUS_AT_GOAL:
-            return CommandStatus(CommandState.DONE)
-        if part_status == Claw.STATUS_APPLYING_FORCE:
-            return CommandStatus(CommandState.DONE, "stopped by an object in the gripper")
-        return CommandStatus(CommandState.RUNNING)
-    standing = given.stand_feedback.status == basic_command_pb2.StandCommand.Feedback.STATUS_IS_STANDING
-    sitting = given.sit_feedback.status == basic_command_pb2.SitCommand.Feedback.STATUS_IS_SITTING
-    return CommandStatus(CommandState.DONE if standing or sitting else CommandState.RUNNING)
-
-
-def _arm_status(given: Any) -> CommandStatus:
-    Move = arm_command_pb2.ArmJointMoveCommand.Feedback
-    moved = given.arm_joint_move_feedback
-    if given.HasField("arm_stop_feedback") or moved.status == Move.STATUS_COMPLETE:
-        return CommandStatus(CommandState.DONE)
-    if moved.status == Move.STATUS_STALLED:
-        return CommandStatus(CommandState.STOPPED, "the arm is stalled")
-    return CommandStatus(CommandState.RUNNING)

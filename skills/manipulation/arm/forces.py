@@ -39,15 +39,17 @@ def hand_force_n(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm:
 class PullWatch:
     """Detector of a pull at the hand: compares the mean of the last readings with a baseline from the first ones.
 
-    A pull is a force beyond `threshold_n` at `ticks` readings in a row.
+    A pull is a force beyond `threshold_n` at all readings of `pull_s`; the mean is that of `mean_s`, the baseline that
+    of the first `baseline_s`. The arm gives a reading every `period_s`.
     """
 
     model: ArmModel
     p_HO: FloatArray
     threshold_n: float
-    ticks: int = 3
-    baseline_readings: int = 10
-    mean_of: int = 4
+    period_s: float = 0.05
+    pull_s: float = 0.15
+    baseline_s: float = 0.5
+    mean_s: float = 0.2
     force_n: float = field(default=0.0, init=False)
     _first: list[FloatArray] = field(default_factory=list, init=False)
     _last: deque[FloatArray] = field(default_factory=deque, init=False)
@@ -59,16 +61,20 @@ class PullWatch:
         if stamp_s > self._stamp_s:
             self._stamp_s = stamp_s
             self._take(q_rad, efforts_nm)
-        return self._felt >= self.ticks
+        return self._felt >= self._readings(self.pull_s)
+
+    def _readings(self, span_s: float) -> int:
+        """Number of readings in a time, at least one."""
+        return max(1, round(span_s / self.period_s))
 
     def _take(self, q_rad: FloatArray, efforts_nm: FloatArray) -> None:
-        if len(self._first) < self.baseline_readings:
+        if len(self._first) < self._readings(self.baseline_s):
             self._first.append(efforts_nm)
             return
         self._last.append(efforts_nm)
-        if len(self._last) > self.mean_of:
+        if len(self._last) > (mean_of := self._readings(self.mean_s)):
             self._last.popleft()
         extra_nm = np.mean(self._last, axis=0) - np.mean(self._first, axis=0)
         self.force_n = float(np.linalg.norm(hand_force_n(self.model, q_rad, self.p_HO, extra_nm)))
-        enough = len(self._last) == self.mean_of and self.force_n > self.threshold_n
+        enough = len(self._last) == mean_of and self.force_n > self.threshold_n
         self._felt = self._felt + 1 if enough else 0

@@ -1,7 +1,7 @@
 """Watch over the object in the gripper: recognises a loss and a slip from the gripper's readings, within 0.3 s."""
 
 import enum
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 from skills.robot import Capabilities, Clock, CommandId, Gripper, Lease, Robot
@@ -32,9 +32,9 @@ class HoldWatch:
 
     The robot's belief that it holds nothing counts once it has lasted for `patience_s`. An object slips when the
     gripper has closed by more than `slip_rad` about it, or when its force has been below the part `slip_force` of its
-    first value for `slip_s`. An object that was gripped again slips on when the gripper closes about it, judged from
-    `settle_s` later on; fingers that stay apart have `regrip_s` to feel it again before it counts as lost. A gripper
-    that has opened by `released_rad` lets go on purpose.
+    first value for `slip_s`. Both times span two readings. An object that was gripped again slips on when the gripper
+    closes about it, judged from `settle_s` later on; fingers that stay apart have `regrip_s` to feel it again before it
+    counts as lost. A gripper that has opened by `released_rad` lets go on purpose.
     """
 
     patience_s: float = 0.05
@@ -100,10 +100,12 @@ class HoldWatch:
 
 def hold_watch(capabilities: Capabilities) -> HoldWatch:
     """Returns a watch with limits that suit a robot's gripper."""
-    usual, gripper = HoldWatch(), capabilities.gripper
+    period_s, gripper = capabilities.sensor_period_s, capabilities.gripper
+    usual = HoldWatch(patience_s=period_s, slip_s=period_s)
     if gripper is None:
         return usual
-    return HoldWatch(slip_rad=gripper.like_turn(usual.slip_rad), released_rad=gripper.like_turn(usual.released_rad))
+    slip, released = gripper.like_turn(usual.slip_rad), gripper.like_turn(usual.released_rad)
+    return replace(usual, slip_rad=slip, released_rad=released)
 
 
 def firmer_n(force_n: float, capabilities: Capabilities) -> float:

@@ -134,7 +134,8 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         Returns True as well when the object is out of the gripper: somebody pulled it out, or it has fallen.
         """
         message, robot = f"holding the {inputs.thing} out to {inputs.person}", self.context.robot
-        watch, hold = PullWatch(self.model, self.p_HT, self.options.pull_n), self.hold_watch()
+        period_s = robot.capabilities().sensor_period_s
+        watch, hold = PullWatch(self.model, self.p_HT, self.options.pull_n, period_s), self.hold_watch()
         text = f"{robot.name} holds the {inputs.thing} out to {inputs.person}. Let go?"
         question = Question(f"hand-over/{robot.name}", text, (_LETS_GO, _KEEPS), _KEEPS, self.options.wait_s)
         asked, end_s = self.context.ask(question), self.context.clock.now() + self.options.wait_s

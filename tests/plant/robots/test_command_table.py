@@ -3,7 +3,7 @@
 import pytest
 
 from plant.robots.command_table import MOST_STATUSES, CommandTable, Part
-from skills.robot import CommandId, CommandState
+from skills.robot import CommandCause, CommandId, CommandState
 
 
 def test_of_many_commands_the_last_are_known_and_the_old_ones_are_over():
@@ -15,5 +15,6 @@ def test_of_many_commands_the_last_are_known_and_the_old_ones_are_over():
     assert table.status(arm).state is CommandState.RUNNING
     assert [table.status(each).state for each in ids[-2:]] == [CommandState.STOPPED, CommandState.RUNNING]
     assert table.status(ids[0]).reason == "it was over long ago"
+    assert {table.status(each).cause for each in (ids[0], ids[-2])} == {CommandCause.STOPPED}
     with pytest.raises(KeyError):
         table.status(CommandId(ids[-1] + 1))

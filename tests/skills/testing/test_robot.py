@@ -7,7 +7,7 @@ import pytest
 
 from plant.robots.fetch.description import HEAD_CAMERA
 from plant.robots.fetch.kind import fetch_capabilities
-from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
+from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, Pose2D
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, can_at
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot, Start
@@ -76,6 +76,28 @@ def test_invalid_commands_are_refused(clock, robot):
     reach = ArmTrajectory(np.array([1.0]), np.zeros((1, 6)))
     refused = robot.command_status(robot.move_arm(reach, until_s=9.0, lease=lease))
     assert (refused.state, refused.reason) == (CommandState.REFUSED, "there is no arm")
+    assert refused.cause is CommandCause.UNSUPPORTED
+
+
+def test_a_command_that_does_not_succeed_has_its_cause(clock, robot):
+    old = robot.acquire_lease("test")
+    late = robot.stand(0.6, 0.0, until_s=0.01, lease=old)
+    clock.advance(0.05)
+    clock.advance(0.05)
+    replaced = robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=old)
+    taken = robot.drive(0.4, 0.0, 0.0, until_s=9.0, lease=old)
+    lease = robot.take_lease("other")
+    refused = [robot.stand(2.0, 0.0, until_s=9.0, lease=each) for each in (old, lease)]
+    robot.refuse_because, robot.refusal_cause = {"sit": "it fell"}, CommandCause.FAULT
+    fallen = robot.sit(until_s=9.0, lease=lease)
+    assert [robot.command_status(each).cause for each in (late, replaced, taken, *refused, fallen)] == [
+        CommandCause.LATE,
+        CommandCause.STOPPED,
+        CommandCause.NO_LEASE,
+        CommandCause.NO_LEASE,
+        CommandCause.INVALID,
+        CommandCause.FAULT,
+    ]
 
 
 def test_the_body_rises_to_the_commanded_height(clock, robot):

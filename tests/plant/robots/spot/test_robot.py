@@ -1,5 +1,7 @@
 """The Robot protocol as the simulated Spot keeps it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlantConfig
@@ -7,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlantConfig
 from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
 from plant.robots.robot_kind import PlacedRobot
-from skills.robot import ArmTrajectory, CommandState, LeaseError, Pose2D
+from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, Pose2D
 
 
 @pytest.fixture
@@ -90,6 +92,40 @@ def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, spot, lease
     assert "other" in spot.command_status(refused).reason
     assert truth(engine)[0] == pytest.approx(0.5, abs=0.01)
     assert spot.command_status(spot.stop(lease=other)).state is CommandState.DONE
+
+
+def test_a_lease_of_an_earlier_start_does_not_count(engine, spot, lease):
+    earlier = replace(lease, epoch="of the last start")
+    refused = spot.command_status(spot.drive(0.5, 0, 0, until_s=9.0, lease=earlier))
+    assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.NO_LEASE)
+
+
+@pytest.mark.parametrize(
+    ("begin", "cause"),
+    [
+        (lambda spot, lease: spot.drive(np.nan, 0.0, 0.0, until_s=9.0, lease=lease), CommandCause.INVALID),
+        (lambda spot, lease: spot.stand(2.0, 0.0, until_s=9.0, lease=lease), CommandCause.INVALID),
+        (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 0.1), until_s=9.0, lease=lease), CommandCause.INVALID),
+        (lambda spot, lease: spot.point_head(0.0, 0.0, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
+        (lambda spot, lease: spot.sit(until_s=0.0, lease=lease), CommandCause.LATE),
+        (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 3.0), until_s=0.2, lease=lease), CommandCause.LATE),
+        (lambda spot, lease: spot.drive(0.1, 0.0, 0.0, until_s=0.2, lease=lease), CommandCause.NONE),
+    ],
+)
+def test_a_command_that_does_not_succeed_has_its_cause(engine, spot, lease, begin, cause):
+    command = begin(spot, lease)
+    engine.advance(0.4)
+    assert spot.command_status(command).cause is cause
+
+
+def test_a_stopped_command_has_its_cause(engine, spot, lease):
+    replaced = spot.drive(0.3, 0.0, 0.0, until_s=5.0, lease=lease)
+    seated = spot.drive(0.3, 0.0, 0.0, until_s=5.0, lease=lease)
+    spot.sit(until_s=9.0, lease=lease)
+    taken = spot.move_arm(arm_to(spot, 1.0, 3.0), until_s=9.0, lease=lease)
+    spot.take_lease("other")
+    causes = [spot.command_status(each).cause for each in (replaced, seated, taken)]
+    assert causes == [CommandCause.STOPPED, CommandCause.STOPPED, CommandCause.NO_LEASE]
 
 
 def test_a_returned_lease_stops_the_robot_and_frees_it(engine, spot, lease):

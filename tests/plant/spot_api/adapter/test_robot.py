@@ -22,7 +22,7 @@ from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter import connection
 from plant.spot_api.adapter.connection import Address, Connection
 from skills.files.errors import InputError
-from skills.robot import ArmTrajectory, CommandState, LeaseError
+from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
@@ -117,12 +117,30 @@ def test_a_drive_keeps_the_posture_asked_for(standing):
 
 
 @pytest.mark.parametrize(
-    ("velocity", "ahead_s", "reason"), [((math.nan, 0.0, 0.0), 1.0, "not finite"), ((0.1, 0.0, 0.0), -1.0, "expires")]
+    ("velocity", "ahead_s", "reason", "cause"),
+    [
+        ((math.nan, 0.0, 0.0), 1.0, "not finite", CommandCause.INVALID),
+        ((0.1, 0.0, 0.0), -1.0, "expires", CommandCause.LATE),
+    ],
 )
-def test_a_drive_that_cannot_be_is_refused(standing, velocity, ahead_s, reason):
+def test_a_drive_that_cannot_be_is_refused(standing, velocity, ahead_s, reason, cause):
     command = standing.robot.drive(*velocity, until_s=standing.now() + ahead_s, lease=standing.lease)
     status = standing.robot.command_status(command)
-    assert (status.state, reason in status.reason) == (CommandState.REFUSED, True)
+    assert (status.state, reason in status.reason, status.cause) == (CommandState.REFUSED, True, cause)
+
+
+def test_a_drive_without_power_has_that_cause(step):
+    lease = step.robot.acquire_lease("test")
+    command = step.robot.drive(0.1, 0.0, 0.0, until_s=step.now() + 0.5, lease=lease)
+    assert step.robot.command_status(command).cause is CommandCause.UNPOWERED
+
+
+def test_a_drive_may_last_as_long_as_the_capabilities_say(standing):
+    assert standing.robot.capabilities().drive_expiry_s == 0.6
+
+
+def test_a_lease_has_the_epoch_of_the_robot(standing):
+    assert standing.lease.epoch == standing.connection.lease.epoch != ""
 
 
 def test_the_arm_follows_a_trajectory(standing):
@@ -176,6 +194,7 @@ def test_a_taken_lease_refuses_commands_and_says_who_took_it(standing, credentia
     status = standing.robot.command_status(command)
     assert status.state is CommandState.REFUSED
     assert "errand" in status.reason
+    assert status.cause is CommandCause.NO_LEASE
     assert standing.robot.lease_holder() is None
 
 
@@ -207,7 +226,8 @@ def test_a_robot_that_does_not_answer_is_not_driven_and_becomes_a_fault(standing
     monkeypatch.setattr(standing.connection._stubs["robot-state"], "GetRobotState", silent)
     standing.advance(1.0)
     command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.5, lease=standing.lease)
-    assert "old" in standing.robot.command_status(command).reason
+    status = standing.robot.command_status(command)
+    assert ("old" in status.reason, status.cause) == (True, CommandCause.NO_ANSWER)
     standing.advance(3.0)
     assert any("has not answered" in fault for fault in standing.robot.faults())
 

@@ -1,5 +1,7 @@
 """Tests of the watch over the object in the gripper."""
 
+from dataclasses import replace
+
 import pytest
 
 from plant.robots.fetch.kind import fetch_capabilities
@@ -86,6 +88,12 @@ def test_two_fingers_that_slide_slip_by_millimetres(closed_m, grip):
 def test_two_fingers_that_open_by_a_few_millimetres_let_go():
     watch = hold_watch(fetch_capabilities())
     assert judged((0.06, 40.0, True), (0.068, 0.0, False), watch=watch)[-1] is Grip.RELEASED
+
+
+def test_a_gripper_that_is_read_seldom_is_judged_by_two_readings_as_well(spot):
+    watch = hold_watch(replace(spot, sensor_period_s=0.1))
+    grips = [watch.judge(Gripper(0.1 * (n // 2), 0.5, 20.0, n < 2), 0.05 * n) for n in range(5)]
+    assert grips == [Grip.HELD] * 4 + [Grip.LOST]
 
 
 def test_a_finger_that_turns_is_judged_as_usual(spot):

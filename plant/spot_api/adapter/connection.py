@@ -108,12 +108,12 @@ class Connection:
     # -- clock -------------------------------------------------------------------------------------------------------
 
     def synchronise(self) -> None:
-        """Estimates how far the robot's clock is ahead of this machine's. Raises LostError."""
+        """Estimates how far the robot's clock is ahead of this machine's, which never jumps. Raises LostError."""
         request = time_sync_pb2.TimeSyncUpdateRequest(clock_identifier=self.clock_identifier)
         for _ in range(_ROUND_TRIPS):
-            sent_ns = time.time_ns()
+            sent_ns = time.monotonic_ns()
             answer = self.call("time-sync", "TimeSyncUpdate", request)
-            back_ns = time.time_ns()
+            back_ns = time.monotonic_ns()
             self.clock_identifier = answer.clock_identifier
             request = time_sync_pb2.TimeSyncUpdateRequest(clock_identifier=self.clock_identifier)
             trip = request.previous_round_trip
@@ -126,7 +126,7 @@ class Connection:
 
     def robot_time_s(self) -> float:
         """The robot's time now (s since 1970), by the last synchronisation."""
-        return time.time() + self._ahead_s
+        return time.monotonic() + self._ahead_s
 
     # -- lease, E-stop and power -------------------------------------------------------------------------------------
 

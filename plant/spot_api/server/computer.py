@@ -136,7 +136,7 @@ class Computer:
         self.settling = False
         self._motions: dict[str, Motion] = {}
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._started_s = time.time()
+        self._started_s, self._started_monotonic_s = time.time(), time.monotonic()
         self.watchers: list[Callable[[], None]] = []
         """Called before each step."""
         self._sit_command: CommandId | None = None
@@ -147,8 +147,9 @@ class Computer:
     # -- time --------------------------------------------------------------------------------------------------------
 
     def now_s(self) -> float:
-        """The robot's time (s since 1970): wall time, or with a client's pace the start plus the clock's."""
-        return time.time() if self.pace is Pace.REAL else self._started_s + self.clock.now()
+        """The robot's time (s since 1970): its start plus what has passed since on the wall, or by a client's pace."""
+        real = self.pace is Pace.REAL
+        return self._started_s + (time.monotonic() - self._started_monotonic_s if real else self.clock.now())
 
     def until_s(self, robot_time_s: float) -> float:
         """Converts a robot time to one of the robot's clock; what is left of it counts from now on."""

@@ -309,10 +309,16 @@ class Robot(Protocol):
         """Returns the present faults, an empty tuple when there are none."""
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Drives at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s."""
+        """Drives at a body-frame velocity (m/s, m/s, rad/s) until the clock reads until_s.
+
+        The body keeps the posture that was last asked for.
+        """
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
-        """Holds the body origin at a height above the floor and a pitch (positive looks down)."""
+        """Holds the body origin at a height above the floor and a pitch (positive looks down).
+
+        A drive that comes later takes the posture over; a robot may end an earlier one.
+        """
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
@@ -325,6 +331,9 @@ class Robot(Protocol):
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper to an opening with at most force_n at its tip, which stays; done when there or blocked."""
+
+    def carry(self, holding: bool, *, lease: Lease) -> None:
+        """Says whether the gripper holds an object that it must keep when the communication is lost."""
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command if it still runs; the gripper keeps its clamp force."""

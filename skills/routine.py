@@ -331,6 +331,7 @@ class RoutineSkill(Skill[InputsT]):
         context = self.context
         if opening > context.robot.gripper().opening:
             context.payload.corners_H = context.payload.R_BH = context.payload.kind = None
+            context.robot.carry(False, lease=context.lease)
         until_s = context.clock.now() + GRIPPER_EXPIRY_S
         return context.robot.set_gripper(opening, force_n, until_s=until_s, lease=context.lease)
 

@@ -185,6 +185,9 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             self._gripper.begin(GripperGoal(opening, force_n))
         return command
 
+    def carry(self, holding: bool, *, lease: Lease) -> None:
+        """Changes nothing: the gripper keeps its force whatever happens."""
+
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command if it still runs."""
         refusal = self._leases.refusal(lease)

@@ -29,7 +29,7 @@ THIEF: Final = "the tablet"
 
 VERBS: Final = (
     "capabilities", "odometry", "imu", "scan", "image", "joints", "gripper", "battery", "faults",
-    "drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "stop", "command_status",
+    "drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "carry", "stop", "command_status",
     "acquire_lease", "take_lease", "return_lease", "lease_holder",
 )  # fmt: skip
 SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")

@@ -199,11 +199,12 @@ class Teleop:
         alive = now_s + self._options.period_s <= until_s + 1e-9
         asked = asked if alive else {}
         self.note, self._commands = "", []
+        if alive:
+            self._stand(asked, until_s)  # before the drive, which keeps the posture
         self._drive(asked, now_s)
         self._move_arm(asked, now_s)
         if alive:
             self._move_gripper(asked, until_s)
-            self._stand(asked, until_s)
         self.note = self._refusal() or self.note
 
     # -- inside ---------------------------------------------------------------------------------------------------

@@ -115,6 +115,7 @@ class ScriptedRobot:
         self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
         self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
+        self.carries = False
         self._hangs_down_m = 0.057  # of the held object, below the fingers' middle
         self.charge, self.docked, self._pulled_at_s = start.charge, start.docked, start.pulled_at_s
         self.present_faults: tuple[str, ...] = ()
@@ -263,6 +264,12 @@ class ScriptedRobot:
         """Moves the gripper, which stops at an object between its fingers."""
         fault = "" if self._capabilities.gripper is not None else "there is no gripper"
         return self._begin("set_gripper", (opening, force_n), until_s, lease, fault)
+
+    def carry(self, holding: bool, *, lease: Lease) -> None:
+        """Notes whether the gripper must keep its object."""
+        self.calls.append("carry")
+        if lease == self._lease:
+            self.carries = holding
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops all motion, or only the given command; the gripper keeps its force."""

@@ -122,6 +122,9 @@ class ScriptedRobot:
         self.clamps_n.append(force_n)
         return self._called("set_gripper")
 
+    def carry(self, holding: bool, *, lease: Lease) -> None:
+        self._called("carry")
+
     def battery(self) -> Battery:
         return Battery(self.clock.now(), self.charge)
 

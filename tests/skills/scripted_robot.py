@@ -115,6 +115,9 @@ class ScriptedRobot:
         self.holding = self.opening > opening
         return self._note(CommandStatus(CommandState.RUNNING))
 
+    def carry(self, holding, *, lease):
+        self.carries = holding
+
     def lease_holder(self):
         return Lease("Alice", "test")
 

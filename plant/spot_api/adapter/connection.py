@@ -18,6 +18,7 @@ from bosdyn.api import (
     image_service_pb2_grpc,
     lease_pb2,
     lease_service_pb2_grpc,
+    manipulation_api_service_pb2_grpc,
     point_cloud_service_pb2_grpc,
     power_pb2,
     power_service_pb2_grpc,
@@ -41,6 +42,7 @@ _STUBS: Final[Mapping[str, Callable[[Any], Any]]] = {
     "estop": estop_service_pb2_grpc.EstopServiceStub,
     "image": image_service_pb2_grpc.ImageServiceStub,
     "lease": lease_service_pb2_grpc.LeaseServiceStub,
+    "manipulation": manipulation_api_service_pb2_grpc.ManipulationApiServiceStub,
     "velodyne-point-cloud": point_cloud_service_pb2_grpc.PointCloudServiceStub,
     "power": power_service_pb2_grpc.PowerServiceStub,
     "robot-command": robot_command_service_pb2_grpc.RobotCommandServiceStub,
@@ -98,7 +100,9 @@ class Connection:
         try:
             answer = getattr(self._stubs[service], name)(request, timeout=timeout_s)
         except (grpc.RpcError, KeyError) as error:
-            raise LostError(f"{service}/{name}: {_cause(error)}") from error
+            lacks = isinstance(error, KeyError) or error.code() is grpc.StatusCode.UNIMPLEMENTED
+            cause = CommandCause.UNSUPPORTED if lacks else CommandCause.NO_ANSWER
+            raise LostError(f"{service}/{name}: {_cause(error)}", cause) from error
         if answer.header.error.code not in (0, 1):
             invalid = answer.header.error.code == header_pb2.CommonError.CODE_INVALID_REQUEST
             cause = CommandCause.INVALID if invalid else CommandCause.FAULT

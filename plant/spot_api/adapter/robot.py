@@ -19,9 +19,11 @@ from bosdyn.api import (
     gripper_command_pb2,
     image_pb2,
     lease_pb2,
+    manipulation_api_pb2,
     mobility_command_pb2,
     point_cloud_pb2,
     robot_command_pb2,
+    robot_state_pb2,
 )
 from bosdyn.client.robot_command import RobotCommandBuilder
 from bosdyn.geometry import EulerZXY
@@ -85,6 +87,7 @@ class ApiRobot:
         self._current: Lease | None = None
         self._posture = (capabilities.standing_height_m, 0.0)
         self._scan: Scan | None = None
+        self._carries: bool | None = None  # what the robot has yet to hear
         self._readings = self._read()
 
     # -- know and sense ----------------------------------------------------------------------------------------------
@@ -181,8 +184,12 @@ class ApiRobot:
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Holds the body origin at a height above the floor and a pitch."""
-        self._posture = (height_m, pitch_rad)
-        return self._send(RobotCommandBuilder.synchro_stand_command(params=self._params()), "posture", lease, until_s)
+        before, self._posture = self._posture, (height_m, pitch_rad)
+        command = RobotCommandBuilder.synchro_stand_command(params=self._params())
+        sent = self._send(command, "posture", lease, until_s)
+        if self.command_status(sent).state is CommandState.REFUSED:
+            self._posture = before
+        return sent
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
@@ -216,6 +223,23 @@ class ApiRobot:
         command = robot_command_pb2.RobotCommand()
         command.synchronized_command.gripper_command.claw_gripper_command.CopyFrom(made)
         return self._send(command, "gripper", lease, until_s)
+
+    def carry(self, holding: bool, *, lease: Lease) -> None:
+        """Says whether the robot keeps what it holds when the communication is lost; said again until it answers."""
+        if lease == self._current:
+            self._carries = holding
+            self._say_carry()
+
+    def _say_carry(self) -> None:
+        State, request = robot_state_pb2.ManipulatorState, manipulation_api_pb2.ApiGraspOverrideRequest()
+        carried, free = State.CARRY_STATE_CARRIABLE, State.CARRY_STATE_NOT_CARRIABLE
+        request.carry_state_override.override_request = carried if self._carries else free
+        try:
+            self._connection.call("manipulation", "OverrideGrasp", request)
+        except LostError as error:
+            if error.cause is CommandCause.NO_ANSWER:
+                return
+        self._carries = None
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops base and arm, or only the part of a command; the gripper keeps its clamp force."""
@@ -294,6 +318,8 @@ class ApiRobot:
                 running = [sent for sent in self._sent.values() if sent.status.state is CommandState.RUNNING]
             for sent in running:
                 self._follow(sent)
+            if self._carries is not None:
+                self._say_carry()
             now_s = self._clock.now()
             if self._connection.lease is not None and now_s - self._retained_s > _RETAIN_S:
                 self._retained_s = now_s

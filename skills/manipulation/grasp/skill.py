@@ -398,10 +398,15 @@ class Grasp(GraspPorts, LookingSkill[GraspInputs]):
         return (yield from self.shift_by_first([*planned_B, *others_B], message))
 
     def _check_held(self, name: str, opening_before: float | None) -> float:
-        """Returns the gripper's opening. Raises SkillFailure with cause POSTCONDITION when the object is not held."""
+        """Returns the gripper's opening; the robot carries the object from the first check on.
+
+        Raises SkillFailure with cause POSTCONDITION when the object is not held.
+        """
         gripper = self.context.robot.gripper()
         if not gripper.holding:
             raise SkillFailure(Cause.POSTCONDITION, f"the gripper closed on nothing where the {name} was seen")
+        if opening_before is None:
+            self.context.robot.carry(True, lease=self.context.lease)
         slip = self.gripper.like_turn(self.options.slip_rad)
         if opening_before is not None and abs(gripper.opening - opening_before) > slip:
             raise SkillFailure(Cause.POSTCONDITION, f"the {name} slipped in the gripper while it was lifted")

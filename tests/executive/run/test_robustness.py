@@ -32,6 +32,7 @@ from tests.visitors import OnMessage
 CAPABILITIES = spot_capabilities()
 SENSES = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
 USED = tuple(verb for verb in VERBS if verb != "take_lease")
+ANSWERING = set(USED) - {"return_lease", "carry"}
 HANG_LIMITS = {"verb_limit_s": 0.2, "image_limit_s": 0.2}
 HANGS_S = 0.7
 
@@ -84,6 +85,7 @@ class UseAll(Skill):
         start = np.array(CAPABILITIES.arm.stowed_rad)
         trajectory = ArmTrajectory(np.array([0.1, 2.0]), np.stack([start, start + 0.2]))
         robot.sit(until_s=until_s, lease=lease)
+        robot.carry(True, lease=lease)
         self.commands = [
             robot.stand(0.5, 0.0, until_s=until_s, lease=lease),
             robot.move_arm(trajectory, until_s=until_s, lease=lease),
@@ -131,10 +133,10 @@ def hanging(call):
 KINDS = {
     "raises": (raising, USED),
     "hangs": (hanging, USED),
-    "gives None": (lambda call: (call.proceed(), None)[1], set(USED) - {"scan", "lease_holder", "return_lease"}),
-    "gives text": (lambda call: (call.proceed(), "41")[1], set(USED) - {"return_lease"}),
-    "gives NaN": (lambda call: (call.proceed(), float("nan"))[1], set(USED) - {"return_lease"}),
-    "gives a truth value": (lambda call: (call.proceed(), True)[1], set(USED) - {"return_lease"}),
+    "gives None": (lambda call: (call.proceed(), None)[1], ANSWERING - {"scan", "lease_holder"}),
+    "gives text": (lambda call: (call.proceed(), "41")[1], ANSWERING),
+    "gives NaN": (lambda call: (call.proceed(), float("nan"))[1], ANSWERING),
+    "gives a truth value": (lambda call: (call.proceed(), True)[1], ANSWERING),
     "gives numbers that are not finite": (not_finite, ("odometry", "imu", "joints", "gripper", "battery")),
     "gives a negative stamp": (spoiled(stamp_s=-1.0), SENSES),
     "gives no stamp": (spoiled(stamp_s=None), SENSES),

@@ -9,11 +9,13 @@ no answer          old readings: drive refused, later a fault
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import grpc
 import numpy as np
 import pytest
+from bosdyn.api import manipulation_api_pb2, robot_command_pb2, robot_state_pb2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from lock_step import LockStep
@@ -26,6 +28,19 @@ from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+
+
+class Silent(grpc.RpcError):
+    """Call that fails with a code."""
+
+    def __init__(self, code):
+        self._code = code
+
+    def code(self):
+        return self._code
+
+    def details(self):
+        return "cut"
 
 
 def scripted():
@@ -114,6 +129,57 @@ def test_a_drive_keeps_the_posture_asked_for(standing):
     standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
     standing.advance(0.5)
     assert standing.served.height_m == pytest.approx(0.46, abs=0.01)
+
+
+def test_a_posture_that_was_refused_is_not_kept(standing, monkeypatch):
+    refused = robot_command_pb2.RobotCommandResponse.STATUS_BEHAVIOR_FAULT
+    answer = robot_command_pb2.RobotCommandResponse(status=refused)
+    with monkeypatch.context() as patch:
+        patch.setattr(standing.connection, "command", lambda command: answer)
+        low = standing.robot.stand(0.46, 0.1, until_s=standing.now() + 5.0, lease=standing.lease)
+    assert standing.robot.command_status(low).cause is CommandCause.FAULT
+    standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
+    standing.advance(0.5)
+    assert standing.served.height_m == pytest.approx(0.52, abs=0.01)
+
+
+class Gripped:
+    """Manipulation service that hears carry states; the first `silent` calls are not answered."""
+
+    def __init__(self, silent=0, code=grpc.StatusCode.UNAVAILABLE):
+        self.silent, self.code, self.heard = silent, code, []
+
+    def OverrideGrasp(self, request, timeout):
+        self.silent -= 1
+        if self.silent >= 0:
+            raise Silent(self.code)
+        self.heard.append(request.carry_state_override.override_request)
+        return manipulation_api_pb2.ApiGraspOverrideResponse()
+
+
+State = robot_state_pb2.ManipulatorState
+
+
+@pytest.mark.parametrize("silent", [0, 3])
+def test_the_robot_hears_what_it_carries_as_soon_as_it_answers(standing, silent):
+    standing.connection._stubs["manipulation"] = service = Gripped(silent)
+    standing.robot.carry(True, lease=standing.lease)
+    standing.until(lambda: service.heard, 0.5)
+    standing.robot.carry(False, lease=standing.lease)
+    assert service.heard == [State.CARRY_STATE_CARRIABLE, State.CARRY_STATE_NOT_CARRIABLE]
+
+
+def test_a_robot_that_cannot_carry_is_told_once(standing):
+    standing.connection._stubs["manipulation"] = service = Gripped(9, grpc.StatusCode.UNIMPLEMENTED)
+    standing.robot.carry(True, lease=standing.lease)
+    standing.advance(0.3)
+    assert (service.silent, service.heard) == (8, [])
+
+
+def test_only_the_holder_of_the_lease_says_what_is_carried(standing):
+    standing.connection._stubs["manipulation"] = service = Gripped()
+    standing.robot.carry(True, lease=replace(standing.lease, number=0))
+    assert service.heard == []
 
 
 @pytest.mark.parametrize(
@@ -213,15 +279,8 @@ def test_a_pressed_estop_is_a_fault(standing):
 
 
 def test_a_robot_that_does_not_answer_is_not_driven_and_becomes_a_fault(standing, monkeypatch):
-    class Silent(grpc.RpcError):
-        def code(self):
-            return grpc.StatusCode.UNAVAILABLE
-
-        def details(self):
-            return "cut"
-
     def silent(*_, **__):
-        raise Silent
+        raise Silent(grpc.StatusCode.UNAVAILABLE)
 
     monkeypatch.setattr(standing.connection._stubs["robot-state"], "GetRobotState", silent)
     standing.advance(1.0)

@@ -118,7 +118,7 @@ def test_an_object_held_after_a_restart_is_not_taken_again():
     step = resumed(Grasp(context_of(robot)), SEEN)
     assert isinstance(step, Succeeded), step
     assert step.message == "the coke was in the gripper already; holding it"
-    assert (robot.opening, robot.holding) == (0.3, True)
+    assert (robot.opening, robot.holding, robot.carries) == (0.3, True, True)
 
 
 def test_after_a_restart_with_an_empty_gripper_the_robot_looks_before_it_takes():

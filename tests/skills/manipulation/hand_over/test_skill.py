@@ -99,8 +99,9 @@ def test_the_object_is_held_out_near_the_person_without_contact(y):
 
 def test_a_pull_opens_the_gripper_and_the_hand_is_drawn_in():
     robot = _before_robin()
+    robot.carries = True
     assert outcome(HandOver(context_of(robot)), BEER).message == "gave the beer to Robin"
-    assert not robot.holding
+    assert not (robot.holding or robot.carries)
     assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
 
 

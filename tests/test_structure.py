@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 7738,
     "executive/cli": 4807,
-    "skills": 27260,
+    "skills": 27258,
     "plant": 18415,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 474, 77, 10

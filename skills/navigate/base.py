@@ -9,8 +9,6 @@ from skills.api import Cause, InputsT, Running, SkillContext
 from skills.robot import CommandId, CommandState
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
-"""Lifetime (s) of a drive command unless the next one replaces it."""
-
 
 class Base:
     """Sender of drive commands under a context's lease.

@@ -11,7 +11,7 @@ import numpy as np
 
 from skills.api import Cause, Failed, InputsT, Job, PlanningError, Running, Skill, SkillContext, Step, Succeeded
 from skills.geometry import wrap
-from skills.robot import ArmTrajectory, Clock, CommandId, CommandState, FloatArray, NoImageError, Pose2D
+from skills.robot import ArmTrajectory, Clock, CommandCause, CommandId, CommandState, FloatArray, NoImageError, Pose2D
 
 PATIENCE_S: Final = 6.5
 """Duration (s) up to which trouble ends no skill."""
@@ -84,8 +84,9 @@ class OffPathError(Exception):
 class CommandFailure(SkillFailure):
     """Failure of a command that was refused, stopped or lost; cause EXECUTION. A repetition may succeed."""
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, why: CommandCause = CommandCause.NO_ANSWER) -> None:
         super().__init__(Cause.EXECUTION, message)
+        self.why = why
 
 
 def planning_failure(routine: Routine[object]) -> Routine[SkillFailure | None]:
@@ -300,16 +301,17 @@ class RoutineSkill(Skill[InputsT]):
     def persist(self, attempt: Callable[[], Routine[ResultT]], message: str) -> Routine[ResultT]:
         """Makes an attempt; repeats it, while patience lasts, when its command is refused, stopped or lost.
 
-        Patience begins with the first such failure. Raises SkillFailure.
+        Patience begins with the first such failure. Without the lease it is repeated once: a run suspends the skill
+        until the robot has its lease again. Raises SkillFailure.
         """
-        patience, before = Patience(self.context.clock), SkillFailure(Cause.EXECUTION, message)
+        patience, before = Patience(self.context.clock), CommandFailure(message)
         while True:
             try:
                 return (yield from attempt())
             except OffPathError as off:
                 raise before from off
             except CommandFailure as failure:
-                if not patience.is_left() or self.context.robot.lease_holder() != self.context.lease:
+                if not patience.is_left() or failure.why is before.why is CommandCause.NO_LEASE:
                     raise
                 before = failure
                 yield from self.pause(_AGAIN_S, f"{failure.message}; {message} again")
@@ -398,7 +400,7 @@ class RoutineSkill(Skill[InputsT]):
         sentence = f"{what} was {status.state.value} while {message}{why}"
         if status.state is CommandState.STOPPED and self.context.clock.now() >= until_s:
             raise SkillFailure(Cause.EXECUTION, sentence)
-        raise CommandFailure(sentence)
+        raise CommandFailure(sentence, status.cause)
 
     def pause(self, duration_s: float, message: str) -> Routine[None]:
         """Waits on the robot's clock."""

@@ -19,15 +19,15 @@ LINES = {
     "executive/speech": 1582,
     "executive/mission": 1590,
     "executive/tree": 7704,
-    "executive/run": 3087,
+    "executive/run": 3132,
     "executive/record": 1377,
     "executive/store": 1666,
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 7738,
+    "executive/app": 7739,
     "executive/cli": 4807,
-    "skills": 27258,
+    "skills": 27262,
     "plant": 18415,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 474, 77, 10

@@ -6,7 +6,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -70,7 +70,8 @@ class ApiBackend:
             raise InputError(f"there is no robot '{tree.robot_name}'", hint=f"known: {self._robot.name}")
         if durable is not None and durable.take_up:
             raise InputError("a mission of a real robot is not resumed", hint="run it again with errand run")
-        return run_entry(self._robot, self._world, tree, self._stack, start=self._start, surely=False)
+        entry = run_entry(self._robot, self._world, tree, self._stack, start=self._start, surely=False)
+        return replace(entry, real=True)
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns nothing: nobody knows what happens around a real robot."""

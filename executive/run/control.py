@@ -109,13 +109,18 @@ class Control:
         return self.state
 
     def pause(self, reason: str = "paused by the operator", *, robot: str | None = None) -> None:
-        """Pauses all robots, or one of them; the trees keep their state. Idempotent.
+        """Pauses all robots, or one of them; the trees keep their state. Idempotent; the last reason counts.
 
         Raises ValueError when the run has no such robot.
         """
         if robot is None:
             self._stride = None
         self._hold(robot, Mode.PAUSED, "pause", reason)
+
+    @property
+    def pause_reason(self) -> str | None:
+        """Reason why all robots are paused; None while they are not."""
+        return self._holds.get((None, Mode.PAUSED))
 
     def resume(self, *, robot: str | None = None) -> None:
         """Ends a pause, a breakpoint or steps, or one robot's own pause; a pressed stop button stays pressed."""
@@ -352,7 +357,7 @@ class Control:
         """Makes a robot, or all robots, stand still. Raises ValueError when the run has no such robot."""
         if robot is not None:
             self._refuse_stranger(robot)
-        if (robot, mode) not in self._holds:
+        if self._holds.get((robot, mode)) != reason:
             self._holds[robot, mode] = reason
             self._note(what, reason if robot is None else f"{robot}: {reason}")
 

@@ -27,6 +27,7 @@ POSE_PERIOD_S: Final = 0.5
 SENSORS_PERIOD_S: Final = 1.0
 MOST_PARTICLES: Final = 30
 LEASE_PATIENCE_S: Final = 60.0
+SILENT_S: Final = 3.0
 _EPSILON_S: Final = 1e-9
 _NOTHING: Final = np.empty((0, 2))
 ResultT = TypeVar("ResultT")
@@ -51,7 +52,8 @@ class Session(RunRobot):
         except BaseException:
             self._guarded.give_lease_back()
             raise
-        self._after = entry.after
+        self._after, self._real = entry.after, entry.real
+        self._paused_because: str | None = None
         self._control, self._visitors = shared.control, shared.visitors
         self._given_up: tuple[TreeRun, ...] = ()
         self._held = False
@@ -135,18 +137,24 @@ class Session(RunRobot):
     def may_move(self) -> bool:
         """Returns whether the robot has its lease; a lost lease suspends the mission until the robot has it again.
 
-        Raises nothing. After LEASE_PATIENCE_S without the lease, the session is closed with cause EXECUTION.
+        Raises nothing. After LEASE_PATIENCE_S without the lease, the session is closed with cause EXECUTION. A real
+        robot waits as `_paused` says.
         """
-        lost, now_s = self._guarded.lease_lost(), self.context.clock.now()
+        lost, now_s = self._silence() or self._guarded.lease_lost(), self.context.clock.now()
         if self._cancelled is not None and now_s >= self._cancelled[1]:
             self.close()
             return False
         if lost is None:
+            self._answers_again()
             return True
+        resumed = self._lost_since_s is not None and self._control.pause_reason is None
         if self._lost_since_s is None:
             self._lost_since_s = now_s
             self._top.suspend()
-            self._control.note_lease(self.name, lost)
+            if not self._real:
+                self._control.note_lease(self.name, lost)
+        if self._real:
+            return not self._paused(lost, resumed, now_s - self._lost_since_s)
         if self._guarded.regain_lease():
             self._lost_since_s = None
             self._control.note_lease(self.name, None)
@@ -157,6 +165,36 @@ class Session(RunRobot):
             self.gone = message
             self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, message))
         return False
+
+    def _silence(self) -> str | None:
+        """Says that a real robot has not answered for a while; None when it has."""
+        silent = self._real and self.context.clock.now() - self.context.robot.odometry().stamp_s > SILENT_S
+        return f"{self.name} has not answered for {SILENT_S:g} s" if silent else None
+
+    def _paused(self, why: str, resumed: bool, for_s: float) -> bool:
+        """Pauses the run of a real robot that another program may move, or that is silent; returns whether it waits.
+
+        The lease is acquired when it is free and the operator resumes the run, because nobody else knows whether people
+        are near; the run goes on by itself when a silent robot answers. An unattended session is closed after
+        LEASE_PATIENCE_S.
+        """
+        if resumed and self._guarded.regain_lease():
+            self._lost_since_s = None
+            return False
+        if self._control.pause_reason in (None, self._paused_because):  # else the operator has paused the run too
+            self._paused_because = why
+            self._control.pause(why)
+        if not self._control.attended and for_s > LEASE_PATIENCE_S:
+            self.gone = f"{why}; nobody resumed the mission within {LEASE_PATIENCE_S:g} s"
+            self.close(Ending(Outcome.FAILURE, Cause.EXECUTION, self.gone))
+        return True
+
+    def _answers_again(self) -> None:
+        """Ends the pause of a robot that was silent, unless the operator has paused it too."""
+        if self._lost_since_s is not None:
+            self._lost_since_s = None
+            if self._control.pause_reason == self._paused_because:
+                self._control.resume()
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
         """Ticks the mission under way once; returns whether a node changed its status. After its end, the mission

@@ -31,7 +31,8 @@ class RunEntry:
 
     The mission begins when the robots `after` have succeeded with theirs, and fails when one of them fails. The person
     who asked for it stands at `speaker_W` (world frame; None: where the robot begins). `walls` are those of the robot's
-    map (`skills.api.SkillContext`).
+    map (`skills.api.SkillContext`). People stand around a `real` robot: when another program has taken its lease, or it
+    does not answer, the run pauses (`Session.may_move`).
     """
 
     tree: CompiledTree
@@ -43,6 +44,7 @@ class RunEntry:
     after: tuple[str, ...] = ()
     speaker_W: Pose2D | None = None
     walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
+    real: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import Cause, InputsT, Running, SkillContext
-from skills.robot import CommandId, CommandState
+from skills.robot import CommandCause, CommandId, CommandState
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
 
 
@@ -19,6 +19,7 @@ class Base:
     def __init__(self, context: SkillContext) -> None:
         self._context = context
         self._command: CommandId | None = None
+        self._cause = CommandCause.NONE  # of the last refusal
         self.accepted = False
         self.patience = Patience(context.clock)
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
@@ -35,6 +36,7 @@ class Base:
             return None
         status = self._context.robot.command_status(self._command)
         if status.state is CommandState.REFUSED:
+            self._cause = status.cause
             return status.reason or "no reason given"
         self.accepted = True
         self.patience.reset()
@@ -42,7 +44,7 @@ class Base:
 
     def ask_again(self) -> bool:
         """Asks a robot that refused again, by a command to stand; False when patience or the lease is gone."""
-        if self._context.robot.lease_holder() != self._context.lease or not self.patience.is_left():
+        if self._cause is CommandCause.NO_LEASE or not self.patience.is_left():
             return False
         self.drive((0.0, 0.0, 0.0))
         return True

@@ -74,7 +74,7 @@ class ScriptedRobot:
         self.holding = False
         self.opening, self.empty_rad = 0.3, 0.0
         self.clamps_n: list[float] = []
-        self.driving = False
+        self.driving = self.silent = False
         self.charge = 0.9
         self.standing = Pose2D(0.0, 0.0, 0.0)
         self.lease: Lease | None = None
@@ -93,7 +93,9 @@ class ScriptedRobot:
         if "odometry" in self.raising:
             raise self.raising["odometry"]
         now = self.clock.now(), self.standing
-        if self._odometry is None or self._odometry[0] != now:  # one reading for all who ask at one time
+        if self._odometry is None or (
+            self._odometry[0] != now and not self.silent
+        ):  # one reading for all who ask at one time
             self._odometry = now, Odometry(now[0], self.standing.transform(), (0.0, 0.0, 0.0))
         return self._odometry[1]
 
@@ -469,7 +471,8 @@ def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> 
     def runner(tree: CompiledTree, **options: Any) -> Any:
         settings = replace(RunSettings(seed=3), **options.pop("settings", {}))
         localiser = options.pop("localiser", None) or StillLocaliser()
-        entry = RunEntry(tree, robot, localiser, EmptyCostmap())  # type: ignore[arg-type]
+        costmap, real = EmptyCostmap(), options.pop("real", False)
+        entry = RunEntry(tree, robot, localiser, costmap, real=real)  # type: ignore[arg-type]
         observer, log = options.pop("observer", None), options.pop("log", None)
         log = log or OnMessage(lambda topic, message: published.append((topic, message)))
         visitors = [log, *options.pop("visitors", ()), *([] if observer is None else [OnTick(observer)])]

@@ -18,6 +18,7 @@ from skills.robot import (
     BaseKind,
     CameraCapabilities,
     Capabilities,
+    CommandCause,
     CommandId,
     CommandState,
     CommandStatus,
@@ -162,7 +163,8 @@ class PlanarRobot:
         command = CommandId(len(self._commands) + 1)
         if lease.number != self._lease.number or self.refuse_because:
             reason = self.refuse_because or "the lease was taken away"
-            self._commands[command] = CommandStatus(CommandState.REFUSED, reason)
+            cause = CommandCause.REFUSED if self.refuse_because else CommandCause.NO_LEASE
+            self._commands[command] = CommandStatus(CommandState.REFUSED, reason, cause)
             return command
         if vy != 0.0 and self.base_kind is BaseKind.DIFFERENTIAL:
             self._commands[command] = CommandStatus(CommandState.REFUSED, "this base cannot go sideways")

@@ -5,8 +5,8 @@ import pytest
 from scripted_robot import ScriptedRobot, context_of
 
 from skills.api import Cause, Failed, PlanningError, Running, Succeeded
-from skills.robot import ArmTrajectory
-from skills.routine import RoutineSkill, SkillFailure
+from skills.robot import ArmTrajectory, CommandCause
+from skills.routine import CommandFailure, RoutineSkill, SkillFailure
 
 TRAJECTORY = ArmTrajectory(np.array([0.5]), np.array([[0.1, -3.0, 3.0, 0.0, 0.0, 0.0]]))
 
@@ -102,3 +102,26 @@ def test_ending_the_outer_skill_stops_the_inner_ones_command():
 def test_a_step_before_begin_is_a_defect():
     with pytest.raises(RuntimeError, match="step before begin"):
         _Moves(context_of(ScriptedRobot())).step()
+
+
+@pytest.mark.parametrize(("lost", "attempts"), [(1, 2), (9, 2)])
+def test_a_command_without_the_lease_is_given_again_once(lost, attempts):
+    robot, made = ScriptedRobot(), []
+
+    def attempt():
+        made.append(robot.now_s)
+        if len(made) <= lost:
+            raise CommandFailure("the arm was refused", CommandCause.NO_LEASE)
+        return "done"
+        yield
+
+    routine, ended = _Moves(context_of(robot)).persist(attempt, "moving"), None
+    while ended is None:
+        try:
+            assert isinstance(next(routine), Running)  # here a run suspends the skill
+            robot.advance(0.1)
+        except (StopIteration, CommandFailure) as end:
+            ended = end
+    assert len(made) == attempts
+    assert made[-1] > made[0]
+    assert isinstance(ended, StopIteration if lost < attempts else CommandFailure)

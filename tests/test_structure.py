@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 7739,
-    "executive/cli": 4807,
+    "executive/app": 7915,
+    "executive/cli": 4809,
     "skills": 27262,
-    "plant": 18415,
+    "plant": 18964,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 474, 77, 10
+MODULES, ONE_IMPORTER, SAME_NAME = 479, 81, 11
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -107,6 +107,7 @@ def _environment(server: SpotServer) -> dict[str, str]:
 def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotServer]:
     """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
     _need_sdk()
+    from executive.app.picking import PointPicker
     from executive.app.placed_robots import only_robot
     from executive.app.simulated import compile_first, simulate
     from executive.app.worlds import open_world
@@ -121,7 +122,8 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     compile_first()
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
     robot = simulation.robots["Alice"]
-    options = Options({USER: PASSWORD}, port, tablet=Tablet.TABLET if tablet else Tablet.NONE)
+    picker = PointPicker(robot, simulation.clock)
+    options = Options({USER: PASSWORD}, port, tablet=Tablet.TABLET if tablet else Tablet.NONE, picker=picker)
     try:
         held = credentials(user_cache() / _FOLDER)
         server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), held, options)

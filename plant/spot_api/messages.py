@@ -105,10 +105,12 @@ def pose_between(frames: Frames, a: str, b: str) -> RigidTransform:
 
 def _from_root(frames: Frames, frame: str) -> RigidTransform:
     X = RigidTransform()
-    while frame:
+    for _ in range(len(frames) + 1):
+        if not frame:
+            return X
         parent, X_PF = frames[frame]
         X, frame = X_PF @ X, parent
-    return X
+    raise KeyError(f"{frame}, whose parents are a circle")
 
 
 def api_joint(name: str) -> str:

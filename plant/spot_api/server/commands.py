@@ -20,8 +20,8 @@ from bosdyn.api import (
     robot_command_pb2,
 )
 
-from plant.spot_api.messages import InvalidRequestError
-from plant.spot_api.server import arm, mobility
+from plant.spot_api.messages import InvalidRequestError, seconds, timestamp
+from plant.spot_api.server import arm, gripper, hand, mobility
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Motion, Motors, Snapshot
 from plant.spot_api.server.identity import DOMAIN, TimeSyncService
@@ -41,7 +41,7 @@ class PowerService(Service):
 
     def __init__(self, computer: Computer, leases: LeaseService) -> None:
         self._computer, self._leases, self._ids = computer, leases, count(1)
-        self._wanted: dict[int, Motors] = {}
+        self._wanted, self._fan_ends_s = dict[int, Motors](), dict[int, float]()
 
     def PowerCommand(self, request: Any, _call: Call) -> Any:
         """Takes a command for the motors; the power of the computer, ports and radio cannot be switched."""
@@ -75,6 +75,33 @@ class PowerService(Service):
         if wanted is Motors.ON and self._computer.estop.level() != estop_pb2.ESTOP_LEVEL_NONE:
             return Response(status=power_pb2.STATUS_ESTOPPED)
         return Response(status=power_pb2.STATUS_IN_PROGRESS)
+
+    def FanPowerCommand(self, request: Any, _call: Call) -> Any:
+        """Takes a command for the fans, of which the simulated robot has none that turn."""
+        Response = power_pb2.FanPowerCommandResponse
+        used = self._leases.use(request.lease, _ALL)
+        if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
+            return Response(lease_use_result=used, status=Response.STATUS_UNKNOWN)
+        lasts_s = seconds(request.duration)
+        if not 0 <= request.percent_power <= 100 or not 0.0 < lasts_s <= mobility.LONGEST_S:
+            raise InvalidRequestError(
+                f"percent_power must be 0 to 100, and duration at most {mobility.LONGEST_S:.0f} s"
+            )
+        number, end_s = next(self._ids), self._computer.now_s() + lasts_s
+        self._fan_ends_s[number] = end_s
+        return Response(
+            lease_use_result=used, status=Response.STATUS_OK, desired_end_time=timestamp(end_s), command_id=number
+        )
+
+    def FanPowerCommandFeedback(self, request: Any, _call: Call) -> Any:
+        """Tells whether the time of a command is over, or a later one has taken its place."""
+        Response, end_s = power_pb2.FanPowerCommandFeedbackResponse, self._fan_ends_s.get(request.command_id)
+        if end_s is None:
+            raise InvalidRequestError(f"command_id: there is no command {request.command_id}")
+        status = Response.STATUS_COMPLETE if self._computer.now_s() >= end_s else Response.STATUS_RUNNING
+        if status == Response.STATUS_RUNNING and request.command_id != max(self._fan_ends_s):
+            status = Response.STATUS_OVERRIDDEN_BY_COMMAND
+        return Response(status=status, desired_end_time=timestamp(end_s))
 
 
 @dataclass(frozen=True)
@@ -173,11 +200,11 @@ class RobotCommandService(Service):
                 raise mobility.unsupported("arm_command of a robot without an arm")
             made[ARM] = _arm_motion(command.arm_command, self._computer, snapshot, now_s)
         if command.HasField("gripper_command"):
-            gripper = self._computer.capabilities.gripper
-            if gripper is None:
+            can = self._computer.capabilities.gripper
+            if can is None:
                 raise mobility.unsupported("gripper_command of a robot without a gripper")
             request = command.gripper_command.claw_gripper_command
-            made[GRIPPER] = arm.Claw(request, gripper.widest, gripper.max_force_n)
+            made[GRIPPER] = gripper.Claw(request, can.widest, can.max_force_n)
         if not made:
             raise InvalidRequestError("command: it names no part of the robot")
         return made
@@ -244,15 +271,15 @@ def _arm_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: flo
 
     def velocity() -> arm.ArmMotion:
         given = request.arm_velocity_command
-        return arm.Moving(given, snapshot, mobility.end_of(given, now_s, "arm_velocity_command"))
+        return hand.Moving(given, snapshot, mobility.end_of(given, now_s, "arm_velocity_command"))
 
     made: dict[str, Callable[[], arm.ArmMotion]] = {
         "arm_joint_move_command": lambda: arm.JointMove(
             request.arm_joint_move_command, computer.arm_rad(snapshot.joints), now_s
         ),
         "named_arm_position_command": lambda: arm.Named(request.named_arm_position_command),
-        "arm_cartesian_command": lambda: arm.Cartesian(request.arm_cartesian_command, snapshot, now_s),
-        "arm_gaze_command": lambda: arm.Gaze(request.arm_gaze_command, snapshot),
+        "arm_cartesian_command": lambda: hand.Cartesian(request.arm_cartesian_command, snapshot, now_s),
+        "arm_gaze_command": lambda: hand.Gaze(request.arm_gaze_command, snapshot),
         "arm_velocity_command": velocity,
         "arm_stop_command": arm.ArmHalt,
     }

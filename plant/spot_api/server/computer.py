@@ -15,7 +15,7 @@ from threading import Event
 from typing import Final, Protocol, TypeVar
 
 import numpy as np
-from bosdyn.api import basic_command_pb2, estop_pb2
+from bosdyn.api import basic_command_pb2, estop_pb2, robot_state_pb2
 from pydrake.math import RigidTransform
 
 from plant.spot_api.messages import Frames, pose_between
@@ -102,7 +102,7 @@ class Snapshot:
 
 
 class Motion(Protocol):
-    """Motion of one part of the robot on a client's command; only the computer's thread calls it."""
+    """Motion of one part of the robot, or several, on a client's command; only the computer's thread calls it."""
 
     def begin(self, computer: Computer) -> None:
         """Starts it."""
@@ -112,6 +112,29 @@ class Motion(Protocol):
 
     def end(self, status: int) -> None:
         """Ends it with a status of `RobotCommandFeedbackStatus`."""
+
+
+@dataclass
+class Grip:
+    """Word of clients on the item in the gripper, in place of the robot's own: is one held, and how it is carried."""
+
+    holding: bool | None = None
+    carry: int | None = None
+
+    def holds(self, gripper: Gripper) -> bool:
+        """Returns whether an item is held."""
+        return gripper.holding if self.holding is None else self.holding
+
+    def carry_state(self, gripper: Gripper) -> int:
+        """Returns the carry state: unless clients say otherwise an item is carriable, since the grip stays firm."""
+        State = robot_state_pb2.ManipulatorState
+        own = State.CARRY_STATE_CARRIABLE if self.holds(gripper) else State.CARRY_STATE_NOT_CARRIABLE
+        return int(own if self.carry is None else self.carry)
+
+    def may_stow(self, gripper: Gripper) -> bool:
+        """Returns whether the arm may stow: with an item only on a client's word."""
+        stowable = robot_state_pb2.ManipulatorState.CARRY_STATE_CARRIABLE_AND_STOWABLE
+        return not self.holds(gripper) or self.carry_state(gripper) == stowable
 
 
 class Computer:
@@ -133,7 +156,7 @@ class Computer:
         self.lease: Lease = robot.take_lease("the server of Spot's API")
         self.capabilities: Capabilities = robot.capabilities()
         self.motors, self._motors_since_s = Motors.OFF, 0.0
-        self.settling = False
+        self.settling, self.grip = False, Grip()
         self._motions: dict[str, Motion] = {}
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._started_s, self._started_monotonic_s = time.time(), time.monotonic()
@@ -200,7 +223,7 @@ class Computer:
         self._watch()
         self.clock.advance(PERIOD_S)
         self.snapshot = self._sensed()
-        for motion in list(self._motions.values()):
+        for motion in dict.fromkeys(self._motions.values()):
             motion.tick(self)
 
     def _work_until(self, due_s: float) -> None:
@@ -255,11 +278,12 @@ class Computer:
     # -- motions -----------------------------------------------------------------------------------------------------
 
     def move(self, motions: Mapping[str, Motion]) -> None:
-        """Starts motions of parts in place of those that run."""
+        """Starts motions in place of those that run; one motion may move several parts."""
         for part, motion in motions.items():
             if (before := self._motions.pop(part, None)) is not None:
                 before.end(OVERRIDDEN)
             self._motions[part] = motion
+        for motion in dict.fromkeys(motions.values()):
             motion.begin(self)
 
     def stop_parts(self, parts: Sequence[str]) -> None:

@@ -201,6 +201,7 @@ class Trajectory(_Driving):
     """Drives along poses in a frame, and stops at the last."""
 
     field = "se2_trajectory_feedback"
+    at_goal: Final = basic_command_pb2.SE2TrajectoryCommand.Feedback.STATUS_AT_GOAL
 
     def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot) -> None:
         """Takes the poses over into `odom`, in which they stay."""
@@ -231,7 +232,7 @@ class Trajectory(_Driving):
         part = basic_command_pb2.SE2TrajectoryCommand.Feedback
         self.feedback = self._made(
             part(
-                status=part.STATUS_AT_GOAL if arrived and still else part.STATUS_GOING_TO_GOAL,
+                status=self.at_goal if arrived and still else part.STATUS_GOING_TO_GOAL,
                 body_movement_status=part.BODY_STATUS_SETTLED if still else part.BODY_STATUS_MOVING,
                 final_goal_status=part.FINAL_GOAL_STATUS_ACHIEVABLE if arrived else part.FINAL_GOAL_STATUS_IN_PROGRESS,
             )

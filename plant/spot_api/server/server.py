@@ -11,7 +11,7 @@ from typing import Final
 
 import grpc
 
-from plant.spot_api.server import identity, pictures, state
+from plant.spot_api.server import identity, manipulation, pictures, rays, state
 from plant.spot_api.server.calls import Service, handlers
 from plant.spot_api.server.commands import PowerService, RobotCommandService
 from plant.spot_api.server.computer import Computer, Pace, Solver
@@ -35,11 +35,8 @@ LISTED: Final[Mapping[str, str]] = {
     "docking": "bosdyn.api.docking.DockingService",
     "door": "bosdyn.api.spot.DoorService",
     "graph-nav-service": "bosdyn.api.graph_nav.GraphNavService",
-    "log-status": "bosdyn.api.log_status.LogStatusService",
-    "manipulation": "bosdyn.api.ManipulationApiService",
     "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
     "payload-registration": "bosdyn.api.PayloadRegistrationService",
-    "ray-cast": "bosdyn.api.RayCastService",
     "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
     "robot-command-streaming": "bosdyn.api.RobotCommandStreamingService",
     "robot-mission": "bosdyn.api.mission.MissionService",
@@ -64,11 +61,14 @@ SERVICES: Final[tuple[type[Service], ...]] = (
     pictures.GripperCameraParamService,
     pictures.PointCloudService,
     pictures.LocalGridService,
+    rays.RayCastService,
+    manipulation.ManipulationService,
     state.InverseKinematicsService,
     state.WorldObjectService,
     state.FaultService,
     state.PayloadService,
     state.DataBufferService,
+    state.LogStatusService,
 )
 """Services that are served."""
 MOTIONS: Final = (
@@ -81,7 +81,7 @@ _DESCRIBED_IN: Final = (
     *("auth", "data_buffer", "directory_registration", "directory", "estop", "fault", "image", "lease", "license"),
     *("gripper_camera_param", "local_grid"),
     *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
-    "spot.inverse_kinematics",
+    *("manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
     "keepalive.keepalive",
 )
 """Files of the SDK that describe the services; importing them registers their descriptions."""
@@ -89,12 +89,16 @@ _DESCRIBED_IN: Final = (
 
 @dataclass(frozen=True)
 class Options:
-    """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet."""
+    """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet.
+
+    `picker` picks up objects for the manipulation service; without it picks are refused.
+    """
 
     passwords: Mapping[str, str]
     port: int = 0
     pace: Pace = Pace.REAL
     tablet: Tablet = Tablet.TABLET
+    picker: manipulation.Picker | None = None
 
 
 class SpotServer:
@@ -111,7 +115,7 @@ class SpotServer:
         self.computer = Computer(robot, clock, leases=leases, estop=estop, solver=solver, pace=options.pace)
         self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
-        services = self._services(leases, estop, auth, robot.name)
+        self.services = self._services(leases, estop, auth, robot.name, options.picker)
         self.faults = Switchboard()
         self._grpc = grpc.server(
             ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
@@ -122,7 +126,7 @@ class SpotServer:
                 ("grpc.so_reuseport", 0),
             ],
         )
-        self._grpc.add_generic_rpc_handlers(handlers(services, auth.user_of, self.computer.now_s))
+        self._grpc.add_generic_rpc_handlers(handlers(self.services, auth.user_of, self.computer.now_s))
         key, certificate = credentials.private_key.read_bytes(), credentials.certificate.read_bytes()
         try:
             self.port = self._grpc.add_secure_port(
@@ -132,7 +136,12 @@ class SpotServer:
             raise OSError(f"port {options.port} of 127.0.0.1 cannot be opened") from error
 
     def _services(
-        self, leases: LeaseService, estop: EstopService, auth: identity.AuthService, robot_name: str
+        self,
+        leases: LeaseService,
+        estop: EstopService,
+        auth: identity.AuthService,
+        robot_name: str,
+        picker: manipulation.Picker | None,
     ) -> Sequence[Service]:
         """All services that are served; the directory lists them and the others."""
         computer, clocks = self.computer, identity.TimeSyncService()
@@ -161,11 +170,14 @@ class SpotServer:
             pictures.GripperCameraParamService(),
             pictures.PointCloudService(computer),
             pictures.LocalGridService(computer),
+            rays.RayCastService(computer),
+            manipulation.ManipulationService(computer, leases, picker),
             state.InverseKinematicsService(computer),
             state.WorldObjectService(),
             faults,
             state.PayloadService(),
             state.DataBufferService(),
+            state.LogStatusService(),
         ]
         return [service for service in made if service.name not in lacking]
 

@@ -16,6 +16,7 @@ from bosdyn.api import (
     service_fault_pb2,
     world_object_pb2,
 )
+from bosdyn.api.log_status import log_status_pb2
 from bosdyn.api.spot import inverse_kinematics_pb2
 
 from plant.spot_api.messages import (
@@ -28,9 +29,10 @@ from plant.spot_api.messages import (
     vec3,
     velocity,
 )
-from plant.spot_api.server.arm import JOINTS, READY_RAD, X_HAND, solutions
+from plant.spot_api.server.arm import JOINTS, READY_RAD
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Motors, Snapshot
+from plant.spot_api.server.hand import X_HAND, solutions
 from plant.spot_api.server.identity import DOMAIN
 
 RUNTIME_S: Final = 5400.0
@@ -140,11 +142,11 @@ class RobotStateService(Service):
         assert can.gripper is not None and can.arm is not None
         made = state.manipulator_state
         made.gripper_open_percentage = 100.0 * snapshot.gripper.opening / can.gripper.widest
-        made.is_gripper_holding_item = snapshot.gripper.holding
+        made.is_gripper_holding_item = self._computer.grip.holds(snapshot.gripper)
         made.estimated_end_effector_force_in_hand.CopyFrom(vec3((0.0, 0.0, 0.0)))
         stowed = np.abs(self._computer.arm_rad(snapshot.joints) - np.array(can.arm.stowed_rad)).max() < 0.1
         made.stow_state = State.STOWSTATE_STOWED if stowed else State.STOWSTATE_DEPLOYED
-        made.carry_state = State.CARRY_STATE_CARRIABLE if snapshot.gripper.holding else State.CARRY_STATE_NOT_CARRIABLE
+        made.carry_state = self._computer.grip.carry_state(snapshot.gripper)
         made.velocity_of_hand_in_odom.SetInParent()
         made.velocity_of_hand_in_vision.SetInParent()
 
@@ -320,3 +322,19 @@ class DataBufferService(Service):
     def RegisterSignalSchema(self, _request: Any, _call: Call) -> Any:
         """Gives a schema its number."""
         return data_buffer_pb2.RegisterSignalSchemaResponse(schema_id=next(self._ids))
+
+
+class LogStatusService(Service):
+    """Tells that no logs are written: the simulated robot keeps none, and starts none."""
+
+    name, type, authority = "log-status", "bosdyn.api.log_status.LogStatusService", f"log.{DOMAIN}"
+
+    def GetActiveLogStatuses(self, _request: Any, _call: Call) -> Any:
+        """Lists no logs."""
+        Response = log_status_pb2.GetActiveLogStatusesResponse
+        return Response(status=Response.STATUS_OK)
+
+    def GetLogStatus(self, _request: Any, _call: Call) -> Any:
+        """Answers that there is no such log."""
+        Response = log_status_pb2.GetLogStatusResponse
+        return Response(status=Response.STATUS_ID_NOT_FOUND)

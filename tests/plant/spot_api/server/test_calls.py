@@ -28,7 +28,7 @@ def test_a_malformed_message_is_an_invalid_argument_without_a_traceback(channel,
 
 @pytest.mark.parametrize(
     "path",
-    ["/bosdyn.api.docking.DockingService/DockingCommand", "/bosdyn.api.PowerService/FanPowerCommand", "/no.Such/Call"],
+    ["/bosdyn.api.mission.MissionService/PlayMission", "/bosdyn.api.PowerService/ResetSafetyStop", "/no.Such/Call"],
 )
 def test_a_call_that_is_not_served_is_named(channel, path):
     with pytest.raises(grpc.RpcError) as refused:

@@ -17,6 +17,7 @@ from bosdyn.api import (
     geometry_pb2,
     gripper_command_pb2,
     mobility_command_pb2,
+    power_pb2,
     robot_command_pb2,
     synchronized_command_pb2,
 )
@@ -258,7 +259,7 @@ def test_a_gripper_that_refuses_applies_no_force(spot):
 
 
 def test_a_gaze_that_no_posture_has_is_stalled(spot, monkeypatch):
-    monkeypatch.setattr("plant.spot_api.server.arm.solutions", lambda solver, X_BW: [])
+    monkeypatch.setattr("plant.spot_api.server.hand.solutions", lambda solver, X_BW: [])
     command = spot.commands.robot_command(Build.arm_gaze_command(2.0, 0.0, 0.5, "body"))
     stalled = arm_command_pb2.GazeCommand.Feedback.STATUS_TOOL_TRAJECTORY_STALLED
     assert wait_until(lambda: arm_feedback(spot, command).arm_gaze_feedback.status == stalled)
@@ -278,3 +279,19 @@ def test_the_hand_moves_at_a_velocity_until_its_end(spot):
     assert after.z - before.z == pytest.approx(0.1, abs=0.05)
     assert abs(after.y - before.y) < 0.03
     assert after.rot.to_roll() - before.rot.to_roll() == pytest.approx(0.2, abs=0.1)
+
+
+def test_fans_run_for_their_time_or_until_a_later_command(spot):
+    power = spot.robot.ensure_client("power")
+    first = power.fan_power_command(percent_power=100, duration=60).command_id
+    feedback = power_pb2.FanPowerCommandFeedbackResponse
+    assert power.fan_power_command_feedback(first).status == feedback.STATUS_RUNNING
+    second = power.fan_power_command(percent_power=50, duration=1).command_id
+    assert power.fan_power_command_feedback(first).status == feedback.STATUS_OVERRIDDEN_BY_COMMAND
+    assert wait_until(lambda: power.fan_power_command_feedback(second).status == feedback.STATUS_COMPLETE)
+
+
+@pytest.mark.parametrize(("percent", "duration"), [(101, 5), (-1, 5), (50, -1), (50, 10_000)])
+def test_fans_with_impossible_power_or_time_are_an_invalid_request(spot, percent, duration):
+    with pytest.raises(InvalidRequestError):
+        spot.robot.ensure_client("power").fan_power_command(percent_power=percent, duration=duration)

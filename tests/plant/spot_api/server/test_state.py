@@ -7,6 +7,7 @@ from bosdyn.api import (
     image_pb2,
     local_grid_pb2,
     point_cloud_pb2,
+    ray_cast_pb2,
     service_fault_pb2,
     world_object_pb2,
 )
@@ -16,6 +17,7 @@ from bosdyn.client.fault import ServiceFaultAlreadyExistsError
 from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
 from bosdyn.client.image import build_image_request, depth_image_to_pointcloud
 from bosdyn.client.inverse_kinematics import InverseKinematicsClient
+from bosdyn.client.log_status import RequestIdDoesNotExistError as InvalidLogError
 from bosdyn.client.math_helpers import SE3Pose
 from bosdyn.client.world_object import make_add_world_object_req, make_delete_world_object_req
 
@@ -205,3 +207,44 @@ def test_a_fault_of_a_client_is_listed_once_until_it_is_cleared(robot):
     assert listed.error_message == "tired"
     client.clear_service_fault(fault.fault_id)
     assert not states.get_robot_state().service_fault_state.faults
+
+
+def cast(robot, direction, types=(), frame="body", least_m=0.0):
+    """Casts a ray from 0.4 m ahead of the body's middle."""
+    request = ray_cast_pb2.RaycastRequest(
+        ray_frame_name=frame, intersection_types=types, min_intersection_distance=least_m
+    )
+    request.ray.origin.x = 0.4
+    request.ray.direction.x, request.ray.direction.z = direction
+    return robot.ensure_client("ray-cast")._stub.Raycast(request)
+
+
+def test_a_ray_meets_the_wall_and_the_floor(robot):
+    Hit = ray_cast_pb2.RayIntersection
+    hits = cast(robot, (2.0, -0.4)).hits
+    assert {hit.type for hit in hits} >= {Hit.TYPE_GROUND_PLANE, Hit.TYPE_VOXEL_MAP}
+    assert [hit.distance_meters for hit in hits] == sorted(hit.distance_meters for hit in hits)
+    wall = next(hit for hit in hits if hit.type == Hit.TYPE_VOXEL_MAP)
+    assert wall.hit_position_in_hit_frame.x == pytest.approx(1.7, abs=0.05) or wall.hit_position_in_hit_frame.z < 0.05
+    assert not cast(robot, (0.0, 1.0)).hits
+    assert not cast(robot, (0.0, -1.0), [Hit.TYPE_GROUND_PLANE], least_m=5.0).hits
+
+
+@pytest.mark.parametrize(
+    ("direction", "types", "frame", "status"),
+    [
+        ((1.0, 0.0), (), "moon", ray_cast_pb2.RaycastResponse.STATUS_UNKNOWN_FRAME),
+        ((0.0, 0.0), (), "body", ray_cast_pb2.RaycastResponse.STATUS_INVALID_REQUEST),
+        ((1.0, 0.0), (2,), "body", ray_cast_pb2.RaycastResponse.STATUS_INVALID_INTERSECTION_TYPE),
+        ((1.0, 0.0), (99,), "body", ray_cast_pb2.RaycastResponse.STATUS_INVALID_INTERSECTION_TYPE),
+    ],
+)
+def test_a_ray_that_cannot_be_cast_has_a_status(robot, direction, types, frame, status):
+    assert cast(robot, direction, types, frame).status == status
+
+
+def test_no_logs_are_written(robot):
+    client = robot.ensure_client("log-status")
+    assert not client.get_active_log_statuses().log_statuses
+    with pytest.raises(InvalidLogError):
+        client.get_log_status("7")

@@ -25,7 +25,7 @@ LINES = {
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 7915,
+    "executive/app": 7923,
     "executive/cli": 4809,
     "skills": 27262,
     "plant": 18964,

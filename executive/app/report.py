@@ -110,14 +110,18 @@ class Ending:
         return self.referee or NOT_JUDGED
 
     def verdicts(self, *, name: str | None = None, counts: bool = False) -> Iterator[Verdict]:
-        """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, perhaps with counts."""
+        """Yields the tree's claim, with the robot's `name` if given, and the referee's verdict, perhaps with counts.
+
+        Without a referee it says so.
+        """
         cause = f" ({self.cause})" if self.cause else ""
         who = "The tree claims" if name is None else f"{name}'s tree claims"
         yield Verdict(who, self.claimed, f"{self.outcome}{cause}", self.message)
-        if self.referee is not None:
-            counted = f" ({counts_text(self.referee)})" if counts else ""
-            good = self.referee.success
-            yield Verdict("The referee saw", good, VERDICTS[good], f"{self.referee.why}{counted}")
+        if self.referee is None:
+            yield Verdict("No referee", None, VERDICTS[None], "nobody saw the truth; only the tree's claim counts")
+            return
+        counted, good = f" ({counts_text(self.referee)})" if counts else "", self.referee.success
+        yield Verdict("The referee saw", good, VERDICTS[good], f"{self.referee.why}{counted}")
 
 
 @dataclass(frozen=True)
@@ -150,6 +154,12 @@ class RunReport(Ending):
     scenario: tuple[str, ...] = ()
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
+    @property
+    def duration_text(self) -> str:
+        """Duration in words; a run without a referee is not simulated."""
+        simulated = "" if self.referee is None else f" simulated in {self.wall_time_s:.1f} s"
+        return f"{self.sim_time_s:.1f} s{simulated}"
+
     def to_json(self) -> dict[str, Any]:
         """Returns the report as JSON values, without the referee's sentences."""
         no_events = {"referee": {"events"}}
@@ -178,10 +188,8 @@ class RunReport(Ending):
 
     def lines(self) -> Iterator[str]:
         """Yields the verdicts and the figures as lines with rich markup."""
-        figures = (
-            f"{self.sim_time_s:.1f} s simulated in {self.wall_time_s:.1f} s ({self.real_time_factor:.1f} x real time), "
-            f"{self.ticks} ticks"
-        )
+        pace = "" if self.referee is None else f" ({self.real_time_factor:.1f} x real time)"
+        figures = f"{self.duration_text}{pace}, {self.ticks} ticks"
         if self.robots:
             for name, robot in self.robots.items():
                 yield from (line for verdict in robot.verdicts(name=name, counts=True) for line in verdict.lines())

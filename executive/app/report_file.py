@@ -242,7 +242,7 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
     """Returns the facts of a run; an empty name stands for several robots."""
     facts = (
         ("world", f"{report.world}, seed {report.seed}"),
-        ("duration", f"{report.sim_time_s:.1f} s simulated in {report.wall_time_s:.1f} s"),
+        ("duration", report.duration_text),
     )
     if not robot_name:
         return facts

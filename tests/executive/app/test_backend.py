@@ -38,7 +38,14 @@ def test_the_report_of_a_run_without_a_referee_says_so(prepared):
     told = json.loads(json.dumps(report.to_json()))
     assert told["referee"] is None
     assert RunReport.from_json(told) == report
-    assert not any("referee" in line or "collisions" in line for line in report.lines())
+    lines = list(report.lines())
+    assert lines[1] == (
+        "[bold]No referee:[/bold] [yellow]?[/yellow] not judged: nobody saw the truth; only the tree's claim counts"
+    )
+    assert lines[2] == f"{report.sim_time_s:.1f} s, {report.ticks} ticks"
+    page = (prepared.request.out / "report.html").read_text(encoding="utf-8")
+    assert "nobody saw the truth" in page
+    assert not any(word in text for word in ("collisions", "simulated") for text in (page, *lines))
 
 
 def test_faults_and_events_are_at_work_logged_and_in_the_report(prepared):

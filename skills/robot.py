@@ -360,3 +360,7 @@ class NoImageError(RuntimeError):
 
 class LeaseError(RuntimeError):
     """Error of a lease that another holds."""
+
+
+class RobotStoppedError(RuntimeError):
+    """Error of a robot that has stopped for good, by its E-stop for example; the run ends."""

@@ -5,11 +5,10 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
-from functools import partial
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from executive.app.artifacts import Artifacts
 from executive.app.backend import Durable
@@ -17,6 +16,7 @@ from executive.app.goal_conditions import Share
 from executive.app.mission_run import FinishedRun, run_request
 from executive.app.placed_robots import robot_stack
 from executive.app.prepared import Prepared
+from executive.app.signals import ended_by_signals
 from executive.app.simulated import compile_first, run_entry
 from executive.record.work import Profile
 from executive.run.outcome import RobotResult
@@ -28,24 +28,32 @@ from plant.spot_api.adapter.connection import Address, Connection, LostError, Wa
 from plant.spot_api.adapter.robot import ApiRobot
 from plant.worlds.world import World
 from skills.files.errors import InputError
-from skills.robot import Clock, CommandId, CommandState, LeaseError, Pose2D, Robot
+from skills.robot import Clock, CommandId, CommandState, LeaseError, Pose2D, Robot, RobotStoppedError
 from skills.stack import RobotStack
 
 LEAST_CHARGE: Final = 0.3
+LEAST_VERSION: Final = (4, 0, 0)
 _HOLDER: Final = "errand run"
-_POWER_S, _POSTURE_S = 20.0, 15.0
+_POWER_S, _POSTURE_S, _OFF_S = 20.0, 15.0, 15.0
 _TICK_S: Final = 0.05
 
 
 @dataclass(frozen=True)
 class Access:
-    """Access to a robot: address, user and password; may the motors be switched on, and may the lease be taken?"""
+    """Access to a robot: address, user and password; may motors, lease and E-stop be switched on, taken, replaced?
+
+    `confirm` asks a person a question and returns whether they said yes. `padding_m` is the distance that the robot
+    keeps from obstacles by itself (None: its usual one).
+    """
 
     address: Address
     user: str
-    password: str
+    password: str = field(repr=False)
     power_on: bool = False
     take: bool = False
+    own_estop: bool = False
+    padding_m: float | None = None
+    confirm: Callable[[str], bool] = lambda question: False
 
 
 class ApiBackend:
@@ -98,48 +106,106 @@ class ApiBackend:
         return None
 
 
-@contextmanager
-def connected(name: str, access: Access) -> Iterator[tuple[ApiRobot, WallClock]]:
-    """Connects to a robot and gets it ready: clock, E-stop, charge, lease, power, stand.
+class Watch:
+    """Watch over the robot after each wait of its clock: reads it, and ends a run that it cannot go on with."""
 
-    However it ends, the robot stops, the lease is returned, and motors that were switched on here are switched off.
+    def __init__(self, robot: ApiRobot) -> None:
+        self._robot, self.running = robot, False
+
+    def __call__(self) -> None:
+        """Reads the robot. Raises RobotStoppedError when it has stopped for good during the run."""
+        self._robot.poll()
+        if self.running and (why := self._robot.stopped_because()):
+            raise RobotStoppedError(why)
+
+    def interrupt(self, _reason: str) -> None:
+        """Raises KeyboardInterrupt outside a run, which ends by its control."""
+        if not self.running:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def connected(name: str, access: Access) -> Iterator[tuple[ApiRobot, WallClock, Watch]]:
+    """Connects to a robot and gets it ready: clock, E-stop, charge, lease, keepalive policy, power, stand.
+
+    However it ends, the robot stops, motors that were switched on here are switched off, and policy, lease and an
+    E-stop of our own are given back.
 
     Raises:
         InputError: the robot cannot be reached, or is not ready; the message says what is missing.
     """
     connection = Connection(access.address, access.user, access.password)
-    powered_here = False
-    try:
-        connection.synchronise()
-        if not connection.is_released():
-            raise InputError("the E-stop is pressed, or nobody holds one", hint="release it, on the tablet for example")
-        clock = WallClock(connection)
-        robot = ApiRobot(name, connection, clock, spot_capabilities())
-        clock.after.append(robot.poll)
-        if robot.battery().charge < LEAST_CHARGE:
-            raise InputError(f"the battery has {robot.battery().charge:.0%}", hint=f"charge it to {LEAST_CHARGE:.0%}")
-        if faults := robot.faults():
-            raise InputError(f"the robot has a fault: {', '.join(faults)}", hint="clear it first")
-        lease = robot.take_lease(_HOLDER) if access.take else robot.acquire_lease(_HOLDER)
-        if not robot.powered:
-            if not access.power_on:
-                raise InputError("the motors are off", hint="allow it to switch them on: --power-on")
-            connection.power(True)
-            powered_here = True
-            wait_until(clock, lambda: robot.powered, _POWER_S, "the motors do not switch on")
-        stood = robot.stand(robot.capabilities().standing_height_m, 0.0, until_s=clock.now() + _POSTURE_S, lease=lease)
-        finish(robot, clock, stood, "stand up")
-        robot.return_lease(lease)
-        yield robot, clock
-    except (LostError, LeaseError) as error:
-        raise InputError(str(error), hint="try again; --take takes the lease from another client") from error
-    finally:
-        with suppress(LostError):
-            if connection.lease is not None:
-                connection.stop()
-                if powered_here:
-                    connection.power_off_safely()
-            connection.give_back()
+    with ExitStack() as ending:
+        try:
+            connection.synchronise()
+            clock = WallClock(connection)
+            robot = ApiRobot(name, connection, clock, spot_capabilities(), padding_m=access.padding_m)
+            watch = Watch(robot)
+            clock.after.append(watch)
+            ending.enter_context(ended_by_signals(watch.interrupt))
+            _check(robot, connection)
+            _hold(robot, connection, access, ending)
+            robot.sensors.fix_focus()
+            lease = robot.take_lease(_HOLDER) if access.take else robot.acquire_lease(_HOLDER)
+            ending.callback(_try, connection.give_back)
+            robot.heartbeat.add_policy()
+            ending.callback(_try, robot.heartbeat.remove_policy)
+            ending.callback(_try, connection.stop)
+            _switch_on(robot, connection, clock, access, ending)
+            until_s = clock.now() + _POSTURE_S
+            stood = robot.stand(robot.capabilities().standing_height_m, 0.0, until_s=until_s, lease=lease)
+            finish(robot, clock, stood, "stand up")
+            robot.return_lease(lease)
+        except (LostError, LeaseError) as error:
+            raise InputError(str(error), hint="try again; --take takes the lease from another client") from error
+        yield robot, clock, watch
+
+
+def _try(call: Callable[[], None]) -> None:
+    """Calls what must not keep the rest of the ending from being done."""
+    with suppress(LostError):
+        call()
+
+
+def _check(robot: ApiRobot, connection: Connection) -> None:
+    """Raises InputError for a robot that is no Spot with an arm, has a fault, too little charge or old software."""
+    version, least = connection.software_version(), ".".join(map(str, LEAST_VERSION))
+    if version < LEAST_VERSION:
+        said = f"the robot's software is {'.'.join(map(str, version))}"
+        raise InputError(said, hint=f"update the robot to {least} or later")
+    if (missing := robot.sensors.missing()) is not None:
+        raise InputError(missing, hint="missions need a Spot with an arm that is switched on")
+    if robot.battery().charge < LEAST_CHARGE:
+        raise InputError(f"the battery has {robot.battery().charge:.0%}", hint=f"charge it to {LEAST_CHARGE:.0%}")
+    if faults := [fault for fault in robot.faults() if "E-stop" not in fault]:
+        raise InputError(f"the robot has a fault: {', '.join(faults)}", hint="clear it first")
+
+
+def _hold(robot: ApiRobot, connection: Connection, access: Access, ending: ExitStack) -> None:
+    """Registers an E-stop of our own if that is wanted. Raises InputError when the E-stop does not allow motion."""
+    if access.own_estop:
+        if robot.powered:
+            raise InputError("--estop own: the motors are on", hint="switch them off on the tablet first")
+        robot.heartbeat.hold_estop()
+        ending.callback(_try, robot.heartbeat.drop_estop)
+    if (stopped := connection.estop_trouble()) is not None:
+        raise InputError(stopped, hint="release it on the tablet, or begin with --estop own")
+
+
+def _switch_on(robot: ApiRobot, connection: Connection, clock: WallClock, access: Access, ending: ExitStack) -> None:
+    """Switches the motors on if they are off; the ending then switches them off. Raises InputError and LostError."""
+    if robot.powered:
+        return
+    if not (access.power_on or access.confirm("The motors are off. Switch them on? Type yes: ")):
+        raise InputError("the motors are off", hint="allow it to switch them on: --power-on")
+
+    def switch_off() -> None:
+        connection.stop(power_off=True)
+        wait_until(clock, lambda: not robot.powered, _OFF_S, "the motors do not switch off")
+
+    number = connection.power(True)
+    ending.callback(_try, switch_off)
+    wait_until(clock, lambda: connection.power_is_done(number) and robot.powered, _POWER_S, "the motors stay off")
 
 
 def finish(robot: Robot, clock: Clock, command: CommandId, what: str) -> None:
@@ -170,7 +236,15 @@ def spot_runner(prepared: Prepared, access: Access) -> Iterator[Callable[..., Fi
     compile_first()
     logging.getLogger("drake").setLevel(logging.WARNING)
     start = prepared.request.start
-    with connected(prepared.tree.robot_name, access) as (robot, clock):
+    with connected(prepared.tree.robot_name, access) as (robot, clock, watch):
         stack = robot_stack(prepared.robots[robot.name])
         backend = ApiBackend(robot, clock, prepared.world, stack, start if isinstance(start, Pose2D) else None)
-        yield partial(run_request, backend=backend)
+
+        def run(prepared: Prepared, **options: Any) -> FinishedRun:
+            watch.running = True
+            try:
+                return run_request(prepared, backend, **options)
+            finally:
+                watch.running = False
+
+        yield run

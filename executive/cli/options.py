@@ -22,7 +22,7 @@ from executive.cli.number_options import quantity_option
 from executive.mission.request import Request, parse_start
 from executive.words.forms import Option
 from executive.words.forms import OptionGroup as Group
-from skills.quantities import Port, Wait, quantity_of
+from skills.quantities import Margin, Port, Wait, quantity_of
 from skills.robot import Pose2D
 
 _START, _FOXGLOVE = "--start", "--foxglove"
@@ -63,6 +63,25 @@ CERTIFICATE = Annotated[
 ]
 POWER_ON = Annotated[bool, grouped(Group.SPOT, "--power-on", help="Switch the motors on, and off at the end.")]
 TAKE = Annotated[bool, grouped(Group.SPOT, "--take", help="Take the lease from its holder, after a typed yes.")]
+
+
+class EstopHolder(enum.StrEnum):
+    """Holder of the E-stop during a run: a person's device, or this program."""
+
+    TABLET = "tablet"
+    OWN = "own"
+
+
+ESTOP = Annotated[
+    EstopHolder,
+    grouped(Group.SPOT, "--estop", help="Who holds the E-stop; own replaces the tablet's, after a typed yes."),
+]
+PADDING = Annotated[
+    float | None,
+    quantity_option(
+        Margin, "--padding", help="Distance, m, that the robot keeps from obstacles by itself.", group=Group.SPOT
+    ),
+]
 FOXGLOVE = Annotated[
     str | None,
     grouped(

@@ -15,7 +15,9 @@ from executive.cli.options import (
     ANYWAY,
     AS_JSON,
     CERTIFICATE,
+    ESTOP,
     FOXGLOVE,
+    PADDING,
     POWER_ON,
     QUIET,
     ROBOT,
@@ -25,6 +27,7 @@ from executive.cli.options import (
     VIEW,
     VIEW_FOR,
     VIEW_PORT,
+    EstopHolder,
     grouped,
     takes_request,
 )
@@ -65,6 +68,8 @@ def run(
     certificate: CERTIFICATE = None,
     power_on: POWER_ON = False,
     take: TAKE = False,
+    estop: ESTOP = EstopHolder.TABLET,
+    padding: PADDING = None,
 ) -> None:
     """Runs a sentence or a mission file in the simulated world, or with a real Spot."""
     refuse_unaddressed(request)
@@ -91,10 +96,9 @@ def run(
             request = replace(request, sentence=hear_request(listen_to, request, console=console))
         prepared = prepare_checked(request, ask=terminal_answerer(), anyway=anyway)
         page = page_of if view or view_for is not None else None
-        screen = ConsoleScreen(
-            console, quiet=quiet, whole_tree=whole_tree, voice=voice, page=page, live=live, profile=timing
-        )
-        spot = connected_spot(prepared, robot, user, certificate, power_on, take) if robot else nullcontext()
+        screen = ConsoleScreen(console, quiet, whole_tree, voice, page, live, timing)
+        given = robot and (robot, user, certificate, power_on, take, estop, padding)
+        spot = connected_spot(prepared, *given) if given else nullcontext()
         with MissionStore(kept_in) as missions, missions.claim(), spot as runner:
             mission = missions.add(prepared.request.from_anywhere(), queued=False)
             ended = MissionRuns(missions, screen, run=runner).run(mission, prepared)

@@ -6,16 +6,17 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Event, Thread
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from executive.cli.number_options import quantity_option
+from executive.cli.options import EstopHolder
 from executive.cli.output import console_for
 from skills.files.errors import InputError
 from skills.quantities import Port, Seed
@@ -135,18 +136,29 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
 
 @contextmanager
 def connected_spot(
-    prepared: Prepared, url: str, user: str | None, certificate: Path | None, power_on: bool, take: bool
+    prepared: Prepared,
+    url: str,
+    user: str | None,
+    certificate: Path | None,
+    power_on: bool,
+    take: bool,
+    estop: EstopHolder,
+    padding_m: float | None,
 ) -> Iterator[Callable[..., FinishedRun]]:
     """Connects to the Spot at a URL, and yields a function that runs a mission with it."""
-    access = spot_access(url, user, certificate, power_on=power_on, take=take)
+    granted = {"power_on": power_on, "take": take, "own_estop": estop is EstopHolder.OWN, "padding_m": padding_m}
+    access = spot_access(url, user, certificate, granted)
     from executive.app import real_spot
 
     with real_spot.spot_runner(prepared, access) as run:
         yield run
 
 
-def spot_access(url: str, user: str | None, certificate: Path | None, *, power_on: bool, take: bool) -> Access:
-    """Returns the access to a robot; asks for what is missing at a terminal. Raises InputError."""
+def spot_access(url: str, user: str | None, certificate: Path | None, permissions: Mapping[str, Any]) -> Access:
+    """Returns the access to a robot; asks for what is missing at a terminal. Raises InputError.
+
+    `permissions` are fields of `Access` by name: `power_on`, `take`, `own_estop` and `padding_m`.
+    """
     _need_sdk()
     from executive.app.real_spot import Access
     from plant.spot_api.adapter.connection import Address
@@ -160,9 +172,14 @@ def spot_access(url: str, user: str | None, certificate: Path | None, *, power_o
     if not name:
         raise InputError("the user of the robot is missing", hint="give --user, or BOSDYN_CLIENT_USERNAME")
     password = os.environ.get("BOSDYN_CLIENT_PASSWORD") or _asked_password(name)
-    if take and not _confirmed(f"Take the lease of {url} from its holder? Type yes: "):
-        raise InputError("--take: the lease is not taken without a yes", hint="type yes at the terminal")
-    return Access(Address(found["host"], port, certificate), name, password, power_on=power_on, take=take)
+    asked = {
+        "take": ("--take", f"Take the lease of {url} from its holder?"),
+        "own_estop": ("--estop own", f"Replace all E-stops of {url}, the tablet's too, by this program's?"),
+    }
+    for permission, (option, question) in asked.items():
+        if permissions.get(permission) and not _confirmed(f"{question} Type yes: "):
+            raise InputError(f"{option} needs a yes", hint="type yes at the terminal")
+    return Access(Address(found["host"], port, certificate), name, password, confirm=_confirmed, **permissions)
 
 
 def _asked_password(user: str) -> str:

@@ -13,7 +13,7 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import Snapshot
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC
 from skills.api import Cause, Publish
-from skills.robot import LeaseError, Pose2D
+from skills.robot import LeaseError, Pose2D, RobotStoppedError
 
 
 class Outcome(enum.Enum):
@@ -158,5 +158,6 @@ def ending_of(stop: BaseException, publish: Publish) -> Ending:
 _ENDINGS: Final[dict[type[BaseException], tuple[Outcome, Cause, str]]] = {
     KeyboardInterrupt: (Outcome.CANCELLED, Cause.CANCELLED, "cancelled from the keyboard"),
     LeaseError: (Outcome.FAILURE, Cause.PRECONDITION, "the lease is held by another"),
+    RobotStoppedError: (Outcome.FAILURE, Cause.EXECUTION, "the robot has stopped"),
     VerbHung: (Outcome.ERROR, Cause.ERROR, "a verb hung"),
 }

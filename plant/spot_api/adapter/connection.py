@@ -14,7 +14,7 @@ import grpc
 from bosdyn.api import (
     estop_pb2,
     estop_service_pb2_grpc,
-    header_pb2,
+    gripper_camera_param_service_pb2_grpc,
     image_service_pb2_grpc,
     lease_pb2,
     lease_service_pb2_grpc,
@@ -24,39 +24,46 @@ from bosdyn.api import (
     power_service_pb2_grpc,
     robot_command_pb2,
     robot_command_service_pb2_grpc,
+    robot_id_pb2,
+    robot_id_service_pb2_grpc,
     robot_state_pb2,
     robot_state_service_pb2_grpc,
     time_sync_pb2,
     time_sync_service_pb2_grpc,
 )
+from bosdyn.api.keepalive import keepalive_service_pb2_grpc
 
+from plant.spot_api.adapter.statuses import call_trouble, response_trouble, trouble
+from plant.spot_api.messages import seconds
 from skills.files.errors import InputError
 from skills.robot import CommandCause
 
 CLIENT: Final = "errand"
 CALL_S: Final = 0.5
 _SLOW_S: Final = 5.0
-_OFF_S, _LOOK_S = 15.0, 0.1
 _ROUND_TRIPS: Final = 5
 _STUBS: Final[Mapping[str, Callable[[Any], Any]]] = {
     "estop": estop_service_pb2_grpc.EstopServiceStub,
+    "gripper-camera-param": gripper_camera_param_service_pb2_grpc.GripperCameraParamServiceStub,
     "image": image_service_pb2_grpc.ImageServiceStub,
+    "keepalive": keepalive_service_pb2_grpc.KeepaliveServiceStub,
     "lease": lease_service_pb2_grpc.LeaseServiceStub,
     "manipulation": manipulation_api_service_pb2_grpc.ManipulationApiServiceStub,
     "velodyne-point-cloud": point_cloud_service_pb2_grpc.PointCloudServiceStub,
     "power": power_service_pb2_grpc.PowerServiceStub,
     "robot-command": robot_command_service_pb2_grpc.RobotCommandServiceStub,
+    "robot-id": robot_id_service_pb2_grpc.RobotIdServiceStub,
     "robot-state": robot_state_service_pb2_grpc.RobotStateServiceStub,
     "time-sync": time_sync_service_pb2_grpc.TimeSyncServiceStub,
 }
 
 
 class LostError(RuntimeError):
-    """A call that the robot did not answer, or answered with an error; the message names call and cause."""
+    """A call that the robot did not answer, or refused; it has the cause, and who holds the lease instead."""
 
-    def __init__(self, message: str, cause: CommandCause = CommandCause.NO_ANSWER) -> None:
+    def __init__(self, message: str, cause: CommandCause = CommandCause.NO_ANSWER, holder: str = "") -> None:
         super().__init__(message)
-        self.cause = cause
+        self.cause, self.holder = cause, holder
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,7 @@ class Connection:
 
     def __init__(self, address: Address, user: str, password: str) -> None:
         """Logs in. Raises InputError when the robot cannot be reached, or refuses user and password."""
+        self._epoch_s = time.time() - time.monotonic()
         glob = None if address.certificate is None else str(address.certificate)
         sdk = bosdyn.client.create_standard_sdk(CLIENT, cert_resource_glob=glob)
         self._robot = sdk.create_robot(address.host)
@@ -84,53 +92,71 @@ class Connection:
         except bosdyn.client.auth.InvalidLoginError as error:
             hint = "check --user, and the password that was typed or stands in BOSDYN_CLIENT_PASSWORD"
             raise InputError(f"{where}: the robot refuses user '{user}' with this password", hint=hint) from error
+        except bosdyn.client.auth.TemporarilyLockedOutError as error:
+            hint = "wait a minute before the next try"
+            raise InputError(f"{where}: too many wrong passwords for user '{user}'", hint=hint) from error
         except bosdyn.client.Error as error:
             hint = "check address and network; is the robot on?"
-            raise InputError(f"{where}: the robot does not answer ({_cause(error)})", hint=hint) from error
-        self.has_lidar = "velodyne-point-cloud" in services
+            raise InputError(f"{where}: the robot does not answer ({_first_line(error)})", hint=hint) from error
         wanted = [name for name in _STUBS if name in services]
         self._stubs = {name: _STUBS[name](self._robot.ensure_channel(name)) for name in wanted}
         self.clock_identifier, self._ahead_s = "", 0.0
         self.lease: Any = None
 
-    def call(self, service: str, name: str, request: Any, timeout_s: float = CALL_S) -> Any:
-        """Calls a service. Raises LostError when no good answer comes in time."""
+    def has(self, service: str) -> bool:
+        """Returns whether the robot has a service."""
+        return service in self._stubs
+
+    def call(self, service: str, name: str, request: Any, timeout_s: float = CALL_S, *, checked: bool = True) -> Any:
+        """Calls a service. Raises LostError when no answer comes in time, or (if `checked`) one that is no success."""
         request.header.client_name = CLIENT
-        request.header.request_timestamp.FromNanoseconds(time.time_ns())
+        request.header.request_timestamp.FromNanoseconds(round(self._now_s() * 1e9))
         try:
             answer = getattr(self._stubs[service], name)(request, timeout=timeout_s)
         except (grpc.RpcError, KeyError) as error:
-            lacks = isinstance(error, KeyError) or error.code() is grpc.StatusCode.UNIMPLEMENTED
-            cause = CommandCause.UNSUPPORTED if lacks else CommandCause.NO_ANSWER
-            raise LostError(f"{service}/{name}: {_cause(error)}", cause) from error
-        if answer.header.error.code not in (0, 1):
-            invalid = answer.header.error.code == header_pb2.CommonError.CODE_INVALID_REQUEST
-            cause = CommandCause.INVALID if invalid else CommandCause.FAULT
-            raise LostError(f"{service}/{name}: {answer.header.error.message or answer.header.error.code}", cause)
+            found = call_trouble(error)
+            raise LostError(f"{found.text} [{service}/{name}]", found.cause) from error
+        wrong = response_trouble(answer) if checked else None
+        if wrong is not None:
+            raise LostError(f"{wrong.text} [{service}/{name}]", wrong.cause, wrong.holder)
         return answer
+
+    def software_version(self) -> tuple[int, int, int]:
+        """Returns the version of the robot's software. Raises LostError."""
+        answer = self.call("robot-id", "GetRobotId", robot_id_pb2.RobotIdRequest())
+        version = answer.robot_id.software_release.version
+        return version.major_version, version.minor_version, version.patch_level
 
     # -- clock -------------------------------------------------------------------------------------------------------
 
-    def synchronise(self) -> None:
-        """Estimates how far the robot's clock is ahead of this machine's, which never jumps. Raises LostError."""
-        request = time_sync_pb2.TimeSyncUpdateRequest(clock_identifier=self.clock_identifier)
+    def synchronise(self, *, jumped: bool = False) -> None:
+        """Measures how far the robot's clock is ahead of ours; forgets trips if it has `jumped`. Raises LostError."""
+        trips, request = list[tuple[float, float]](), time_sync_pb2.TimeSyncUpdateRequest()
+        request.clock_identifier = "" if jumped else self.clock_identifier
         for _ in range(_ROUND_TRIPS):
-            sent_ns = time.monotonic_ns()
+            sent_s = self._now_s()
             answer = self.call("time-sync", "TimeSyncUpdate", request)
-            back_ns = time.monotonic_ns()
-            self.clock_identifier = answer.clock_identifier
-            request = time_sync_pb2.TimeSyncUpdateRequest(clock_identifier=self.clock_identifier)
+            back_s = self._now_s()
+            received, answered = answer.header.request_received_timestamp, answer.header.response_timestamp
+            skew_s = 0.5 * (seconds(received) - sent_s + seconds(answered) - back_s)
+            trips.append((back_s - sent_s - (seconds(answered) - seconds(received)), skew_s))
+            request = time_sync_pb2.TimeSyncUpdateRequest(clock_identifier=answer.clock_identifier)
             trip = request.previous_round_trip
-            trip.client_tx.FromNanoseconds(sent_ns)
-            trip.server_rx.CopyFrom(answer.header.request_received_timestamp)
-            trip.server_tx.CopyFrom(answer.header.response_timestamp)
-            trip.client_rx.FromNanoseconds(back_ns)
-        skew = answer.state.best_estimate.clock_skew
-        self._ahead_s = skew.seconds + skew.nanos * 1e-9
+            trip.client_tx.FromNanoseconds(round(sent_s * 1e9))
+            trip.server_rx.CopyFrom(received)
+            trip.server_tx.CopyFrom(answered)
+            trip.client_rx.FromNanoseconds(round(back_s * 1e9))
+        if (wrong := response_trouble(answer.state)) is not None:
+            raise LostError(wrong.text, wrong.cause)
+        self.clock_identifier, (_, self._ahead_s) = answer.clock_identifier, min(trips)
 
     def robot_time_s(self) -> float:
         """The robot's time now (s since 1970), by the last synchronisation."""
-        return time.monotonic() + self._ahead_s
+        return self._now_s() + self._ahead_s
+
+    def _now_s(self) -> float:
+        """This machine's time (s since 1970); it does not jump when somebody sets the clock."""
+        return self._epoch_s + time.monotonic()
 
     # -- lease, E-stop and power -------------------------------------------------------------------------------------
 
@@ -140,54 +166,46 @@ class Connection:
             answer = self.call("lease", "TakeLease", lease_pb2.TakeLeaseRequest(resource="body"))
         else:
             answer = self.call("lease", "AcquireLease", lease_pb2.AcquireLeaseRequest(resource="body"))
-        if answer.status != 1:
-            holder = answer.lease_owner.client_name or "another client"
-            raise LostError(f"the lease is held by {holder}", CommandCause.NO_LEASE)
         self.lease = answer.lease
 
-    def retain(self) -> bool:
-        """Retains the lease; returns whether it still counts. Raises LostError."""
-        answer = self.call("lease", "RetainLease", lease_pb2.RetainLeaseRequest(lease=self.lease))
-        return bool(answer.lease_use_result.status == lease_pb2.LeaseUseResult.STATUS_OK)
+    def retain(self) -> None:
+        """Retains the lease. Raises LostError."""
+        self.call("lease", "RetainLease", lease_pb2.RetainLeaseRequest(lease=self.lease))
+
+    def holder(self) -> str:
+        """Name of the client that has the body's lease; empty when it is free. Raises LostError."""
+        resources = self.call("lease", "ListLeases", lease_pb2.ListLeasesRequest()).resources
+        return next((each.lease_owner.client_name for each in resources if each.resource == "body"), "")
 
     def give_back(self) -> None:
-        """Returns the lease."""
+        """Returns the lease. Raises LostError."""
         lease, self.lease = self.lease, None
         if lease is not None:
             self.call("lease", "ReturnLease", lease_pb2.ReturnLeaseRequest(lease=lease))
 
-    def is_released(self) -> bool:
-        """Returns whether the E-stop allows motion. Raises LostError."""
+    def estop_trouble(self) -> str | None:
+        """Returns why the E-stop allows no motion, None when it does. Raises LostError."""
         answer = self.call("estop", "GetEstopSystemStatus", estop_pb2.GetEstopSystemStatusRequest())
-        return bool(answer.status.stop_level == estop_pb2.ESTOP_LEVEL_NONE)
+        wrong = trouble(estop_pb2.EstopStopLevel.DESCRIPTOR, answer.status.stop_level)
+        return None if wrong is None else wrong.text
 
     def power(self, on: bool) -> int:
         """Asks for the motors to be switched on or off; returns the command's number. Raises LostError."""
         Request = power_pb2.PowerCommandRequest
         wanted = Request.REQUEST_ON_MOTORS if on else Request.REQUEST_OFF_MOTORS
-        answer = self.call("power", "PowerCommand", Request(lease=self.lease, request=wanted))
-        if answer.status not in (power_pb2.STATUS_IN_PROGRESS, power_pb2.STATUS_SUCCESS):
-            name = power_pb2.PowerCommandStatus.Name(answer.status)
-            raise LostError(f"the motors stay off: {name}", CommandCause.UNPOWERED)
-        return int(answer.power_command_id)
+        return int(self.call("power", "PowerCommand", Request(lease=self.lease, request=wanted)).power_command_id)
 
-    def stop(self) -> None:
-        """Stops base and arm. Raises LostError."""
-        command = robot_command_pb2.RobotCommand()
-        command.full_body_command.stop_request.SetInParent()
-        self.command(command)
+    def power_is_done(self, number: int) -> bool:
+        """Returns whether the motors have been switched as a command said. Raises LostError."""
+        request = power_pb2.PowerCommandFeedbackRequest(power_command_id=number)
+        return bool(self.call("power", "PowerCommandFeedback", request).status == power_pb2.STATUS_SUCCESS)
 
-    def power_off_safely(self) -> None:
-        """Lets the robot sit down and switch its motors off. Raises LostError."""
+    def stop(self, *, power_off: bool = False) -> None:
+        """Stops base and arm, or lets the robot sit down and switch its motors off. Raises LostError."""
         command = robot_command_pb2.RobotCommand()
-        command.full_body_command.safe_power_off_request.SetInParent()
+        whole = command.full_body_command
+        (whole.safe_power_off_request if power_off else whole.stop_request).SetInParent()
         self.command(command)
-        until_s = time.monotonic() + _OFF_S
-        while self.state().power_state.motor_power_state == robot_state_pb2.PowerState.MOTOR_POWER_STATE_ON:
-            if time.monotonic() > until_s:
-                raise LostError("the motors do not switch off")
-            self.retain()
-            Event().wait(_LOOK_S)
 
     def command(self, command: Any) -> Any:
         """Sends a command with the lease; returns the answer. Raises LostError."""
@@ -196,9 +214,14 @@ class Connection:
         )
         return self.call("robot-command", "RobotCommand", request)
 
+    def feedback(self, number: int) -> Any:
+        """Returns how far a command has come. Raises LostError."""
+        request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=number)
+        return self.call("robot-command", "RobotCommandFeedback", request).feedback
+
     def state(self) -> Any:
-        """Returns the robot's state. Raises LostError."""
-        return self.call("robot-state", "GetRobotState", robot_state_pb2.RobotStateRequest()).robot_state
+        """Returns the response with the robot's state. Raises LostError."""
+        return self.call("robot-state", "GetRobotState", robot_state_pb2.RobotStateRequest())
 
 
 class RobotClock(Protocol):
@@ -234,8 +257,5 @@ class WallClock:
             each()
 
 
-def _cause(error: Exception) -> str:
-    """The cause of a failed call in a few words."""
-    if isinstance(error, grpc.RpcError):
-        return f"{error.code().name.lower()}: {error.details()}"
+def _first_line(error: Exception) -> str:
     return str(error).splitlines()[0] if str(error) else type(error).__name__

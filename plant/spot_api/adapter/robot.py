@@ -7,32 +7,21 @@ protocol begins when the connection is made.
 from __future__ import annotations
 
 import math
+import time
+from collections.abc import Iterable
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
-from threading import Lock
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
-from bosdyn.api import (
-    arm_command_pb2,
-    basic_command_pb2,
-    gripper_command_pb2,
-    image_pb2,
-    lease_pb2,
-    manipulation_api_pb2,
-    mobility_command_pb2,
-    point_cloud_pb2,
-    robot_command_pb2,
-    robot_state_pb2,
-)
-from bosdyn.client.robot_command import RobotCommandBuilder
-from bosdyn.geometry import EulerZXY
-from pydrake.math import RigidTransform
+from bosdyn.api import manipulation_api_pb2, robot_state_pb2
 
-from plant.spot_api.adapter.answers import CAUSES, status_of
+from plant.spot_api.adapter import commands
+from plant.spot_api.adapter.commands import Sent, SentCommands, status_of
 from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
-from plant.spot_api.adapter.readings import TIP_RADIUS_M, Readings, picture, readings, scan
-from plant.spot_api.messages import frames_of, pose_between
+from plant.spot_api.adapter.heartbeat import Heartbeat
+from plant.spot_api.adapter.readings import off_path_rad
+from plant.spot_api.adapter.sensors import OLD_STATE_S, Sensors
 from skills.robot import (
     ArmTrajectory,
     Battery,
@@ -41,54 +30,48 @@ from skills.robot import (
     CommandId,
     CommandState,
     CommandStatus,
-    FrameTree,
     Gripper,
     Image,
     Imu,
     Joints,
     Lease,
     LeaseError,
-    NoImageError,
     Odometry,
     Scan,
 )
 
 DRIVE_EXPIRY_S: Final = 0.6
-FASTEST_M_S, FASTEST_RAD_S = 0.8, 1.0
-OLD_STATE_S, SILENT_S = 0.5, 3.0
+SILENT_S, GONE_S = 3.0, 15.0
+OLD_CLOCK_S: Final = 30.0
+OFF_PATH_RAD: Final = 0.15
 _SYNCHRONISED_EVERY_S: Final = 10.0
-_RETAIN_S: Final = 1.0
-_SCAN_S: Final = 0.09
-_MOST_POINTS: Final = 250
-_LIDAR: Final = "velodyne-point-cloud"
-Answer = robot_command_pb2.RobotCommandResponse
-
-
-@dataclass
-class _Sent:
-    """A command that was sent: its number at the robot and the part that it moves; `status` is the last known."""
-
-    number: int
-    part: str
-    status: CommandStatus = field(default_factory=lambda: CommandStatus(CommandState.RUNNING))
-    until_s: float = math.inf
+_LATE_S: Final = 0.3
+_LOOK_S: Final = 1.0
 
 
 class ApiRobot:
     """Spot, through a connection. Implements `skills.robot.Robot`."""
 
-    def __init__(self, name: str, connection: Connection, clock: RobotClock, capabilities: Capabilities) -> None:
-        """Reads the robot's first state. Raises LostError."""
+    def __init__(
+        self,
+        name: str,
+        connection: Connection,
+        clock: RobotClock,
+        capabilities: Capabilities,
+        *,
+        padding_m: float | None = None,
+    ) -> None:
+        """Reads the robot's first state. The robot keeps `padding_m` from obstacles by itself. Raises LostError."""
         self._name, self._connection, self._clock = name, connection, clock
-        self._capabilities = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S)
-        self._lock = Lock()
-        self._sent: dict[CommandId, _Sent] = {}
-        self._next, self._lease_number, self._retained_s, self._synchronised_s = 1, 0, -math.inf, clock.now()
+        self._capabilities, self._padding_m = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S), padding_m
+        self.sensors, self.heartbeat = Sensors(connection, clock, capabilities), Heartbeat(connection)
+        self._sent = SentCommands()
+        self._unsure: set[str | None] = set()
+        self._ended, self._taken_by, self._looked_s = "", "", -math.inf
+        self._lease_number, self._synchronised_s = 0, clock.now()
         self._current: Lease | None = None
-        self._posture = (capabilities.standing_height_m, 0.0)
-        self._scan: Scan | None = None
         self._carries: bool | None = None  # what the robot has yet to hear
-        self._readings = self._read()
+        self._posture = (capabilities.standing_height_m, 0.0)
 
     # -- know and sense ----------------------------------------------------------------------------------------------
 
@@ -103,7 +86,7 @@ class ApiRobot:
 
     def odometry(self) -> Odometry:
         """Latest dead reckoning."""
-        return self._readings.odometry
+        return self.sensors.readings.odometry
 
     def imu(self) -> Imu | None:
         """Returns None: the API gives no inertial readings."""
@@ -111,105 +94,82 @@ class ApiRobot:
 
     def scan(self) -> Scan | None:
         """Latest LiDAR revolution, None before the first."""
-        return self._scan
+        return self.sensors.scan
 
     def joints(self) -> Joints:
         """Latest joint state."""
-        return self._readings.joints
+        return self.sensors.readings.joints
 
     def gripper(self) -> Gripper:
         """Latest gripper state."""
-        return self._readings.gripper
+        return self.sensors.readings.gripper
 
     def battery(self) -> Battery:
         """Latest battery state."""
-        return self._readings.battery
+        return self.sensors.readings.battery
 
     @property
     def powered(self) -> bool:
         """Returns whether the motors have power."""
-        return self._readings.powered
+        return self.sensors.readings.powered
 
     def faults(self) -> tuple[str, ...]:
-        """Present faults, with a pressed E-stop and a robot that does not answer."""
-        stopped = () if self._readings.released else ("the E-stop is pressed",)
-        silent_s = self._clock.now() - self._readings.stamp_s
-        silent = (f"the robot has not answered for {silent_s:.0f} s",) if silent_s > SILENT_S else ()
-        return (*self._readings.faults, *stopped, *silent)
+        """Present faults, with a pressed E-stop, feet that are not known, and a robot that does not answer."""
+        now, silent_s = self.sensors.readings, self.sensors.silent_s()
+        own = {
+            "the E-stop is pressed": not now.released,
+            "no foot is on the floor, so the height is unknown": now.powered and not now.feet_known,
+            f"the robot has not answered for {silent_s:.0f} s": silent_s > SILENT_S,
+        }
+        return (*now.faults, *(fault for fault, present in own.items() if present))
+
+    def stopped_because(self) -> str:
+        """Reason why the robot has stopped for good; empty while it goes on."""
+        present = {
+            self._ended: bool(self._ended),
+            "the E-stop is pressed": not self.sensors.readings.released,
+            "the motors have lost their power": not self.sensors.readings.powered,
+            f"the robot has not answered for {GONE_S:.0f} s": self.sensors.silent_s() > GONE_S,
+        }
+        return next((why for why, holds in present.items() if holds), "")
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Takes a picture with depth, or only one of the two. Raises ValueError and NoImageError."""
-        camera = next((each for each in self._capabilities.cameras if each.source == source), None)
-        if camera is None:
-            raise ValueError(f"there is no camera {source!r}")
-        hand = source == "hand"
-        names = ["hand_color_image" if hand else f"{source}_fisheye_image"] if visual else []
-        names += ["hand_depth_in_hand_color_frame" if hand else f"{source}_depth"] if depth else []
-        Pixels = image_pb2.Image
-        request = image_pb2.GetImageRequest()
-        for name in names:
-            is_depth = "_depth" in name
-            form = Pixels.FORMAT_RAW if is_depth else Pixels.FORMAT_JPEG
-            request.image_requests.add(image_source_name=name, image_format=form, quality_percent=95.0)
-        try:
-            answers = self._connection.call("image", "GetImage", request, timeout_s=2.0).image_responses
-        except LostError as error:
-            raise NoImageError(str(error)) from error
-        first = answers[0].shot
-        frames = self._frame_tree(frames_of(first.transforms_snapshot))
-        stamp_s = self._stamp(first.acquisition_time)
-        return picture(source, f"{source}_camera", answers, stamp_s, frames, coloured=hand)
-
-    def _frame_tree(self, frames: Any) -> FrameTree:
-        """The protocol's frames from those of the API; heights are over the feet."""
-        X_OB = self._readings.odometry.X_OB if "odom" not in frames else pose_between(frames, "odom", "body")
-        x, y, _ = X_OB.translation()
-        X_OB.set_translation([x, y, self._readings.odometry.X_OB.translation()[2]])
-        made = {"body": ("odom", X_OB)}
-        if "arm0.link_wr1" in frames:
-            made["hand"] = ("body", pose_between(frames, "body", "arm0.link_wr1"))
-        for camera in self._capabilities.cameras:
-            made[f"{camera.source}_camera"] = ("hand" if camera.on_hand else "body", camera.X_FC)
-        return FrameTree(made)
+        return self.sensors.image(source, visual=visual, depth=depth)
 
     # -- act ---------------------------------------------------------------------------------------------------------
 
     def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
         """Drives at a body-frame velocity; the robot stops by itself at `until_s`, or 0.6 s from now."""
-        if not all(map(math.isfinite, (vx, vy, wz))):
-            return self._refused(f"drive: velocity ({vx}, {vy}, {wz}) is not finite", CommandCause.INVALID)
+        if (refused := self._objection("base", lease, until_s, (vx, vy, wz))) is not None:
+            return refused
         end_s = min(until_s, self._clock.now() + DRIVE_EXPIRY_S)
-        command = RobotCommandBuilder.synchro_velocity_command(vx, vy, wz, params=self._params())
-        return self._send(command, "base", lease, end_s=end_s)
+        robot_end_s = self._clock.robot_time_s() + end_s - self._clock.now()
+        command = commands.drive((vx, vy, wz), robot_end_s, self._params())
+        return self._send(command, Sent(0, "base", until_s=end_s + _LATE_S))
 
     def stand(self, height_m: float, pitch_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Holds the body origin at a height above the floor and a pitch."""
+        if (refused := self._objection("posture", lease, until_s, (height_m, pitch_rad))) is not None:
+            return refused
         before, self._posture = self._posture, (height_m, pitch_rad)
-        command = RobotCommandBuilder.synchro_stand_command(params=self._params())
-        sent = self._send(command, "posture", lease, until_s)
+        sent = self._send(commands.stand(self._params()), Sent(0, "posture", until_s=until_s))
         if self.command_status(sent).state is CommandState.REFUSED:
             self._posture = before
         return sent
 
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
-        return self._send(RobotCommandBuilder.synchro_sit_command(), "posture", lease, until_s)
+        refused = self._objection("posture", lease, until_s)
+        return refused or self._send(commands.sit(), Sent(0, "posture", until_s=until_s))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
-        """Follows a joint trajectory; done when the robot says so."""
-        keep = np.unique(np.linspace(0, len(trajectory.times_s) - 1, _MOST_POINTS).astype(int))
-        times, positions = trajectory.times_s[keep], trajectory.positions_rad[keep]
-        made = arm_command_pb2.ArmJointMoveCommand.Request()
-        for time_s, q in zip(times, positions, strict=True):
-            point = made.trajectory.points.add()
-            point.time_since_reference.FromNanoseconds(round(max(0.0, float(time_s)) * 1e9))
-            for joint, value in zip(("sh0", "sh1", "el0", "el1", "wr0", "wr1"), q, strict=True):
-                getattr(point.position, joint).value = float(value)
-        made.trajectory.maximum_velocity.value, made.trajectory.maximum_acceleration.value = 2.5, 15.0
-        made.trajectory.reference_time.FromNanoseconds(round(self._clock.robot_time_s() * 1e9))
-        command = robot_command_pb2.RobotCommand()
-        command.synchronized_command.arm_command.arm_joint_move_command.CopyFrom(made)
-        return self._send(command, "arm", lease, until_s)
+        """Follows a joint trajectory, and holds at its end; done when the robot says so, stopped when it leaves it."""
+        if (refused := self._objection("arm", lease, until_s, trajectory.times_s)) is not None:
+            return refused
+        path_rad = np.vstack([self.sensors.arm_rad, trajectory.positions_rad])
+        command = commands.arm_move(trajectory, self._clock.robot_time_s())
+        return self._send(command, Sent(0, "arm", until_s=until_s, path_rad=path_rad))
 
     def point_head(self, pan_rad: float, tilt_rad: float, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: Spot has no head."""
@@ -217,20 +177,19 @@ class ApiRobot:
 
     def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
         """Moves the gripper to an opening with at most force_n at its tip."""
-        made = gripper_command_pb2.ClawGripperCommand.Request()
-        made.trajectory.points.add(point=-opening)
-        made.maximum_torque.value = force_n * TIP_RADIUS_M
-        command = robot_command_pb2.RobotCommand()
-        command.synchronized_command.gripper_command.claw_gripper_command.CopyFrom(made)
-        return self._send(command, "gripper", lease, until_s)
+        refused = self._objection("gripper", lease, until_s, (opening, force_n))
+        return refused or self._send(commands.claw(opening, force_n), Sent(0, "gripper", until_s=until_s))
 
     def carry(self, holding: bool, *, lease: Lease) -> None:
         """Says whether the robot keeps what it holds when the communication is lost; said again until it answers."""
         if lease == self._current:
             self._carries = holding
-            self._say_carry()
+            with suppress(LostError):
+                self._say_carry()
 
     def _say_carry(self) -> None:
+        if self._carries is None:
+            return
         State, request = robot_state_pb2.ManipulatorState, manipulation_api_pb2.ApiGraspOverrideRequest()
         carried, free = State.CARRY_STATE_CARRIABLE, State.CARRY_STATE_NOT_CARRIABLE
         request.carry_state_override.override_request = carried if self._carries else free
@@ -238,49 +197,39 @@ class ApiRobot:
             self._connection.call("manipulation", "OverrideGrasp", request)
         except LostError as error:
             if error.cause is CommandCause.NO_ANSWER:
-                return
+                raise
         self._carries = None
 
     def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
         """Stops base and arm, or only the part of a command; the gripper keeps its clamp force."""
-        with self._lock:
-            part = self._sent[only].part if only is not None and only in self._sent else None
-            running = only is None or (part is not None and self._sent[only].status.state is CommandState.RUNNING)
-        if not running:
-            return self._noted(CommandStatus(CommandState.DONE))
-        command = robot_command_pb2.RobotCommand()
-        if part in (None, "base", "posture"):
-            stop = mobility_command_pb2.MobilityCommand.Request(stop_request=basic_command_pb2.StopCommand.Request())
-            command.synchronized_command.mobility_command.CopyFrom(stop)
-        if part in (None, "arm"):
-            command.MergeFrom(_arm_stop())
-        if part == "gripper":
-            return self._noted(CommandStatus(CommandState.DONE))
-        stopped = self._send(command, part or "all", lease, math.inf)
-        with self._lock:
-            for sent in self._sent.values():
-                mine = sent.part == part if part else sent.part != "gripper"
-                if mine and sent.status.state is CommandState.RUNNING:
-                    sent.status = CommandStatus(CommandState.STOPPED, "stopped by command", CommandCause.STOPPED)
-            if self._sent[stopped].status.state is CommandState.STOPPED:
-                self._sent[stopped].status = CommandStatus(CommandState.DONE)
-        return stopped
+        sent = None if only is None else self._sent.get(only)
+        if sent is not None and (sent.status.state is not CommandState.RUNNING or sent.part == "gripper"):
+            return self._sent.note(CommandState.DONE)
+        if (gone := self._without(lease)) is not None:
+            return self._refused(f"stop: {gone}", CommandCause.NO_LEASE)
+        part = None if sent is None else sent.part
+        try:
+            self._connection.command(commands.halt(part))
+        except LostError as error:
+            return self._lost(error, "stop", part)
+        self._unsure -= {part, None} if part else {None, "base", "posture", "arm"}
+        self._sent.stopped(part)
+        return self._sent.note(CommandState.DONE)
 
     def command_status(self, command: CommandId) -> CommandStatus:
         """Returns the last known status of a command. Raises KeyError for an unknown id."""
-        with self._lock:
-            return self._sent[command].status
+        return self._sent.get(command).status
 
     # -- own ---------------------------------------------------------------------------------------------------------
 
     def lease_holder(self) -> Lease | None:
-        """Lease that counts now, as far as the robot has said."""
-        return self._current
+        """Lease that counts now, as far as the robot has said; another client's has its name."""
+        return Lease(self._name, self._taken_by, self._lease_number + 1) if self._taken_by else self._current
 
     def acquire_lease(self, holder: str) -> Lease:
         """Takes the lease within this program, and acquires the robot's. Raises LeaseError when another has it."""
-        if self._current is not None:
-            raise LeaseError(f"{self._name}: the lease is held by {self._current.holder!r}")
+        if (held := self.lease_holder()) is not None:
+            raise LeaseError(f"{self._name}: the lease is held by {held.holder!r}")
         return self._own(holder, take=False)
 
     def take_lease(self, holder: str) -> Lease:
@@ -293,6 +242,7 @@ class ApiRobot:
                 self._connection.acquire(take=take)
         except LostError as error:
             raise LeaseError(f"{self._name}: {error}") from error
+        self._taken_by = ""
         self._lease_number += 1
         self._current = Lease(self._name, holder, self._lease_number, self._connection.lease.epoch)
         return self._current
@@ -306,140 +256,136 @@ class ApiRobot:
     # -- upkeep ------------------------------------------------------------------------------------------------------
 
     def poll(self) -> None:
-        """Reads state and LiDAR, follows the commands that run, and retains lease and clock.
+        """Reads state and scan, follows the commands that run, and says what the robot must hear.
 
-        What the robot does not answer keeps its last value: old readings stop the drive, and are a fault later.
+        What the robot does not answer keeps its last value: old readings stop the drive, and are a fault later. While
+        it does not answer nothing else is asked, so the robot falls back on E-stop, policy and stale lease.
         """
-        with suppress(LostError):
-            self._readings = self._read()
-            if self._connection.has_lidar and (self._scan is None or self._clock.now() - self._scan.stamp_s > _SCAN_S):
-                self._scan = self._read_scan()
-            with self._lock:
-                running = [sent for sent in self._sent.values() if sent.status.state is CommandState.RUNNING]
-            for sent in running:
-                self._follow(sent)
-            if self._carries is not None:
-                self._say_carry()
-            now_s = self._clock.now()
-            if self._connection.lease is not None and now_s - self._retained_s > _RETAIN_S:
-                self._retained_s = now_s
-                if not self._connection.retain():
-                    self._current, self._connection.lease = None, None
-            if now_s - self._synchronised_s > _SYNCHRONISED_EVERY_S:
-                self._connection.synchronise()
-                self._synchronised_s = now_s
+        read_state, read_scan = self.sensors.read_state, self.sensors.read_scan
+        acting = (self._follow, self._halt_unsure, self._say_carry)
+        for step in (read_state, *acting, read_scan, self._synchronise, self._keep):
+            try:
+                step()
+            except LostError as error:
+                if error.cause is CommandCause.NO_LEASE:
+                    self._lose(error.holder)
+                elif error.cause is CommandCause.ESTOPPED:
+                    self._ended = str(error)
+                elif error.cause is CommandCause.NO_ANSWER:
+                    if self.sensors.silent_s() > OLD_STATE_S:
+                        self._end_running(error)
+                    return
 
-    def _read(self) -> Readings:
-        state = self._connection.state()
-        return readings(state, self._stamp(state.kinematic_state.acquisition_timestamp), self._capabilities)
+    def _follow(self) -> None:
+        """Reads how far the commands have come; ends those that are late, and arms that have left their path."""
+        for sent in self._sent.running():
+            try:
+                feedback = self._connection.feedback(sent.number)
+                status = status_of(feedback.synchronized_feedback, sent.part)
+            except LostError as error:
+                status = CommandStatus(CommandState.STOPPED, str(error), error.cause)
+            if status.state is CommandState.RUNNING:
+                status = self._watched(sent)
+            self._sent.update(sent, status)
+            if status.state is CommandState.STOPPED and status.cause is not CommandCause.STOPPED:
+                self._unsure.add(sent.part)
+            if status.cause is CommandCause.NO_ANSWER:
+                raise LostError(status.reason)
 
-    def _stamp(self, message: Any) -> float:
-        """Time of a message on the protocol's clock."""
-        return self._clock.now() - (self._clock.robot_time_s() - float(message.seconds) - float(message.nanos) * 1e-9)
+    def _watched(self, sent: Sent) -> CommandStatus:
+        """Status of a command that runs: stopped when its time is over, or the arm has left its path."""
+        if self._clock.now() >= sent.until_s:
+            return CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
+        off_rad = off_path_rad(sent.path_rad, self.sensors.arm_rad) if sent.part == "arm" else 0.0
+        if off_rad > OFF_PATH_RAD:
+            reason = f"the arm is {off_rad:.2f} rad off its path; look what is in its way"
+            return CommandStatus(CommandState.STOPPED, reason, CommandCause.BLOCKED)
+        return sent.status
 
-    def _read_scan(self) -> Scan | None:
-        request = point_cloud_pb2.GetPointCloudRequest()
-        request.point_cloud_requests.add(
-            point_cloud_source_name=_LIDAR, cloud_type=point_cloud_pb2.PointCloudRequest.CLOUD_TYPE_POINTS
-        )
-        (answer,) = self._connection.call(_LIDAR, "GetPointCloud", request).point_cloud_responses
-        if answer.status != point_cloud_pb2.PointCloudResponse.STATUS_OK:
-            return self._scan
-        cloud, source = answer.point_cloud, answer.point_cloud.source
-        frames = frames_of(source.transforms_snapshot)
-        points = np.frombuffer(cloud.data, np.float32).reshape(-1, 3).astype(np.float64)
-        X_BF = pose_between(frames, "body", source.frame_name_sensor)
-        X_BL = self._X_BL()
-        points_L = (X_BL.inverse() @ X_BF @ points.T).T
-        X_OB = pose_between(frames, "odom", "body")
-        return scan(points_L, self._stamp(source.acquisition_time), X_BL, X_OB)
+    def _end_running(self, error: LostError) -> None:
+        """Ends the commands that run while the robot does not answer; their parts stop when it does again."""
+        for sent in self._sent.running():
+            self._unsure.add(sent.part)
+            self._sent.update(sent, CommandStatus(CommandState.STOPPED, str(error), error.cause))
 
-    def _X_BL(self) -> RigidTransform:
-        """Pose of the LiDAR on the rear rails, as in the description."""
-        height_m = (self._capabilities.lidar_height_m or 0.0) - self._capabilities.standing_height_m
-        return RigidTransform([-0.2, 0.0, height_m])
+    def _halt_unsure(self) -> None:
+        """Stops the parts of which it is not known whether they move; the gripper keeps its clamp."""
+        for part in list(self._unsure):
+            if part != "gripper" and self._connection.lease is not None:
+                try:
+                    self._connection.command(commands.halt(part))
+                except LostError as error:
+                    if error.cause is CommandCause.NO_ANSWER:
+                        raise
+            self._unsure.discard(part)
 
-    def _follow(self, sent: _Sent) -> None:
-        """Reads how far a command has come."""
-        request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=sent.number)
-        answer = self._connection.call("robot-command", "RobotCommandFeedback", request).feedback
-        status = status_of(answer.synchronized_feedback, sent.part)
-        if status.state is CommandState.RUNNING and self._clock.now() >= sent.until_s:
-            status = CommandStatus(CommandState.STOPPED, "expired before it was done", CommandCause.LATE)
-        with self._lock:
-            if sent.status.state is not CommandState.RUNNING:
-                return
-            sent.status = status
-        if status.state is CommandState.STOPPED and sent.part == "arm" and self._current is not None:
-            self._send(_arm_stop(), "arm", self._current)  # the API's arm commands have no end of their own
+    def _synchronise(self) -> None:
+        """Measures the robot's clock again, at once after it has jumped; nothing moves before."""
+        jumped = self.sensors.clock_jumped
+        self._synchronised_s = -math.inf if jumped else self._synchronised_s
+        if self._clock.now() - self._synchronised_s > _SYNCHRONISED_EVERY_S:
+            self._connection.synchronise(jumped=jumped)
+            self._synchronised_s, self.sensors.clock_jumped = self._clock.now(), False
+
+    def _keep(self) -> None:
+        """Says what the robot must hear; looks whether a lease that was taken is free again."""
+        self.heartbeat.beat()
+        if self._taken_by and time.monotonic() - self._looked_s > _LOOK_S:
+            self._looked_s = time.monotonic()
+            self._taken_by = self._connection.holder()
 
     # -- inside ------------------------------------------------------------------------------------------------------
 
     def _params(self) -> Any:
-        """Mobility parameters with the posture last asked for, and limits of speed."""
+        """Mobility parameters with the posture last asked for."""
         height_m, pitch_rad = self._posture
-        params = RobotCommandBuilder.mobility_params(
-            body_height=height_m - self._capabilities.standing_height_m, footprint_R_body=EulerZXY(pitch=pitch_rad)
-        )
-        for limit, sign in ((params.vel_limit.max_vel, 1.0), (params.vel_limit.min_vel, -1.0)):
-            limit.linear.x = limit.linear.y = sign * FASTEST_M_S
-            limit.angular = sign * FASTEST_RAD_S
-        return params
+        return commands.mobility_params(height_m - self._capabilities.standing_height_m, pitch_rad, self._padding_m)
 
-    def _send(
-        self, command: Any, part: str, lease: Lease, until_s: float = math.inf, *, end_s: float | None = None
-    ) -> CommandId:
-        if lease != self._current:
-            gone = f"{part}: lease {lease.number} of {lease.holder!r} no longer counts"
-            return self._refused(gone, CommandCause.NO_LEASE)
-        now_s = self._clock.now()
-        if min(until_s, math.inf if end_s is None else end_s) <= now_s:
+    def _without(self, lease: Lease) -> str | None:
+        """Returns why a lease does not count; None when it does."""
+        if lease == self._current:
+            return None
+        by = f"; it is held by {self._taken_by}" if self._taken_by else ""
+        return f"lease {lease.number} of {lease.holder!r} no longer counts{by}"
+
+    def _objection(self, part: str, lease: Lease, until_s: float, values: Iterable[float] = ()) -> CommandId | None:
+        """Refuses a command that must not be sent; returns None for one that may."""
+        now_s, values = self._clock.now(), np.append(np.asarray(values, dtype=float), min(until_s, 1e9))
+        clock_s, state_s = now_s - self._synchronised_s, self.sensors.silent_s()
+        if (gone := self._without(lease)) is not None:
+            return self._refused(f"{part}: {gone}", CommandCause.NO_LEASE)
+        if not np.isfinite(values).all():
+            return self._refused(f"{part}: {values[:-1]} until {until_s} s is not finite", CommandCause.INVALID)
+        if until_s <= now_s:
             late = f"{part}: expires at {until_s:.2f} s, and it is {now_s:.2f} s already"
             return self._refused(late, CommandCause.LATE)
-        if part == "base" and end_s is not None:
-            if now_s - self._readings.stamp_s > OLD_STATE_S:
-                old = f"drive: the last state is {now_s - self._readings.stamp_s:.1f} s old"
-                return self._refused(old, CommandCause.NO_ANSWER)
-            end = self._clock.robot_time_s() + end_s - now_s
-            given = command.synchronized_command.mobility_command.se2_velocity_request
-            given.end_time.FromNanoseconds(round(end * 1e9))
+        if clock_s > OLD_CLOCK_S:
+            old = f"{part}: the clocks were last synchronised {clock_s:.0f} s ago; check the network"
+            return self._refused(old, CommandCause.NO_ANSWER)
+        if part == "base" and state_s > OLD_STATE_S:
+            return self._refused(f"drive: the last state is {state_s:.1f} s old", CommandCause.NO_ANSWER)
+        if part == "base" and not self.sensors.readings.feet_known:
+            return self._refused("drive: no foot is on the floor, so the height is unknown", CommandCause.FAULT)
+        return None
+
+    def _send(self, command: Any, sent: Sent) -> CommandId:
         try:
-            answer = self._connection.command(command)
+            sent.number = self._connection.command(command).robot_command_id
         except LostError as error:
-            return self._refused(f"{part}: {error}", error.cause)
-        if answer.lease_use_result.status not in (0, lease_pb2.LeaseUseResult.STATUS_OK):
-            owner = answer.lease_use_result.owner.client_name or "another client"
-            self._current, self._connection.lease = None, None
-            return self._refused(f"{part}: the lease is held by {owner}", CommandCause.NO_LEASE)
-        if answer.status != Answer.STATUS_OK:
-            why = answer.message or Answer.Status.Name(answer.status)
-            return self._refused(f"{part}: {why}", CAUSES.get(answer.status, CommandCause.REFUSED))
-        made = _Sent(answer.robot_command_id, part, until_s=until_s if end_s is None else math.inf)
-        with self._lock:
-            for sent in self._sent.values():
-                same = sent.part == part or {sent.part, part} <= {"base", "posture"}
-                if same and sent.status.state is CommandState.RUNNING:
-                    sent.status = CommandStatus(
-                        CommandState.STOPPED, "replaced by another command", CommandCause.STOPPED
-                    )
-            return self._kept(made)
+            return self._lost(error, sent.part, sent.part)
+        return self._sent.add(sent)
+
+    def _lost(self, error: LostError, what: str, part: str | None) -> CommandId:
+        """Notes a command that failed on its way; the robot may have begun it, so its part is stopped."""
+        if error.cause is CommandCause.NO_LEASE:
+            self._lose(error.holder)
+        else:
+            self._unsure.add(part)
+        return self._refused(f"{what}: {error}", error.cause)
+
+    def _lose(self, holder: str) -> None:
+        """Notes that another client has the lease; it is not taken back."""
+        self._current, self._connection.lease, self._taken_by = None, None, holder
 
     def _refused(self, reason: str, cause: CommandCause) -> CommandId:
-        return self._noted(CommandStatus(CommandState.REFUSED, reason, cause))
-
-    def _noted(self, status: CommandStatus) -> CommandId:
-        with self._lock:
-            return self._kept(_Sent(0, "", status))
-
-    def _kept(self, sent: _Sent) -> CommandId:
-        number, self._next = CommandId(self._next), self._next + 1
-        self._sent[number] = sent
-        while len(self._sent) > 1000:
-            del self._sent[next(iter(self._sent))]
-        return number
-
-
-def _arm_stop() -> Any:
-    command = robot_command_pb2.RobotCommand()
-    command.synchronized_command.arm_command.arm_stop_command.SetInParent()
-    return command
+        return self._sent.note(CommandState.REFUSED, reason, cause)

@@ -2,7 +2,7 @@
 
 drive              as asked, until its end or 0.6 s
 expired, NaN       refused
-lease taken        refused, lease_holder() is None
+lease taken        refused, lease_holder() names the other until it returns it
 E-stop             a fault
 no answer          old readings: drive refused, later a fault
 """
@@ -135,7 +135,8 @@ def test_a_posture_that_was_refused_is_not_kept(standing, monkeypatch):
     refused = robot_command_pb2.RobotCommandResponse.STATUS_BEHAVIOR_FAULT
     answer = robot_command_pb2.RobotCommandResponse(status=refused)
     with monkeypatch.context() as patch:
-        patch.setattr(standing.connection, "command", lambda command: answer)
+        service = standing.connection._stubs["robot-command"]
+        patch.setattr(service, "RobotCommand", lambda _, timeout: answer)
         low = standing.robot.stand(0.46, 0.1, until_s=standing.now() + 5.0, lease=standing.lease)
     assert standing.robot.command_status(low).cause is CommandCause.FAULT
     standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
@@ -261,7 +262,9 @@ def test_a_taken_lease_refuses_commands_and_says_who_took_it(standing, credentia
     assert status.state is CommandState.REFUSED
     assert "errand" in status.reason
     assert status.cause is CommandCause.NO_LEASE
-    assert standing.robot.lease_holder() is None
+    assert standing.robot.lease_holder().holder == "errand"
+    other.give_back()
+    assert standing.until(lambda: standing.robot.lease_holder() is None)
 
 
 def test_a_lease_that_another_holds_is_not_acquired(step, credentials):

@@ -14,6 +14,7 @@ import json
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -67,8 +68,13 @@ def in_process(request: Request) -> Ended:
     return _ended(run_request(prepare(request)).report, began_s)
 
 
-def through_api(request: Request, folder: Path) -> Ended:
-    """Runs a request through adapter and server in lock-step; the server's credentials lie in the folder."""
+def through_api(
+    request: Request, folder: Path, options: Callable[[LockStep], Mapping[str, Any]] = lambda _: {}
+) -> Ended:
+    """Runs a request through adapter and server in lock-step; the server's credentials lie in the folder.
+
+    `options` are more options of `run_request`.
+    """
     prepared, made = prepare(request), list[Simulation]()
 
     def build() -> tuple[Any, Any]:
@@ -79,7 +85,7 @@ def through_api(request: Request, folder: Path) -> Ended:
     try:
         step.stand_up()
         began_s = time.monotonic()
-        return _ended(run_request(prepared, Judged(step, made[0], prepared)).report, began_s)
+        return _ended(run_request(prepared, Judged(step, made[0], prepared), **options(step)).report, began_s)
     finally:
         made.clear()
         step.close()

@@ -2,14 +2,23 @@
 
 go to the kitchen   fulfilled, as in process
 fetch a drink       fulfilled, as in process (nightly)
+lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run
 """
 
 import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
 
+import bosdyn.client
+from bosdyn.client.lease import LeaseClient
+
 from executive.mission.request import Request
+from executive.run.control import Control
+from executive.run.control_state import Mode
+from executive.run.visitor import RunVisitor
 from tests.benchmarks.spot_missions import MISSIONS, through_api
+
+FREE = "the lease was given back"
 
 
 @pytest.mark.mission
@@ -23,4 +32,46 @@ from tests.benchmarks.spot_missions import MISSIONS, through_api
 )
 def test_a_mission_through_the_api_is_fulfilled(what, tmp_path):
     ended = through_api(Request(**what, record=False, out=tmp_path / "out"), tmp_path / "credentials")
+    assert (ended.outcome, ended.verdict) == ("success", True), ended
+
+
+class Tablet(RunVisitor):
+    """Person with a tablet: takes the lease at tick 140, gives it back at 200, and resumes the run when it is free."""
+
+    def __init__(self, port, certificate, control):
+        sdk = bosdyn.client.create_standard_sdk("tablet", cert_resource_glob=str(certificate))
+        robot = sdk.create_robot("127.0.0.1")
+        robot.update_secure_channel_port(port)
+        robot.authenticate("user", "right")
+        self._client, self._control = robot.ensure_client(LeaseClient.default_service_name), control
+        self._lease, self.seen, self.poses = None, [], {}
+
+    def tick(self, progress):
+        if progress.ticks == 140:
+            self._lease = self._client.take()
+        elif progress.ticks == 200:
+            self._client.return_lease(self._lease)
+        mode, reason = self._control.state.mode, self._control.state.reason
+        if reason == FREE and self.seen[-1] == (mode, reason):
+            self._control.resume()
+        if self.seen[-1:] != [(mode, reason)]:
+            self.seen.append((mode, reason))
+        self.poses[progress.ticks] = progress.robots["Alice"].pose
+
+
+@pytest.mark.mission
+def test_a_run_whose_lease_is_taken_goes_on_when_the_operator_resumes_it(tmp_path):
+    control = Control(attended=True, pace=None)
+    tablets = []
+
+    def with_tablet(step):
+        tablets.append(Tablet(step.server.port, step.certificate, control))
+        return {"visitors": tablets, "control": control}
+
+    request = Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out")
+    ended = through_api(request, tmp_path / "credentials", with_tablet)
+    tablet = tablets[0]
+    assert [mode for mode, _ in tablet.seen] == [Mode.RUNNING, Mode.PAUSED, Mode.PAUSED, Mode.RUNNING]
+    assert tablet.seen[1][1].startswith("tablet") and tablet.seen[1][1].endswith("holds the lease of Alice")
+    assert tablet.poses[170].x_m == pytest.approx(tablet.poses[200].x_m, abs=0.02)
     assert (ended.outcome, ended.verdict) == ("success", True), ended

@@ -22,7 +22,7 @@ class LockStep:
     """
 
     def __init__(self, build: Callable[[], tuple[Robot, Clock]], credentials) -> None:
-        self._build, self._credentials = build, credentials
+        self._build, self._credentials, self.certificate = build, credentials, credentials.certificate
         self._ready, self._stopping = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()

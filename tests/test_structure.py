@@ -26,11 +26,11 @@ LINES = {
     "executive/view": 1553,
     "executive/testing": 818,
     "executive/app": 7997,
-    "executive/cli": 4849,
+    "executive/cli": 4852,
     "skills": 27266,
-    "plant": 19652,
+    "plant": 19884,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 482, 82, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 484, 83, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -116,6 +116,7 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     from plant.spot_api.server.estop import Tablet
     from plant.spot_api.server.identity import credentials
     from plant.spot_api.server.server import Options, SpotServer
+    from skills.geometry import compose, inverse
     from skills.manipulation.arm.kinematics import arm_model
 
     opened = open_world(world)
@@ -124,7 +125,9 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
     robot = simulation.robots["Alice"]
     picker = PointPicker(robot, simulation.clock)
-    options = Options({USER: PASSWORD}, port, tablet=Tablet.TABLET if tablet else Tablet.NONE, picker=picker)
+    dock_O = None if placed.dock is None else compose(inverse(placed.start), placed.dock)
+    tablet_or_none = Tablet.TABLET if tablet else Tablet.NONE
+    options = Options({USER: PASSWORD}, port, tablet=tablet_or_none, picker=picker, dock_O=dock_O)
     try:
         held = credentials(user_cache() / _FOLDER)
         server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), held, options)

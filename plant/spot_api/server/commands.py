@@ -174,6 +174,8 @@ class RobotCommandService(Service):
         whole = _whole_motion(command.full_body_command) if command.HasField("full_body_command") else None
         if snapshot.motors is not Motors.ON and not isinstance(whole, _PowerOff | _StopAll):
             raise mobility.RefusedError(Status.STATUS_NOT_POWERED_ON, "the motors are off")
+        if whole is None and computer.docked() and _leaves_dock(command.synchronized_command):
+            raise mobility.RefusedError(Status.STATUS_DOCKED, "the robot is docked: undock it first")
         parts: Mapping[str, Any] = {}
         if whole is None:
             if _has_end_time(command) and not self._clocks.knows(request.clock_identifier):
@@ -232,6 +234,12 @@ def _has_end_time(command: Any) -> bool:
     which = base.WhichOneof("command")
     ends = ("se2_velocity_request", "se2_trajectory_request", "stance_request")
     return which in ends or named.arm_command.HasField("arm_velocity_command")
+
+
+def _leaves_dock(command: Any) -> bool:
+    """Returns whether a command would move a robot that is docked."""
+    stays = (None, "sit_request", "stop_request", "freeze_request")
+    return command.HasField("arm_command") or command.mobility_command.WhichOneof("command") not in stays
 
 
 def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: float) -> mobility.BaseMotion:

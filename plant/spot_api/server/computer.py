@@ -5,6 +5,7 @@ One thread owns robot and clock. Calls of clients read the last snapshot, and ha
 
 from __future__ import annotations
 
+import math
 import queue
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -33,6 +34,7 @@ from skills.robot import (
     Lease,
     Mount,
     Odometry,
+    Pose2D,
     Robot,
     Scan,
 )
@@ -44,6 +46,7 @@ _LATE_S: Final = 0.3
 _STILL_M, _STILL_S, _NEAR_M = 0.01, 1.0, 0.05
 OVERRIDDEN: Final = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN
 _FOREVER_S: Final = 1e7
+_DOCKED_M, _DOCKED_RAD = 0.12, 0.2
 HAND_X_M: Final = 0.19557
 """Distance of the API's frame `hand` ahead of `link_wr1`, the protocol's hand frame H (SDK, frames of the arm)."""
 
@@ -149,10 +152,11 @@ class Computer:
         estop: EstopService,
         solver: Solver | None,
         pace: Pace = Pace.REAL,
+        dock_O: Pose2D | None = None,
     ) -> None:
-        """Takes the robot's lease. The robot sits down, as before its motors are switched on."""
+        """Takes the robot's lease. The robot sits down, as before its motors are switched on; `dock_O` is its dock."""
         self.robot, self.clock, self.solver, self.pace = robot, clock, solver, pace
-        self.leases, self.estop = leases, estop
+        self.leases, self.estop, self.dock_O = leases, estop, dock_O
         self.lease: Lease = robot.take_lease("the server of Spot's API")
         self.capabilities: Capabilities = robot.capabilities()
         self.motors, self._motors_since_s = Motors.OFF, 0.0
@@ -319,6 +323,22 @@ class Computer:
         state = self.robot.command_status(self._sit_command).state
         low = height_m < self.capabilities.height_range_m[0] - _NEAR_M
         return state is CommandState.DONE or (low and self.clock.now() - self._still_since_s > _STILL_S)
+
+    def tell_carried(self) -> None:
+        """Tells the robot whether it must keep what the gripper holds."""
+        carry = self.grip.carry_state(self.snapshot.gripper)
+        keeps = carry != robot_state_pb2.ManipulatorState.CARRY_STATE_NOT_CARRIABLE
+        self.robot.carry(keeps and self.grip.holds(self.snapshot.gripper), lease=self.lease)
+
+    def docked(self) -> bool:
+        """Returns whether the robot sits on its dock."""
+        return self.snapshot.sitting and self.dock_O is not None and self.near(self.dock_O)
+
+    def near(self, goal_O: Pose2D) -> bool:
+        """Returns whether the body is at a pose in `odom`, as exactly as a dock needs it."""
+        pose = self.snapshot.odometry.pose
+        off_m = math.hypot(goal_O.x_m - pose.x_m, goal_O.y_m - pose.y_m)
+        return off_m < _DOCKED_M and abs(math.remainder(goal_O.yaw_rad - pose.yaw_rad, math.tau)) < _DOCKED_RAD
 
     # -- sensing -----------------------------------------------------------------------------------------------------
 

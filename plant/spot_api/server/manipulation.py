@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from itertools import count
 from typing import Any, Final, Protocol
 
 import numpy as np
 from bosdyn.api import (
-    arm_command_pb2,
-    basic_command_pb2,
     geometry_pb2,
     lease_pb2,
     manipulation_api_pb2,
     robot_state_pb2,
 )
-from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from pydrake.math import RigidTransform, RotationMatrix
 
 from plant.spot_api.messages import (
@@ -29,20 +26,16 @@ from plant.spot_api.messages import (
     transform,
     vector,
 )
-from plant.spot_api.server.arm import Named
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Motors, Snapshot
 from plant.spot_api.server.identity import DOMAIN
-from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY, LeaseService
-from plant.spot_api.server.mobility import Status, Trajectory
+from plant.spot_api.server.leases import LeaseService
 from plant.spot_api.server.rays import depth_points_O, first_hit_m
-from skills.robot import FloatArray, Lease
+from plant.spot_api.server.task import WHOLE, Steps, Task, stow, walk
+from skills.robot import FloatArray, Lease, Pose2D
 
 Api: Final = manipulation_api_pb2
-_Positions: Final = arm_command_pb2.NamedArmPositionsCommand
-_ALL: Final = (MOBILITY, ARM, GRIPPER)
 _USUAL_OFFSET_M: Final = 0.9
-_LEAST_WALK_S, _WALK_S_PER_M = 10.0, 3.0
 _AHEAD_RAD: Final = 0.4
 _REACHING_M, _GRASPING_M = 0.3, 0.12
 _REMEMBERED: Final = 100
@@ -69,46 +62,25 @@ class Picker(Protocol):
         """Stops what it has begun."""
 
 
-class _Task:
-    """Task of the whole robot: looks where the object is, walks there and perhaps picks it up.
+class _ObjectTask(Task):
+    """Looks where an object is, walks there and perhaps picks it up. Other threads read `found_O`."""
 
-    Other threads read `state` and `found_O`.
-    """
+    broken = Api.MANIP_STATE_GRASP_FAILED
 
     def __init__(self, aim: Aim, offset_m: float | None, picker: Picker | None, allows: Allows, *, walks: bool) -> None:
         self._aim, self._offset_m, self._picker, self._allows, self._walks = aim, offset_m, picker, allows, walks
-        self.state: int = Api.MANIP_STATE_ATTEMPTING_RAYCASTING
         self.found_O: FloatArray | None = None
-        self._routine: Generator[None, None, int] | None = None
+        super().__init__(Api.MANIP_STATE_ATTEMPTING_RAYCASTING)
 
-    def begin(self, computer: Computer) -> None:
-        """Looks for the point."""
-        self._routine = self._run(computer)
-        self.tick(computer)
-
-    def tick(self, computer: Computer) -> None:
-        """Goes on with it."""
-        if self._routine is not None:
-            try:
-                next(self._routine)
-            except StopIteration as done:
-                self.state, self._routine = done.value, None
-
-    def end(self, _status: int) -> None:
-        """Ends what is not finished as failed."""
-        if self._routine is not None:
-            self._routine.close()
-            self.state, self._routine = Api.MANIP_STATE_GRASP_FAILED, None
-
-    def _run(self, computer: Computer) -> Generator[None, None, int]:
-        """Does the task, a piece in each tick; returns its last state."""
+    def _run(self, computer: Computer) -> Steps:
         points_O = depth_points_O(computer)
         self.found_O = point_O = self._aim(points_O)
         if point_O is None:
             return int(Api.MANIP_STATE_GRASP_FAILED_TO_RAYCAST_INTO_MAP)
         if self._walks and not self._near(computer, point_O):
             self.state = Api.MANIP_STATE_WALKING_TO_OBJECT
-            if not (yield from self._walk(computer, point_O)):
+            yield from stow(computer)
+            if not (yield from walk(computer, self._before(computer, point_O))):
                 return int(Api.MANIP_STATE_GRASP_FAILED)
         if self._picker is None:
             return int(Api.MANIP_STATE_DONE)
@@ -133,34 +105,15 @@ class _Task:
             least_m, most_m = min(arm.nearer_m), max(arm.nearer_m)
         return least_m < math.hypot(x, y) < most_m and abs(math.atan2(y, x)) < _AHEAD_RAD
 
-    def _walk(self, computer: Computer, point_O: FloatArray) -> Generator[None, None, bool]:
-        """Stows the arm, and walks straight until the body's middle is at a distance and faces the point."""
-        arm, pose = computer.capabilities.arm, computer.snapshot.odometry.pose
-        if arm is not None:
-            stow = Named(_Positions.Request(position=_Positions.POSITIONS_STOW))
-            stow.begin(computer)
-            while stow.feedback.named_arm_position_feedback.status == stow.going:
-                yield
-                stow.tick(computer)
-        offset_m = self._offset_m
+    def _before(self, computer: Computer, point_O: FloatArray) -> Pose2D:
+        """Pose on the line to a point from which the body's middle faces it at the distance that the task needs."""
+        arm, pose, offset_m = computer.capabilities.arm, computer.snapshot.odometry.pose, self._offset_m
         if offset_m is None:
             above = self._picker is not None and _only_from_above(self._allows)
             offset_m = _USUAL_OFFSET_M if arm is None else (arm.nearer_m if above else arm.standing_m)[0]
-        ahead = point_O[:2] - [pose.x_m, pose.y_m]
-        far_m, yaw_rad = float(np.linalg.norm(ahead)), math.atan2(ahead[1], ahead[0])
-        end_s = computer.now_s() + _LEAST_WALK_S + _WALK_S_PER_M * abs(far_m - offset_m)
-        request = basic_command_pb2.SE2TrajectoryCommand.Request(se2_frame_name="odom")
-        goal = request.trajectory.points.add().pose
-        goal.position.x, goal.position.y = point_O[:2] - offset_m / max(far_m, 1e-6) * ahead
-        goal.angle = yaw_rad
-        walk = Trajectory(request, spot_command_pb2.MobilityParams(), end_s, computer.snapshot)
-        walk.begin(computer)
-        while walk.status == Status.STATUS_PROCESSING:
-            yield
-            walk.tick(computer)
-            if walk.feedback.se2_trajectory_feedback.status == walk.at_goal:
-                return True
-        return False
+        x_m, y_m = float(point_O[0]), float(point_O[1])
+        yaw_rad = math.atan2(y_m - pose.y_m, x_m - pose.x_m)
+        return Pose2D(x_m - offset_m * math.cos(yaw_rad), y_m - offset_m * math.sin(yaw_rad), yaw_rad)
 
     def _phase(self, computer: Computer, point_O: FloatArray) -> int:
         """State of a pick by where the hand is: on its way to the object, about it, or holding it."""
@@ -177,20 +130,22 @@ class ManipulationService(Service):
 
     def __init__(self, computer: Computer, leases: LeaseService, picker: Picker | None) -> None:
         self._computer, self._leases, self._picker = computer, leases, picker
-        self._ids, self._tasks = count(1), OrderedDict[int, _Task]()
+        self._ids, self._tasks = count(1), OrderedDict[int, _ObjectTask]()
 
     def ManipulationApi(self, request: Any, _call: Call) -> Any:
         """Starts a task in place of all motions. One that cannot be done is an invalid request."""
-        used = self._leases.use(request.lease, _ALL)
+        used = self._leases.use(request.lease, WHOLE)
         if used.status != lease_pb2.LeaseUseResult.STATUS_OK:
             return Api.ManipulationApiResponse(lease_use_result=used)
         if self._computer.snapshot.motors is not Motors.ON:
             raise InvalidRequestError("the motors are off")
+        if self._computer.docked():
+            raise InvalidRequestError("the robot is docked: undock it first")
         task, number = self._task(request), next(self._ids)
         self._tasks[number] = task
         while len(self._tasks) > _REMEMBERED:
             self._tasks.popitem(last=False)
-        self._computer.do(lambda: self._computer.move(dict.fromkeys(_ALL, task)))
+        self._computer.do(lambda: self._computer.move(dict.fromkeys(WHOLE, task)))
         return Api.ManipulationApiResponse(lease_use_result=used, manipulation_cmd_id=number)
 
     def ManipulationApiFeedback(self, request: Any, _call: Call) -> Any:
@@ -220,9 +175,10 @@ class ManipulationService(Service):
             grip.carry = carry
         if request.HasField("api_grasp_override"):
             grip.holding = word == Override.OVERRIDE_HOLDING
+        self._computer.do(self._computer.tell_carried)
         return Api.ApiGraspOverrideResponse()
 
-    def _task(self, request: Any) -> _Task:
+    def _task(self, request: Any) -> _ObjectTask:
         """Returns the task of a request. Raises InvalidRequestError."""
         which, snapshot = request.WhichOneof("manipulation_cmd"), self._computer.snapshot
         given = getattr(request, which or "pick_object_execute_plan")
@@ -238,14 +194,14 @@ class ManipulationService(Service):
         aim = aims[which](given, snapshot)
         if which.startswith("walk_to"):
             offset_m = finite(given.offset_distance.value, "offset_distance")
-            return _Task(aim, offset_m if given.HasField("offset_distance") else None, None, _any, walks=True)
+            return _ObjectTask(aim, offset_m if given.HasField("offset_distance") else None, None, _any, walks=True)
         if self._picker is None or self._computer.capabilities.gripper is None:
             raise InvalidRequestError(f"manipulation_cmd: {which} needs an arm that plans grasps")
         mode = getattr(given, "walk_gaze_mode", Api.PICK_AUTO_WALK_AND_GAZE)
         if mode == Api.PICK_PLAN_ONLY:
             raise InvalidRequestError("walk_gaze_mode: PICK_PLAN_ONLY is not simulated")
         walks = mode in (Api.PICK_WALK_GAZE_UNKNOWN, Api.PICK_AUTO_WALK_AND_GAZE)
-        return _Task(aim, None, self._picker, _allows(given.grasp_params, snapshot), walks=walks)
+        return _ObjectTask(aim, None, self._picker, _allows(given.grasp_params, snapshot), walks=walks)
 
 
 def _any(_rotation: RotationMatrix) -> bool:

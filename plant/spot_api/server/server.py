@@ -11,7 +11,7 @@ from typing import Final
 
 import grpc
 
-from plant.spot_api.server import identity, manipulation, pictures, rays, state
+from plant.spot_api.server import docking, identity, manipulation, pictures, rays, state
 from plant.spot_api.server.calls import Service, handlers
 from plant.spot_api.server.commands import PowerService, RobotCommandService
 from plant.spot_api.server.computer import Computer, Pace, Solver
@@ -20,7 +20,7 @@ from plant.spot_api.server.faults import Switchboard
 from plant.spot_api.server.identity import DOMAIN, Credentials
 from plant.spot_api.server.keepalive import KeepaliveService
 from plant.spot_api.server.leases import LeaseService
-from skills.robot import Clock, Robot
+from skills.robot import Clock, Pose2D, Robot
 
 _MOST_BYTES: Final = 64 * 1024**2
 _THREADS: Final = 24
@@ -32,7 +32,6 @@ LISTED: Final[Mapping[str, str]] = {
     "data": "bosdyn.api.DataService",
     "data-acquisition": "bosdyn.api.DataAcquisitionService",
     "data-acquisition-store": "bosdyn.api.DataAcquisitionStoreService",
-    "docking": "bosdyn.api.docking.DockingService",
     "door": "bosdyn.api.spot.DoorService",
     "graph-nav-service": "bosdyn.api.graph_nav.GraphNavService",
     "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
@@ -63,6 +62,7 @@ SERVICES: Final[tuple[type[Service], ...]] = (
     pictures.LocalGridService,
     rays.RayCastService,
     manipulation.ManipulationService,
+    docking.DockingService,
     state.InverseKinematicsService,
     state.WorldObjectService,
     state.FaultService,
@@ -81,7 +81,7 @@ _DESCRIBED_IN: Final = (
     *("auth", "data_buffer", "directory_registration", "directory", "estop", "fault", "image", "lease", "license"),
     *("gripper_camera_param", "local_grid"),
     *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
-    *("manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
+    *("docking.docking", "manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
     "keepalive.keepalive",
 )
 """Files of the SDK that describe the services; importing them registers their descriptions."""
@@ -91,7 +91,8 @@ _DESCRIBED_IN: Final = (
 class Options:
     """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet.
 
-    `picker` picks up objects for the manipulation service; without it picks are refused.
+    `picker` picks up objects for the manipulation service; without it picks are refused. `dock_O` is the robot's pose
+    on its dock, in `odom`.
     """
 
     passwords: Mapping[str, str]
@@ -99,6 +100,7 @@ class Options:
     pace: Pace = Pace.REAL
     tablet: Tablet = Tablet.TABLET
     picker: manipulation.Picker | None = None
+    dock_O: Pose2D | None = None
 
 
 class SpotServer:
@@ -112,7 +114,9 @@ class SpotServer:
             importlib.import_module(f"bosdyn.api.{name}_service_pb2")
         estop = EstopService(options.tablet)
         leases = LeaseService(lambda: self.computer.now_s(), lambda parts: self.computer.lost(parts))
-        self.computer = Computer(robot, clock, leases=leases, estop=estop, solver=solver, pace=options.pace)
+        self.computer = Computer(
+            robot, clock, leases=leases, estop=estop, solver=solver, pace=options.pace, dock_O=options.dock_O
+        )
         self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
         self.services = self._services(leases, estop, auth, robot.name, options.picker)
@@ -172,6 +176,7 @@ class SpotServer:
             pictures.LocalGridService(computer),
             rays.RayCastService(computer),
             manipulation.ManipulationService(computer, leases, picker),
+            docking.DockingService(computer, leases, clocks),
             state.InverseKinematicsService(computer),
             state.WorldObjectService(),
             faults,

@@ -102,7 +102,8 @@ class RobotStateService(Service):
             Motors.STARTING: State.MOTOR_POWER_STATE_POWERING_ON,
             Motors.ON: State.MOTOR_POWER_STATE_ON,
         }[snapshot.motors]
-        power.shore_power_state = State.SHORE_POWER_STATE_OFF
+        docked = self._computer.docked()
+        power.shore_power_state = State.SHORE_POWER_STATE_ON if docked else State.SHORE_POWER_STATE_OFF
         power.robot_power_state = State.ROBOT_POWER_STATE_ON
         power.payload_ports_power_state = State.PAYLOAD_PORTS_POWER_STATE_ON
         power.wifi_radio_power_state = State.WIFI_RADIO_POWER_STATE_ON
@@ -112,9 +113,10 @@ class RobotStateService(Service):
         battery.timestamp.CopyFrom(stamp)
         battery.charge_percentage.value = charge
         battery.estimated_runtime.CopyFrom(duration(RUNTIME_S * snapshot.battery.charge))
-        battery.voltage.value, battery.current.value = 52.0, -6.0
+        battery.voltage.value, battery.current.value = 52.0, 6.0 if docked else -6.0
         battery.temperatures.append(30.0)
-        battery.status = robot_state_pb2.BatteryState.STATUS_DISCHARGING
+        Battery = robot_state_pb2.BatteryState
+        battery.status = Battery.STATUS_CHARGING if docked else Battery.STATUS_DISCHARGING
 
     def _estop(self, state: Any, stamp: Any) -> None:
         State = robot_state_pb2.EStopState

@@ -321,3 +321,12 @@ def test_an_item_is_stowed_only_when_a_client_says_that_it_may_be(spot):
 def test_nothing_is_carried_by_an_empty_gripper(spot):
     with pytest.raises(InvalidRequestError, match="no item"):
         said(spot, holding=False, carry=State.CARRY_STATE_CARRIABLE)
+
+
+def test_the_robot_is_told_what_it_must_keep(spot):
+    said(spot, holding=True, carry=State.CARRY_STATE_CARRIABLE)
+    time.sleep(0.1)
+    assert spot.served.scripted.carries
+    said(spot, holding=True, carry=State.CARRY_STATE_NOT_CARRIABLE)
+    time.sleep(0.1)
+    assert not spot.served.scripted.carries

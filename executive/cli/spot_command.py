@@ -124,6 +124,7 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     compile_first()
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
     robot = simulation.robots["Alice"]
+    robot.image(robot.capabilities().cameras[0].source)  # the first picture takes long: the renderer begins
     picker = PointPicker(robot, simulation.clock)
     dock_O = None if placed.dock is None else compose(inverse(placed.start), placed.dock)
     tablet_or_none = Tablet.TABLET if tablet else Tablet.NONE

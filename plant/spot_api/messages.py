@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from bosdyn.api import geometry_pb2
@@ -13,7 +14,7 @@ from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RotationMatrix
 
 _NANOS = 1_000_000_000
-
+_MOST_POINTS = 250
 
 Frames = Mapping[str, tuple[str, RigidTransform]]
 """Frame tree: child -> (parent, X_parent_child); the root's parent is empty."""
@@ -46,6 +47,13 @@ def finite(value: float, field: str) -> float:
     if not math.isfinite(value):
         raise InvalidRequestError(f"{field} is {value}; it must be finite")
     return value
+
+
+def points_of(trajectory: Any, field: str) -> Sequence[Any]:
+    """Returns the points of a trajectory. Raises InvalidRequestError when there are none, or too many."""
+    if not 0 < (count := len(trajectory.points)) <= _MOST_POINTS:
+        raise InvalidRequestError(f"{field} has {count or 'no'} points; 1 to {_MOST_POINTS} are allowed")
+    return list(trajectory.points)
 
 
 def vector(message: geometry_pb2.Vec3, field: str) -> tuple[float, float, float]:

@@ -9,8 +9,9 @@ import numpy as np
 from bosdyn.api import arm_command_pb2, basic_command_pb2
 from scipy.interpolate import PchipInterpolator
 
-from plant.spot_api.messages import InvalidRequestError, duration, finite, seconds
+from plant.spot_api.messages import InvalidRequestError, duration, finite, points_of, seconds
 from plant.spot_api.server.computer import Computer
+from plant.spot_api.server.mobility import soon
 from skills.robot import ArmTrajectory, CommandState, FloatArray
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
@@ -119,19 +120,18 @@ class JointMove(ArmMotion):
 
     def __init__(self, request: Any, now_rad: FloatArray, now_s: float) -> None:
         trajectory = request.trajectory
-        if not trajectory.points:
-            raise InvalidRequestError("arm_joint_move_command.trajectory has no points")
+        points = points_of(trajectory, "arm_joint_move_command.trajectory")
         fastest = trajectory.maximum_velocity.value if trajectory.HasField("maximum_velocity") else USUAL_RAD_S
         fastest = finite(fastest, "arm_joint_move_command.trajectory.maximum_velocity")
         offset_s = seconds(trajectory.reference_time) - now_s if trajectory.HasField("reference_time") else 0.0
         self._times_s, self._positions, before = list[float](), list[FloatArray](), now_rad
-        timed = any(point.HasField("time_since_reference") for point in trajectory.points)
-        for point in trajectory.points:
+        timed = any(point.HasField("time_since_reference") for point in points)
+        for point in points:
             goal = _joints(point.position, before)
             at_s = offset_s + seconds(point.time_since_reference)
             if not timed:
                 at_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
-            self._times_s.append(max(0.0, at_s))
+            self._times_s.append(soon(at_s, "arm_joint_move_command.trajectory: a point"))
             self._positions.append(goal)
             before = goal
         while len(self._times_s) > 1 and self._times_s[0] <= 0.0:  # it is late: these have passed

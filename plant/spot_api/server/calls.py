@@ -98,7 +98,7 @@ class _ServiceHandler:
         error = header_pb2.CommonError(code=header_pb2.CommonError.CODE_OK)
         try:
             response = answer(request, call)
-        except InvalidRequestError as invalid:
+        except (InvalidRequestError, DecodeError) as invalid:  # a message within a message is decoded late
             response = response_type()
             error = header_pb2.CommonError(code=header_pb2.CommonError.CODE_INVALID_REQUEST, message=str(invalid))
         except Exception as failed:

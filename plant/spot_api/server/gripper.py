@@ -7,7 +7,7 @@ from typing import Any, Final
 from bosdyn.api import gripper_command_pb2
 
 from plant.robots.spot.description import spot_facts
-from plant.spot_api.messages import InvalidRequestError, finite
+from plant.spot_api.messages import finite, points_of
 from plant.spot_api.server.arm import Status
 from plant.spot_api.server.computer import Computer
 from skills.robot import CommandState
@@ -20,9 +20,8 @@ class Claw:
 
     def __init__(self, request: Any, widest: float, most_force_n: float) -> None:
         """Takes a trajectory of angles, of which the last is the goal: 0 closed, negative open (rad)."""
-        if not request.trajectory.points:
-            raise InvalidRequestError("claw_gripper_command.trajectory has no points")
-        goal = finite(request.trajectory.points[-1].point, "claw_gripper_command.trajectory.point")
+        points = points_of(request.trajectory, "claw_gripper_command.trajectory")
+        goal = finite(points[-1].point, "claw_gripper_command.trajectory.point")
         self._opening = min(max(-goal, 0.0), widest)
         torque = request.maximum_torque.value if request.HasField("maximum_torque") else 5.5
         force = finite(torque, "claw_gripper_command.maximum_torque") / float(spot_facts()["gripper"]["tip_radius"])

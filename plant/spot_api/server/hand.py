@@ -11,10 +11,10 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
-from plant.spot_api.messages import InvalidRequestError, finite, seconds, transform, vector
+from plant.spot_api.messages import finite, points_of, seconds, transform, vector
 from plant.spot_api.server.arm import USUAL_RAD_S, ArmMotion, Status
 from plant.spot_api.server.computer import HAND_X_M, Computer, Snapshot, Solver
-from plant.spot_api.server.mobility import unknown_frame
+from plant.spot_api.server.mobility import soon, unknown_frame
 from skills.robot import ArmTrajectory, FloatArray
 
 _USUAL_M_S: Final = 0.4
@@ -38,12 +38,10 @@ class Cartesian(ArmMotion):
             transform(request.wrist_tform_tool, "wrist_tform_tool") if request.HasField("wrist_tform_tool") else X_HAND
         )
         X_RT = transform(request.root_tform_task, "root_tform_task")
-        points = request.pose_trajectory_in_task.points
-        if not points:
-            raise InvalidRequestError("arm_cartesian_command.pose_trajectory_in_task has no points")
-        given = request.pose_trajectory_in_task
+        given, field = request.pose_trajectory_in_task, "arm_cartesian_command.pose_trajectory_in_task"
+        points = points_of(given, field)
         offset_s = seconds(given.reference_time) - now_s if given.HasField("reference_time") else 0.0
-        self._times_s = [max(0.0, offset_s + seconds(point.time_since_reference)) for point in points]
+        self._times_s = [soon(offset_s + seconds(point.time_since_reference), field) for point in points]
         X_OR = snapshot.X_AB("odom", frame)
         self._X_OW = [X_OR @ X_RT @ transform(point.pose, "pose") @ X_WT.inverse() for point in points]
         super().__init__()
@@ -89,9 +87,8 @@ class Gaze(ArmMotion):
 
     def __init__(self, request: Any, snapshot: Snapshot) -> None:
         frame = _known(request.frame1_name, snapshot)
-        if not request.target_trajectory_in_frame1.points:
-            raise InvalidRequestError("arm_gaze_command.target_trajectory_in_frame1 has no points")
-        target = vector(request.target_trajectory_in_frame1.points[-1].point, "target")
+        points = points_of(request.target_trajectory_in_frame1, "arm_gaze_command.target_trajectory_in_frame1")
+        target = vector(points[-1].point, "target")
         self._target_O = snapshot.X_AB("odom", frame) @ np.array(target)
         self._at_O: FloatArray | None = None
         if request.tool_trajectory_in_frame2.points:

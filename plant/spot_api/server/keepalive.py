@@ -50,7 +50,7 @@ class KeepaliveService(Service):
         with self._lock:
             if any(number not in self._live for number in request.policy_ids_to_remove):
                 return Response(status=Response.STATUS_INVALID_POLICY_ID)
-            for number in request.policy_ids_to_remove:
+            for number in dict.fromkeys(request.policy_ids_to_remove):
                 made.removed_policies.append(self._described(number, self._live.pop(number)))
             if request.HasField("to_add"):
                 number = next(self._ids)

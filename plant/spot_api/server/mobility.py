@@ -11,8 +11,8 @@ from bosdyn.api import basic_command_pb2, mobility_command_pb2, robot_command_pb
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from pydrake.math import RigidTransform
 
-from plant.spot_api.messages import InvalidRequestError, finite, seconds, transform
-from plant.spot_api.server.computer import Computer, Snapshot
+from plant.spot_api.messages import InvalidRequestError, finite, points_of, seconds, transform
+from plant.spot_api.server.computer import PERIOD_S, Computer, Snapshot
 from skills.robot import FloatArray, Pose2D
 
 Status = basic_command_pb2.RobotCommandFeedbackStatus
@@ -52,10 +52,15 @@ def end_of(message: Any, now_s: float, name: str) -> float:
     end_s = seconds(message.end_time)
     if end_s <= now_s:
         raise RefusedError(Answer.STATUS_EXPIRED, f"{name}: end_time was {now_s - end_s:.2f} s ago")
-    if end_s > now_s + LONGEST_S:
-        said = f"{name}: end_time is {end_s - now_s:.0f} s ahead; at most {LONGEST_S:.0f} s are allowed"
+    return now_s + soon(end_s - now_s, f"{name}: end_time")
+
+
+def soon(ahead_s: float, name: str) -> float:
+    """Returns how far ahead a time is (s), 0 for one that has passed. Raises RefusedError for one that is too far."""
+    if ahead_s > LONGEST_S:
+        said = f"{name} is {ahead_s:.0f} s ahead; at most {LONGEST_S:.0f} s are allowed"
         raise RefusedError(Answer.STATUS_TOO_DISTANT, said)
-    return end_s
+    return max(0.0, ahead_s)
 
 
 class BaseMotion:
@@ -194,7 +199,7 @@ class Velocity(_Driving):
         turn_rad = _yaw(computer.snapshot.X_AB("body", self._frame))
         ahead = math.cos(turn_rad) * vx - math.sin(turn_rad) * vy
         aside = math.sin(turn_rad) * vx + math.cos(turn_rad) * vy
-        _drive(computer, self._limit(np.array([ahead, aside, wz])), computer.until_s(self.end_s))
+        _drive(computer, self._limit(np.array([ahead, aside, wz])), self.end_s)
 
 
 class Trajectory(_Driving):
@@ -206,11 +211,10 @@ class Trajectory(_Driving):
     def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot) -> None:
         """Takes the poses over into `odom`, in which they stay."""
         frame = known_frame(request.se2_frame_name)
-        if not request.trajectory.points:
-            raise InvalidRequestError("se2_trajectory_request.trajectory has no points")
+        points = points_of(request.trajectory, "se2_trajectory_request.trajectory")
         X_OF = snapshot.X_AB("odom", frame)
-        self._poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in request.trajectory.points]
-        self._times_s = [seconds(point.time_since_reference) for point in request.trajectory.points]
+        self._poses = [Pose2D.from_transform(X_OF @ _planar(point.pose)) for point in points]
+        self._times_s = [seconds(point.time_since_reference) for point in points]
         if any(later < earlier for earlier, later in zip(self._times_s, self._times_s[1:], strict=False)):
             raise InvalidRequestError("se2_trajectory_request.trajectory: the times of its points must increase")
         self._params, self.end_s, self._limit = params, end_s, speed_limit(params)
@@ -238,7 +242,7 @@ class Trajectory(_Driving):
             )
         )
         velocity = np.zeros(3) if arrived else self._limit(_GAIN_1_S * error)
-        _drive(computer, velocity, computer.until_s(min(self.end_s, computer.now_s() + 0.5)))
+        _drive(computer, velocity, self.end_s)
 
     def _target(self, since_s: float) -> Pose2D:
         """Pose at a time since the start: with one pose this one, else between two."""
@@ -253,7 +257,9 @@ def _error(pose: Pose2D, goal: Pose2D) -> FloatArray:
     return np.array([c * dx + s * dy, c * dy - s * dx, math.remainder(goal.yaw_rad - pose.yaw_rad, math.tau)])
 
 
-def _drive(computer: Computer, velocity: FloatArray, until_s: float) -> None:
+def _drive(computer: Computer, velocity: FloatArray, end_s: float) -> None:
+    """Drives until an end (robot time), or two steps: a plant that is late does not drive on what is left of a time."""
+    until_s = min(computer.until_s(end_s), computer.clock.now() + 2.0 * PERIOD_S)
     vx, vy, wz = (float(value) for value in velocity)
     computer.robot.drive(vx, vy, wz, until_s=until_s, lease=computer.lease)
 

@@ -1,0 +1,256 @@
+"""Kills clients of Spot's API, or cuts their connections, at random moments, and watches what the robot does then.
+
+    python -m tests.benchmarks.spot_kills [--trials 50] [--seed 1] [--scripted]
+
+Each client logs in, takes the lease, switches the motors on, stands, drives and moves the arm, in real time: every
+second one is a program of the SDK with a keepalive policy (motors off after 2 s), the other one the adapter of
+`errand run --robot`. Of three clients one is killed with SIGKILL, one has its connection reset, and one silenced; of
+five one before it drives. The robot is a Spot in the plant (`--scripted`: one that moves exactly as commanded). Right
+is: from 0.3 s after the end of the last drive the base moves less than 2 cm, as the body settles over the feet; the
+lease free within 6 s; the motors off by policy. Prints JSON.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import multiprocessing
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+PRELOADED = ("bosdyn.client.keepalive", "bosdyn.client.util", "plant.spot_api.adapter.robot", "skills.testing.robot")
+USER, PASSWORD = "user", "right"
+STILL_S, FREE_S, OFF_AFTER_S = 0.3, 6.0, 2.0
+DRIVE_S = 0.6
+STILL_M = 0.02
+ENDINGS = ("killed", "reset", "silenced")
+ARM_RAD = ((0.0, -0.9, 1.8, 0.0, -0.9, 0.0), (0.0, -1.6, 2.3, 0.0, -0.7, 0.0))
+
+
+def velocity(number: int) -> tuple[float, float, float]:
+    """Velocity of a client's drives (m/s, m/s, rad/s)."""
+    sign = 1.0 if number % 4 < 2 else -1.0
+    return 0.4 * sign, 0.0, 0.3 * sign
+
+
+def sdk_client(port: int, certificate: str, number: int, end_s: Any) -> None:
+    """Drives and moves the arm with the SDK; `end_s` gets the end of each drive (robot's time) first."""
+    import bosdyn.client
+    from bosdyn.client.keepalive import KeepaliveClient, Policy
+    from bosdyn.client.lease import LeaseKeepAlive
+    from bosdyn.client.robot_command import RobotCommandBuilder, RobotCommandClient, blocking_stand
+
+    sdk = bosdyn.client.create_standard_sdk("kills", [KeepaliveClient], cert_resource_glob=certificate)
+    robot = sdk.create_robot("127.0.0.1")
+    robot.update_secure_channel_port(port)
+    robot.authenticate(USER, PASSWORD)
+    robot.time_sync.wait_for_sync()
+    policy = Policy()
+    policy.add_controlled_motors_off_action(OFF_AFTER_S)
+    keepalive = robot.ensure_client(KeepaliveClient.default_service_name)
+    policy_id = keepalive.modify_policy(to_add=policy).added_policy.policy_id
+    end_s.value = 1.0  # the policy counts from now on
+    LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True)
+    robot.power_on(update_frequency=20.0)
+    commands = robot.ensure_client(RobotCommandClient.default_service_name)
+    blocking_stand(commands, update_frequency=20.0)
+    for step in range(1000):
+        keepalive.check_in(policy_id)
+        if step % 10 == 0:
+            arm = RobotCommandBuilder.arm_joint_command(*ARM_RAD[step // 10 % 2])
+            commands.robot_command(arm)
+        until_s = time.time() + DRIVE_S
+        end_s.value = until_s + robot.time_sync.get_robot_clock_skew().ToNanoseconds() * 1e-9
+        commands.robot_command(RobotCommandBuilder.synchro_velocity_command(*velocity(number)), end_time_secs=until_s)
+        time.sleep(0.1)
+
+
+def adapter_client(port: int, certificate: str, number: int, end_s: Any) -> None:
+    """Drives and moves the arm with the adapter; `end_s` gets the end of each drive (robot's time) first."""
+    from plant.robots.spot.kind import spot_capabilities
+    from plant.spot_api.adapter.connection import Address, Connection, WallClock
+    from plant.spot_api.adapter.robot import ApiRobot
+    from skills.robot import ArmTrajectory, CommandState
+
+    connection = Connection(Address("127.0.0.1", port, Path(certificate)), USER, PASSWORD)
+    connection.synchronise()
+    clock = WallClock(connection)
+    robot = ApiRobot("Alice", connection, clock, spot_capabilities())
+    clock.after.append(robot.poll)
+    lease = robot.acquire_lease("kills")
+    connection.power(True)
+    while not robot.powered:
+        clock.advance(0.05)
+    standing = robot.stand(0.52, 0.0, until_s=clock.now() + 10.0, lease=lease)
+    while robot.command_status(standing).state is CommandState.RUNNING:
+        clock.advance(0.05)
+    for step in range(1000):
+        if step % 20 == 0:
+            now = [robot.joints().position_rad[name] for name in spot_capabilities().arm.joint_names]
+            path = ArmTrajectory(np.array([0.0, 2.0]), np.array([now, ARM_RAD[step // 20 % 2]]))
+            robot.move_arm(path, until_s=clock.now() + 4.0, lease=lease)
+        end_s.value = clock.robot_time_s() + DRIVE_S
+        robot.drive(*velocity(number), until_s=clock.now() + DRIVE_S, lease=lease)
+        clock.advance(0.05)
+
+
+CLIENTS: dict[str, Callable[..., None]] = {"sdk": sdk_client, "adapter": adapter_client}
+
+
+def quiet(client: str, *arguments: Any) -> None:
+    """Runs a client, whose errors after its connection is cut nobody reads."""
+    with Path("/dev/null").open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        CLIENTS[client](*arguments)
+
+
+class Trials:
+    """Trials against one server, which another thread steps."""
+
+    def __init__(self, server: Any, certificate: Path, seed: int) -> None:
+        self._server, self._certificate = server, str(certificate)
+        self._rng, self._context = np.random.default_rng(seed), multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(list(PRELOADED))
+
+    def run(self, number: int) -> dict[str, Any]:
+        """Runs one trial."""
+        from tests.plant.spot_api.proxy import Proxy
+
+        kind, ending = ("sdk", "adapter")[number % 2], ENDINGS[number % 3]
+        computer, proxy = self._server.computer, Proxy(self._server.port)
+        end_s = self._context.Value("d", 0.0)
+        client = self._context.Process(target=quiet, args=(kind, proxy.port, self._certificate, number, end_s))
+        client.start()
+        early = number % 5 == 4
+        if not early:
+            self._waited(lambda: end_s.value > 1.0, 20.0)
+        time.sleep(float(self._rng.uniform(0.0, 2.0 if early else 3.0)))
+        at_s = computer.now_s()
+        if ending == "killed":
+            client.kill()
+        else:
+            proxy.cut() if ending == "reset" else proxy.silence()
+        last_s = end_s.value
+        driving = self._motion(0.05)
+        time.sleep(max(0.0, last_s + STILL_S - computer.now_s()))
+        still = self._motion(0.3)
+        free = self._waited(lambda: all(claim.stale for claim in list(computer.leases._claims.values())), 10.0)
+        free_s = computer.now_s() - at_s
+        policy = kind == "sdk" and last_s >= 1.0
+        off = self._waited(lambda: computer.motors.value == "off", 10.0) if policy else None
+        later = self._motion(0.3)
+        client.kill()
+        client.join()
+        proxy.cut()
+        self._recover(number)
+        return {
+            "number": number, "client": kind, "ending": ending, "drives": driving > 0.005,
+            "still": bool(still < STILL_M and later < STILL_M), "moved_m": round(max(still, later), 4),
+            "free_s": round(free_s, 2) if free else None, "off": off,
+        }  # fmt: skip
+
+    def _waited(self, true: Callable[[], bool], most_s: float) -> bool:
+        until_s = time.monotonic() + most_s
+        while not true() and time.monotonic() < until_s:
+            time.sleep(0.02)
+        return true()
+
+    def _motion(self, during_s: float) -> float:
+        """Returns how far the base moves in a while (m, and rad as m)."""
+        before = self._server.computer.snapshot.odometry.pose
+        time.sleep(during_s)
+        after = self._server.computer.snapshot.odometry.pose
+        far_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
+        return max(far_m, abs(math.remainder(after.yaw_rad - before.yaw_rad, math.tau)))
+
+    def _recover(self, number: int) -> None:
+        """Removes what the client has left behind."""
+        computer = self._server.computer
+        computer.leases.make_stale(["body"])
+        for watch in computer.watchers:
+            with suppress(AttributeError):
+                watch.__self__._live.clear()
+
+
+def server_of(scripted: bool, credentials: Any) -> Any:
+    """Returns a server of a robot."""
+    from plant.robots.spot.kind import spot_capabilities
+    from plant.spot_api.server.server import Options, SpotServer
+    from skills.manipulation.arm.kinematics import arm_model
+
+    if scripted:
+        from skills.testing.clock import VirtualClock
+        from skills.testing.robot import ScriptedRobot
+
+        clock: Any = VirtualClock()
+        robot: Any = ScriptedRobot(clock, capabilities=spot_capabilities())
+    else:
+        from executive.app.placed_robots import only_robot
+        from executive.app.simulated import compile_first, simulate
+        from executive.app.worlds import open_world
+
+        world = open_world("flat")
+        compile_first()
+        simulation = simulate(world, {"Alice": only_robot("Alice", world, seed=1)}, seed=1, record=False)
+        robot, clock = simulation.robots["Alice"], simulation.clock
+        robot.image("hand")  # as `errand serve` does: the first picture takes long
+    return SpotServer(robot, clock, arm_model(robot.capabilities()), credentials, Options({USER: PASSWORD}))
+
+
+def summary(trials: list[dict[str, Any]]) -> dict[str, Any]:
+    """Returns the counts of all trials, and those that went wrong."""
+    policy = [each for each in trials if each["off"] is not None]
+    free = [each["free_s"] for each in trials if each["free_s"] is not None]
+    return {
+        "trials": len(trials),
+        "driving": sum(each["drives"] for each in trials),
+        "still": sum(each["still"] for each in trials),
+        "free": sum(free_s < FREE_S for free_s in free),
+        "longest_free_s": max(free, default=None),
+        "with_policy": len(policy),
+        "off_by_policy": sum(each["off"] for each in policy),
+        "wrong": [e for e in trials if not e["still"] or e["off"] is False or (e["free_s"] or FREE_S) >= FREE_S],
+    }  # fmt: skip
+
+
+def main() -> None:
+    """Runs all trials, and prints their counts."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scripted", action="store_true")
+    options = parser.parse_args()
+    from plant.spot_api.server.identity import credentials
+
+    with tempfile.TemporaryDirectory() as folder:
+        held = credentials(Path(folder))
+        server = server_of(options.scripted, held)
+        trials, stopping = Trials(server, held.certificate, options.seed), threading.Event()
+        done: list[dict[str, Any]] = []
+
+        def run() -> None:
+            try:
+                for number in range(options.trials):
+                    done.append(trials.run(number))
+                    sys.stderr.write(f"{done[-1]}\n")
+            finally:
+                stopping.set()
+
+        running = threading.Thread(target=run)
+        with server.running():
+            running.start()
+            server.computer.run(stopping)
+            running.join()
+    sys.stdout.write(json.dumps(summary(done)) + "\n")
+
+
+if __name__ == "__main__":
+    main()

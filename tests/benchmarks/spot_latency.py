@@ -1,0 +1,198 @@
+"""Latency and pace of the server of Spot's API beside the plant, in real time, with a client in another process.
+
+    python -m tests.benchmarks.spot_latency [--seconds 120] [--scripted]
+
+The client reads the state at 30 Hz and drives at 10 Hz, for half of the time; then it reads the point cloud at 10 Hz
+and a picture of the hand with depth at 2 Hz as well. Prints JSON for both: median and 99th percentile of the answers'
+times (ms); of the time from a command's answer to the step of the plant that has its set point (ms); the robot's time
+over wall time, and the most that it was behind (s). Python does not answer while Drake renders, about 60 ms for a
+picture. A machine that does other work gives higher numbers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import multiprocessing
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tests.benchmarks.spot_kills import PASSWORD, USER, server_of
+
+RATES_HZ = {"state": 30.0, "command": 10.0, "cloud": 10.0, "picture": 2.0}
+PHASES = {"alone": ("state", "command"), "with_sensors": tuple(RATES_HZ)}
+DRIVE_S = 0.6
+
+
+class Times:
+    """Times (s, monotonic) at which commands are answered and begun, and the plant's steps with the robot's clock."""
+
+    def __init__(self, server: Any) -> None:
+        self.begun: list[float] = []
+        self.steps: list[tuple[float, float]] = []
+        computer = server.computer
+        move, advance = computer.move, computer.clock.advance
+
+        def timed_move(motions: Any) -> None:
+            move(motions)
+            self.begun.append(time.monotonic())
+
+        def timed_advance(dt_s: float) -> None:
+            self.steps.append((time.monotonic(), computer.clock.now()))
+            advance(dt_s)
+
+        computer.move, computer.clock.advance = timed_move, timed_advance
+
+
+def serve(scripted: bool, folder: str, port: Any, stopping: Any, results: Any) -> None:
+    """Serves a robot, and sends the times of its commands and steps at the end."""
+    from plant.spot_api.server.identity import credentials
+
+    server = server_of(scripted, credentials(Path(folder)))
+    times = Times(server)
+    with server.running():
+        port.value = server.port
+        server.computer.run(stopping)
+    results.put((times.begun, times.steps))
+
+
+class Client:
+    """Client whose calls are timed, each kind in a thread of its own."""
+
+    def __init__(self, port: int, certificate: Path) -> None:
+        from bosdyn.api import image_pb2, point_cloud_pb2
+
+        from plant.spot_api.adapter.connection import Address, Connection
+
+        self.connection = Connection(Address("127.0.0.1", port, certificate), USER, PASSWORD)
+        self.connection.synchronise()
+        self.took_s: dict[str, list[float]] = {}
+        self.answered_s: list[float] = []
+        self._images, self._cloud = image_pb2.GetImageRequest(), point_cloud_pb2.GetPointCloudRequest()
+        for name in ("hand_color_image", "hand_depth_in_hand_color_frame"):
+            self._images.image_requests.add(image_source_name=name, quality_percent=95.0)
+        self._cloud.point_cloud_requests.add(point_cloud_source_name="velodyne-point-cloud", cloud_type=1)
+
+    def stand_up(self) -> None:
+        """Switches the motors on and stands."""
+        from bosdyn.client.robot_command import RobotCommandBuilder
+
+        self.connection.acquire()
+        self.connection.power(True)
+        while self.connection.state().robot_state.power_state.motor_power_state != 2:
+            time.sleep(0.1)
+        self.connection.command(RobotCommandBuilder.synchro_stand_command())
+        time.sleep(3.0)
+
+    def calls(self) -> dict[str, Callable[[], Any]]:
+        """The calls by kind."""
+        call = self.connection.call
+        return {
+            "state": self.connection.state,
+            "cloud": lambda: call("velodyne-point-cloud", "GetPointCloud", self._cloud),
+            "picture": lambda: call("image", "GetImage", self._images, timeout_s=2.0),
+            "command": self._drive,
+        }
+
+    def _drive(self) -> None:
+        """Turns to and fro."""
+        from bosdyn.client.robot_command import RobotCommandBuilder
+
+        sign = 1.0 if len(self.answered_s) // 10 % 2 else -1.0
+        command = RobotCommandBuilder.synchro_velocity_command(0.0, 0.0, 0.3 * sign)
+        end_s = self.connection.robot_time_s() + DRIVE_S
+        given = command.synchronized_command.mobility_command.se2_velocity_request
+        given.end_time.FromNanoseconds(round(end_s * 1e9))
+        answer = self.connection.command(command)
+        assert answer.status == 1, answer
+        self.answered_s.append(time.monotonic())
+
+    def run(self, kinds: Sequence[str], seconds: float) -> tuple[float, float]:
+        """Makes calls of some kinds at their rates for a while; returns when it began and ended (s, monotonic)."""
+        self.took_s = {kind: [] for kind in kinds}
+        since_s, calls = time.monotonic(), self.calls()
+        threads = [threading.Thread(target=self._repeat, args=(k, calls[k], since_s + seconds)) for k in kinds]
+        for each in threads:
+            each.start()
+        for each in threads:
+            each.join()
+        return since_s, time.monotonic()
+
+    def _repeat(self, kind: str, call: Callable[[], Any], until_s: float) -> None:
+        period_s, due_s = 1.0 / RATES_HZ[kind], time.monotonic()
+        while due_s < until_s:
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            begun_s = time.monotonic()
+            call()
+            self.took_s[kind].append(time.monotonic() - begun_s)
+            due_s = max(due_s + period_s, time.monotonic() - period_s)
+
+
+def milliseconds(times_s: list[float]) -> dict[str, float]:
+    """Median, 99th percentile and number of times."""
+    median, p99 = np.percentile(times_s, [50, 99]) * 1e3
+    return {"median_ms": round(float(median), 1), "p99_ms": round(float(p99), 1), "count": len(times_s)}
+
+
+def in_plant_s(answered_s: list[float], begun_s: list[float], steps_s: list[float]) -> list[float]:
+    """Times from each command's answer to the plant's first step after it has begun."""
+    steps = np.array(steps_s)
+    first = np.searchsorted(steps, np.array(begun_s))
+    pairs = [(int(step), answer_s) for step, answer_s in zip(first, answered_s, strict=True) if step < len(steps)]
+    return [max(0.0, float(steps[step]) - answer_s) for step, answer_s in pairs]
+
+
+def pace(steps: list[tuple[float, float]], since_s: float, until_s: float) -> dict[str, float]:
+    """Robot's time over wall time, and the most that the robot was behind since it was least so."""
+    wall, clock = np.array([step for step in steps if since_s <= step[0] <= until_s]).T
+    behind = (wall - wall[0]) - (clock - clock[0])
+    return {
+        "pace": round(float((clock[-1] - clock[0]) / (wall[-1] - wall[0])), 4),
+        "most_behind_s": round(float(np.max(behind - np.minimum.accumulate(behind))), 3),
+        "longest_step_s": round(float(np.diff(wall).max()), 3),
+    }
+
+
+def main() -> None:
+    """Serves, measures, and prints the numbers."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=120.0)
+    parser.add_argument("--scripted", action="store_true")
+    options = parser.parse_args()
+    context = multiprocessing.get_context("spawn")
+    with tempfile.TemporaryDirectory() as folder:
+        from plant.spot_api.server.identity import credentials
+
+        held = credentials(Path(folder))
+        port, stopping, results = context.Value("i", 0), context.Event(), context.Queue()
+        server = context.Process(target=serve, args=(options.scripted, folder, port, stopping, results))
+        server.start()
+        while not port.value and server.is_alive():
+            time.sleep(0.1)
+        client, phases = Client(port.value, held.certificate), list[Any]()
+        client.stand_up()
+        for kinds in PHASES.values():
+            span_s = client.run(kinds, options.seconds / 2.0)
+            phases.append((span_s, {kind: milliseconds(times) for kind, times in client.took_s.items()}))
+        stopping.set()
+        begun_s, steps = results.get(timeout=60.0)
+        server.join()
+    begun_s = begun_s[-len(client.answered_s) :]
+    result = {}
+    for name, ((since_s, until_s), figures) in zip(PHASES, phases, strict=True):
+        commands = [k for k, at_s in enumerate(client.answered_s) if since_s <= at_s <= until_s]
+        answered, begun = [client.answered_s[k] for k in commands], [begun_s[k] for k in commands]
+        figures["set_point"] = milliseconds(in_plant_s(answered, begun, [step[0] for step in steps]))
+        result[name] = {**figures, **pace(steps, since_s, until_s)}
+    sys.stdout.write(json.dumps(result) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -77,6 +77,10 @@ class Backend(Protocol):
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
 
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sentences for the report on how the robots sense; empty in a simulation."""
+
     def work(self) -> Mapping[str, int]:
         """Returns the backend's work counters by name; empty for a real robot."""
 

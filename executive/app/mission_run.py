@@ -235,6 +235,7 @@ def _judge(
         ticks=result.ticks,
         log=str(log.path),
         scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
+        notes=tuple(backend.notes),
         robots=robots if prepared.request.robots else {},
     )
     return FinishedRun(report, views[worst]), [

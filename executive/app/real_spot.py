@@ -7,8 +7,9 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from executive.app.artifacts import Artifacts
 from executive.app.backend import Durable
@@ -59,10 +60,22 @@ class Access:
 class ApiBackend:
     """Backend with one robot behind its API."""
 
-    def __init__(self, robot: Robot, clock: Clock, world: World, stack: RobotStack, start: Pose2D | None) -> None:
-        """`start` is where the robot stands by what the user says; without it it localises on the whole map."""
+    def __init__(
+        self,
+        robot: Robot,
+        clock: Clock,
+        world: World,
+        stack: RobotStack,
+        start: Pose2D | None,
+        make_ready: Callable[[], None] = lambda: None,
+        notes: Sequence[str] = (),
+    ) -> None:
+        """`start` is where the robot stands by what the user says; without it it localises on the whole map.
+
+        `make_ready` lets the robot stand, when all that takes time is done. The report has the `notes`.
+        """
         self._robot, self._clock, self._world = robot, clock, world
-        self._stack, self._start = stack, start
+        self._stack, self._start, self._make_ready, self._notes = stack, start, make_ready, notes
 
     @property
     def clock(self) -> Clock:
@@ -79,11 +92,17 @@ class ApiBackend:
         if durable is not None and durable.take_up:
             raise InputError("a mission of a real robot is not resumed", hint="run it again with errand run")
         entry = run_entry(self._robot, self._world, tree, self._stack, start=self._start, surely=False)
+        self._make_ready()
         return replace(entry, real=True)
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns nothing: nobody knows what happens around a real robot."""
         return ()
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """Sensors that make the scan, if they are not the LiDAR."""
+        return self._notes
 
     def work(self) -> Mapping[str, int]:
         """Returns no counters."""
@@ -125,8 +144,8 @@ class Watch:
 
 
 @contextmanager
-def connected(name: str, access: Access) -> Iterator[tuple[ApiRobot, WallClock, Watch]]:
-    """Connects to a robot and gets it ready: clock, E-stop, charge, lease, keepalive policy, power, stand.
+def connected(name: str, access: Access) -> Iterator[ReadyRobot]:
+    """Connects to a robot, checks it and gets its lease. `make_ready` then lets it stand.
 
     However it ends, the robot stops, motors that were switched on here are switched off, and policy, lease and an
     E-stop of our own are given back.
@@ -136,29 +155,88 @@ def connected(name: str, access: Access) -> Iterator[tuple[ApiRobot, WallClock, 
     """
     connection = Connection(access.address, access.user, access.password)
     with ExitStack() as ending:
-        try:
+        with _errors_of_input():
             connection.synchronise()
             clock = WallClock(connection)
             robot = ApiRobot(name, connection, clock, spot_capabilities(), padding_m=access.padding_m)
-            watch = Watch(robot)
-            clock.after.append(watch)
-            ending.enter_context(ended_by_signals(watch.interrupt))
+            made = ReadyRobot(robot, clock, Watch(robot), connection, access, ending)
+            clock.after.append(made.watch)
+            ending.enter_context(ended_by_signals(made.watch.interrupt))
             _check(robot, connection)
-            _hold(robot, connection, access, ending)
             robot.sensors.fix_focus()
             lease = robot.take_lease(_HOLDER) if access.take else robot.acquire_lease(_HOLDER)
             ending.callback(_try, connection.give_back)
+            robot.return_lease(lease)
+        try:
+            yield made
+        finally:
+            made.watch.running = False
+
+
+@dataclass(frozen=True)
+class ReadyRobot:
+    """Robot that is connected; `make_ready` lets it stand."""
+
+    robot: ApiRobot
+    clock: WallClock
+    watch: Watch
+    connection: Connection
+    access: Access
+    ending: ExitStack
+
+    def make_ready(self) -> None:
+        """Sees to E-stop and keepalive policy, switches the motors on, and stands up. Raises InputError.
+
+        From now on the run must not fall silent.
+        """
+        robot, clock, ending = self.robot, self.clock, self.ending
+        with _errors_of_input():
+            if self.access.own_estop:
+                self._hold_estop()
+            if (stopped := self.connection.estop_trouble()) is not None:
+                raise InputError(stopped, hint="release it on the tablet, or begin with --estop own")
+            lease = robot.acquire_lease(_HOLDER)
             robot.heartbeat.add_policy()
             ending.callback(_try, robot.heartbeat.remove_policy)
-            ending.callback(_try, connection.stop)
-            _switch_on(robot, connection, clock, access, ending)
+            ending.callback(_try, self.connection.stop)
+            if not robot.powered:
+                self._switch_on()
             until_s = clock.now() + _POSTURE_S
             stood = robot.stand(robot.capabilities().standing_height_m, 0.0, until_s=until_s, lease=lease)
             finish(robot, clock, stood, "stand up")
             robot.return_lease(lease)
-        except (LostError, LeaseError) as error:
-            raise InputError(str(error), hint="try again; --take takes the lease from another client") from error
-        yield robot, clock, watch
+            self.watch.running = True
+
+    def _hold_estop(self) -> None:
+        if self.robot.powered:
+            raise InputError("--estop own: the motors are on", hint="switch them off on the tablet first")
+        self.ending.callback(_try, self.robot.heartbeat.drop_estop)
+        self.robot.heartbeat.hold_estop()
+
+    def _switch_on(self) -> None:
+        """Switches the motors on; the ending then switches them off. Raises InputError and LostError."""
+        if not (self.access.power_on or self.access.confirm("The motors are off. Switch them on? Type yes: ")):
+            raise InputError("the motors are off", hint="allow it to switch them on: --power-on")
+        robot, clock, connection = self.robot, self.clock, self.connection
+
+        def switch_off() -> None:
+            connection.stop(power_off=True)
+            wait_until(clock, lambda: not robot.powered, _OFF_S, "the motors do not switch off")
+
+        self.ending.callback(_try, switch_off)
+        number = connection.power(True)
+        wait_until(clock, lambda: connection.power_is_done(number) and robot.powered, _POWER_S, "the motors stay off")
+
+
+@contextmanager
+def _errors_of_input() -> Iterator[None]:
+    """Raises InputError for what the robot refuses."""
+    try:
+        yield
+    except LeaseError as error:
+        raise InputError(str(error), hint="--take takes the lease from another client") from error
+    except LostError as error:
+        raise InputError(f"the robot is not ready: {error}") from error
 
 
 def _try(call: Callable[[], None]) -> None:
@@ -179,33 +257,6 @@ def _check(robot: ApiRobot, connection: Connection) -> None:
         raise InputError(f"the battery has {robot.battery().charge:.0%}", hint=f"charge it to {LEAST_CHARGE:.0%}")
     if faults := [fault for fault in robot.faults() if "E-stop" not in fault]:
         raise InputError(f"the robot has a fault: {', '.join(faults)}", hint="clear it first")
-
-
-def _hold(robot: ApiRobot, connection: Connection, access: Access, ending: ExitStack) -> None:
-    """Registers an E-stop of our own if that is wanted. Raises InputError when the E-stop does not allow motion."""
-    if access.own_estop:
-        if robot.powered:
-            raise InputError("--estop own: the motors are on", hint="switch them off on the tablet first")
-        robot.heartbeat.hold_estop()
-        ending.callback(_try, robot.heartbeat.drop_estop)
-    if (stopped := connection.estop_trouble()) is not None:
-        raise InputError(stopped, hint="release it on the tablet, or begin with --estop own")
-
-
-def _switch_on(robot: ApiRobot, connection: Connection, clock: WallClock, access: Access, ending: ExitStack) -> None:
-    """Switches the motors on if they are off; the ending then switches them off. Raises InputError and LostError."""
-    if robot.powered:
-        return
-    if not (access.power_on or access.confirm("The motors are off. Switch them on? Type yes: ")):
-        raise InputError("the motors are off", hint="allow it to switch them on: --power-on")
-
-    def switch_off() -> None:
-        connection.stop(power_off=True)
-        wait_until(clock, lambda: not robot.powered, _OFF_S, "the motors do not switch off")
-
-    number = connection.power(True)
-    ending.callback(_try, switch_off)
-    wait_until(clock, lambda: connection.power_is_done(number) and robot.powered, _POWER_S, "the motors stay off")
 
 
 def finish(robot: Robot, clock: Clock, command: CommandId, what: str) -> None:
@@ -236,15 +287,10 @@ def spot_runner(prepared: Prepared, access: Access) -> Iterator[Callable[..., Fi
     compile_first()
     logging.getLogger("drake").setLevel(logging.WARNING)
     start = prepared.request.start
-    with connected(prepared.tree.robot_name, access) as (robot, clock, watch):
-        stack = robot_stack(prepared.robots[robot.name])
-        backend = ApiBackend(robot, clock, prepared.world, stack, start if isinstance(start, Pose2D) else None)
+    with connected(prepared.tree.robot_name, access) as made:
+        stack = robot_stack(prepared.robots[made.robot.name])
+        where = start if isinstance(start, Pose2D) else None
+        notes = made.robot.sensors.notes
+        backend = ApiBackend(made.robot, made.clock, prepared.world, stack, where, made.make_ready, notes)
 
-        def run(prepared: Prepared, **options: Any) -> FinishedRun:
-            watch.running = True
-            try:
-                return run_request(prepared, backend, **options)
-            finally:
-                watch.running = False
-
-        yield run
+        yield partial(run_request, backend=backend)

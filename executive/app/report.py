@@ -137,7 +137,7 @@ class RunReport(Ending):
 
     Times are in seconds. `log` is the path of the event log, and `work` has the work counters by name. `answers` and
     `said` are in the order of time, `seen_objects` are the confirmed objects, and `scenario` lists the faults and
-    events of the run's scenario.
+    events of the run's scenario. `notes` say how a real robot sensed.
     """
 
     world: str
@@ -152,6 +152,7 @@ class RunReport(Ending):
     said: tuple[Said, ...] = ()
     seen_objects: tuple[ReportedObject, ...] = ()
     scenario: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
     @property
@@ -164,7 +165,7 @@ class RunReport(Ending):
         """Returns the report as JSON values, without the referee's sentences."""
         no_events = {"referee": {"events"}}
         without: dict[str, Any] = {**no_events, "robots": {"__all__": no_events}}
-        for name in ("scenario", "robots"):
+        for name in ("scenario", "notes", "robots"):
             if not getattr(self, name):
                 without[name] = True
         plain = replace(self, work=dict(self.work), robots=dict(self.robots))
@@ -197,7 +198,7 @@ class RunReport(Ending):
             return
         yield from (line for verdict in self.verdicts() for line in verdict.lines())
         yield figures if self.referee is None else f"{counts_text(self.referee)}; {figures}"
-        yield from (escape(f"  {event}") for event in self.seen.events)
+        yield from (escape(f"  {event}") for event in (*self.notes, *self.seen.events))
 
 
 _LONG_TEXT: Final = 100

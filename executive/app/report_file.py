@@ -243,6 +243,7 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
     facts = (
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", report.duration_text),
+        *(("sensors", note) for note in report.notes),
     )
     if not robot_name:
         return facts

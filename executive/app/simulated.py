@@ -113,6 +113,8 @@ class SimulatedBackend:
         """Events of doors, people and moved objects, as times (s) and sentences."""
         return self._pipeline.events
 
+    notes: Sequence[str] = ()
+
     def work(self) -> Mapping[str, int]:
         """The plant's work counters by name."""
         counts: Mapping[str, int] = self._settled().work()

@@ -18,7 +18,7 @@ from plant.spot_api.messages import duration
 from skills.robot import CommandCause
 
 ESTOP_S: Final = 3.0
-_CUT_S: Final = 6.0
+CUT_S: Final = 6.0
 LEASE_STALE_S, MOTORS_OFF_S = 3.0, 15.0
 _BEAT_S: Final = 1.0
 _MASK: Final = (1 << 64) - 1
@@ -53,7 +53,7 @@ class Heartbeat:
         """Replaces all E-stops by our own, which is released. Raises LostError, while the motors are on too."""
         endpoint = estop_pb2.EstopEndpoint(role=_ROLE, name=CLIENT)
         endpoint.timeout.CopyFrom(duration(ESTOP_S))
-        endpoint.cut_power_timeout.CopyFrom(duration(_CUT_S))
+        endpoint.cut_power_timeout.CopyFrom(duration(CUT_S))
         known = self._connection.call(
             "estop", "GetEstopConfig", estop_pb2.GetEstopConfigRequest()
         ).active_config.unique_id

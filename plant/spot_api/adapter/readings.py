@@ -61,10 +61,9 @@ def unfit(state: Any, capabilities: Capabilities) -> str | None:
     """Returns what a robot lacks that its state should show; None when it has all."""
     names = {our_joint(joint.name) for joint in state.kinematic_state.joint_states}
     arm = () if capabilities.arm is None else capabilities.arm.joint_names
-    fingers = () if capabilities.gripper is None else tuple(name for name, _ in capabilities.gripper.finger_joints)
     if arm and not (state.HasField("manipulator_state") and names.intersection(arm)):
         return "the robot has no arm"
-    missing = [name for name in (*arm, *fingers) if name not in names]
+    missing = [name for name in arm if name not in names]
     return f"the robot does not report its joints {', '.join(missing)}" if missing else None
 
 
@@ -158,12 +157,13 @@ def depth_scan(answers: Sequence[Any], stamp_s: float, X_BL: RigidTransform, X_O
 def _points_B(answer: Any) -> FloatArray:
     """Points (N, 3) of a depth picture in the body frame."""
     lens, depth_m = _lens(answer.source), _depth_m(answer)[::_DEPTH_STRIDE, ::_DEPTH_STRIDE]
-    rows, columns = np.nonzero((depth_m > 0.0) & (depth_m < DEPTH_RANGE_M))
+    rows, columns = np.nonzero(depth_m > 0.0)
     far_m = depth_m[rows, columns].astype(np.float64)
     across = (columns * _DEPTH_STRIDE - lens.cx) / lens.fx * far_m
     down = (rows * _DEPTH_STRIDE - lens.cy) / lens.fy * far_m
-    X_BC = sensor_pose(answer, "body")
-    return np.asarray((X_BC @ np.stack([across, down, far_m])).T)
+    points_C = np.stack([across, down, far_m])
+    points_C = points_C[:, np.linalg.norm(points_C, axis=0) < DEPTH_RANGE_M]
+    return np.asarray((sensor_pose(answer, "body") @ points_C).T)
 
 
 def sensor_pose(answer: Any, frame: str) -> RigidTransform:

@@ -50,11 +50,11 @@ class Sensors:
         return np.array([self.readings.joints.position_rad[name] for name in names])
 
     @property
-    def scans_with(self) -> str:
-        """Sensors that make the scan, in words."""
+    def notes(self) -> Sequence[str]:
+        """Sentences for the report on the sensors that make the scan."""
         if self._connection.has(_LIDAR):
-            return "the LiDAR"
-        return f"the depth cameras, which see {DEPTH_RANGE_M:g} m far, because there is no LiDAR"
+            return ()
+        return (f"There is no LiDAR: the scan is that of the depth cameras, which see {DEPTH_RANGE_M:g} m far.",)
 
     def missing(self) -> str | None:
         """Returns what the robot lacks by its last state; None when it has arm and joints."""

@@ -7,49 +7,9 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import grpc
-from bosdyn.api import (
-    arm_command_pb2,
-    basic_command_pb2,
-    estop_pb2,
-    gripper_command_pb2,
-    header_pb2,
-    image_pb2,
-    lease_pb2,
-    point_cloud_pb2,
-    power_pb2,
-    robot_command_pb2,
-    time_sync_pb2,
-)
-from bosdyn.api.keepalive import keepalive_pb2
 
 from skills.robot import CommandCause as Cause
 
-READ: Final[tuple[Any, ...]] = (
-    header_pb2.CommonError.Code.DESCRIPTOR,
-    lease_pb2.LeaseUseResult.Status.DESCRIPTOR,
-    lease_pb2.AcquireLeaseResponse.Status.DESCRIPTOR,
-    lease_pb2.TakeLeaseResponse.Status.DESCRIPTOR,
-    lease_pb2.ReturnLeaseResponse.Status.DESCRIPTOR,
-    robot_command_pb2.RobotCommandResponse.Status.DESCRIPTOR,
-    basic_command_pb2.RobotCommandFeedbackStatus.Status.DESCRIPTOR,
-    basic_command_pb2.StandCommand.Feedback.Status.DESCRIPTOR,
-    basic_command_pb2.SitCommand.Feedback.Status.DESCRIPTOR,
-    arm_command_pb2.ArmJointMoveCommand.Feedback.Status.DESCRIPTOR,
-    arm_command_pb2.ArmJointMoveCommand.Feedback.PlannerStatus.DESCRIPTOR,
-    gripper_command_pb2.ClawGripperCommand.Feedback.Status.DESCRIPTOR,
-    power_pb2.PowerCommandStatus.DESCRIPTOR,
-    estop_pb2.EstopStopLevel.DESCRIPTOR,
-    estop_pb2.SetEstopConfigResponse.Status.DESCRIPTOR,
-    estop_pb2.RegisterEstopEndpointResponse.Status.DESCRIPTOR,
-    estop_pb2.DeregisterEstopEndpointResponse.Status.DESCRIPTOR,
-    estop_pb2.EstopCheckInResponse.Status.DESCRIPTOR,
-    keepalive_pb2.ModifyPolicyResponse.Status.DESCRIPTOR,
-    keepalive_pb2.CheckInResponse.Status.DESCRIPTOR,
-    time_sync_pb2.TimeSyncState.Status.DESCRIPTOR,
-    image_pb2.ImageResponse.Status.DESCRIPTOR,
-    point_cloud_pb2.PointCloudResponse.Status.DESCRIPTOR,
-)
-"""All statuses that the adapter reads."""
 GOOD: Final = frozenset(
     {
         *("CODE_UNSPECIFIED", "CODE_OK", "STATUS_OK", "STATUS_SUCCESS", "ESTOP_LEVEL_NONE", "STATUS_UNMANAGED"),
@@ -160,7 +120,7 @@ class Trouble:
 def trouble(statuses: Any, number: int, said: str = "", holder: str = "") -> Trouble | None:
     """Returns the trouble that a status means, with what the robot `said`; None for one that is a success.
 
-    `statuses` describes the enumeration (one of `READ`). A status that a newer robot sends is a refusal.
+    `statuses` describes the enumeration. A status that a newer robot sends is a refusal.
     """
     value = statuses.values_by_number.get(number)
     if value is not None and value.name in GOOD:

@@ -297,6 +297,8 @@ class Computer:
                 motion.end(OVERRIDDEN)
         if MOBILITY in parts or ARM in parts:
             self.robot.stop(lease=self.lease)
+            if self.settling:  # it goes on sitting down
+                self.sit()
 
     def sit(self) -> None:
         """Sits down."""

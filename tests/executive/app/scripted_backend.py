@@ -27,6 +27,8 @@ class ScriptedBackend:
     def attach(self, profile):
         profile.attach("scripted", self.clock, "advance")
 
+    notes = ()
+
     def happened(self):
         return ()
 

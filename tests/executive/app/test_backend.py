@@ -48,6 +48,18 @@ def test_the_report_of_a_run_without_a_referee_says_so(prepared):
     assert not any(word in text for word in ("collisions", "simulated") for text in (page, *lines))
 
 
+def test_the_report_says_how_a_real_robot_sensed(prepared):
+    class Blind(ScriptedBackend):
+        """One without a LiDAR."""
+
+        notes = ("There is no LiDAR.",)
+
+    report = run_request(prepared, Blind()).report
+    assert RunReport.from_json(json.loads(json.dumps(report.to_json()))).notes == ("There is no LiDAR.",)
+    assert "  There is no LiDAR." in list(report.lines())
+    assert "There is no LiDAR." in (prepared.request.out / "report.html").read_text(encoding="utf-8")
+
+
 def test_faults_and_events_are_at_work_logged_and_in_the_report(prepared):
     class Busy(ScriptedBackend):
         """One in whose world something happens."""

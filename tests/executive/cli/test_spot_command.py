@@ -1,18 +1,22 @@
-"""`errand serve` and `errand sdk`.
+"""`errand serve`, `errand sdk`, and `errand run --robot`.
 
 SDK missing      one line that names the extra, exit 2
 program missing  one line that names it, exit 2
 program ends     its exit code
+wrong password   one line, exit 2
+right password   in no file, log or report
 """
 
 import sys
 from importlib import util
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from executive.cli import spot_command
 from executive.cli.entry import app
+from executive.record.history import read_events
 
 PROGRAM = """
 import os, sys, time
@@ -69,3 +73,51 @@ def test_nothing_but_the_server_loads_the_sdk():
     before = {name for name in sys.modules if name.startswith("bosdyn")}
     CliRunner().invoke(app, ["sdk", "--help"])
     assert {name for name in sys.modules if name.startswith("bosdyn")} == before
+
+
+SECRET = "wOmbat-7391-password"
+
+
+@pytest.fixture
+def served(tmp_path, monkeypatch):
+    """Serves a scripted Spot; returns the options of `errand run` for it."""
+    pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
+    sys.path.insert(0, str(Path(__file__).parents[2] / "plant" / "spot_api"))
+    from lock_step import USER, real_time
+
+    from plant.spot_api.server.identity import credentials
+
+    held = credentials(tmp_path / "credentials")
+    monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", SECRET)
+    with real_time(held, password=SECRET) as (server, _):
+        address = ["--robot", f"spot://127.0.0.1:{server.port}", "--certificate", str(held.certificate)]
+        files = ["--out", str(tmp_path / "out"), "--store", str(tmp_path / "missions.db")]
+        yield ["run", "--say", "say hello", "--start", "9.3", "4.05", "0", "--user", USER, *address, *files]
+
+
+def test_a_wrong_password_is_one_line(served, monkeypatch):
+    monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", "guessed-password")
+    result = CliRunner().invoke(app, served)
+    assert (result.exit_code, "refuses user 'user' with this password" in result.output) == (2, True), result.output
+    assert "guessed-password" not in result.output
+
+
+@pytest.mark.parametrize("option", [["--take"], ["--estop", "own"]])
+def test_an_option_that_replaces_another_holder_needs_a_yes(served, option):
+    result = CliRunner().invoke(app, [*served, *option])
+    assert (result.exit_code, f"{' '.join(option)} needs a yes" in result.output) == (2, True), result.output
+
+
+def test_a_padding_that_is_no_number_is_refused(served):
+    result = CliRunner().invoke(app, [*served, "--padding", "nan"])
+    assert (result.exit_code, "--padding" in result.output) == (2, True), result.output
+
+
+def test_the_password_stands_in_no_file_and_no_output(served, tmp_path):
+    result = CliRunner().invoke(app, [*served, "--power-on", "--padding", "0.1"])
+    assert result.exit_code == 0, result.output
+    assert SECRET not in result.output
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert {"log.mcap", "report.html", "missions.db"} <= {path.name for path in files}
+    assert [path for path in files if SECRET.encode() in path.read_bytes()] == []
+    assert not any(SECRET in repr(event) for event in read_events(tmp_path / "out" / "log.mcap"))

@@ -2,17 +2,41 @@
 
 import gc
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.adapter.robot import ApiRobot
 from plant.spot_api.server.computer import PERIOD_S, Pace
+from plant.spot_api.server.estop import Tablet
 from plant.spot_api.server.server import Options, SpotServer
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Clock, Robot
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
 
 USER, PASSWORD = "user", "right"
+
+
+@contextmanager
+def real_time(
+    credentials, *, tablet=Tablet.TABLET, password=PASSWORD, **scripted
+) -> Iterator[tuple[SpotServer, ScriptedRobot]]:
+    """Serves a scripted Spot in real time, stepped by a thread."""
+    clock = VirtualClock()
+    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), **scripted)
+    options = Options({USER: password}, tablet=tablet)
+    server = SpotServer(robot, clock, arm_model(spot_capabilities()), credentials, options)
+    stopping = threading.Event()
+    stepping = threading.Thread(target=server.computer.run, args=(stopping,))
+    with server.running():
+        stepping.start()
+        try:
+            yield server, robot
+        finally:
+            stopping.set()
+            stepping.join()
 
 
 class LockStep:

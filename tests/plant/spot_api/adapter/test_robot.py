@@ -15,7 +15,14 @@ from pathlib import Path
 import grpc
 import numpy as np
 import pytest
-from bosdyn.api import manipulation_api_pb2, robot_command_pb2, robot_state_pb2
+from bosdyn.api import (
+    gripper_camera_param_pb2,
+    image_pb2,
+    manipulation_api_pb2,
+    robot_command_pb2,
+    robot_state_pb2,
+)
+from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from lock_step import LockStep
@@ -23,11 +30,19 @@ from lock_step import LockStep
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter import connection
 from plant.spot_api.adapter.connection import Address, Connection
+from plant.spot_api.adapter.readings import picture
+from plant.spot_api.adapter.robot import ApiRobot
+from plant.spot_api.server.faults import Fault
 from skills.files.errors import InputError
-from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError
+from skills.robot import ArmTrajectory, CommandCause, CommandState, FrameTree, LeaseError, NoImageError
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+
+COMMANDS, TIME = "bosdyn.api.RobotCommandService", "bosdyn.api.TimeSyncService"
+STATE = "bosdyn.api.RobotStateService/GetRobotState"
+NUMBERED = robot_command_pb2.RobotCommandResponse(robot_command_id=7)
+READY_RAD = [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]
 
 
 class Silent(grpc.RpcError):
@@ -235,6 +250,220 @@ def test_the_gripper_goes_to_an_opening(standing):
     command = standing.robot.set_gripper(0.8, 40.0, until_s=standing.now() + 5.0, lease=standing.lease)
     assert standing.done(command)
     assert standing.robot.gripper().opening == pytest.approx(0.8, abs=0.05)
+
+
+def test_after_a_trajectory_the_arm_holds(standing):
+    trajectory = ArmTrajectory(np.array([0.0, 0.5]), np.array([standing.served.q_rad, READY_RAD]))
+    assert standing.done(standing.robot.move_arm(trajectory, until_s=standing.now() + 8.0, lease=standing.lease))
+    standing.advance(2.0)
+    assert standing.served.q_rad == pytest.approx(READY_RAD, abs=0.04)
+
+
+def test_an_arm_that_leaves_its_path_is_stopped(standing, monkeypatch):
+    """Something turns a joint of the arm by 0.2 rad while it moves."""
+    trajectory = ArmTrajectory(np.array([0.0, 3.0]), np.array([standing.served.q_rad, READY_RAD]))
+    command = standing.robot.move_arm(trajectory, until_s=standing.now() + 8.0, lease=standing.lease)
+    standing.advance(0.5)
+    assert standing.robot.command_status(command).state is CommandState.RUNNING
+    joints = type(standing.served).joints
+
+    def pushed(robot):
+        read = joints(robot)
+        return replace(read, position_rad={**read.position_rad, "arm_sh0": read.position_rad["arm_sh0"] + 0.2})
+
+    monkeypatch.setattr(type(standing.served), "joints", pushed)
+    standing.advance(0.05)
+    status = standing.robot.command_status(command)
+    assert (status.state, status.cause) == (CommandState.STOPPED, CommandCause.BLOCKED)
+    assert "0.20 rad off its path" in status.reason
+    q_rad = standing.served.q_rad.copy()
+    standing.advance(0.5)
+    assert standing.served.q_rad == pytest.approx(q_rad, abs=0.21)
+
+
+@pytest.mark.parametrize(
+    ("code", "cause"),
+    [(grpc.StatusCode.UNAVAILABLE, CommandCause.NO_ANSWER), (grpc.StatusCode.INTERNAL, CommandCause.FAULT)],
+)
+def test_an_arm_without_feedback_is_stopped(standing, code, cause):
+    trajectory = ArmTrajectory(np.array([0.0, 3.0]), np.array([standing.served.q_rad, READY_RAD]))
+    command = standing.robot.move_arm(trajectory, until_s=standing.now() + 8.0, lease=standing.lease)
+    with standing.server.faults.fault(f"{COMMANDS}/RobotCommandFeedback", Fault(code=code)):
+        standing.advance(0.1)
+        standing.advance(0.1)
+    status = standing.robot.command_status(command)
+    assert (status.state, status.cause) == (CommandState.STOPPED, cause)
+    standing.advance(0.1)
+    q_rad = standing.served.q_rad.copy()
+    standing.advance(0.5)
+    assert standing.served.q_rad == pytest.approx(q_rad, abs=1e-3)
+
+
+def test_a_command_whose_answer_is_lost_does_not_go_on(standing):
+    trajectory = ArmTrajectory(np.array([0.0, 3.0]), np.array([standing.served.q_rad, READY_RAD]))
+    with standing.server.faults.fault(f"{COMMANDS}/RobotCommand", Fault(code=grpc.StatusCode.UNAVAILABLE)):
+        command = standing.robot.move_arm(trajectory, until_s=standing.now() + 8.0, lease=standing.lease)
+    assert standing.robot.command_status(command).cause is CommandCause.NO_ANSWER
+    standing.advance(0.2)
+    q_rad = standing.served.q_rad.copy()
+    standing.advance(0.5)
+    assert standing.served.q_rad == pytest.approx(q_rad, abs=1e-3)
+
+
+def test_nothing_moves_by_clocks_that_were_synchronised_long_ago(standing):
+    with standing.server.faults.fault(f"{TIME}/TimeSyncUpdate", Fault(code=grpc.StatusCode.INTERNAL)):
+        for _ in range(32):
+            standing.advance(1.0)
+        trajectory = ArmTrajectory(np.array([0.5]), np.array([READY_RAD]))
+        until_s, lease = standing.now() + 1.0, standing.lease
+        refused = [
+            standing.robot.drive(0.2, 0.0, 0.0, until_s=until_s, lease=lease),
+            standing.robot.stand(0.5, 0.0, until_s=until_s, lease=lease),
+            standing.robot.move_arm(trajectory, until_s=until_s, lease=lease),
+            standing.robot.set_gripper(0.5, 20.0, until_s=until_s, lease=lease),
+        ]
+        assert all("clocks" in standing.robot.command_status(command).reason for command in refused)
+    standing.advance(0.1)
+    command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=lease)
+    assert standing.robot.command_status(command).state is CommandState.RUNNING
+
+
+def test_the_robots_clock_is_measured_again_when_it_jumps(standing):
+    standing.server.computer._started_s += 100.0
+    with standing.server.faults.fault(f"{TIME}/TimeSyncUpdate", Fault(code=grpc.StatusCode.INTERNAL)):
+        standing.robot.poll()
+        standing.robot_time_s = lambda: standing.server.computer.now_s() - 100.0
+        standing.robot.poll()
+        command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=standing.lease)
+        assert "clocks" in standing.robot.command_status(command).reason
+    del standing.robot_time_s
+    standing.advance(0.1)
+    command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=standing.lease)
+    assert standing.robot.command_status(command).state is CommandState.RUNNING
+
+
+def test_the_height_is_that_over_the_feet_and_a_robot_off_its_feet_is_not_driven(standing):
+    z_m = standing.robot.odometry().X_OB.translation()[2]
+    lifted = Fault(fields={"robot_state.foot_state.contact": robot_state_pb2.FootState.CONTACT_LOST})
+    with standing.server.faults.fault(STATE, lifted):
+        standing.advance(0.1)
+        assert "no foot is on the floor, so the height is unknown" in standing.robot.faults()
+        assert standing.robot.odometry().X_OB.translation()[2] == pytest.approx(z_m)
+        command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=standing.lease)
+        assert standing.robot.command_status(command).cause is CommandCause.FAULT
+    sunk = Fault(fields={"robot_state.foot_state.foot_position_rt_body.z": -0.4})
+    with standing.server.faults.fault(STATE, sunk):
+        standing.advance(0.1)
+        assert standing.robot.odometry().X_OB.translation()[2] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(("severity", "counts"), [("INFO", False), ("WARN", False), ("CRITICAL", True)])
+def test_only_severe_faults_count(step, severity, counts):
+    step.served.present_faults = ("hot",)
+    number = robot_state_pb2.SystemFault.Severity.Value(f"SEVERITY_{severity}")
+    fault = Fault(fields={"robot_state.system_fault_state.faults.severity": number})
+    with step.server.faults.fault(STATE, fault):
+        step.advance(0.1)
+    assert ("hot" in step.robot.faults()) is counts
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"image_responses.status": 3}, "STATUS_SOURCE_DATA_ERROR"),
+        ({"image_responses.shot.image.data": b"x"}, "cannot be decoded"),
+        ({"image_responses.shot.image.format": 3, "image_responses.shot.image.pixel_format": 6}, "pixel format 6"),
+        ({"image_responses.source.pinhole.intrinsics.focal_length.x": 0.0}, "lacks its intrinsics"),
+        ({"image_responses.shot.frame_name_image_sensor": "periscope"}, "periscope"),
+        ({"header.error.code": 2}, "CODE_INTERNAL_SERVER_ERROR"),
+    ],
+)
+def test_a_picture_that_cannot_be_used_is_no_picture(step, fields, said):
+    fault = step.server.faults.fault("bosdyn.api.ImageService/GetImage", Fault(fields=fields))
+    with fault, pytest.raises(NoImageError, match=said):
+        step.robot.image("hand")
+
+
+def test_intrinsics_and_frames_are_those_of_each_picture(step):
+    before = step.robot.image("hand")
+    moved = {
+        "image_responses.source.pinhole.intrinsics.focal_length.x": 500.0,
+        "image_responses.shot.frame_name_image_sensor": "frontleft",
+    }
+    with step.server.faults.fault("bosdyn.api.ImageService/GetImage", Fault(fields=moved)):
+        picture = step.robot.image("hand")
+    assert (before.intrinsics.fx != 500.0, picture.intrinsics.fx) == (True, 500.0)
+    other = step.robot.image("frontleft")
+    assert picture.frames.pose("hand_camera").IsNearlyEqualTo(other.frames.pose("frontleft_camera"), 1e-6)
+
+
+def test_the_most_that_a_camera_measures_is_no_depth():
+    raw = np.array([[0, 65535, 1500]], dtype=np.uint16)
+    answer = image_pb2.ImageResponse(status=image_pb2.ImageResponse.STATUS_OK)
+    answer.source.cols, answer.source.rows, answer.source.depth_scale = 3, 1, 1000.0
+    answer.source.pinhole.intrinsics.focal_length.x = answer.source.pinhole.intrinsics.focal_length.y = 1.0
+    image = answer.shot.image
+    image.rows, image.cols, image.data = 1, 3, raw.tobytes()
+    image.format, image.pixel_format = image_pb2.Image.FORMAT_RAW, image_pb2.Image.PIXEL_FORMAT_DEPTH_U16
+    made = picture("hand", "hand_camera", [answer], 0.0, FrameTree({}), coloured=True)
+    assert made.depth_m.tolist() == [[0.0, 0.0, 1.5]]
+
+
+def test_the_focus_of_the_hand_is_fixed(step):
+    step.robot.sensors.fix_focus()
+    request = gripper_camera_param_pb2.GripperCameraGetParamRequest()
+    params = step.connection.call("gripper-camera-param", "GetParams", request).params
+    assert (params.HasField("focus_auto"), params.focus_auto.value) == (True, False)
+
+
+def test_without_a_lidar_the_depth_cameras_make_the_scan(credentials):
+    def build():
+        clock = VirtualClock()
+        can = replace(spot_capabilities(), lidar_height_m=None)
+        return ScriptedRobot(clock, capabilities=can, blocks=[Block(1.9, -1.5, 2.1, 1.5)]), clock
+
+    step = LockStep(build, credentials)
+    try:
+        step.advance(0.1)
+        points = step.robot.scan().points_B()
+        ahead = points[(np.abs(points[:, 1]) < 0.2) & (points[:, 2] > -0.3)]
+        assert ahead[:, 0].min() == pytest.approx(1.9, abs=0.05)
+        assert np.linalg.norm(points, axis=1).max() < 4.5
+        assert "no LiDAR" in step.robot.sensors.notes[0]
+        first = step.robot.scan()
+        step.advance(0.5)
+        assert step.robot.scan().stamp_s > first.stamp_s
+    finally:
+        step.close()
+
+
+def test_the_robots_own_avoidance_is_on_with_the_padding_asked_for(standing, monkeypatch):
+    sent = []
+    robot = ApiRobot("Alice", standing.connection, standing, spot_capabilities(), padding_m=0.15)
+    lease = robot.acquire_lease("test")
+    monkeypatch.setattr(standing.connection, "command", lambda command: sent.append(command) or NUMBERED)
+    robot.drive(3.0, -4.0, 2.0, until_s=standing.now() + 1.0, lease=lease)
+    request = sent[0].synchronized_command.mobility_command
+    params = spot_command_pb2.MobilityParams()
+    request.params.Unpack(params)
+    given = request.se2_velocity_request.velocity
+    assert (given.linear.x, given.linear.y, given.angular) == pytest.approx((0.48, -0.64, 1.0))
+    most, least = params.vel_limit.max_vel, params.vel_limit.min_vel
+    assert (most.linear.x, most.angular, least.linear.y, least.angular) == pytest.approx((0.8, 1.0, -0.8, -1.0))
+    assert params.obstacle_params.obstacle_avoidance_padding == pytest.approx(0.15)
+    assert not params.obstacle_params.disable_vision_body_obstacle_avoidance
+
+
+@pytest.mark.parametrize("until_s", [math.nan, 1.0])
+def test_numbers_that_are_not_finite_are_refused(standing, until_s):
+    lease, bad = standing.lease, math.nan if until_s == 1.0 else 0.1
+    until_s += standing.now()
+    commands = [
+        standing.robot.drive(bad, 0.0, 0.0, until_s=until_s, lease=lease),
+        standing.robot.stand(0.5, bad, until_s=until_s, lease=lease),
+        standing.robot.set_gripper(bad, 20.0, until_s=until_s, lease=lease),
+    ]
+    assert {standing.robot.command_status(command).cause for command in commands} == {CommandCause.INVALID}
 
 
 def test_stop_ends_the_drive_and_not_the_gripper(standing):

@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 8052,
-    "executive/cli": 4853,
+    "executive/app": 8186,
+    "executive/cli": 4875,
     "skills": 27266,
-    "plant": 19856,
+    "plant": 20910,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 484, 83, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 488, 84, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -17,7 +17,7 @@ import typer
 
 from executive.cli.number_options import quantity_option
 from executive.cli.options import EstopHolder
-from executive.cli.output import console_for
+from executive.cli.output import console_for, writing
 from skills.files.errors import InputError
 from skills.quantities import Port, Seed
 
@@ -43,8 +43,13 @@ def serve(
     seed: SEED = 1,
     port: Annotated[int, quantity_option(Port, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     no_tablet: NO_TABLET = False,
+    graph: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Writes a GraphNav map of the world there first.")
+    ] = None,
 ) -> None:
     """Serves Spot's API for a simulated Spot in real time, until Ctrl-C."""
+    if graph is not None:
+        _write_graph(world, graph)
     with _server(world, seed, port, tablet=not no_tablet) as server:
         console = console_for(False)
         console.print(f"Spot's API: 127.0.0.1:{server.port} (Ctrl-C ends it)\n", markup=False)
@@ -93,6 +98,18 @@ def _run(script: Path, arguments: list[str], server: SpotServer) -> int:
     return subprocess.run([*launch, str(script), *arguments], env={**os.environ, **_environment(server)}).returncode
 
 
+def _write_graph(world: str, folder: Path) -> None:
+    """Writes a GraphNav map of a world. Raises InputError."""
+    _need_sdk()
+    from executive.app.placed_robots import DEFAULT_KIND
+    from executive.app.served_spot import world_map
+    from executive.app.worlds import open_world
+    from plant.spot_api.server.graph_map import write_map
+
+    with writing(folder, "name another --graph"):
+        write_map(world_map(open_world(world), DEFAULT_KIND), folder)
+
+
 def _environment(server: SpotServer) -> dict[str, str]:
     """Environment variables with which programs and drivers find the server, and log in."""
     return {
@@ -110,8 +127,9 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     _need_sdk()
     from executive.app.picking import PointPicker
     from executive.app.placed_robots import only_robot
+    from executive.app.served_spot import SpotPerception
     from executive.app.simulated import compile_first, simulate
-    from executive.app.worlds import open_world
+    from executive.app.worlds import knowledge_of, open_world
     from plant.models.catalogue import user_cache
     from plant.spot_api.server.estop import Tablet
     from plant.spot_api.server.identity import credentials
@@ -125,10 +143,14 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)
     robot = simulation.robots["Alice"]
     robot.image(robot.capabilities().cameras[0].source)  # the first picture takes long: the renderer begins
-    picker = PointPicker(robot, simulation.clock)
-    dock_O = None if placed.dock is None else compose(inverse(placed.start), placed.dock)
-    tablet_or_none = Tablet.TABLET if tablet else Tablet.NONE
-    options = Options({USER: PASSWORD}, port, tablet=tablet_or_none, picker=picker, dock_O=dock_O)
+    options = Options(
+        {USER: PASSWORD},
+        port,
+        tablet=Tablet.TABLET if tablet else Tablet.NONE,
+        picker=PointPicker(robot, simulation.clock),
+        dock_O=None if placed.dock is None else compose(inverse(placed.start), placed.dock),
+        perception=SpotPerception({tag.id: tag.size_m for tag in knowledge_of(opened).known_tags()}),
+    )
     try:
         held = credentials(user_cache() / _FOLDER)
         server = SpotServer(robot, simulation.clock, arm_model(robot.capabilities()), held, options)

@@ -30,6 +30,7 @@ from skills.robot import (
     CommandState,
     FloatArray,
     Gripper,
+    Image,
     Joints,
     Lease,
     Mount,
@@ -67,6 +68,35 @@ class Solver(Protocol):
 
     def inverse(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> Sequence[FloatArray]:
         """Joint angles (J,) that put the last link at a pose."""
+
+
+@dataclass(frozen=True)
+class SeenTag:
+    """AprilTag in a picture: its number, the side of its black square, and its pose."""
+
+    number: int
+    size_m: float
+    X_OT: RigidTransform
+
+
+class MapLocaliser(Protocol):
+    """Localiser on the points of a map, in whose frame S poses are."""
+
+    def start(self, X_SO: Pose2D, scan: Scan, reach_m: float) -> Pose2D | None:
+        """Believes the pose of `odom` at which a scan fits, within reach_m of a guess; returns None when none does."""
+
+    def update(self, robot: Robot) -> tuple[Pose2D, bool]:
+        """Takes in the newest scan; returns the pose of `odom`, and whether it is sure."""
+
+
+class Perception(Protocol):
+    """Localisers for maps, and tags in pictures."""
+
+    def localiser(self, points_S: FloatArray) -> MapLocaliser:
+        """Creates a localiser on points (N, 3) of a map: x, y, and the height above the floor."""
+
+    def tags(self, image: Image) -> Sequence[SeenTag]:
+        """Finds the known tags in a picture."""
 
 
 class Motors(Enum):
@@ -304,6 +334,11 @@ class Computer:
         """Sits down."""
         self._still_since_s = self.clock.now()
         self._sit_command = self.robot.sit(until_s=self.forever(), lease=self.lease)
+
+    @property
+    def sits(self) -> bool:
+        """Returns whether the last posture is to sit, reached or not."""
+        return self._sit_command is not None
 
     def stand(self, height_m: float, pitch_rad: float) -> CommandId:
         """Stands up, or changes height and pitch of the body."""

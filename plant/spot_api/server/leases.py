@@ -148,6 +148,12 @@ class LeaseService(Service):
                 made.latest_known_lease.CopyFrom(lease)
         return made
 
+    def holds(self, lease: Any, part: str) -> bool:
+        """Returns whether the claim that a lease belongs to still counts for a smallest part."""
+        with self._lock:
+            claim = self._claims.get(part)
+            return claim is not None and not claim.stale and claim.lease.sequence[:1] == lease.sequence[:1]
+
     def make_stale(self, resources: Sequence[str]) -> None:
         """Makes the claims on resources stale at once."""
         with self._lock:

@@ -170,7 +170,7 @@ class _Driving(BaseMotion):
 
     def _posture(self, computer: Computer, params: Any) -> None:
         """Stands up if the robot sits, at the height and pitch of the parameters."""
-        if computer.snapshot.sitting or params.HasField("body_control"):
+        if computer.sits or params.HasField("body_control"):
             computer.stand(*posture(params, computer))
 
 
@@ -199,7 +199,7 @@ class Velocity(_Driving):
         turn_rad = _yaw(computer.snapshot.X_AB("body", self._frame))
         ahead = math.cos(turn_rad) * vx - math.sin(turn_rad) * vy
         aside = math.sin(turn_rad) * vx + math.cos(turn_rad) * vy
-        _drive(computer, self._limit(np.array([ahead, aside, wz])), self.end_s)
+        drive(computer, self._limit(np.array([ahead, aside, wz])), self.end_s)
 
 
 class Trajectory(_Driving):
@@ -229,8 +229,8 @@ class Trajectory(_Driving):
 
     def _drive(self, computer: Computer) -> None:
         odometry, goal = computer.snapshot.odometry, self._poses[-1]
-        error = _error(odometry.pose, self._target(computer.now_s() - self._begun_s))
-        to_goal, speed = _error(odometry.pose, goal), np.abs(odometry.velocity)
+        error = error_to(odometry.pose, self._target(computer.now_s() - self._begun_s))
+        to_goal, speed = error_to(odometry.pose, goal), np.abs(odometry.velocity)
         arrived = bool(math.hypot(*to_goal[:2]) < _NEAR_M and abs(to_goal[2]) < _NEAR_RAD)
         still = bool(speed[:2].max() < _STILL_M_S and speed[2] < _STILL_RAD_S)
         part = basic_command_pb2.SE2TrajectoryCommand.Feedback
@@ -242,7 +242,7 @@ class Trajectory(_Driving):
             )
         )
         velocity = np.zeros(3) if arrived else self._limit(_GAIN_1_S * error)
-        _drive(computer, velocity, self.end_s)
+        drive(computer, velocity, self.end_s)
 
     def _target(self, since_s: float) -> Pose2D:
         """Pose at a time since the start: with one pose this one, else between two."""
@@ -250,14 +250,14 @@ class Trajectory(_Driving):
         return self._poses[later]
 
 
-def _error(pose: Pose2D, goal: Pose2D) -> FloatArray:
+def error_to(pose: Pose2D, goal: Pose2D) -> FloatArray:
     """Way from a pose to a goal in the pose's frame: ahead (m), to the left (m), turn (rad)."""
     dx, dy = goal.x_m - pose.x_m, goal.y_m - pose.y_m
     c, s = math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)
     return np.array([c * dx + s * dy, c * dy - s * dx, math.remainder(goal.yaw_rad - pose.yaw_rad, math.tau)])
 
 
-def _drive(computer: Computer, velocity: FloatArray, end_s: float) -> None:
+def drive(computer: Computer, velocity: FloatArray, end_s: float) -> None:
     """Drives until an end (robot time), or two steps: a plant that is late does not drive on what is left of a time."""
     until_s = min(computer.until_s(end_s), computer.clock.now() + 2.0 * PERIOD_S)
     vx, vy, wz = (float(value) for value in velocity)

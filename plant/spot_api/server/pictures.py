@@ -16,7 +16,7 @@ from plant.spot_api.messages import frame_tree, timestamp
 from plant.spot_api.server.calls import Call, Service
 from plant.spot_api.server.computer import Computer, Snapshot, sensor_frame
 from plant.spot_api.server.identity import DOMAIN
-from skills.robot import CameraCapabilities, Image, Intrinsics, NoImageError
+from skills.robot import CameraCapabilities, Image, Intrinsics, NoImageError, Scan
 
 _PICTURE_TIMEOUT_S: Final = 5.0
 
@@ -193,13 +193,16 @@ class PointCloudService(Service):
             elif scan is None:
                 one.status = Response.STATUS_SOURCE_DATA_ERROR
             else:
-                points = (scan.X_OB @ scan.points_B().T).T.astype(np.float32)
                 one.status = Response.STATUS_OK
-                one.point_cloud.source.CopyFrom(self._source())
-                one.point_cloud.num_points = len(points)
-                one.point_cloud.encoding = point_cloud_pb2.PointCloud.ENCODING_XYZ_32F
-                one.point_cloud.data = np.ascontiguousarray(points).tobytes()
+                self.fill(one.point_cloud, scan)
         return made
+
+    def fill(self, made: Any, scan: Scan) -> None:
+        """Fills in the message of a scan."""
+        points = (scan.X_OB @ scan.points_B().T).T.astype(np.float32)
+        made.source.CopyFrom(self._source())
+        made.num_points, made.encoding = len(points), point_cloud_pb2.PointCloud.ENCODING_XYZ_32F
+        made.data = np.ascontiguousarray(points).tobytes()
 
     def _source(self) -> Any:
         snapshot = self._computer.snapshot
@@ -238,11 +241,13 @@ class LocalGridService(Service):
                 one.status = Response.STATUS_DATA_UNAVAILABLE
             else:
                 one.status = Response.STATUS_OK
-                self._fill(one.local_grid, snapshot, (snapshot.scan.X_OB @ snapshot.scan.points_B().T).T)
+                self.fill(one.local_grid, snapshot, snapshot.scan)
         made.num_local_grid_errors = sum(one.status != Response.STATUS_OK for one in made.local_grid_responses)
         return made
 
-    def _fill(self, made: Any, snapshot: Snapshot, points_O: NDArray[np.float64]) -> None:
+    def fill(self, made: Any, snapshot: Snapshot, scan: Scan) -> None:
+        """Fills in the message of a grid."""
+        points_O = (scan.X_OB @ scan.points_B().T).T
         corner = snapshot.odometry.X_OB.translation()[:2] - 0.5 * self._CELLS * self._CELL_M
         high = points_O[(points_O[:, 2] > self._LOW_M) & (points_O[:, 2] < self._HIGH_M)]
         cells = np.floor((high[:, :2] - corner) / self._CELL_M).astype(int)

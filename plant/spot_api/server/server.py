@@ -14,9 +14,10 @@ import grpc
 from plant.spot_api.server import docking, identity, manipulation, pictures, rays, state
 from plant.spot_api.server.calls import Service, handlers
 from plant.spot_api.server.commands import PowerService, RobotCommandService
-from plant.spot_api.server.computer import Computer, Pace, Solver
+from plant.spot_api.server.computer import Computer, Pace, Perception, Solver
 from plant.spot_api.server.estop import EstopService, Tablet
 from plant.spot_api.server.faults import Switchboard
+from plant.spot_api.server.graph_nav import GraphNavService, Live
 from plant.spot_api.server.identity import DOMAIN, Credentials
 from plant.spot_api.server.keepalive import KeepaliveService
 from plant.spot_api.server.leases import LeaseService
@@ -33,7 +34,6 @@ LISTED: Final[Mapping[str, str]] = {
     "data-acquisition": "bosdyn.api.DataAcquisitionService",
     "data-acquisition-store": "bosdyn.api.DataAcquisitionStoreService",
     "door": "bosdyn.api.spot.DoorService",
-    "graph-nav-service": "bosdyn.api.graph_nav.GraphNavService",
     "map-processing-service": "bosdyn.api.graph_nav.MapProcessingService",
     "payload-registration": "bosdyn.api.PayloadRegistrationService",
     "recording-service": "bosdyn.api.graph_nav.GraphNavRecordingService",
@@ -69,6 +69,7 @@ SERVICES: Final[tuple[type[Service], ...]] = (
     state.PayloadService,
     state.DataBufferService,
     state.LogStatusService,
+    GraphNavService,
 )
 """Services that are served."""
 MOTIONS: Final = (
@@ -83,6 +84,7 @@ _DESCRIBED_IN: Final = (
     *("payload", "point_cloud", "power", "robot_command", "robot_id", "robot_state", "time_sync", "world_object"),
     *("docking.docking", "manipulation_api", "ray_cast", "log_status.log_status", "spot.inverse_kinematics"),
     "keepalive.keepalive",
+    "graph_nav.graph_nav",
 )
 """Files of the SDK that describe the services; importing them registers their descriptions."""
 
@@ -92,7 +94,7 @@ class Options:
     """Options of a server: users with their passwords, port (0 takes a free one), pace, and the operator's tablet.
 
     `picker` picks up objects for the manipulation service; without it picks are refused. `dock_O` is the robot's pose
-    on its dock, in `odom`.
+    on its dock, in `odom`. Without `perception` odometry alone localises the robot, and no tags are seen.
     """
 
     passwords: Mapping[str, str]
@@ -101,6 +103,7 @@ class Options:
     tablet: Tablet = Tablet.TABLET
     picker: manipulation.Picker | None = None
     dock_O: Pose2D | None = None
+    perception: Perception | None = None
 
 
 class SpotServer:
@@ -119,7 +122,7 @@ class SpotServer:
         )
         self.certificate = credentials.certificate
         auth = identity.AuthService(options.passwords, credentials.token_key.read_bytes())
-        self.services = self._services(leases, estop, auth, robot.name, options.picker)
+        self.services = self._services(leases, estop, auth, robot.name, options)
         self.faults = Switchboard()
         self._grpc = grpc.server(
             ThreadPoolExecutor(_THREADS, thread_name_prefix="spot-api"),
@@ -145,7 +148,7 @@ class SpotServer:
         estop: EstopService,
         auth: identity.AuthService,
         robot_name: str,
-        picker: manipulation.Picker | None,
+        options: Options,
     ) -> Sequence[Service]:
         """All services that are served; the directory lists them and the others."""
         computer, clocks = self.computer, identity.TimeSyncService()
@@ -157,6 +160,12 @@ class SpotServer:
         entries = [entry for entry in (*known, *others) if entry[0] not in lacking]
         directory = identity.DirectoryService(entries, computer.now_s)
         faults = state.FaultService(computer.now_s, directory.silent)
+        live = Live(
+            state.RobotStateService(computer, faults.faults),
+            pictures.PointCloudService(computer),
+            pictures.LocalGridService(computer),
+            state.WorldObjectService(computer, options.perception),
+        )
         made: list[Service] = [
             auth,
             identity.RobotIdService(robot_name),
@@ -169,20 +178,18 @@ class SpotServer:
             KeepaliveService(computer),
             PowerService(computer, leases),
             RobotCommandService(computer, leases, clocks),
-            state.RobotStateService(computer, faults.faults),
             pictures.ImageService(computer),
             pictures.GripperCameraParamService(),
-            pictures.PointCloudService(computer),
-            pictures.LocalGridService(computer),
             rays.RayCastService(computer),
-            manipulation.ManipulationService(computer, leases, picker),
+            manipulation.ManipulationService(computer, leases, options.picker),
             docking.DockingService(computer, leases, clocks),
             state.InverseKinematicsService(computer),
-            state.WorldObjectService(),
+            *vars(live).values(),
             faults,
             state.PayloadService(),
             state.DataBufferService(),
             state.LogStatusService(),
+            GraphNavService(computer, leases, clocks, options.perception, live),
         ]
         return [service for service in made if service.name not in lacking]
 

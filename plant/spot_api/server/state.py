@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from itertools import count
 from threading import Lock
 from typing import Any, Final
@@ -24,6 +26,7 @@ from plant.spot_api.messages import (
     api_joint,
     duration,
     frame_tree,
+    seconds,
     timestamp,
     transform,
     vec3,
@@ -31,11 +34,24 @@ from plant.spot_api.messages import (
 )
 from plant.spot_api.server.arm import JOINTS, READY_RAD
 from plant.spot_api.server.calls import Call, Service
-from plant.spot_api.server.computer import Computer, Motors, Snapshot
+from plant.spot_api.server.computer import Computer, Motors, Perception, SeenTag, Snapshot
 from plant.spot_api.server.hand import X_HAND, solutions
 from plant.spot_api.server.identity import DOMAIN
+from skills.robot import Mount, NoImageError
 
 RUNTIME_S: Final = 5400.0
+_LOOK_S, _PICTURES_S = 0.5, 5.0
+_FIRST_TAG: Final = 1_000_000
+"""Id of the object of tag 0; those of clients' objects are smaller."""
+_Kinds = world_object_pb2.WorldObjectType
+_FIELDS: Final[Mapping[int, str]] = {
+    _Kinds.WORLD_OBJECT_DRAWABLE: "drawable_properties",
+    _Kinds.WORLD_OBJECT_APRILTAG: "apriltag_properties",
+    _Kinds.WORLD_OBJECT_IMAGE_COORDINATES: "image_properties",
+    _Kinds.WORLD_OBJECT_DOCK: "dock_properties",
+    _Kinds.WORLD_OBJECT_USER_NOGO: "nogo_region_properties",
+}
+"""Field of an object of each type; others are never listed."""
 _FEET: Final = ("fl", "fr", "hl", "hr")
 
 
@@ -171,17 +187,60 @@ def kinematic_state(snapshot: Snapshot) -> Any:
 
 
 class WorldObjectService(Service):
-    """Lists the objects that clients have added; the simulated robot adds none of its own."""
+    """Lists the objects that clients have added, and the known AprilTags that the body's cameras see."""
 
     name, type, authority = "world-objects", "bosdyn.api.WorldObjectService", f"api.{DOMAIN}"
 
-    def __init__(self) -> None:
+    def __init__(self, computer: Computer, perception: Perception | None) -> None:
+        """No tags are seen without `perception`."""
+        self._computer, self._perception = computer, perception
         self._lock, self._ids, self._objects = Lock(), count(1), dict[int, Any]()
+        self._looking, self._looked_s, self._seen = Lock(), -math.inf, dict[int, SeenTag]()
 
-    def ListWorldObjects(self, _request: Any, _call: Call) -> Any:
-        """Lists the objects."""
+    def ListWorldObjects(self, request: Any, _call: Call) -> Any:
+        """Lists the objects of the types that are asked for, and not older than asked for."""
+        fields = [_FIELDS[kind] for kind in request.object_type if kind in _FIELDS]
+        since_s, made = seconds(request.timestamp_filter), world_object_pb2.ListWorldObjectResponse()
+        for each in self.objects(look=not fields or "apriltag_properties" in fields):
+            has = not request.object_type or any(field.name in fields for field, _ in each.ListFields())
+            if has and not 0.0 < seconds(each.acquisition_time) < since_s:
+                made.world_objects.append(each)
+        return made
+
+    def objects(self, *, look: bool = True) -> list[Any]:
+        """All objects; `look` takes pictures first."""
+        seen = [self._described(tag) for tag in self.tags()] if look else []
         with self._lock:
-            return world_object_pb2.ListWorldObjectResponse(world_objects=self._objects.values())
+            return [*self._objects.values(), *seen]
+
+    def tags(self) -> Sequence[SeenTag]:
+        """The tags that the body's cameras see now, or saw a moment ago."""
+        computer, perception = self._computer, self._perception
+        if perception is None:
+            return ()
+        with self._looking:
+            if computer.now_s() - self._looked_s > _LOOK_S:
+                cameras = [each.source for each in computer.capabilities.cameras if each.mount is Mount.BODY]
+                taken = computer.do(lambda: [computer.robot.image(source) for source in cameras])
+                with suppress(NoImageError, TimeoutError):
+                    found = [tag for image in taken.result(_PICTURES_S) for tag in perception.tags(image)]
+                    self._seen = {tag.number: tag for tag in found}
+                self._looked_s = computer.now_s()
+            return list(self._seen.values())
+
+    def _described(self, tag: SeenTag) -> Any:
+        """The message of a tag; the frame `filtered_fiducial` is the same one."""
+        made = world_object_pb2.WorldObject(id=_FIRST_TAG + tag.number, name=f"world_obj_apriltag_{tag.number}")
+        made.acquisition_time.CopyFrom(timestamp(self._looked_s))
+        frames, described = dict(self._computer.snapshot.frames), made.apriltag_properties
+        described.tag_id, described.dimensions.x, described.dimensions.y = tag.number, tag.size_m, tag.size_m
+        described.frame_name_fiducial = f"fiducial_{tag.number}"
+        described.frame_name_fiducial_filtered = f"filtered_fiducial_{tag.number}"
+        for name in (described.frame_name_fiducial, described.frame_name_fiducial_filtered):
+            frames[name] = ("odom", tag.X_OT)
+        described.fiducial_pose_status = described.fiducial_filtered_pose_status = described.STATUS_OK
+        made.transforms_snapshot.CopyFrom(frame_tree(frames))
+        return made
 
     def MutateWorldObjects(self, request: Any, _call: Call) -> Any:
         """Adds, changes or deletes an object of a client."""

@@ -58,6 +58,14 @@ def test_a_program_that_is_not_there_is_named(tmp_path):
     assert "none.py: there is no such program" in result.output
 
 
+def test_a_map_that_cannot_be_written_is_one_error(tmp_path):
+    pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
+    (tmp_path / "file").write_text("")
+    result = CliRunner().invoke(app, ["serve", "--graph", str(tmp_path / "file")])
+    assert result.exit_code == 2
+    assert "file: cannot write it" in result.output.replace("\n", " ") and "--graph" in result.output
+
+
 @pytest.mark.mission
 def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd):
     pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")

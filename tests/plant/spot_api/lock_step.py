@@ -45,8 +45,9 @@ class LockStep:
     `build` makes robot and clock in the server's thread, to which a renderer belongs.
     """
 
-    def __init__(self, build: Callable[[], tuple[Robot, Clock]], credentials) -> None:
+    def __init__(self, build: Callable[[], tuple[Robot, Clock]], credentials, perception=None) -> None:
         self._build, self._credentials, self.certificate = build, credentials, credentials.certificate
+        self._perception = perception
         self._ready, self._stopping = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._serve)
         self._thread.start()
@@ -57,7 +58,10 @@ class LockStep:
 
     def _serve(self) -> None:
         robot, clock = self._build()
-        solver, options = arm_model(robot.capabilities()), Options({USER: PASSWORD}, pace=Pace.CLIENT)
+        solver, options = (
+            arm_model(robot.capabilities()),
+            Options({USER: PASSWORD}, pace=Pace.CLIENT, perception=self._perception),
+        )
         self.server = SpotServer(robot, clock, solver, self._credentials, options)
         self.served = robot
         with self.server.running():

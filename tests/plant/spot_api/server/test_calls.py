@@ -1,10 +1,14 @@
 """Calls that are malformed, unknown, or fail inside."""
 
+import itertools
 import logging
 
+import bosdyn.client
 import grpc
 import pytest
+from bosdyn.api.graph_nav import graph_nav_pb2
 
+from plant.spot_api.server import calls
 from plant.spot_api.server.state import RobotStateService
 
 
@@ -55,3 +59,32 @@ def test_a_port_in_use_is_one_error(served, credentials):
     port = served.server.port
     with pytest.raises(OSError, match=f"port {port} of 127.0.0.1 cannot be opened"):
         SpotServer(served.scripted, served.server.computer.clock, None, credentials, Options({}, port))
+
+
+UPLOAD = "/bosdyn.api.graph_nav.GraphNavService/UploadWaypointSnapshot"
+
+
+@pytest.mark.parametrize("requests", [[], [b"\xff\xff"], [b"", b"\x0a\xff"]], ids=["empty", "malformed", "later"])
+def test_a_stream_that_cannot_be_read_is_an_invalid_argument(channel, requests):
+    with pytest.raises(grpc.RpcError) as refused:
+        channel.stream_unary(UPLOAD, lambda raw: raw, lambda raw: raw)(iter(requests), timeout=5.0)
+    assert refused.value.code() is grpc.StatusCode.INVALID_ARGUMENT
+
+
+def test_a_stream_without_end_is_cut(channel, monkeypatch):
+    monkeypatch.setattr(calls, "MOST_STREAMED_BYTES", 10_000)
+    request = graph_nav_pb2.UploadWaypointSnapshotRequest(chunk={"data": bytes(1000)}).SerializeToString()
+    with pytest.raises(grpc.RpcError) as refused:
+        channel.stream_unary(UPLOAD, lambda raw: raw, lambda raw: raw)(itertools.repeat(request), timeout=5.0)
+    assert refused.value.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+
+
+def test_streams_need_a_token(served):
+    sdk = bosdyn.client.create_standard_sdk("test", cert_resource_glob=str(served.server.certificate))
+    robot = sdk.create_robot("127.0.0.1")
+    robot.update_secure_channel_port(served.server.port)
+    for call in (UPLOAD, "/bosdyn.api.graph_nav.GraphNavService/DownloadGraphStreaming"):
+        stub = robot.ensure_secure_channel("api.spot.robot").stream_stream(call, lambda raw: raw, lambda raw: raw)
+        with pytest.raises(grpc.RpcError) as refused:
+            list(stub(iter([b""]), timeout=5.0))
+        assert refused.value.code() is grpc.StatusCode.UNAUTHENTICATED

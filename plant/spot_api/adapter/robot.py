@@ -287,7 +287,7 @@ class ApiRobot:
             if status.state is CommandState.RUNNING:
                 status = self._watched(sent)
             self._sent.update(sent, status)
-            if status.state is CommandState.STOPPED and status.cause is not CommandCause.STOPPED:
+            if status.state is CommandState.STOPPED:
                 self._unsure.add(sent.part)
             if status.cause is CommandCause.NO_ANSWER:
                 raise LostError(status.reason)

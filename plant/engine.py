@@ -193,7 +193,7 @@ Background = Callable[[Callable[[], None]], "Future[None]"]
 """Begins work in the background."""
 
 _EXACT_S, _LEAST_S = 1e-9, 1e-6
-_BEGIN_LATER = frozenset({"drive", "stand", "sit", "point_head", "set_gripper"})
+_BEGIN_LATER = frozenset({"drive", "stand", "sit", "dock", "undock", "point_head", "set_gripper"})
 
 
 class Pipeline:

@@ -323,6 +323,12 @@ class Robot(Protocol):
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
 
+    def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
+        """Docks at the docking station of a number, nearby; only where `Capabilities.docks`, else refused."""
+
+    def undock(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Stands up and leaves the docking station; refused like `dock`."""
+
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when the arm is still at its end."""
 

@@ -35,7 +35,7 @@ from skills.stack import RobotStack
 LEAST_CHARGE: Final = 0.3
 LEAST_VERSION: Final = (4, 0, 0)
 _HOLDER: Final = "errand run"
-_POWER_S, _POSTURE_S, _OFF_S = 20.0, 15.0, 15.0
+_POWER_S, _POSTURE_S, _OFF_S, _UNDOCK_S = 20.0, 15.0, 15.0, 30.0
 _TICK_S: Final = 0.05
 
 
@@ -195,12 +195,18 @@ class ReadyRobot:
                 self._hold_estop()
             if (stopped := self.connection.estop_trouble()) is not None:
                 raise InputError(stopped, hint="release it on the tablet, or begin with --estop own")
+            docked = self.connection.docked()
+            if docked and not self.access.power_on:
+                raise InputError("the robot stands on its dock", hint="allow it to undock: --power-on")
             lease = robot.acquire_lease(_HOLDER)
             robot.heartbeat.add_policy()
             ending.callback(_try, robot.heartbeat.remove_policy)
             ending.callback(_try, self.connection.stop)
             if not robot.powered:
                 self._switch_on()
+            if docked:
+                leaves = robot.undock(until_s=clock.now() + _UNDOCK_S, lease=lease)
+                finish(robot, clock, leaves, "leave its dock", _UNDOCK_S)
             until_s = clock.now() + _POSTURE_S
             stood = robot.stand(robot.capabilities().standing_height_m, 0.0, until_s=until_s, lease=lease)
             finish(robot, clock, stood, "stand up")
@@ -259,9 +265,9 @@ def _check(robot: ApiRobot, connection: Connection) -> None:
         raise InputError(f"the robot has a fault: {', '.join(faults)}", hint="clear it first")
 
 
-def finish(robot: Robot, clock: Clock, command: CommandId, what: str) -> None:
-    """Waits for a command. Raises LostError when it does not succeed."""
-    wait_until(clock, lambda: robot.command_status(command).state is not CommandState.RUNNING, _POSTURE_S, what)
+def finish(robot: Robot, clock: Clock, command: CommandId, what: str, most_s: float = _POSTURE_S) -> None:
+    """Waits for a command. Raises LostError when it does not succeed within most_s."""
+    wait_until(clock, lambda: robot.command_status(command).state is not CommandState.RUNNING, most_s, what)
     status = robot.command_status(command)
     if status.state is not CommandState.DONE:
         raise LostError(f"the robot does not {what}: {status.reason}")

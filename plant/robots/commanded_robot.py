@@ -164,6 +164,14 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
             )
         return self._begin(Part.HEAD, HeadGoal((pan_rad, tilt_rad)), until_s, lease)
 
+    def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: a simulated robot charges where it stands."""
+        return self._commands.refuse("dock: the robot has no docking station", CommandCause.UNSUPPORTED)
+
+    def undock(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: see `dock`."""
+        return self._commands.refuse("undock: the robot has no docking station", CommandCause.UNSUPPORTED)
+
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when its end is reached and the arm is still."""
         reason = self._arm.refusal(trajectory)

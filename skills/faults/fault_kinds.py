@@ -29,8 +29,8 @@ THIEF: Final = "the tablet"
 
 VERBS: Final = (
     "capabilities", "odometry", "imu", "scan", "image", "joints", "gripper", "battery", "faults",
-    "drive", "stand", "sit", "move_arm", "point_head", "set_gripper", "carry", "stop", "command_status",
-    "acquire_lease", "take_lease", "return_lease", "lease_holder",
+    "drive", "stand", "sit", "dock", "undock", "move_arm", "point_head", "set_gripper", "carry", "stop",
+    "command_status", "acquire_lease", "take_lease", "return_lease", "lease_holder",
 )  # fmt: skip
 SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
 MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "point_head", "set_gripper")

@@ -48,7 +48,7 @@ _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
 _FINGER_M = 0.03
 _LEAST_CLAMP_N = 2.0
-_LACKS = frozenset({"there is no arm", "there is no head", "there is no gripper"})
+_LACKS = frozenset({"there is no arm", "there is no head", "there is no gripper", "there is no docking station"})
 _EPOCH = "scripted"
 
 BASE_ONLY = Capabilities(
@@ -234,6 +234,14 @@ class ScriptedRobot:
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
         return self._begin("stand", (0.2, 0.0), until_s, lease, "", verb="sit")
+
+    def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: there is no docking station."""
+        return self._begin("dock", station, until_s, lease, "there is no docking station")
+
+    def undock(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: there is no docking station."""
+        return self._begin("undock", None, until_s, lease, "there is no docking station")
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory that begins near the arm's angles."""

@@ -15,6 +15,7 @@ from bosdyn.api import (
     mobility_command_pb2,
     robot_command_pb2,
 )
+from bosdyn.api.docking import docking_pb2
 from bosdyn.client.robot_command import RobotCommandBuilder
 from bosdyn.geometry import EulerZXY
 
@@ -26,12 +27,15 @@ FASTEST_M_S, FASTEST_RAD_S = 0.8, 1.0
 _FASTEST_JOINT_RAD_S, _FASTEST_JOINT_RAD_S2 = 2.5, 15.0
 _MOST_POINTS: Final = 250
 _REMEMBERED: Final = 1000
+_MOBILITY: Final = {"base", "posture", "dock"}
+"""Parts that are one command of the robot."""
 _JOINTS: Final = ("sh0", "sh1", "el0", "el1", "wr0", "wr1")
 _DONE, _RUNNING = CommandStatus(CommandState.DONE), CommandStatus(CommandState.RUNNING)
 _Feedback: Final = basic_command_pb2.RobotCommandFeedbackStatus.Status
 _Stand: Final = basic_command_pb2.StandCommand.Feedback
 _Sit: Final = basic_command_pb2.SitCommand.Feedback
 _Claw: Final = gripper_command_pb2.ClawGripperCommand.Feedback
+_Dock: Final = docking_pb2.DockingCommandFeedbackResponse
 _Move: Final = arm_command_pb2.ArmJointMoveCommand.Feedback
 
 
@@ -101,7 +105,7 @@ def claw(opening_rad: float, force_n: float) -> Any:
 def halt(part: str | None) -> Any:
     """Returns the command to stop the base, the arm, or (None) both; the gripper keeps its clamp force."""
     command = robot_command_pb2.RobotCommand()
-    if part in (None, "base", "posture"):
+    if part is None or part in _MOBILITY:
         stop = mobility_command_pb2.MobilityCommand.Request(stop_request=basic_command_pb2.StopCommand.Request())
         command.synchronized_command.mobility_command.CopyFrom(stop)
     if part in (None, "arm"):
@@ -169,7 +173,7 @@ class SentCommands:
 
     def _end(self, part: str, reason: str) -> None:
         for sent in self._sent.values():
-            same = sent.part == part or {sent.part, part} <= {"base", "posture"}
+            same = sent.part == part or {sent.part, part} <= _MOBILITY
             if same and sent.status.state is CommandState.RUNNING:
                 sent.status = CommandStatus(CommandState.STOPPED, reason, CommandCause.STOPPED)
 
@@ -182,6 +186,11 @@ def status_of(feedback: Any, part: str) -> CommandStatus:
     whole = _judged(_Feedback, given.status)
     parts = {"arm": _arm, "gripper": _gripper, "posture": _posture}
     return parts[part](given) if whole is _RUNNING and part in parts else whole
+
+
+def docking_status(number: int) -> CommandStatus:
+    """Returns the protocol's status of a command to dock or undock, by the number of its feedback."""
+    return _DONE if number in (_Dock.STATUS_DOCKED, _Dock.STATUS_AT_PREP_POSE) else _judged(_Dock.Status, number)
 
 
 def _stopped(cause: CommandCause, reason: str) -> CommandStatus:

@@ -31,6 +31,7 @@ from bosdyn.api import (
     time_sync_pb2,
     time_sync_service_pb2_grpc,
 )
+from bosdyn.api.docking import docking_pb2, docking_service_pb2_grpc
 from bosdyn.api.keepalive import keepalive_service_pb2_grpc
 
 from plant.spot_api.adapter.statuses import call_trouble, response_trouble, trouble
@@ -43,6 +44,7 @@ CALL_S: Final = 0.5
 _SLOW_S: Final = 5.0
 _ROUND_TRIPS: Final = 5
 _STUBS: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "docking": docking_service_pb2_grpc.DockingServiceStub,
     "estop": estop_service_pb2_grpc.EstopServiceStub,
     "gripper-camera-param": gripper_camera_param_service_pb2_grpc.GripperCameraParamServiceStub,
     "image": image_service_pb2_grpc.ImageServiceStub,
@@ -218,6 +220,26 @@ class Connection:
         """Returns how far a command has come. Raises LostError."""
         request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=number)
         return self.call("robot-command", "RobotCommandFeedback", request).feedback
+
+    def dock(self, station: int | None, end_s: float) -> int:
+        """Asks to dock at a station, or (None) to undock, until a robot time; returns the number. Raises LostError."""
+        how = docking_pb2.PREP_POSE_UNDOCK if station is None else docking_pb2.PREP_POSE_USE_POSE
+        request = docking_pb2.DockingCommandRequest(lease=self.lease, clock_identifier=self.clock_identifier)
+        request.docking_station_id, request.prep_pose_behavior = station or 0, how
+        request.end_time.FromNanoseconds(round(end_s * 1e9))
+        return int(self.call("docking", "DockingCommand", request).docking_command_id)
+
+    def docking(self, number: int) -> int:
+        """Returns the status of a command to dock or undock. Raises LostError."""
+        request = docking_pb2.DockingCommandFeedbackRequest(docking_command_id=number)
+        return int(self.call("docking", "DockingCommandFeedback", request, checked=False).status)
+
+    def docked(self) -> bool:
+        """Returns whether the robot stands on a docking station. Raises LostError."""
+        if not self.has("docking"):
+            return False
+        answer = self.call("docking", "GetDockingState", docking_pb2.GetDockingStateRequest())
+        return bool(answer.dock_state.status == docking_pb2.DockState.DOCK_STATUS_DOCKED)
 
     def state(self) -> Any:
         """Returns the response with the robot's state. Raises LostError."""

@@ -17,7 +17,7 @@ import numpy as np
 from bosdyn.api import manipulation_api_pb2, robot_state_pb2
 
 from plant.spot_api.adapter import commands
-from plant.spot_api.adapter.commands import Sent, SentCommands, status_of
+from plant.spot_api.adapter.commands import Sent, SentCommands, docking_status, status_of
 from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
 from plant.spot_api.adapter.heartbeat import Heartbeat
 from plant.spot_api.adapter.readings import off_path_rad
@@ -63,7 +63,8 @@ class ApiRobot:
     ) -> None:
         """Reads the robot's first state. The robot keeps `padding_m` from obstacles by itself. Raises LostError."""
         self._name, self._connection, self._clock = name, connection, clock
-        self._capabilities, self._padding_m = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S), padding_m
+        docks, self._padding_m = connection.has("docking"), padding_m
+        self._capabilities = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S, docks=docks)
         self.sensors, self.heartbeat = Sensors(connection, clock, capabilities), Heartbeat(connection)
         self._sent = SentCommands()
         self._unsure: set[str | None] = set()
@@ -162,6 +163,23 @@ class ApiRobot:
         """Lowers the body to the floor."""
         refused = self._objection("posture", lease, until_s)
         return refused or self._send(commands.sit(), Sent(0, "posture", until_s=until_s))
+
+    def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
+        """Docks at the docking station of a number, nearby."""
+        return self._dock(station, until_s, lease)
+
+    def undock(self, *, until_s: float, lease: Lease) -> CommandId:
+        """Stands up and leaves the docking station."""
+        return self._dock(None, until_s, lease)
+
+    def _dock(self, station: int | None, until_s: float, lease: Lease) -> CommandId:
+        if (refused := self._objection("dock", lease, until_s)) is not None:
+            return refused
+        try:
+            number = self._connection.dock(station, self._clock.robot_time_s() + until_s - self._clock.now())
+        except LostError as error:
+            return self._lost(error, "dock", "dock")
+        return self._sent.add(Sent(number, "dock", until_s=until_s + _LATE_S))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory, and holds at its end; done when the robot says so, stopped when it leaves it."""
@@ -280,8 +298,10 @@ class ApiRobot:
         """Reads how far the commands have come; ends those that are late, and arms that have left their path."""
         for sent in self._sent.running():
             try:
-                feedback = self._connection.feedback(sent.number)
-                status = status_of(feedback.synchronized_feedback, sent.part)
+                if sent.part == "dock":
+                    status = docking_status(self._connection.docking(sent.number))
+                else:
+                    status = status_of(self._connection.feedback(sent.number).synchronized_feedback, sent.part)
             except LostError as error:
                 status = CommandStatus(CommandState.STOPPED, str(error), error.cause)
             if status.state is CommandState.RUNNING:

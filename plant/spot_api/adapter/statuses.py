@@ -15,7 +15,7 @@ GOOD: Final = frozenset(
         *("CODE_UNSPECIFIED", "CODE_OK", "STATUS_OK", "STATUS_SUCCESS", "ESTOP_LEVEL_NONE", "STATUS_UNMANAGED"),
         *("STATUS_IN_PROGRESS", "STATUS_PROCESSING", "STATUS_IS_STANDING", "STATUS_IS_SITTING", "STATUS_COMPLETE"),
         *("STATUS_AT_GOAL", "STATUS_APPLYING_FORCE", "PLANNER_STATUS_UNKNOWN", "PLANNER_STATUS_SUCCESS"),
-        *("PLANNER_STATUS_MODIFIED", "STATUS_COMMAND_TIMED_OUT"),
+        *("PLANNER_STATUS_MODIFIED", "STATUS_COMMAND_TIMED_OUT", "STATUS_AT_PREP_POSE"),
     }
 )
 """Names of statuses with which a command goes on, or is done."""
@@ -47,6 +47,20 @@ MEANINGS: Final[Mapping[str, tuple[Cause, str]]] = {
     "STATUS_UNKNOWN_FRAME": (Cause.INVALID, "the robot does not know the frame; update its software"),
     "STATUS_BEHAVIOR_FAULT": (Cause.FAULT, "the robot has fallen or has a fault; clear it on the tablet"),
     "STATUS_DOCKED": (Cause.REFUSED, "the robot stands on its dock; undock it first"),
+    "STATUS_ERROR_LEASE": (Cause.NO_LEASE, _TAKEN),
+    "STATUS_ERROR_DOCK_NOT_FOUND": (Cause.BLOCKED, "the robot does not see this dock; put it before the dock"),
+    "STATUS_ERROR_NOT_DOCKED": (Cause.INVALID, "the robot stands on no dock"),
+    "STATUS_ERROR_GRIPPER_HOLDING_ITEM": (Cause.BLOCKED, "the gripper holds something; put it down first"),
+    "STATUS_ERROR_NOT_AVAILABLE": (Cause.REFUSED, "the robot cannot dock now; let it stand up first"),
+    "STATUS_ERROR_SYSTEM": (Cause.FAULT, f"an error within the robot; {_REPORT}"),
+    "STATUS_OLD_DOCKING_COMMAND": (Cause.STOPPED, "replaced by another command"),
+    **dict.fromkeys(
+        ("STATUS_MISALIGNED", "STATUS_ERROR_DOCK_LOST", "STATUS_ERROR_UNREFINED_PRIOR", "STATUS_ERROR_STUCK"),
+        (Cause.BLOCKED, "the robot does not get onto its dock, or off it; look what is in its way"),
+    ),
+    "STATUS_ERROR_COMMAND_TIMED_OUT": (Cause.LATE, "expired before it was done"),
+    "STATUS_ERROR_NO_TIMESYNC": (Cause.REFUSED, "the robot does not know this clock; it is synchronised again"),
+    "STATUS_ERROR_TOO_DISTANT": (Cause.INVALID, "its end is too far ahead; check the clocks"),
     "STATUS_COMMAND_OVERRIDDEN": (Cause.STOPPED, "replaced by another command"),
     "STATUS_ROBOT_FROZEN": (Cause.STOPPED, "the robot is frozen; unfreeze it on the tablet"),
     "STATUS_INCOMPATIBLE_HARDWARE": (Cause.UNSUPPORTED, "this robot's hardware cannot do it"),

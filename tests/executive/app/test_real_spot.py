@@ -1,6 +1,7 @@
 """Getting a real Spot ready, and every ending, with a scripted robot behind a server in real time.
 
 not ready         one error that names what is missing
+docked            leaves the dock, if the motors may be switched on
 ready             lease, policy and motors are held; afterwards only what was there before
 exception, signal the same ending
 E-stop            pressed or lost: the run ends by it
@@ -28,7 +29,7 @@ from plant.spot_api.server import computer, identity, keepalive
 from plant.spot_api.server.computer import Motors
 from plant.spot_api.server.estop import Tablet
 from skills.files.errors import InputError
-from skills.robot import RobotStoppedError
+from skills.robot import Pose2D, RobotStoppedError
 
 
 @pytest.fixture(scope="session")
@@ -107,6 +108,24 @@ def test_the_motors_are_switched_on_only_with_a_yes(serve):
         made.make_ready()
         assert serve.server.computer.motors is Motors.ON
     assert "Switch them on?" in asked[0]
+
+
+def test_a_docked_robot_leaves_its_dock_only_when_that_is_allowed(serve):
+    serve.server.computer.dock_O = Pose2D(0.0, 0.0, 0.0)
+    for _ in range(100):
+        if serve.server.computer.docked():
+            break
+        time.sleep(0.05)
+    with (
+        pytest.raises(InputError, match=r"stands on its dock.*--power-on"),
+        connected("Alice", replace(serve.access, power_on=False, confirm=lambda question: True)) as made,
+    ):
+        made.make_ready()
+    assert is_as_before(serve)
+    with connected("Alice", serve.access) as made:
+        made.make_ready()
+        assert serve.robot.pose.x_m > 0.7
+        assert serve.robot.height_m == pytest.approx(0.52, abs=0.02)
 
 
 def test_a_lease_that_another_holds_is_taken_only_when_that_is_allowed(serve):

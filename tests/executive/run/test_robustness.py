@@ -91,6 +91,8 @@ class UseAll(Skill):
             robot.move_arm(trajectory, until_s=until_s, lease=lease),
             robot.set_gripper(1.0, 10.0, until_s=until_s, lease=lease),
             robot.point_head(0.1, 0.1, until_s=until_s, lease=lease),
+            robot.dock(520, until_s=until_s, lease=lease),
+            robot.undock(until_s=until_s, lease=lease),
         ]
 
     def drive(self):

@@ -107,6 +107,8 @@ def test_a_lease_of_an_earlier_start_does_not_count(engine, spot, lease):
         (lambda spot, lease: spot.stand(2.0, 0.0, until_s=9.0, lease=lease), CommandCause.INVALID),
         (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 0.1), until_s=9.0, lease=lease), CommandCause.INVALID),
         (lambda spot, lease: spot.point_head(0.0, 0.0, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
+        (lambda spot, lease: spot.dock(520, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
+        (lambda spot, lease: spot.undock(until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
         (lambda spot, lease: spot.sit(until_s=0.0, lease=lease), CommandCause.LATE),
         (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 3.0), until_s=0.2, lease=lease), CommandCause.LATE),
         (lambda spot, lease: spot.drive(0.1, 0.0, 0.0, until_s=0.2, lease=lease), CommandCause.NONE),

@@ -15,6 +15,7 @@ from bosdyn.api import (
     robot_command_pb2,
     time_sync_pb2,
 )
+from bosdyn.api.docking import docking_pb2
 from bosdyn.api.keepalive import keepalive_pb2
 
 from plant.spot_api.adapter.commands import status_of
@@ -23,6 +24,8 @@ from skills.robot import CommandCause, CommandState
 
 READ = (
     header_pb2.CommonError.Code,
+    docking_pb2.DockingCommandResponse.Status,
+    docking_pb2.DockingCommandFeedbackResponse.Status,
     lease_pb2.LeaseUseResult.Status,
     lease_pb2.AcquireLeaseResponse.Status,
     lease_pb2.TakeLeaseResponse.Status,

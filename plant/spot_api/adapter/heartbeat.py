@@ -33,6 +33,7 @@ class Heartbeat:
         self._endpoint: Any = None
         self._config_id, self._challenge = "", 0
         self._policy: int | None = None
+        self._wanted, self._guarded = False, None  # shall there be a policy, and the lease that it names
 
     def beat(self) -> None:
         """Retains the lease, and checks in. Raises LostError; with cause ESTOPPED when our E-stop is gone."""
@@ -42,6 +43,8 @@ class Heartbeat:
         self._beat_s = now_s
         if self._endpoint is not None:
             self._release()
+        if self._wanted and self._connection.lease != self._guarded:
+            self._guard()
         if self._policy is not None:
             self._check_in()
         if self._connection.lease is not None:
@@ -93,9 +96,17 @@ class Heartbeat:
     def add_policy(self) -> None:
         """Lets the robot act alone when we fall silent: it frees the lease, and switches its motors off.
 
-        A robot without the service does neither. Raises LostError.
+        The policy is gone while another client has the lease. A robot without the service does neither. Raises
+        LostError.
         """
-        if not self._connection.has("keepalive"):
+        self._wanted = self._connection.has("keepalive")
+        if self._wanted:
+            self._guard()
+
+    def _guard(self) -> None:
+        self._drop()
+        self._guarded = self._connection.lease
+        if self._guarded is None:
             return
         request = keepalive_pb2.ModifyPolicyRequest()
         request.to_add.name = CLIENT
@@ -106,7 +117,11 @@ class Heartbeat:
 
     def remove_policy(self) -> None:
         """Removes the policy. Raises LostError."""
-        policy, self._policy = self._policy, None
+        self._wanted = False
+        self._drop()
+
+    def _drop(self) -> None:
+        policy, self._policy, self._guarded = self._policy, None, None
         if policy is not None:
             request = keepalive_pb2.ModifyPolicyRequest(policy_ids_to_remove=[policy])
             self._connection.call("keepalive", "ModifyPolicy", request)
@@ -118,4 +133,5 @@ class Heartbeat:
         except LostError as error:
             if error.cause is not CommandCause.REFUSED:
                 raise
-            self.add_policy()
+            self._policy = None
+            self._guard()

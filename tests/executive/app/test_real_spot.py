@@ -203,6 +203,29 @@ class TestOwnEstop:
                     made.clock.advance(0.05)
 
 
+def test_the_robot_does_not_act_alone_while_another_client_moves_it(serve):
+    with connected("Alice", serve.access) as made:
+        made.make_ready()
+        other = other_client(serve)
+        other.acquire(take=True)
+        assert in_time(made.clock, lambda: policies(serve) == {})
+        other.give_back()
+        assert in_time(made.clock, lambda: made.robot.lease_holder() is None)
+        made.robot.acquire_lease("again")
+        assert in_time(made.clock, lambda: len(policies(serve)) == 1)
+        (live,) = policies(serve).values()
+        assert live.policy.actions[0].lease_stale.leases[0] == made.connection.lease
+
+
+def in_time(clock, true):
+    """Lets the run beat until a condition holds, for 4 s at most."""
+    for _ in range(80):
+        if true():
+            return True
+        clock.advance(0.05)
+    return False
+
+
 def test_a_pressed_estop_ends_the_run(serve):
     with connected("Alice", serve.access) as made:
         made.make_ready()

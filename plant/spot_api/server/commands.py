@@ -265,6 +265,7 @@ def _base_motion(request: Any, computer: Computer, snapshot: Snapshot, now_s: fl
         "se2_velocity_request": velocity,
         "se2_trajectory_request": trajectory,
         "stance_request": stance,
+        "follow_arm_request": lambda: hand.FollowArm(request.follow_arm_request),
         "stop_request": lambda: mobility.Halt("stop_feedback"),
         "freeze_request": lambda: mobility.Halt("freeze_feedback"),
     }

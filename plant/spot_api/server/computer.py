@@ -47,6 +47,7 @@ _LATE_S: Final = 0.3
 _STILL_M, _STILL_S, _NEAR_M = 0.01, 1.0, 0.05
 OVERRIDDEN: Final = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN
 _FOREVER_S: Final = 1e7
+_MOVING: Final = 0.05
 _DOCKED_M, _DOCKED_RAD = 0.12, 0.2
 HAND_X_M: Final = 0.19557
 """Distance of the API's frame `hand` ahead of `link_wr1`, the protocol's hand frame H (SDK, frames of the arm)."""
@@ -319,6 +320,15 @@ class Computer:
             self._motions[part] = motion
         for motion in dict.fromkeys(motions.values()):
             motion.begin(self)
+
+    def motion(self, part: str) -> Motion | None:
+        """Motion of a part; None while there is none."""
+        return self._motions.get(part)
+
+    def base_moves(self, *, shifted: bool) -> bool:
+        """Returns whether the base is to move on, or has `shifted` and is not still yet."""
+        speed = np.abs(self.snapshot.odometry.velocity)
+        return getattr(self.motion(MOBILITY), "moving", False) or (shifted and bool(speed.max() > _MOVING))
 
     def stop_parts(self, parts: Sequence[str]) -> None:
         """Ends the motions of parts; the base stops, and the arm holds its position."""

@@ -79,6 +79,11 @@ class BaseMotion:
     def tick(self, computer: Computer) -> None:
         """Goes on with it after a step."""
 
+    @property
+    def moving(self) -> bool:
+        """Returns whether the base is to move on."""
+        return False
+
     def end(self, status: int) -> None:
         """Ends it with a status."""
         if self.status == Status.STATUS_PROCESSING:
@@ -158,6 +163,11 @@ class _Driving(BaseMotion):
 
     end_s: float
 
+    @property
+    def moving(self) -> bool:
+        """Returns whether it drives."""
+        return bool(self.status == Status.STATUS_PROCESSING)
+
     def tick(self, computer: Computer) -> None:
         """Drives on."""
         if self.status == Status.STATUS_PROCESSING and computer.now_s() >= self.end_s:
@@ -206,7 +216,7 @@ class Trajectory(_Driving):
     """Drives along poses in a frame, and stops at the last."""
 
     field = "se2_trajectory_feedback"
-    at_goal: Final = basic_command_pb2.SE2TrajectoryCommand.Feedback.STATUS_AT_GOAL
+    at_goal: Final[int] = basic_command_pb2.SE2TrajectoryCommand.Feedback.STATUS_AT_GOAL
 
     def __init__(self, request: Any, params: Any, end_s: float, snapshot: Snapshot) -> None:
         """Takes the poses over into `odom`, in which they stay."""
@@ -244,10 +254,23 @@ class Trajectory(_Driving):
         velocity = np.zeros(3) if arrived else self._limit(_GAIN_1_S * error)
         drive(computer, velocity, self.end_s)
 
+    @property
+    def moving(self) -> bool:
+        """Returns whether it drives and is not at its last pose."""
+        return super().moving and bool(self._part().status != self.at_goal)
+
     def _target(self, since_s: float) -> Pose2D:
         """Pose at a time since the start: with one pose this one, else between two."""
         later = next((k for k, time_s in enumerate(self._times_s) if time_s > since_s), len(self._poses) - 1)
         return self._poses[later]
+
+
+def way_to(goal_O: Pose2D, end_s: float, snapshot: Snapshot) -> Trajectory:
+    """Returns a motion straight to a pose in `odom`, until a robot time."""
+    request = basic_command_pb2.SE2TrajectoryCommand.Request(se2_frame_name="odom")
+    goal = request.trajectory.points.add().pose
+    goal.position.x, goal.position.y, goal.angle = goal_O.x_m, goal_O.y_m, goal_O.yaw_rad
+    return Trajectory(request, spot_command_pb2.MobilityParams(), end_s, snapshot)
 
 
 def error_to(pose: Pose2D, goal: Pose2D) -> FloatArray:

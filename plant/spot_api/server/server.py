@@ -73,9 +73,9 @@ SERVICES: Final[tuple[type[Service], ...]] = (
 )
 """Services that are served."""
 MOTIONS: Final = (
-    "stand with height and pitch, sit, velocity, trajectory of poses, stance, stop, freeze, safe power off, "
-    "self-right; the arm's joint moves, named positions, Cartesian moves, gaze, velocity and stop; the gripper. Others "
-    "are refused as unsupported."
+    "stand with height and pitch, sit, velocity, trajectory of poses, follow arm, stance, stop, freeze, safe power "
+    "off, self-right; the arm's joint moves, named positions, Cartesian moves, gaze, velocity and stop; the gripper. "
+    "Others are refused as unsupported."
 )
 """The motions of `RobotCommand`, in words."""
 _DESCRIBED_IN: Final = (

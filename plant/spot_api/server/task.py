@@ -6,13 +6,12 @@ import math
 from collections.abc import Generator
 from typing import Final
 
-from bosdyn.api import arm_command_pb2, basic_command_pb2
-from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
+from bosdyn.api import arm_command_pb2
 
 from plant.spot_api.server.arm import Named
 from plant.spot_api.server.computer import Computer
 from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY
-from plant.spot_api.server.mobility import Status, Trajectory
+from plant.spot_api.server.mobility import Status, way_to
 from skills.robot import Pose2D
 
 WHOLE: Final = (MOBILITY, ARM, GRIPPER)
@@ -73,15 +72,12 @@ def walk(computer: Computer, goal_O: Pose2D) -> Generator[None, None, bool]:
     """Walks straight to a pose in `odom`, standing up before; returns whether the robot came there in time."""
     pose = computer.snapshot.odometry.pose
     far_m = math.hypot(goal_O.x_m - pose.x_m, goal_O.y_m - pose.y_m)
-    request = basic_command_pb2.SE2TrajectoryCommand.Request(se2_frame_name="odom")
-    goal = request.trajectory.points.add().pose
-    goal.position.x, goal.position.y, goal.angle = goal_O.x_m, goal_O.y_m, goal_O.yaw_rad
     end_s = computer.now_s() + _LEAST_WALK_S + _WALK_S_PER_M * far_m
-    motion = Trajectory(request, spot_command_pb2.MobilityParams(), end_s, computer.snapshot)
+    motion = way_to(goal_O, end_s, computer.snapshot)
     motion.begin(computer)
     while motion.status == Status.STATUS_PROCESSING:
         yield
         motion.tick(computer)
-        if motion.feedback.se2_trajectory_feedback.status == motion.at_goal:
+        if motion.status == Status.STATUS_PROCESSING and not motion.moving:
             return True
     return False

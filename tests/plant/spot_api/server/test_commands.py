@@ -198,17 +198,9 @@ Status = robot_command_pb2.RobotCommandResponse
         (lambda now: velocity(now + 1.0, frame="moon"), None, Status.STATUS_UNKNOWN_FRAME, "moon"),
         (lambda now: velocity(now + 1.0, x=math.nan), None, Status.STATUS_INVALID_REQUEST, "linear.x is nan"),
         (lambda now: velocity(now + 1.0), "unknown clock", Status.STATUS_NO_TIMESYNC, "clock"),
-        (
-            lambda now: mobility_command_pb2.MobilityCommand.Request(
-                follow_arm_request=basic_command_pb2.FollowArmCommand.Request()
-            ),
-            None,
-            Status.STATUS_UNSUPPORTED,
-            "follow_arm_request",
-        ),
         (lambda now: mobility_command_pb2.MobilityCommand.Request(), None, Status.STATUS_UNSUPPORTED, "no command"),
     ],
-    ids=["expired", "too distant", "frame", "NaN", "clock", "unsupported", "empty"],
+    ids=["expired", "too distant", "frame", "NaN", "clock", "empty"],
 )
 def test_a_command_that_cannot_be_done_says_why_and_moves_nothing(spot, request_of, clock, status, said):
     answer = raw(spot, request_of(time.time()), clock=clock)
@@ -295,3 +287,102 @@ def test_fans_run_for_their_time_or_until_a_later_command(spot):
 def test_fans_with_impossible_power_or_time_are_an_invalid_request(spot, percent, duration):
     with pytest.raises(InvalidRequestError):
         spot.robot.ensure_client("power").fan_power_command(percent_power=percent, duration=duration)
+
+
+def sent_arm(spot, which, **request):
+    """Sends a command of the arm; returns what the server says against it."""
+    command = robot_command_pb2.RobotCommand()
+    getattr(command.synchronized_command.arm_command, which).MergeFrom(
+        type(getattr(command.synchronized_command.arm_command, which))(**request)
+    )
+    getattr(command.synchronized_command.arm_command, which).SetInParent()
+    with pytest.raises(rc.ResponseError) as refused:
+        sent(spot, command)
+    return refused.value.response
+
+
+@pytest.mark.parametrize(
+    ("which", "request_"),
+    [
+        ("arm_drag_command", {}),
+        ("arm_impedance_command", {"root_frame_name": "odom"}),
+        ("arm_cartesian_command", {"root_frame_name": "odom", "z_axis": 1}),
+    ],
+)
+def test_an_arm_that_holds_positions_refuses_forces(spot, which, request_):
+    refused = sent_arm(spot, which, **request_)
+    assert refused.status == Status.STATUS_UNSUPPORTED
+    assert which in refused.message
+
+
+def ready(spot):
+    block(spot, spot.commands.robot_command(Build.arm_ready_command()))
+
+
+def block(spot, command):
+    assert rc.block_until_arm_arrives(spot.commands, command, timeout_sec=12.0)
+
+
+def hand_in(spot, frame):
+    hand = get_a_tform_b(spot.tree, frame, "hand")
+    return hand.x, hand.y, hand.z
+
+
+def test_the_body_follows_a_hand_whose_goal_is_out_of_reach(spot):
+    ready(spot)
+    pose = Build.arm_pose_command(1.6, 0.2, 0.8, 1.0, 0.0, 0.0, 0.0, "odom", 2.0)
+    block(spot, sent(spot, Build.build_synchro_command(Build.follow_arm_command(), pose)))
+    assert hand_in(spot, "odom") == pytest.approx((1.6, 0.2, 0.8), abs=0.02)
+    body = get_odom_tform_body(spot.tree)
+    assert (body.x, body.y) == pytest.approx((0.85, 0.2), abs=0.04)
+
+
+def test_a_body_that_follows_keeps_the_distance_asked_for(spot):
+    ready(spot)
+    pose = Build.arm_pose_command(1.2, 0.0, 0.8, 1.0, 0.0, 0.0, 0.0, "odom", 2.0)
+    follow = robot_command_pb2.RobotCommand()
+    follow.synchronized_command.mobility_command.follow_arm_request.body_offset_from_hand.x = 0.6
+    block(spot, sent(spot, Build.build_synchro_command(follow, pose)))
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(0.6, abs=0.04)
+
+
+def test_a_body_that_follows_no_goal_stays(spot):
+    command = Build.build_synchro_command(Build.follow_arm_command(), Build.arm_ready_command())
+    block(spot, sent(spot, command))
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("frame", "goal"), [("odom", (0.95, 0.1, 0.8)), ("body", (0.75, 0.1, 0.3))])
+def test_the_hand_stays_in_its_frame_while_the_body_walks(spot, frame, goal):
+    ready(spot)
+    pose = Build.arm_pose_command(*goal, 1.0, 0.0, 0.0, 0.0, frame, 1.0)
+    walk = Build.synchro_se2_trajectory_point_command(0.25, 0.0, 0.1, "odom")
+    block(spot, sent(spot, Build.build_synchro_command(walk, pose)))
+    time.sleep(1.5)
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(0.25, abs=0.04)
+    assert hand_in(spot, frame) == pytest.approx(goal, abs=0.03)
+
+
+def test_the_hand_keeps_its_path_below_which_the_body_walks(spot):
+    ready(spot)
+    goal = (0.95, 0.0, 0.8)
+    block(spot, sent(spot, Build.arm_pose_command(*goal, 1.0, 0.0, 0.0, 0.0, "odom", 1.0)))
+    pose = Build.arm_pose_command(*goal, 1.0, 0.0, 0.0, 0.0, "odom", 1.0)
+    walk = Build.synchro_se2_trajectory_point_command(0.3, 0.0, 0.0, "odom")
+    command = sent(spot, Build.build_synchro_command(walk, pose))
+    off_m, until = [], time.monotonic() + 1.5
+    while time.monotonic() < until:
+        off_m.append(math.dist(hand_in(spot, "odom"), goal))
+        time.sleep(0.02)
+    block(spot, command)
+    assert max(off_m) < 0.1
+
+
+def test_a_slower_hand_is_slower(spot):
+    ready(spot)
+    x, y, z = hand_in(spot, "body")
+    command = Build.arm_pose_command(x, y, z + 0.15, 1.0, 0.0, 0.0, 0.0, "body", 0.1)
+    command.synchronized_command.arm_command.arm_cartesian_command.max_linear_velocity.value = 0.1
+    began = time.monotonic()
+    block(spot, spot.commands.robot_command(command))
+    assert time.monotonic() - began > 1.4

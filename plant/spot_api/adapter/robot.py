@@ -281,7 +281,7 @@ class ApiRobot:
         """
         read_state, read_scan = self.sensors.read_state, self.sensors.read_scan
         acting = (self._follow, self._halt_unsure, self._say_carry)
-        for step in (read_state, *acting, read_scan, self._synchronise, self._keep):
+        for step in (read_state, *acting, self._synchronise, self._keep, read_scan):
             try:
                 step()
             except LostError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -28,7 +29,7 @@ OLD_STATE_S: Final = 0.5
 _JUMP_S: Final = 0.7
 _LIDAR: Final = "velodyne-point-cloud"
 _LIDAR_S, _DEPTH_S = 0.09, 0.3
-_PICTURE_S: Final = 2.0
+_PICTURE_S, _AGAIN_S = 2.0, 0.25
 
 
 class Sensors:
@@ -38,7 +39,7 @@ class Sensors:
         """Reads the first state. Raises LostError."""
         self._connection, self._clock, self._capabilities = connection, clock, capabilities
         self.scan: Scan | None = None
-        self.clock_jumped = False
+        self.clock_jumped, self._failed_s = False, -math.inf
         self._height_m: float | None = None
         self.readings: Readings
         self.read_state()
@@ -79,12 +80,15 @@ class Sensors:
 
     def read_scan(self) -> None:
         """Reads the LiDAR, or without one the depth cameras, when the last scan is old. Raises LostError."""
-        lidar = self._connection.has(_LIDAR)
-        if self.scan is None or self._clock.now() - self.scan.stamp_s > (_LIDAR_S if lidar else _DEPTH_S):
-            try:
-                self.scan = self._lidar_scan() if lidar else self._depth_scan()
-            except (KeyError, ValueError) as error:
-                raise LostError(f"the scan cannot be used: {error}", CommandCause.FAULT) from error
+        lidar, now_s = self._connection.has(_LIDAR), self._clock.now()
+        old = self.scan is None or now_s - self.scan.stamp_s > (_LIDAR_S if lidar else _DEPTH_S)
+        if not old or now_s < self._failed_s + _AGAIN_S:
+            return
+        try:
+            self.scan = self._lidar_scan() if lidar else self._depth_scan()
+        except (LostError, KeyError, ValueError, NoImageError) as error:
+            self._failed_s = self._clock.now()
+            raise LostError(f"the scan cannot be used: {error}", CommandCause.FAULT) from error
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
         """Takes a picture with depth, or only one of the two. Raises ValueError and NoImageError."""
@@ -137,18 +141,13 @@ class Sensors:
             made[f"{camera.source}_camera"] = ("hand" if camera.on_hand else "body", camera.X_FC)
         return made
 
-    def _depth_scan(self) -> Scan | None:
-        """Raises LostError."""
+    def _depth_scan(self) -> Scan:
         names = [f"{camera.source}_depth" for camera in self._capabilities.body_cameras]
         answers = self._pictures(names, OLD_STATE_S)
-        try:
-            stamp_s = self._stamp(answers[0].shot.acquisition_time)
-            return depth_scan(answers, stamp_s, self._X_BL(), self.readings.odometry.X_OB)
-        except NoImageError as error:
-            raise LostError(str(error), CommandCause.FAULT) from error
+        stamp_s = self._stamp(answers[0].shot.acquisition_time)
+        return depth_scan(answers, stamp_s, self._X_BL(), self.readings.odometry.X_OB)
 
-    def _lidar_scan(self) -> Scan | None:
-        """Raises LostError."""
+    def _lidar_scan(self) -> Scan:
         request = point_cloud_pb2.GetPointCloudRequest()
         request.point_cloud_requests.add(
             point_cloud_source_name=_LIDAR, cloud_type=point_cloud_pb2.PointCloudRequest.CLOUD_TYPE_POINTS

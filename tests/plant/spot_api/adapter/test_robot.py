@@ -9,6 +9,7 @@ no answer          old readings: drive refused, later a fault
 
 import math
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -533,3 +534,18 @@ def test_a_robot_that_is_not_there_is_one_error(monkeypatch, credentials):
     monkeypatch.setattr(connection, "_SLOW_S", 0.5)
     with pytest.raises(InputError, match=r"spot://127\.0\.0\.1:9: the robot does not answer"):
         Connection(Address("127.0.0.1", 9, credentials.certificate), "user", "right")
+
+
+@pytest.mark.parametrize("fault", [Fault(answer_s=math.inf), Fault(code=grpc.StatusCode.UNAVAILABLE)])
+def test_a_lidar_that_does_not_answer_stops_neither_heartbeat_nor_drive(standing, fault):
+    standing.advance(0.3)
+    standing.robot.heartbeat._beat_s = -math.inf
+    with standing.server.faults.fault("bosdyn.api.PointCloudService/GetPointCloud", fault):
+        standing.advance(0.3)
+        assert standing.robot.heartbeat._beat_s > 0.0
+        command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
+        standing.advance(0.1)
+        assert standing.robot.command_status(command).state is CommandState.RUNNING
+        begun_s = time.monotonic()
+        standing.advance(0.1)  # it is not asked again at once
+        assert time.monotonic() - begun_s < 0.4

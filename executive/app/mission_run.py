@@ -30,7 +30,7 @@ from executive.run.control import Control
 from executive.run.outcome import RobotResult, RunResult
 from executive.run.runner import run
 from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
-from executive.run.worker import LockStepWorker
+from executive.run.worker import LockStepWorker, ThreadWorker
 from executive.tree.context import RunContext
 from executive.tree.node_view import NodeView, node_view
 from executive.tree.nodes.skill_leaf import ERROR_TOPIC, SkillLeaf
@@ -67,12 +67,14 @@ def run_request(
     live: LiveServer | None = None,
     durable: Durable | None = None,
     profile: Profile | None = None,
+    worker: ThreadWorker | None = None,
 ) -> FinishedRun:
     """Runs a prepared request and writes log, tree, report and pictures into its folder.
 
     The `backend` is by default the plant of the request's world. `visitors` and the log watch the run, `control`
     pauses, steps and cancels it, `page` shows it, and `live` sends what is logged. `durable` stores its state so that
-    another process can resume it, or resumes an earlier run. `profile` measures the time of the subsystems.
+    another process can resume it, or resumes an earlier run. `profile` measures the time of the subsystems. The
+    `worker` runs jobs beside the ticks (None: in lock-step with the backend's clock).
 
     Raises InputError if the world or the stored state cannot be used.
     """
@@ -100,9 +102,9 @@ def run_request(
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
         control = control or Control(pace=None)
-        with ended_by_signals(control.cancel), LockStepWorker(clock) as worker:
+        with ended_by_signals(control.cancel), closing(worker or LockStepWorker(clock)) as jobs:
             result = run(
-                entries, clock=clock, worker=worker, visitors=watching, settings=settings, control=control, spare=spare
+                entries, clock=clock, worker=jobs, visitors=watching, settings=settings, control=control, spare=spare
             )
         if durable is not None:  # the next mission of the queue begins in the world that this one leaves
             next(iter(durable.journals.values())).keep_world()

@@ -22,6 +22,7 @@ from executive.app.simulated import compile_first, run_entry
 from executive.record.work import Profile
 from executive.run.outcome import RobotResult
 from executive.run.visitor import RunEntry
+from executive.run.worker import ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from plant.robots.spot.kind import spot_capabilities
@@ -298,5 +299,4 @@ def spot_runner(prepared: Prepared, access: Access) -> Iterator[Callable[..., Fi
         where = start if isinstance(start, Pose2D) else None
         notes = made.robot.sensors.notes
         backend = ApiBackend(made.robot, made.clock, prepared.world, stack, where, made.make_ready, notes)
-
-        yield partial(run_request, backend=backend)
+        yield partial(run_request, backend=backend, worker=ThreadWorker())

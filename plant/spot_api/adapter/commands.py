@@ -65,16 +65,6 @@ def drive(velocity: tuple[float, float, float], end_s: float, params: Any) -> An
     return made
 
 
-def stand(params: Any) -> Any:
-    """Returns the command to stand with the posture of the parameters."""
-    return RobotCommandBuilder.synchro_stand_command(params=params)
-
-
-def sit() -> Any:
-    """Returns the command to sit down."""
-    return RobotCommandBuilder.synchro_sit_command()
-
-
 def arm_move(trajectory: ArmTrajectory, start_s: float) -> Any:
     """Returns the command of an arm trajectory that starts at a robot time."""
     made = arm_command_pb2.ArmJointMoveCommand.Request()

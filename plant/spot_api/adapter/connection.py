@@ -5,34 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from threading import Event
 from typing import Any, Final, Protocol
 
 import bosdyn.client
 import grpc
-from bosdyn.api import (
-    estop_pb2,
-    estop_service_pb2_grpc,
-    gripper_camera_param_service_pb2_grpc,
-    image_service_pb2_grpc,
-    lease_pb2,
-    lease_service_pb2_grpc,
-    manipulation_api_service_pb2_grpc,
-    point_cloud_service_pb2_grpc,
-    power_pb2,
-    power_service_pb2_grpc,
-    robot_command_pb2,
-    robot_command_service_pb2_grpc,
-    robot_id_pb2,
-    robot_id_service_pb2_grpc,
-    robot_state_pb2,
-    robot_state_service_pb2_grpc,
-    time_sync_pb2,
-    time_sync_service_pb2_grpc,
-)
-from bosdyn.api.docking import docking_pb2, docking_service_pb2_grpc
-from bosdyn.api.keepalive import keepalive_service_pb2_grpc
+from bosdyn.api import estop_pb2, lease_pb2, power_pb2, robot_command_pb2, robot_id_pb2, robot_state_pb2, time_sync_pb2
+from bosdyn.api.docking import docking_pb2
 
 from plant.spot_api.adapter.statuses import call_trouble, response_trouble, trouble
 from plant.spot_api.messages import seconds
@@ -43,21 +24,13 @@ CLIENT: Final = "errand"
 CALL_S: Final = 0.5
 _SLOW_S: Final = 5.0
 _ROUND_TRIPS: Final = 5
-_STUBS: Final[Mapping[str, Callable[[Any], Any]]] = {
-    "docking": docking_service_pb2_grpc.DockingServiceStub,
-    "estop": estop_service_pb2_grpc.EstopServiceStub,
-    "gripper-camera-param": gripper_camera_param_service_pb2_grpc.GripperCameraParamServiceStub,
-    "image": image_service_pb2_grpc.ImageServiceStub,
-    "keepalive": keepalive_service_pb2_grpc.KeepaliveServiceStub,
-    "lease": lease_service_pb2_grpc.LeaseServiceStub,
-    "manipulation": manipulation_api_service_pb2_grpc.ManipulationApiServiceStub,
-    "velodyne-point-cloud": point_cloud_service_pb2_grpc.PointCloudServiceStub,
-    "power": power_service_pb2_grpc.PowerServiceStub,
-    "robot-command": robot_command_service_pb2_grpc.RobotCommandServiceStub,
-    "robot-id": robot_id_service_pb2_grpc.RobotIdServiceStub,
-    "robot-state": robot_state_service_pb2_grpc.RobotStateServiceStub,
-    "time-sync": time_sync_service_pb2_grpc.TimeSyncServiceStub,
+_FILES: Final[Mapping[str, str]] = {
+    **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command", "robot-id")},
+    **{name: name.replace("-", "_") for name in ("robot-state", "time-sync", "gripper-camera-param")},
+    **{"docking": "docking.docking", "keepalive": "keepalive.keepalive", "manipulation": "manipulation_api"},
+    "velodyne-point-cloud": "point_cloud",
 }
+"""Files of the SDK that describe the services that are called, by the names of the services."""
 
 
 class LostError(RuntimeError):
@@ -90,7 +63,7 @@ class Connection:
         where = f"spot://{address.host}:{address.port}"
         try:
             self._robot.authenticate(user, password, timeout=_SLOW_S)
-            services = {entry.name for entry in self._robot.list_services()}
+            services = {entry.name: entry.type for entry in self._robot.list_services()}
         except bosdyn.client.auth.InvalidLoginError as error:
             hint = "check --user, and the password that was typed or stands in BOSDYN_CLIENT_PASSWORD"
             raise InputError(f"{where}: the robot refuses user '{user}' with this password", hint=hint) from error
@@ -100,10 +73,14 @@ class Connection:
         except bosdyn.client.Error as error:
             hint = "check address and network; is the robot on?"
             raise InputError(f"{where}: the robot does not answer ({_first_line(error)})", hint=hint) from error
-        wanted = [name for name in _STUBS if name in services]
-        self._stubs = {name: _STUBS[name](self._robot.ensure_channel(name)) for name in wanted}
+        self._stubs = {name: self._stub(name, services[name]) for name in _FILES if name in services}
         self.clock_identifier, self._ahead_s = "", 0.0
         self.lease: Any = None
+
+    def _stub(self, service: str, type_name: str) -> Any:
+        """Returns the SDK's stub of a service."""
+        module = import_module(f"bosdyn.api.{_FILES[service]}_service_pb2_grpc")
+        return getattr(module, f"{type_name.rpartition('.')[2]}Stub")(self._robot.ensure_channel(service))
 
     def has(self, service: str) -> bool:
         """Returns whether the robot has a service."""

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 from bosdyn.api import manipulation_api_pb2, robot_state_pb2
+from bosdyn.client.robot_command import RobotCommandBuilder
 
 from plant.spot_api.adapter import commands
 from plant.spot_api.adapter.commands import Sent, SentCommands, docking_status, status_of
@@ -154,7 +155,9 @@ class ApiRobot:
         if (refused := self._objection("posture", lease, until_s, (height_m, pitch_rad))) is not None:
             return refused
         before, self._posture = self._posture, (height_m, pitch_rad)
-        sent = self._send(commands.stand(self._params()), Sent(0, "posture", until_s=until_s))
+        sent = self._send(
+            RobotCommandBuilder.synchro_stand_command(params=self._params()), Sent(0, "posture", until_s=until_s)
+        )
         if self.command_status(sent).state is CommandState.REFUSED:
             self._posture = before
         return sent
@@ -162,7 +165,7 @@ class ApiRobot:
     def sit(self, *, until_s: float, lease: Lease) -> CommandId:
         """Lowers the body to the floor."""
         refused = self._objection("posture", lease, until_s)
-        return refused or self._send(commands.sit(), Sent(0, "posture", until_s=until_s))
+        return refused or self._send(RobotCommandBuilder.synchro_sit_command(), Sent(0, "posture", until_s=until_s))
 
     def dock(self, station: int, *, until_s: float, lease: Lease) -> CommandId:
         """Docks at the docking station of a number, nearby."""

@@ -13,6 +13,7 @@ from executive.mission.scenario import Scenario
 from executive.record.history import read_events
 from executive.record.work import Profile
 from executive.run.outcome import Outcome
+from executive.run.worker import ThreadWorker
 from tests.executive.app.scripted_backend import ScriptedBackend
 
 
@@ -31,6 +32,25 @@ def test_a_run_without_a_referee_is_achieved_when_the_tree_says_so(prepared):
     assert backend.asked == [("drive", Outcome.SUCCESS)]
     x_m, y_m, _ = backend.robot.odometry().X_OB.translation()
     assert (x_m, y_m) == (pytest.approx(1.0, abs=0.2), pytest.approx(0.5, abs=0.2))
+
+
+def test_a_run_uses_the_worker_that_it_is_given_and_closes_it(prepared):
+    class Counting(ThreadWorker):
+        """One that counts its jobs."""
+
+        jobs, closed = 0, False
+
+        def submit(self, work, *, latency_s, name):
+            self.jobs += 1
+            return super().submit(work, latency_s=latency_s, name=name)
+
+        def close(self):
+            self.closed = True
+            super().close()
+
+    worker = Counting()
+    assert run_request(prepared, ScriptedBackend(), worker=worker).report.outcome == "success"
+    assert (worker.jobs > 0, worker.closed) == (True, True)
 
 
 def test_the_report_of_a_run_without_a_referee_says_so(prepared):

@@ -31,7 +31,7 @@ def real_time(
     options = Options({USER: password}, tablet=tablet)
     server = SpotServer(robot, clock, arm_model(spot_capabilities()), credentials, options)
     stopping = threading.Event()
-    stepping = threading.Thread(target=server.computer.run, args=(stopping,))
+    stepping = threading.Thread(target=server.computer.run, args=(stopping,), daemon=True)
     with server.running():
         stepping.start()
         try:
@@ -51,20 +51,25 @@ class LockStep:
         self._build, self._credentials, self.certificate = build, credentials, credentials.certificate
         self._perception = perception
         self._ready, self._stopping, self._polled_s = threading.Event(), threading.Event(), time.monotonic()
-        self._thread = threading.Thread(target=self._serve)
+        self._failure: Exception | None = None
+        self._thread = threading.Thread(target=self._serve, daemon=True)
         self._thread.start()
         self._ready.wait()
+        if self._failure is not None:
+            raise self._failure
         self.connection = Connection(Address("127.0.0.1", self.server.port, credentials.certificate), USER, PASSWORD)
         self.connection.synchronise()
         self.robot = ApiRobot("Alice", self.connection, self, spot_capabilities())
 
     def _serve(self) -> None:
-        robot, clock = self._build()
-        solver, options = (
-            arm_model(robot.capabilities()),
-            Options({USER: PASSWORD}, pace=Pace.CLIENT, perception=self._perception),
-        )
-        self.server = SpotServer(robot, clock, solver, self._credentials, options)
+        options = Options({USER: PASSWORD}, pace=Pace.CLIENT, perception=self._perception)
+        try:
+            robot, clock = self._build()
+            self.server = SpotServer(robot, clock, arm_model(robot.capabilities()), self._credentials, options)
+        except Exception as error:
+            self._failure = error
+            self._ready.set()
+            return
         self.served = robot
         with self.server.running():
             self._ready.set()

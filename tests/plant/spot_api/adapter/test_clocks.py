@@ -67,7 +67,7 @@ def serve(credentials, monkeypatch):
         server = SpotServer(scripted, clock, arm_model(spot_capabilities()), credentials, Options({USER: PASSWORD}))
         running, stopping = server.running(), threading.Event()
         running.__enter__()
-        stepping = threading.Thread(target=server.computer.run, args=(stopping,))
+        stepping = threading.Thread(target=server.computer.run, args=(stopping,), daemon=True)
         stepping.start()
         ending.append((running, stopping, stepping))
         made = Connection(Address("127.0.0.1", server.port, credentials.certificate), USER, PASSWORD)

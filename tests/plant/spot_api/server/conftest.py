@@ -47,7 +47,7 @@ def served(credentials) -> Iterator[Served]:
     solver = arm_model(spot_capabilities())
     server = SpotServer(scripted, clock, solver, credentials, Options({USER: PASSWORD}, pace=Pace.REAL))
     stopping = threading.Event()
-    stepping = threading.Thread(target=server.computer.run, args=(stopping,))
+    stepping = threading.Thread(target=server.computer.run, args=(stopping,), daemon=True)
     with server.running():
         stepping.start()
         yield Served(server, scripted)

@@ -7,7 +7,10 @@ wrong password   one line, exit 2
 right password   in no file, log or report
 """
 
+import json
 import sys
+import threading
+import time
 from importlib import util
 from pathlib import Path
 
@@ -87,7 +90,7 @@ SECRET = "wOmbat-7391-password"
 
 
 @pytest.fixture
-def served(tmp_path, monkeypatch):
+def served(request, tmp_path, monkeypatch):
     """Serves a scripted Spot; returns the options of `errand run` for it."""
     pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
     sys.path.insert(0, str(Path(__file__).parents[2] / "plant" / "spot_api"))
@@ -98,6 +101,7 @@ def served(tmp_path, monkeypatch):
     held = credentials(tmp_path / "credentials")
     monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", SECRET)
     with real_time(held, password=SECRET) as (server, _):
+        request.node.server = server
         address = ["--robot", f"spot://127.0.0.1:{server.port}", "--certificate", str(held.certificate)]
         files = ["--out", str(tmp_path / "out"), "--store", str(tmp_path / "missions.db")]
         yield ["run", "--say", "say hello", "--start", "9.3", "4.05", "0", "--user", USER, *address, *files]
@@ -129,3 +133,26 @@ def test_the_password_stands_in_no_file_and_no_output(served, tmp_path):
     assert {"log.mcap", "report.html", "missions.db"} <= {path.name for path in files}
     assert [path for path in files if SECRET.encode() in path.read_bytes()] == []
     assert not any(SECRET in repr(event) for event in read_events(tmp_path / "out" / "log.mcap"))
+
+
+def test_a_password_that_is_missing_is_named_where_nobody_can_type_it(served, monkeypatch):
+    monkeypatch.delenv("BOSDYN_CLIENT_PASSWORD")
+    result = CliRunner().invoke(app, served)
+    assert (result.exit_code, "set BOSDYN_CLIENT_PASSWORD" in result.output) == (2, True), result.output
+
+
+def test_a_pressed_estop_ends_the_run_by_that_cause(request, served, tmp_path):
+    def press():
+        while request.node.server.computer.motors.value != "on":
+            time.sleep(0.05)
+        time.sleep(2.0)
+        request.node.server.computer.estop._held["tablet"].level = 1
+
+    pressing = threading.Thread(target=press)
+    pressing.start()
+    mission = ["run", "--say", "go to the kitchen", *served[3:]]
+    result = CliRunner().invoke(app, [*mission, "--power-on", "--json"])
+    pressing.join()
+    report = json.loads(result.output.splitlines()[-1])
+    assert (report["outcome"], report["message"]) == ("failure", "the E-stop is pressed"), result.output
+    assert request.node.server.computer.motors.value == "off"

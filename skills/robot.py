@@ -107,6 +107,14 @@ class Imu:
 
 
 @dataclass(frozen=True)
+class OwnLocalisation:
+    """Pose of `odom` in the frame S of the robot's own map, from a robot with the verb `own_localisation`."""
+
+    stamp_s: float
+    X_SO: Pose2D
+
+
+@dataclass(frozen=True)
 class Scan:
     """LiDAR revolution: ranges_m[ring, azimuth] with NaN for no return, angles in the lidar frame, X_BL."""
 

@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8194,
     "executive/cli": 4875,
-    "skills": 27282,
-    "plant": 21105,
+    "skills": 27350,
+    "plant": 21141,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 488, 84, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 489, 84, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

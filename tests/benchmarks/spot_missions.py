@@ -24,13 +24,14 @@ from typing import Any, Final
 
 from executive.app.goal_conditions import verdict_of
 from executive.app.mission_run import run_request
+from executive.app.placed_robots import robot_stack
 from executive.app.prepare import prepare
 from executive.app.real_spot import ApiBackend
+from executive.app.served_spot import SpotPerception
 from executive.app.simulated import simulate
 from executive.mission.request import Request
 from plant.simulation import Simulation
 from plant.spot_api.server.identity import credentials
-from skills.stack import default_stack
 from tests.plant.spot_api.lock_step import LockStep
 
 MISSIONS: Final = Path(__file__).parents[2] / "missions"
@@ -54,7 +55,8 @@ class Judged(ApiBackend):
     """Backend of a real Spot, with the referee of the plant behind the server."""
 
     def __init__(self, step: LockStep, simulation: Simulation, prepared: Any) -> None:
-        super().__init__(step.robot, step, prepared.world, default_stack(), prepared.world.start)
+        stack = robot_stack(prepared.robots[step.robot.name])
+        super().__init__(step.robot, step, prepared.world, stack, prepared.world.start)
         self._simulation = simulation
 
     def judge(self, tree, result, *, before=(), since_s=0.0):  # type: ignore[no-untyped-def]
@@ -81,7 +83,7 @@ def through_api(
         made.append(simulate(prepared.world, prepared.robots, seed=request.seed, record=False))
         return made[0].robots["Alice"], made[0].clock
 
-    step = LockStep(build, credentials(folder))
+    step = LockStep(build, credentials(folder), SpotPerception({}))
     try:
         step.stand_up()
         began_s = time.monotonic()

@@ -2,6 +2,7 @@
 
 go to the kitchen   fulfilled, as in process
 fetch a drink       fulfilled, as in process (nightly)
+graph_nav           localised by the robot, fulfilled
 lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run
 """
 
@@ -10,8 +11,13 @@ import pytest
 pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
 
 import bosdyn.client
+from bosdyn.api.graph_nav import nav_pb2
+from bosdyn.api.graph_nav.graph_nav_pb2 import SetLocalizationRequest
+from bosdyn.client.graph_nav import GraphNavClient
 from bosdyn.client.lease import LeaseClient
 
+from executive.app.served_spot import world_map
+from executive.app.worlds import open_world
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
@@ -33,6 +39,31 @@ FREE = "the lease was given back"
 def test_a_mission_through_the_api_is_fulfilled(what, tmp_path):
     ended = through_api(Request(**what, record=False, out=tmp_path / "out"), tmp_path / "credentials")
     assert (ended.outcome, ended.verdict) == ("success", True), ended
+
+
+def localised_by_a_person(step):
+    """Uploads a map of the flat and localises the robot at its start, as a person does with a tablet."""
+    sdk = bosdyn.client.create_standard_sdk("tablet", cert_resource_glob=str(step.certificate))
+    robot = sdk.create_robot("127.0.0.1")
+    robot.update_secure_channel_port(step.server.port)
+    robot.authenticate("user", "right")
+    client, flat = robot.ensure_client(GraphNavClient.default_service_name), world_map(open_world("flat"), "spot")
+    client.upload_graph(graph=flat.graph)
+    for snapshot in flat.waypoint_snapshots.values():
+        client.upload_waypoint_snapshot(snapshot)
+    at_start = nav_pb2.Localization(waypoint_id="start", waypoint_tform_body={"rotation": {"w": 1.0}})
+    client.set_localization(at_start, fiducial_init=SetLocalizationRequest.FIDUCIAL_INIT_NO_FIDUCIAL)
+    return {}
+
+
+@pytest.mark.mission
+@pytest.mark.parametrize("localised", [True, False], ids=["localised", "not localised"])
+def test_graph_nav_localises_the_robot_of_a_mission(localised, tmp_path):
+    (tmp_path / "stack.yaml").write_text("localiser: {use: graph_nav}\n")
+    what = {"sentence": "go to the kitchen", "seed": 3, "stack": tmp_path / "stack.yaml"}
+    request = Request(**what, record=False, out=tmp_path / "out")
+    ended = through_api(request, tmp_path / "credentials", localised_by_a_person if localised else lambda _: {})
+    assert (ended.outcome == "success", ended.verdict) == (localised, localised), ended
 
 
 class Tablet(RunVisitor):

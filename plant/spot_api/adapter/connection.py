@@ -28,7 +28,7 @@ _FILES: Final[Mapping[str, str]] = {
     **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command", "robot-id")},
     **{name: name.replace("-", "_") for name in ("robot-state", "time-sync", "gripper-camera-param")},
     **{"docking": "docking.docking", "keepalive": "keepalive.keepalive", "manipulation": "manipulation_api"},
-    "velodyne-point-cloud": "point_cloud",
+    **{"velodyne-point-cloud": "point_cloud", "graph-nav-service": "graph_nav.graph_nav"},
 }
 """Files of the SDK that describe the services that are called, by the names of the services."""
 

@@ -38,6 +38,7 @@ from skills.robot import (
     Lease,
     LeaseError,
     Odometry,
+    OwnLocalisation,
     Scan,
 )
 
@@ -97,6 +98,11 @@ class ApiRobot:
     def scan(self) -> Scan | None:
         """Latest LiDAR revolution, None before the first."""
         return self.sensors.scan
+
+    def own_localisation(self) -> OwnLocalisation | None:
+        """Latest place by GraphNav, None while it knows none; it is read after somebody has asked for it."""
+        self.sensors.localises = True
+        return self.sensors.place
 
     def joints(self) -> Joints:
         """Latest joint state."""
@@ -284,7 +290,7 @@ class ApiRobot:
         """
         read_state, read_scan = self.sensors.read_state, self.sensors.read_scan
         acting = (self._follow, self._halt_unsure, self._say_carry)
-        for step in (read_state, *acting, self._synchronise, self._keep, read_scan):
+        for step in (read_state, *acting, self._synchronise, self._keep, read_scan, self.sensors.read_place):
             try:
                 step()
             except LostError as error:

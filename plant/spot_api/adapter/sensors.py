@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from bosdyn.api import gripper_camera_param_pb2, image_pb2, point_cloud_pb2
+from bosdyn.api.graph_nav import graph_nav_pb2
 from pydrake.math import RigidTransform
 
 from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
@@ -22,12 +23,23 @@ from plant.spot_api.adapter.readings import (
     unfit,
 )
 from plant.spot_api.adapter.statuses import response_trouble
-from plant.spot_api.messages import frames_of, pose_between, seconds
-from skills.robot import Capabilities, CommandCause, FloatArray, FrameTree, Image, NoImageError, Scan
+from plant.spot_api.messages import frames_of, pose_between, seconds, transform
+from skills.robot import (
+    Capabilities,
+    CommandCause,
+    FloatArray,
+    FrameTree,
+    Image,
+    NoImageError,
+    OwnLocalisation,
+    Pose2D,
+    Scan,
+)
 
 OLD_STATE_S: Final = 0.5
 _JUMP_S: Final = 0.7
 _LIDAR: Final = "velodyne-point-cloud"
+_GRAPH_NAV: Final = "graph-nav-service"
 _LIDAR_S, _DEPTH_S = 0.09, 0.3
 _PICTURE_S, _AGAIN_S = 2.0, 0.25
 
@@ -39,6 +51,8 @@ class Sensors:
         """Reads the first state. Raises LostError."""
         self._connection, self._clock, self._capabilities = connection, clock, capabilities
         self.scan: Scan | None = None
+        self.place: OwnLocalisation | None = None
+        self.localises = False
         self.clock_jumped, self._failed_s = False, -math.inf
         self._height_m: float | None = None
         self.readings: Readings
@@ -89,6 +103,22 @@ class Sensors:
         except (LostError, KeyError, ValueError, NoImageError) as error:
             self._failed_s = self._clock.now()
             raise LostError(f"the scan cannot be used: {error}", CommandCause.FAULT) from error
+
+    def read_place(self) -> None:
+        """Reads where GraphNav localises the robot, if anybody asks. Raises LostError."""
+        if not self.localises:
+            return
+        request = graph_nav_pb2.GetLocalizationStateRequest()
+        answer = self._connection.call(_GRAPH_NAV, "GetLocalizationState", request)
+        place, kinematics = answer.localization, answer.robot_kinematics
+        self.place = None
+        if place.waypoint_id and place.HasField("seed_tform_body") and not answer.lost_detector_state.is_lost:
+            try:
+                X_OB = pose_between(frames_of(kinematics.transforms_snapshot), "odom", "body")
+                X_SO = transform(place.seed_tform_body, "seed_tform_body") @ X_OB.inverse()
+            except (KeyError, ValueError) as error:
+                raise LostError(f"the place cannot be used: {error}", CommandCause.FAULT) from error
+            self.place = OwnLocalisation(self._stamp(kinematics.acquisition_timestamp), Pose2D.from_transform(X_SO))
 
     def image(self, source: str, *, visual: bool, depth: bool) -> Image:
         """Takes a picture with depth, or only one of the two. Raises ValueError and NoImageError."""

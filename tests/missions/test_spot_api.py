@@ -3,14 +3,18 @@
 go to the kitchen   fulfilled, as in process
 fetch a drink       fulfilled, as in process (nightly)
 graph_nav           localised by the robot, fulfilled
+cut for 4.5 s       paused; goes on by itself
 lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run
 """
+
+from contextlib import ExitStack
 
 import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
 
 import bosdyn.client
+import grpc
 from bosdyn.api.graph_nav import nav_pb2
 from bosdyn.api.graph_nav.graph_nav_pb2 import SetLocalizationRequest
 from bosdyn.client.graph_nav import GraphNavClient
@@ -22,6 +26,7 @@ from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.run.visitor import RunVisitor
+from plant.spot_api.server.faults import Fault
 from tests.benchmarks.spot_missions import MISSIONS, through_api
 
 FREE = "the lease was given back"
@@ -88,6 +93,35 @@ class Tablet(RunVisitor):
         if self.seen[-1:] != [(mode, reason)]:
             self.seen.append((mode, reason))
         self.poses[progress.ticks] = progress.robots["Alice"].pose
+
+
+class Cut(RunVisitor):
+    """Network that is cut from tick 140 to tick 230."""
+
+    def __init__(self, faults, control):
+        self._faults, self._control, self._cut, self.seen = faults, control, ExitStack(), []
+
+    def tick(self, progress):
+        if progress.ticks == 140:
+            self._cut.enter_context(self._faults.fault("*", Fault(code=grpc.StatusCode.UNAVAILABLE)))
+        elif progress.ticks == 230:
+            self._cut.close()
+        if self.seen[-1:] != [said := (self._control.state.mode, self._control.state.reason)]:
+            self.seen.append(said)
+
+
+@pytest.mark.mission
+def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
+    control, cuts = Control(attended=True, pace=None), []
+
+    def with_cut(step):
+        cuts.append(Cut(step.server.faults, control))
+        return {"visitors": cuts, "control": control}
+
+    request = Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out")
+    ended = through_api(request, tmp_path / "credentials", with_cut)
+    assert cuts[0].seen == [(Mode.RUNNING, ""), (Mode.PAUSED, "Alice has not answered for 3 s"), (Mode.RUNNING, "")]
+    assert (ended.outcome, ended.verdict) == ("success", True), ended
 
 
 @pytest.mark.mission

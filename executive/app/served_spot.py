@@ -25,6 +25,8 @@ from skills.perception.fiducials import MOST_AMBIGUITY, find_tags
 from skills.robot import FloatArray, Image, Pose2D, Robot, Scan
 
 _CELL_M, _MARGIN_M = 0.025, 1.0
+_MOST_CELLS, _HALF_SIZE_M = 4_000_000, 500.0
+"""Most cells of a map, and the distance from its middle to where its points count."""
 _HEIGHTS_M: Final = (0.7, 1.3)
 _STEP_M, _SAME_M = 0.6, 0.2
 """Distance between waypoints along a path, and from an earlier one that stands for a new one."""
@@ -74,16 +76,18 @@ class PointsLocaliser:
 
 
 def _grid(points_S: FloatArray) -> GridMap:
-    """The cells in which points at the height of the LiDAR lie."""
-    low_m, high_m = _HEIGHTS_M
-    points = points_S[(points_S[:, 2] >= low_m) & (points_S[:, 2] <= high_m), :2]
-    corners = np.array([points.min(axis=0), points.max(axis=0)]) if len(points) else np.zeros((2, 2))
-    origin, size = corners[0] - _MARGIN_M - 0.5 * _CELL_M, corners[1] - corners[0] + 2.0 * _MARGIN_M
-    columns, rows = np.ceil(size / _CELL_M).astype(int)
+    """The cells in which points at the height of the LiDAR lie; large maps have larger cells."""
+    points = points_S[(points_S[:, 2] >= _HEIGHTS_M[0]) & (points_S[:, 2] <= _HEIGHTS_M[1]), :2]
+    middle = np.median(points, axis=0) if len(points) else np.zeros(2)
+    points = points[np.abs(points - middle).max(axis=1, initial=0.0) < _HALF_SIZE_M]
+    low, high = (edge(np.vstack([points, middle]), axis=0) for edge in (np.min, np.max))
+    cell_m = max(_CELL_M, float(np.sqrt(np.prod(high - low + 2.0 * _MARGIN_M) / _MOST_CELLS)))
+    origin = low - _MARGIN_M - 0.5 * cell_m
+    columns, rows = np.ceil((high - origin + _MARGIN_M) / cell_m).astype(int)
     occupied = np.zeros((rows, columns), dtype=np.bool_)
-    column, row = np.floor((points - origin) / _CELL_M).astype(int).T
+    column, row = np.floor((points - origin) / cell_m).astype(int).T
     occupied[row, column] = True
-    return GridMap(occupied, _CELL_M, (float(origin[0]), float(origin[1])), height_band_m=_HEIGHTS_M)
+    return GridMap(occupied, cell_m, (float(origin[0]), float(origin[1])), height_band_m=_HEIGHTS_M)
 
 
 def world_map(world: World, kind: str) -> GraphMap:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections import Counter, deque
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,6 +26,7 @@ Poses = Mapping[str, RigidTransform]
 """Poses X_SW of waypoints by their ids."""
 _SEEN_M: Final = 6.0
 """Distance from a waypoint up to which its snapshot has points."""
+_FARTHEST_M: Final = 10_000.0
 _Validation = graph_nav_pb2.UploadGraphResponse.ValidationStatus
 
 
@@ -47,14 +48,10 @@ class GraphMap:
 
     def with_graph(self, graph: Any, *, alone: bool, anchor: bool) -> GraphMap:
         """Returns the map with a graph added, or `alone`; `anchor` makes new anchors. Raises InvalidGraphError."""
-        graphs = (graph,) if alone else (self.graph, graph)
-        _refuse_duplicates(graph)
-        made = map_pb2.Graph()
-        made.waypoints.extend(_latest((each.id, each) for one in graphs for each in one.waypoints))
-        made.edges.extend(_latest((_ends(each), each) for one in graphs for each in one.edges))
-        made.anchoring.anchors.extend(_latest((each.id, each) for one in graphs for each in one.anchoring.anchors))
-        made.anchoring.objects.extend(_latest((each.id, each) for one in graphs for each in one.anchoring.objects))
-        _refuse_invalid(made)
+        graphs, made = ((graph,) if alone else (self.graph, graph)), map_pb2.Graph()
+        for listed, key in _LISTS:
+            listed(made).extend({key(each): each for one in graphs for each in listed(one)}.values())
+        _refuse_invalid(graph, made)
         if anchor and made.waypoints:
             made.anchoring.Clear()
             for name, X_SW in replace(self, graph=made).poses(made.waypoints[0].id).items():
@@ -138,20 +135,15 @@ class GraphMap:
     def points(self, poses: Poses) -> FloatArray:
         """The snapshots' points (N, 3): x, y in frame S and the height above the floor, by the robot's odometry."""
         made = [np.empty((0, 3))]
-        for name, X_SW in poses.items():
-            snapshot = self.waypoint_snapshots.get(self.waypoints[name].snapshot_id)
-            if snapshot is None or (p_K := _points_K(snapshot.point_cloud)) is None:
-                continue
-            X_SK = X_SW @ transform(self.waypoints[name].waypoint_tform_ko, "waypoint_tform_ko")
-            made.append(np.column_stack([(X_SK @ p_K.T).T[:, :2], p_K[:, 2]]))
+        for X_SK, snapshot in self._snapshots(poses):
+            if (p_K := _points_K(snapshot.point_cloud)) is not None:
+                made.append(np.column_stack([(X_SK @ p_K.T).T[:, :2], p_K[:, 2]]))
         return np.concatenate(made)
 
     def tags(self, poses: Poses) -> Mapping[int, RigidTransform]:
-        """Poses X_ST of the AprilTags that are anchored, or that snapshots show, by their numbers."""
+        """Poses X_ST of the AprilTags that snapshots show, or that are anchored, by their numbers."""
         made: dict[int, RigidTransform] = {}
-        for name, X_SW in poses.items():
-            snapshot = self.waypoint_snapshots.get(self.waypoints[name].snapshot_id, map_pb2.WaypointSnapshot())
-            X_SK = X_SW @ transform(self.waypoints[name].waypoint_tform_ko, "waypoint_tform_ko")
+        for X_SK, snapshot in self._snapshots(poses):
             for each in snapshot.objects:
                 tag, frames = each.apriltag_properties, frames_of(each.transforms_snapshot)
                 if tag.tag_id and {"odom", tag.frame_name_fiducial} <= frames.keys():
@@ -159,51 +151,45 @@ class GraphMap:
         anchored = [each for each in self.graph.anchoring.objects if each.id.isdecimal()]
         return {**made, **{int(each.id): transform(each.seed_tform_object, "object") for each in anchored}}
 
-
-def _latest(named: Iterable[tuple[Any, Any]]) -> Iterable[Any]:
-    """The last message of each name."""
-    return dict(named).values()
+    def _snapshots(self, poses: Poses) -> Iterator[tuple[RigidTransform, Any]]:
+        """Yields the waypoints' snapshots with the poses of `odom` at the time of each."""
+        for name, X_SW in poses.items():
+            snapshot = self.waypoint_snapshots.get(self.waypoints[name].snapshot_id)
+            if snapshot is not None:
+                yield X_SW @ transform(self.waypoints[name].waypoint_tform_ko, "waypoint_tform_ko"), snapshot
 
 
 def _ends(edge: Any) -> tuple[str, str]:
     return edge.id.from_waypoint, edge.id.to_waypoint
 
 
-def _refuse_duplicates(graph: Any) -> None:
-    """Raises InvalidGraphError when two waypoints, edges or anchors of an upload have the same id."""
-    report = _Validation()
-    for names, twice in (
-        ([each.id for each in graph.waypoints], report.duplicate_waypoint_ids),
-        ([each.id for each in graph.anchoring.anchors], report.duplicate_waypoint_anchor_ids),
-        ([each.id for each in graph.anchoring.objects], report.duplicate_object_anchor_ids),
-    ):
-        twice.extend(name for name, count in Counter(names).items() if count > 1)
-    for (a, b), count in Counter(_ends(each) for each in graph.edges).items():
-        if count > 1:
-            report.duplicate_edge_ids.add(from_waypoint=a, to_waypoint=b)
-    if report.ByteSize():
-        raise InvalidGraphError(report)
-
-
-def _refuse_invalid(graph: Any) -> None:
-    """Raises InvalidGraphError for ids without a waypoint, and for poses that are none."""
+def _refuse_invalid(upload: Any, graph: Any) -> None:
+    """Raises InvalidGraphError for ids that come twice in an upload or lack a waypoint, and for poses that are none."""
     report, known = _Validation(), {each.id for each in graph.waypoints}
+    twice = [[key for key, n in Counter(map(key_of, listed(upload))).items() if n > 1] for listed, key_of in _LISTS]
+    report.duplicate_waypoint_ids.extend(twice[0])
+    report.duplicate_edge_ids.extend(map_pb2.Edge.Id(from_waypoint=a, to_waypoint=b) for a, b in twice[1])
+    report.duplicate_waypoint_anchor_ids.extend(twice[2])
+    report.duplicate_object_anchor_ids.extend(twice[3])
+    edges, anchors, objects = graph.edges, graph.anchoring.anchors, graph.anchoring.objects
     report.has_empty_waypoint_ids = "" in known
-    for edge in graph.edges:
-        a, b = _ends(edge)
-        report.missing_waypoint_ids_in_edges.extend({a, b} - known)
-        if a == b:
-            report.invalid_waypoint_ids_self_edges.append(a)
-        if not _is_pose(edge.from_tform_to):
-            report.edge_ids_invalid_transform.add(from_waypoint=a, to_waypoint=b)
-    anchors = graph.anchoring.anchors
-    report.missing_waypoint_ids_in_anchors.extend(each.id for each in anchors if each.id not in known)
+    report.missing_waypoint_ids_in_edges.extend({name for edge in edges for name in _ends(edge)} - known)
+    report.missing_waypoint_ids_in_anchors.extend({each.id for each in anchors} - known)
+    report.invalid_waypoint_ids_self_edges.extend(a for a, b in map(_ends, edges) if a == b)
+    report.edge_ids_invalid_transform.extend(each.id for each in edges if not _is_pose(each.from_tform_to))
     report.waypoint_anchors_invalid_transform.extend(e.id for e in anchors if not _is_pose(e.seed_tform_waypoint))
-    report.object_anchors_invalid_transform.extend(
-        each.id for each in graph.anchoring.objects if not _is_pose(each.seed_tform_object)
-    )
+    report.object_anchors_invalid_transform.extend(e.id for e in objects if not _is_pose(e.seed_tform_object))
     if report.ByteSize():
         raise InvalidGraphError(report)
+
+
+_LISTS: Final[Sequence[tuple[Callable[[Any], Any], Callable[[Any], Any]]]] = (
+    (lambda graph: graph.waypoints, lambda each: each.id),
+    (lambda graph: graph.edges, _ends),
+    (lambda graph: graph.anchoring.anchors, lambda each: each.id),
+    (lambda graph: graph.anchoring.objects, lambda each: each.id),
+)
+"""Lists of a graph, and the key of each of their messages."""
 
 
 def _is_pose(message: Any) -> bool:
@@ -221,7 +207,8 @@ def _points_K(cloud: Any) -> FloatArray | None:
     if not coded or not {"odom", cloud.source.frame_name_sensor} <= frames.keys():
         return None
     p_C = np.frombuffer(cloud.data, np.float32).reshape(-1, 3).astype(np.float64)
-    return np.asarray((pose_between(frames, "odom", cloud.source.frame_name_sensor) @ p_C.T).T)
+    near = np.linalg.norm(p_C, axis=1) < _FARTHEST_M  # no number is none
+    return np.asarray((pose_between(frames, "odom", cloud.source.frame_name_sensor) @ p_C[near].T).T)
 
 
 def map_of(

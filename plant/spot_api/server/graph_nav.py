@@ -111,29 +111,28 @@ class GraphNavService(Service):
 
     def UploadWaypointSnapshot(self, requests: Any, _call: Call) -> Any:
         """Adds a snapshot of a waypoint."""
-        self._add(waypoints=[joined(requests, map_pb2.WaypointSnapshot)])
         Response = graph_nav_pb2.UploadWaypointSnapshotResponse
-        return Response(status=Response.STATUS_OK)
+        return self._added(Response(status=Response.STATUS_OK), [joined(requests, map_pb2.WaypointSnapshot)], [])
 
     def UploadEdgeSnapshot(self, requests: Any, _call: Call) -> Any:
         """Adds a snapshot of an edge."""
-        self._add(edges=[joined(requests, map_pb2.EdgeSnapshot)])
-        return graph_nav_pb2.UploadEdgeSnapshotResponse()
+        return self._added(graph_nav_pb2.UploadEdgeSnapshotResponse(), [], [joined(requests, map_pb2.EdgeSnapshot)])
 
     def UploadSnapshots(self, requests: Any, _call: Call) -> Any:
         """Adds many snapshots."""
-        Response = graph_nav_pb2.UploadSnapshotsResponse
-        given = joined(requests, graph_nav_pb2.UploadSnapshotsRequest.Snapshots)
-        self._add(waypoints=given.waypoint_snapshots, edges=given.edge_snapshots)
-        return Response(status=Response.STATUS_OK)
+        Response, given = graph_nav_pb2.UploadSnapshotsResponse, graph_nav_pb2.UploadSnapshotsRequest.Snapshots
+        both = joined(requests, given)
+        return self._added(Response(status=Response.STATUS_OK), both.waypoint_snapshots, both.edge_snapshots)
+
+    def _added(self, made: Any, waypoints: Sequence[Any], edges: Sequence[Any]) -> Any:
+        """Adds snapshots, and returns the answer."""
+        with self._lock:
+            self._map = self._map.with_snapshots(waypoints, edges)
+        return made
 
     def _used(self, lease: Any) -> Any:
         """The result of using a lease; the SDK sends none with maps, which is allowed."""
         return self._leases.use(lease, ()) if lease.resource else lease_pb2.LeaseUseResult(status=_OK)
-
-    def _add(self, waypoints: Sequence[Any] = (), edges: Sequence[Any] = ()) -> None:
-        with self._lock:
-            self._map = self._map.with_snapshots(waypoints, edges)
 
     def ClearGraph(self, request: Any, _call: Call) -> Any:
         """Forgets map and place."""
@@ -146,6 +145,11 @@ class GraphNavService(Service):
         self._believe(None, None)
         return Response(lease_use_result=used, status=Response.STATUS_OK)
 
+    def ValidateGraph(self, _request: Any, _call: Call) -> Any:
+        """Answers that the map can be used: one that cannot is not taken in."""
+        Response = graph_nav_pb2.ValidateGraphResponse
+        return Response(status=Response.STATUS_OK)
+
     def DownloadGraph(self, _request: Any, _call: Call) -> Any:
         """Returns the graph."""
         return graph_nav_pb2.DownloadGraphResponse(graph=self._map.graph)
@@ -157,27 +161,21 @@ class GraphNavService(Service):
 
     def DownloadWaypointSnapshot(self, request: Any, _call: Call) -> Iterator[Any]:
         """Yields a waypoint's snapshot in chunks, without pictures and points where they are not wanted."""
-        Response, stored = graph_nav_pb2.DownloadWaypointSnapshotResponse, map_pb2.WaypointSnapshot()
-        known = self._map.waypoint_snapshots.get(request.waypoint_snapshot_id)
-        if known is None:
-            yield Response(status=Response.STATUS_SNAPSHOT_DOES_NOT_EXIST)
-            return
-        stored.CopyFrom(known)
-        if not request.download_images:
-            stored.ClearField("images")
-        if request.do_not_download_point_cloud:
-            stored.ClearField("point_cloud")
-        for chunk in chunks(stored):
-            yield Response(status=Response.STATUS_OK, waypoint_snapshot_id=stored.id, chunk=chunk)
+        stored, name = map_pb2.WaypointSnapshot(), request.waypoint_snapshot_id
+        stored.CopyFrom(self._map.waypoint_snapshots.get(name, stored))
+        for field, wanted in (
+            ("images", request.download_images),
+            ("point_cloud", not request.do_not_download_point_cloud),
+        ):
+            if not wanted:
+                stored.ClearField(field)
+        return _streamed(graph_nav_pb2.DownloadWaypointSnapshotResponse, stored, waypoint_snapshot_id=name)
 
     def DownloadEdgeSnapshot(self, request: Any, _call: Call) -> Iterator[Any]:
         """Yields an edge's snapshot in chunks."""
-        Response, stored = graph_nav_pb2.DownloadEdgeSnapshotResponse, self._map.edge_snapshots
-        if request.edge_snapshot_id not in stored:
-            yield Response(status=Response.STATUS_SNAPSHOT_DOES_NOT_EXIST)
-            return
-        for chunk in chunks(stored[request.edge_snapshot_id]):
-            yield Response(status=Response.STATUS_OK, edge_snapshot_id=request.edge_snapshot_id, chunk=chunk)
+        name, none = request.edge_snapshot_id, map_pb2.EdgeSnapshot()
+        stored = self._map.edge_snapshots.get(name, none)
+        return _streamed(graph_nav_pb2.DownloadEdgeSnapshotResponse, stored, edge_snapshot_id=name)
 
     # -- place -------------------------------------------------------------------------------------------------------
 
@@ -387,6 +385,15 @@ class GraphNavService(Service):
         made = self._routes[number].feedback(number)
         made.impaired_state.CopyFrom(_impaired(self._computer.snapshot))
         return made
+
+
+def _streamed(Response: Any, stored: Any, **named: str) -> Iterator[Any]:
+    """Yields a snapshot in chunks; one without id does not exist."""
+    if not stored.id:
+        yield Response(status=Response.STATUS_SNAPSHOT_DOES_NOT_EXIST)
+        return
+    for chunk in chunks(stored):
+        yield Response(status=Response.STATUS_OK, chunk=chunk, **named)
 
 
 def _exact(

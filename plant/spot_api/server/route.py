@@ -15,10 +15,10 @@ from bosdyn.api.spot import robot_command_pb2
 from pydrake.math import RigidTransform
 
 from plant.spot_api.messages import finite, pose
-from plant.spot_api.server.computer import Computer
+from plant.spot_api.server.computer import Computer, Snapshot
 from plant.spot_api.server.graph_map import GraphMap, Poses
 from plant.spot_api.server.mobility import drive, error_to, speed_limit
-from skills.robot import CommandId, FloatArray, Pose2D
+from skills.robot import CommandId, FloatArray, Pose2D, Scan
 
 Feedback = graph_nav_pb2.NavigationFeedbackResponse
 _NEXT_M: Final = 0.25
@@ -97,6 +97,8 @@ class FollowRoute:
         self._graph, self._place, self._cause = graph, place, cause
         self.status: int = Feedback.STATUS_FOLLOWING_ROUTE
         self._next, self._blocked, self._ko_tform_goal = 0, False, RigidTransform()
+        self._scan: Scan | None = None
+        self._obstacles_O = np.empty((0, 3))
         self._standing: CommandId | None = None
         self._moved_s, self._moved_from = -math.inf, Pose2D(math.inf, 0.0, 0.0)
 
@@ -141,7 +143,7 @@ class FollowRoute:
             self.status = Feedback.STATUS_REACHED_GOAL if still else self.status
             return
         velocity = self.course.limit(_velocity(error, last=last))
-        speed, free_m = float(np.hypot(velocity[0], velocity[1])), _free_m(computer, velocity)
+        speed, free_m = float(np.hypot(velocity[0], velocity[1])), self._free_m(computer.snapshot, velocity)
         self._blocked = speed > 0.0 and free_m < _CLOSE_M
         velocity[:2] *= 0.0 if self._blocked else min(1.0, free_m / _BRAKING_S / max(speed, 1e-6))
         drive(computer, velocity, self.end_s)
@@ -150,6 +152,22 @@ class FollowRoute:
             self._moved_s, self._moved_from = computer.clock.now(), here
         elif computer.clock.now() - self._moved_s > self.course.wait_s:
             self.status = Feedback.STATUS_STUCK
+
+    def _free_m(self, snapshot: Snapshot, velocity: FloatArray) -> float:
+        """Distance that the body can go in the direction of a velocity before it meets an obstacle of the last scan."""
+        scan, speed = snapshot.scan, float(np.hypot(velocity[0], velocity[1]))
+        if scan is None or speed == 0.0:
+            return math.inf
+        if scan is not self._scan:
+            points_O = (scan.X_OB @ scan.points_B().T).T
+            inside = (points_O[:, 2] > _HEIGHTS_M[0]) & (points_O[:, 2] < _HEIGHTS_M[1])
+            self._scan, self._obstacles_O = scan, points_O[inside]
+        points = (snapshot.odometry.pose.transform().inverse() @ self._obstacles_O.T).T[:, :2]
+        points = points[(np.abs(points) > _OUTLINE_M).any(axis=1)]  # not the robot itself
+        direction = velocity[:2] / speed
+        along, across = points @ direction, points @ np.array([-direction[1], direction[0]])
+        ahead = along[(along > 0.0) & (np.abs(across) < _OUTLINE_M[1])]
+        return max(0.0, float(ahead.min(initial=math.inf)) - _OUTLINE_M[0])
 
     def feedback(self, number: int) -> Any:
         """The message of how far the robot has come."""
@@ -190,18 +208,3 @@ def _velocity(error: FloatArray, *, last: bool) -> FloatArray:
         return np.asarray(_GAIN_1_S * error)
     speed = min(_GAIN_1_S * far_m if last else math.inf, 1.0) * max(0.0, 1.0 - abs(bearing_rad) / _TURN_FIRST_RAD)
     return np.array([speed, 0.0, 2.0 * bearing_rad])
-
-
-def _free_m(computer: Computer, velocity: FloatArray) -> float:
-    """Distance that the body can go in the direction of a velocity before it meets an obstacle of the last scan."""
-    scan, speed = computer.snapshot.scan, float(np.hypot(velocity[0], velocity[1]))
-    if scan is None or speed == 0.0:
-        return math.inf
-    points_O = (scan.X_OB @ scan.points_B().T).T
-    points_O = points_O[(points_O[:, 2] > _HEIGHTS_M[0]) & (points_O[:, 2] < _HEIGHTS_M[1])]
-    points = (computer.snapshot.odometry.pose.transform().inverse() @ points_O.T).T[:, :2]
-    points = points[(np.abs(points) > _OUTLINE_M).any(axis=1)]  # not the robot itself
-    direction = velocity[:2] / speed
-    along, across = points @ direction, points @ np.array([-direction[1], direction[0]])
-    ahead = along[(along > 0.0) & (np.abs(across) < _OUTLINE_M[1])]
-    return max(0.0, float(ahead.min(initial=math.inf)) - _OUTLINE_M[0])

@@ -40,6 +40,11 @@ def test_a_scan_corrects_the_first_guess_and_the_localiser_follows(robot):
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.0, 0.0, 0.0), abs=0.05)
 
 
+def test_points_far_off_cost_neither_memory_nor_the_place(robot):
+    localiser = SpotPerception({}).localiser(np.vstack([points_of(robot), [[9e8, -9e8, 1.0]]]))
+    assert localiser.start(Pose2D(0.2, 0.0, 0.0), robot.scan(), 0.5) is not None
+
+
 @pytest.mark.parametrize("points", [np.empty((0, 3)), np.array([[30.0, 30.0, 1.0]]), np.array([[1.0, 1.0, 0.1]])])
 def test_a_scan_that_fits_nowhere_localises_nothing(robot, points):
     assert SpotPerception({}).localiser(points).start(Pose2D(0.0, 0.0, 0.0), robot.scan(), 0.5) is None

@@ -28,7 +28,7 @@ LINES = {
     "executive/app": 8198,
     "executive/cli": 4875,
     "skills": 27350,
-    "plant": 21138,
+    "plant": 21140,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 489, 84, 12
 """All modules; those that one other imports; file names that stand more than once."""

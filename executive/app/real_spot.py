@@ -27,7 +27,7 @@ from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection, LostError, WallClock
-from plant.spot_api.adapter.robot import ApiRobot
+from plant.spot_api.adapter.robot import PRESSED, ApiRobot
 from plant.worlds.world import World
 from skills.files.errors import InputError
 from skills.robot import Clock, CommandId, CommandState, LeaseError, Pose2D, Robot, RobotStoppedError
@@ -262,7 +262,7 @@ def _check(robot: ApiRobot, connection: Connection) -> None:
         raise InputError(missing, hint="missions need a Spot with an arm that is switched on")
     if robot.battery().charge < LEAST_CHARGE:
         raise InputError(f"the battery has {robot.battery().charge:.0%}", hint=f"charge it to {LEAST_CHARGE:.0%}")
-    if faults := [fault for fault in robot.faults() if "E-stop" not in fault]:
+    if faults := [fault for fault in robot.faults() if fault != PRESSED]:
         raise InputError(f"the robot has a fault: {', '.join(faults)}", hint="clear it first")
 
 

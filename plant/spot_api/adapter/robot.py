@@ -45,6 +45,7 @@ from skills.robot import (
 DRIVE_EXPIRY_S: Final = 0.6
 SILENT_S, GONE_S = 3.0, 15.0
 OLD_CLOCK_S: Final = 30.0
+PRESSED: Final = "the E-stop is pressed"
 OFF_PATH_RAD: Final = 0.15
 _SYNCHRONISED_EVERY_S: Final = 10.0
 _LATE_S: Final = 0.3
@@ -125,7 +126,7 @@ class ApiRobot:
         """Present faults, with a pressed E-stop, feet that are not known, and a robot that does not answer."""
         now, silent_s = self.sensors.readings, self.sensors.silent_s()
         own = {
-            "the E-stop is pressed": not now.released,
+            PRESSED: not now.released,
             "no foot is on the floor, so the height is unknown": now.powered and not now.feet_known,
             f"the robot has not answered for {silent_s:.0f} s": silent_s > SILENT_S,
         }
@@ -135,7 +136,7 @@ class ApiRobot:
         """Reason why the robot has stopped for good; empty while it goes on."""
         present = {
             self._ended: bool(self._ended),
-            "the E-stop is pressed": not self.sensors.readings.released,
+            PRESSED: not self.sensors.readings.released,
             "the motors have lost their power": not self.sensors.readings.powered,
             f"the robot has not answered for {GONE_S:.0f} s": self.sensors.silent_s() > GONE_S,
         }

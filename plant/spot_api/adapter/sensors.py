@@ -127,7 +127,8 @@ class Sensors:
             raise ValueError(f"there is no camera {source!r}")
         hand = source == "hand"
         names = ["hand_color_image" if hand else f"{source}_fisheye_image"] if visual else []
-        names += ["hand_depth_in_hand_color_frame" if hand else f"{source}_depth"] if depth else []
+        own = f"{source}_depth_in_visual_frame" if visual else f"{source}_depth"  # with a picture it has its pose
+        names += ["hand_depth_in_hand_color_frame" if hand else own] if depth else []
         try:
             answers = self._pictures(names, _PICTURE_S)
         except LostError as error:

@@ -398,6 +398,19 @@ def test_intrinsics_and_frames_are_those_of_each_picture(step):
     assert picture.frames.pose("hand_camera").IsNearlyEqualTo(other.frames.pose("frontleft_camera"), 1e-6)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "depth"),
+    [({}, "frontleft_depth_in_visual_frame"), ({"visual": False}, "frontleft_depth")],
+)
+def test_depth_with_a_picture_is_that_of_its_pose(step, monkeypatch, wanted, depth):
+    asked = []
+    service = step.connection._stubs["image"]
+    take = service.GetImage
+    monkeypatch.setattr(service, "GetImage", lambda request, timeout: asked.append(request) or take(request))
+    step.robot.image("frontleft", **wanted)
+    assert [each.image_source_name for each in asked[0].image_requests][-1] == depth
+
+
 def test_the_most_that_a_camera_measures_is_no_depth():
     raw = np.array([[0, 65535, 1500]], dtype=np.uint16)
     answer = image_pb2.ImageResponse(status=image_pb2.ImageResponse.STATUS_OK)

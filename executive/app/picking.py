@@ -5,7 +5,6 @@ The frame `odom` serves as the world: nothing is localised, no map is known, and
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -25,7 +24,6 @@ from skills.robot import Clock, FloatArray, Lease, Robot, Scan
 from skills.stack import default_stack
 from skills.world_model import FLOOR
 
-_LOG: Final = logging.getLogger(__name__)
 _LEVEL_M: Final = 0.015
 """Height of the slices in which a level surface is looked for."""
 _AROUND_M: Final = 0.3
@@ -158,15 +156,13 @@ class PointPicker:
     def step(self) -> bool | None:
         """Goes on; returns None until the attempt is over, then whether the object is held."""
         assert self._skill is not None
-        try:
-            step = self._skill.step()
-        except Exception:  # as the executive's leaf does: a defect of a skill ends its attempt, and not the robot
-            _LOG.exception("the pick failed")
-            return False
+        step = self._skill.step()
         if isinstance(step, Running):
             return None
-        self.no_plan = isinstance(step, Failed) and step.cause is Cause.PLANNING
-        return not isinstance(step, Failed)
+        if isinstance(step, Failed) and not self._robot.gripper().holding:
+            self.no_plan = step.cause is Cause.PLANNING
+            return False
+        return True  # also when no way was found to carry what is held
 
     def end(self) -> None:
         """Stops what it has begun."""

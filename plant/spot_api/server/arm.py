@@ -125,28 +125,38 @@ class JointMove(ArmMotion):
         fastest = finite(fastest, "arm_joint_move_command.trajectory.maximum_velocity")
         offset_s = seconds(trajectory.reference_time) - now_s if trajectory.HasField("reference_time") else 0.0
         self._times_s, self._positions, before = list[float](), list[FloatArray](), now_rad
+        self._slower = False
+        limited = trajectory.HasField("maximum_velocity")
         timed = any(point.HasField("time_since_reference") for point in points)
         for point in points:
             goal = _joints(point.position, before)
             at_s = offset_s + seconds(point.time_since_reference)
-            if not timed:
-                at_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
+            fast_s = (self._times_s or [0.0])[-1] + 1.5 * float(np.abs(goal - before).max()) / max(1e-3, fastest)
+            if not timed or (limited and at_s < fast_s):
+                at_s, self._slower = fast_s, timed
             self._times_s.append(soon(at_s, "arm_joint_move_command.trajectory: a point"))
             self._positions.append(goal)
             before = goal
         while len(self._times_s) > 1 and self._times_s[0] <= 0.0:  # it is late: these have passed
             del self._times_s[0], self._positions[0]
+        self._left_s = self._times_s[-1]
         super().__init__()
 
     def begin(self, computer: Computer) -> None:
         """Starts to move."""
         self._follow(computer, self._times_s, self._positions)
+        self._slower |= self._ends_s - computer.clock.now() > self._times_s[-1] + _LEAST_S
+
+    def tick(self, computer: Computer) -> None:
+        """Reports the state, and the time that is left."""
+        self._left_s = max(self._ends_s - computer.clock.now(), 0.0)
+        super().tick(computer)
 
     def _made(self, progress: int) -> Any:
-        made = super()._made(progress)
+        made, Part = super()._made(progress), arm_command_pb2.ArmJointMoveCommand.Feedback
         part = made.arm_joint_move_feedback
-        part.planner_status = arm_command_pb2.ArmJointMoveCommand.Feedback.PLANNER_STATUS_SUCCESS
-        part.time_to_goal.CopyFrom(duration(max(0.0, self._times_s[-1]) if progress == self.going else 0.0))
+        part.planner_status = Part.PLANNER_STATUS_MODIFIED if self._slower else Part.PLANNER_STATUS_SUCCESS
+        part.time_to_goal.CopyFrom(duration(self._left_s if progress == self.going else 0.0))
         return made
 
 

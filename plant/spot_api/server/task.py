@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Generator
 from typing import Final
@@ -14,6 +15,7 @@ from plant.spot_api.server.leases import ARM, GRIPPER, MOBILITY
 from plant.spot_api.server.mobility import Status, way_to
 from skills.robot import Pose2D
 
+_LOG: Final = logging.getLogger(__name__)
 WHOLE: Final = (MOBILITY, ARM, GRIPPER)
 """Parts of a task."""
 _LEAST_WALK_S, _WALK_S_PER_M = 10.0, 3.0
@@ -45,6 +47,9 @@ class Task:
                 next(self._steps)
             except StopIteration as done:
                 self.state, self._steps = done.value, None
+            except Exception:  # a defect of a task ends it, and not the robot
+                _LOG.exception("a task failed")
+                self.state, self._steps = self.broken, None
 
     def end(self, _status: int) -> None:
         """Ends what is not finished."""

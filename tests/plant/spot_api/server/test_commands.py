@@ -386,3 +386,20 @@ def test_a_slower_hand_is_slower(spot):
     began = time.monotonic()
     block(spot, spot.commands.robot_command(command))
     assert time.monotonic() - began > 1.4
+
+
+def test_a_joint_move_that_would_be_too_fast_is_slower_and_says_so(spot):
+    ready(spot)
+    goal = [0.0, -0.9, 1.8, 0.0, -0.9, 1.0]
+    Planned = arm_command_pb2.ArmJointMoveCommand.Feedback
+    for most_rad_s, planned, least_s in (
+        (0.5, Planned.PLANNER_STATUS_MODIFIED, 2.5),
+        (5.0, Planned.PLANNER_STATUS_SUCCESS, 0.8),
+    ):
+        command = Build.arm_joint_move_helper(joint_positions=[goal], times=[1.0], max_vel=most_rad_s)
+        number = spot.commands.robot_command(command)
+        told = arm_feedback(spot, number).arm_joint_move_feedback
+        assert told.planner_status == planned
+        assert least_s < told.time_to_goal.seconds + 1e-9 * told.time_to_goal.nanos < least_s + 0.6
+        block(spot, number)
+        goal[5] = 0.0

@@ -168,6 +168,18 @@ def test_an_object_out_of_reach_is_walked_to_before_it_is_picked(spot, picker):
     assert picker.begun[0][0] == pytest.approx([1.5, 0.0, 0.3])
 
 
+def test_a_defect_of_the_picker_ends_the_pick_and_not_the_server(spot, picker, caplog):
+    def fail():
+        raise RuntimeError("a defect")
+
+    picker.step = fail
+    given = Api.PickObjectRayInWorld(**ray(1.0, 0.0, 0.0), walk_gaze_mode=Api.PICK_AUTO_GAZE)
+    assert outcome(spot, started(spot, pick_object_ray_in_world=given))[-1] == Api.MANIP_STATE_GRASP_FAILED
+    assert "a defect" in caplog.text
+    assert picker.ended == 1
+    block_until_arm_arrives(spot.commands, spot.commands.robot_command(Build.arm_ready_command()), timeout_sec=8.0)
+
+
 def test_another_command_stops_a_pick(spot, picker):
     given = Api.PickObjectRayInWorld(**ray(1.0, 0.0, 0.0), walk_gaze_mode=Api.PICK_AUTO_GAZE)
     number = started(spot, pick_object_ray_in_world=given)

@@ -26,11 +26,11 @@ LINES = {
     "executive/view": 1553,
     "executive/testing": 818,
     "executive/app": 8194,
-    "executive/cli": 4875,
+    "executive/cli": 4901,
     "skills": 27350,
-    "plant": 21155,
+    "plant": 21255,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 489, 84, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 490, 86, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from enum import StrEnum
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Event, Thread
@@ -38,25 +39,40 @@ NO_TABLET = Annotated[
 ]
 
 
+class PaceOption(StrEnum):
+    """Driver of the robot's clock."""
+
+    REAL = "real"
+    CLIENT = "client"
+
+
+PACE = Annotated[
+    PaceOption, typer.Option("--pace", help="Wall time, or the client's calls step the robot, which is repeatable.")
+]
+
+
 def serve(
     world: WORLD = "flat",
     seed: SEED = 1,
     port: Annotated[int, quantity_option(Port, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     no_tablet: NO_TABLET = False,
+    pace: PACE = PaceOption.REAL,
     graph: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Writes a GraphNav map of the world there first.")
     ] = None,
 ) -> None:
-    """Serves Spot's API for a simulated Spot in real time, until Ctrl-C."""
+    """Serves Spot's API for a simulated Spot, until Ctrl-C."""
     if graph is not None:
         _write_graph(world, graph)
-    with _server(world, seed, port, tablet=not no_tablet) as server:
+    with _server(world, seed, port, pace, tablet=not no_tablet) as server:
         console = console_for(False)
         console.print(f"Spot's API: 127.0.0.1:{server.port} (Ctrl-C ends it)\n", markup=False)
         for name, value in _environment(server).items():
             console.print(f"export {name}={value}", markup=False)
+        if pace is PaceOption.CLIENT:
+            console.print("\nIt is stepped by calls of errand.Clock/Advance, google.protobuf.Duration -> Timestamp.")
         try:
-            server.computer.run(Event())
+            _drive_clock(server, Event())
         except KeyboardInterrupt:
             return
 
@@ -73,28 +89,36 @@ def run_program(
     world: WORLD = "flat",
     seed: SEED = 1,
     no_tablet: NO_TABLET = False,
+    pace: PACE = PaceOption.REAL,
 ) -> None:
     """Runs a program of Spot's SDK, unchanged, with a simulated Spot; exits as the program does."""
     if not script.is_file():
         raise InputError(f"{script}: there is no such program", hint="name a Python file, after the options of Errand")
-    with _server(world, seed, 0, tablet=not no_tablet) as server:
+    with _server(world, seed, 0, pace, tablet=not no_tablet) as server:
         ended, code = Event(), list[int]()
 
         def run() -> None:
-            code.append(_run(script, arguments or [], server))
+            code.append(_run(script, arguments or [], server, pace))
             ended.set()
 
         program = Thread(target=run, name="sdk-program", daemon=True)
         program.start()
-        server.computer.run(ended)
+        _drive_clock(server, ended)
         program.join()
     raise typer.Exit(code[0])
 
 
-def _run(script: Path, arguments: list[str], server: SpotServer) -> int:
+def _drive_clock(server: SpotServer, ended: Event) -> None:
+    """Steps the robot in wall time, or does what clients ask for, until something has ended."""
+    from plant.spot_api.server.computer import Pace
+
+    (server.computer.run if server.computer.pace is Pace.REAL else server.computer.serve)(ended)
+
+
+def _run(script: Path, arguments: list[str], server: SpotServer, pace: PaceOption) -> int:
     """Runs a program in a process of its own; returns its exit code."""
     certificate = _environment(server)["SPOT_CERTIFICATE"]
-    launch = [sys.executable, "-m", "plant.spot_api.launch", certificate, str(server.port)]
+    launch = [sys.executable, "-m", "plant.spot_api.launch", certificate, str(server.port), pace.value]
     return subprocess.run([*launch, str(script), *arguments], env={**os.environ, **_environment(server)}).returncode
 
 
@@ -122,7 +146,7 @@ def _environment(server: SpotServer) -> dict[str, str]:
 
 
 @contextmanager
-def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotServer]:
+def _server(world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool) -> Iterator[SpotServer]:
     """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
     _need_sdk()
     from executive.app.picking import PointPicker
@@ -131,6 +155,7 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     from executive.app.simulated import compile_first, simulate
     from executive.app.worlds import knowledge_of, open_world
     from plant.models.catalogue import user_cache
+    from plant.spot_api.server.computer import Pace
     from plant.spot_api.server.estop import Tablet
     from plant.spot_api.server.identity import credentials
     from plant.spot_api.server.server import Options, SpotServer
@@ -146,6 +171,7 @@ def _server(world: str, seed: int, port: int, *, tablet: bool) -> Iterator[SpotS
     options = Options(
         {USER: PASSWORD},
         port,
+        pace=Pace(pace.value),
         tablet=Tablet.TABLET if tablet else Tablet.NONE,
         picker=PointPicker(robot, simulation.clock),
         dock_O=None if placed.dock is None else compose(inverse(placed.start), placed.dock),

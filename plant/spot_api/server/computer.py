@@ -44,6 +44,7 @@ T = TypeVar("T")
 PERIOD_S: Final = 0.025
 POWER_ON_S: Final = 1.0
 _LATE_S: Final = 0.3
+_CLIENT_START_S: Final = 1.7e9
 _STILL_M, _STILL_S, _NEAR_M = 0.01, 1.0, 0.05
 OVERRIDDEN: Final = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN
 _FOREVER_S: Final = 1e7
@@ -194,7 +195,8 @@ class Computer:
         self.settling, self.grip = False, Grip()
         self._motions: dict[str, Motion] = {}
         self._work: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
-        self._started_s, self._started_monotonic_s = time.time(), time.monotonic()
+        self._started_s = time.time() if pace is Pace.REAL else _CLIENT_START_S
+        self._started_monotonic_s = time.monotonic()
         self.watchers: list[Callable[[], None]] = []
         """Called before each step."""
         self._sit_command: CommandId | None = None
@@ -211,7 +213,12 @@ class Computer:
 
     def until_s(self, robot_time_s: float) -> float:
         """Converts a robot time to one of the robot's clock; what is left of it counts from now on."""
-        return self.clock.now() + robot_time_s - self.now_s()
+        return self.clock.now() + self.left_s(robot_time_s)
+
+    def left_s(self, robot_time_s: float) -> float:
+        """Returns what is left until a robot time (s); in whole steps by a client's pace, whose clock is not exact."""
+        left_s = robot_time_s - self.now_s()
+        return left_s if self.pace is Pace.REAL else PERIOD_S * round(left_s / PERIOD_S)
 
     def forever(self) -> float:
         """A time (robot's clock) that never comes."""

@@ -267,7 +267,7 @@ class Moving(ArmMotion):
         """Moves the hand on by one step."""
         if self.status != Status.STATUS_PROCESSING:
             return
-        if computer.now_s() >= self._end_s:
+        if computer.left_s(self._end_s) <= 0.0:
             self.end(Status.STATUS_COMMAND_TIMED_OUT)
             return
         step_s, X_BW = 0.1, computer.solver.X_BH(self._q) if computer.solver else RigidTransform()

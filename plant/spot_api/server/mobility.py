@@ -170,7 +170,7 @@ class _Driving(BaseMotion):
 
     def tick(self, computer: Computer) -> None:
         """Drives on."""
-        if self.status == Status.STATUS_PROCESSING and computer.now_s() >= self.end_s:
+        if self.status == Status.STATUS_PROCESSING and computer.left_s(self.end_s) <= 0.0:
             self.end(Status.STATUS_COMMAND_TIMED_OUT)
         if self.status == Status.STATUS_PROCESSING:
             self._drive(computer)

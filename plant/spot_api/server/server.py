@@ -21,6 +21,7 @@ from plant.spot_api.server.graph_nav import GraphNavService, Live
 from plant.spot_api.server.identity import DOMAIN, Credentials
 from plant.spot_api.server.keepalive import KeepaliveService
 from plant.spot_api.server.leases import LeaseService
+from plant.spot_api.server.pace import Pacer
 from skills.robot import Clock, Pose2D, Robot
 
 _MOST_BYTES: Final = 64 * 1024**2
@@ -133,6 +134,8 @@ class SpotServer:
                 ("grpc.so_reuseport", 0),
             ],
         )
+        if options.pace is Pace.CLIENT:
+            self._grpc.add_generic_rpc_handlers([Pacer(self.computer)])
         self._grpc.add_generic_rpc_handlers(handlers(self.services, auth.user_of, self.computer.now_s))
         key, certificate = credentials.private_key.read_bytes(), credentials.certificate.read_bytes()
         try:

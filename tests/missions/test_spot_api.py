@@ -3,6 +3,7 @@
 go to the kitchen   fulfilled, as in process
 fetch a drink       fulfilled, as in process (nightly)
 graph_nav           localised by the robot, fulfilled
+navigation          by the API, within 0.2 m
 cut for 4.5 s       paused; goes on by itself
 lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run
 """
@@ -16,19 +17,30 @@ pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-er
 import bosdyn.client
 import grpc
 from bosdyn.api.graph_nav import nav_pb2
-from bosdyn.api.graph_nav.graph_nav_pb2 import SetLocalizationRequest
+from bosdyn.api.graph_nav.graph_nav_pb2 import (
+    NavigateToRequest,
+    NavigationFeedbackRequest,
+    NavigationFeedbackResponse,
+    SetLocalizationRequest,
+)
 from bosdyn.client.graph_nav import GraphNavClient
 from bosdyn.client.lease import LeaseClient
 
-from executive.app.served_spot import world_map
+from executive.app.placed_robots import only_robot
+from executive.app.served_spot import SpotPerception, world_map
+from executive.app.simulated import simulate
 from executive.app.worlds import open_world
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.run.visitor import RunVisitor
+from plant.spot_api.messages import timestamp
 from plant.spot_api.server.faults import Fault
+from plant.spot_api.server.identity import credentials
 from tests.benchmarks.spot_missions import MISSIONS, through_api
+from tests.plant.spot_api.lock_step import LockStep
 
+GRAPH_NAV = "graph-nav-service"
 FREE = "the lease was given back"
 
 
@@ -69,6 +81,37 @@ def test_graph_nav_localises_the_robot_of_a_mission(localised, tmp_path):
     request = Request(**what, record=False, out=tmp_path / "out")
     ended = through_api(request, tmp_path / "credentials", localised_by_a_person if localised else lambda _: {})
     assert (ended.outcome == "success", ended.verdict) == (localised, localised), ended
+
+
+@pytest.mark.mission
+def test_graph_nav_takes_the_robot_into_another_room(tmp_path):
+    world, made = open_world("flat"), []
+
+    def build():
+        made.append(simulate(world, {"Alice": only_robot("Alice", world, seed=1)}, seed=1, record=False))
+        return made[0].robots["Alice"], made[0].clock
+
+    step = LockStep(build, credentials(tmp_path / "credentials"), SpotPerception({}))
+    try:
+        step.stand_up()
+        localised_by_a_person(step)
+        spot = step.connection
+        request = NavigateToRequest(destination_waypoint_id="kitchen", clock_identifier=spot.clock_identifier)
+        request.leases.add().CopyFrom(spot.lease)
+        request.end_time.CopyFrom(timestamp(spot.robot_time_s() + 60.0))
+        number = spot.call(GRAPH_NAV, "NavigateTo", request).command_id
+
+        def status():
+            request = NavigationFeedbackRequest(command_id=number)
+            return spot.call(GRAPH_NAV, "NavigationFeedback", request, checked=False).status
+
+        step.until(lambda: status() != NavigationFeedbackResponse.STATUS_FOLLOWING_ROUTE, 60.0)
+        truth, there = made[0].true_pose("Alice"), world_map(world, "spot").poses("start")["kitchen"].translation()
+        assert status() == NavigationFeedbackResponse.STATUS_REACHED_GOAL
+        assert (truth.x_m, truth.y_m) == pytest.approx((there[0], there[1]), abs=0.14)  # 0.2 m in all
+    finally:
+        made.clear()
+        step.close()
 
 
 class Tablet(RunVisitor):

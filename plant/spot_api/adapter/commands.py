@@ -131,8 +131,9 @@ class SentCommands:
                 self._end(sent.part, "replaced by another command")
             number, self._next = CommandId(self._next), self._next + 1
             self._sent[number] = sent
-            while len(self._sent) > _REMEMBERED:
-                del self._sent[next(iter(self._sent))]
+            if len(self._sent) > _REMEMBERED:
+                over = (each for each, it in self._sent.items() if it.status.state is not CommandState.RUNNING)
+                del self._sent[next(over)]
             return number
 
     def note(self, state: CommandState, reason: str = "", cause: CommandCause = CommandCause.NONE) -> CommandId:
@@ -142,7 +143,10 @@ class SentCommands:
     def get(self, command: CommandId) -> Sent:
         """Returns a command. Raises KeyError for an unknown id."""
         with self._lock:
-            return self._sent[command]
+            if not 0 < command < self._next:
+                raise KeyError(command)
+            forgotten = CommandStatus(CommandState.STOPPED, "it was over long ago", CommandCause.STOPPED)
+            return self._sent.get(command, Sent(0, "", forgotten))
 
     def running(self) -> list[Sent]:
         """Returns the commands that run."""

@@ -18,7 +18,7 @@ from bosdyn.api import (
 from bosdyn.api.docking import docking_pb2
 from bosdyn.api.keepalive import keepalive_pb2
 
-from plant.spot_api.adapter.commands import status_of
+from plant.spot_api.adapter.commands import Sent, SentCommands, status_of
 from plant.spot_api.adapter.statuses import CODES, GOOD, MEANINGS, call_trouble, response_trouble, trouble
 from skills.robot import CommandCause, CommandState
 
@@ -180,3 +180,14 @@ def test_a_path_that_the_robot_cannot_follow_is_blocked():
     given = feedback("arm", FEEDBACK.STATUS_PROCESSING, MOVE.STATUS_IN_PROGRESS)
     given.arm_command_feedback.arm_joint_move_feedback.planner_status = MOVE.PLANNER_STATUS_FAILED
     assert status_of(given, "arm").cause is CommandCause.BLOCKED
+
+
+def test_a_command_that_runs_is_remembered_whatever_comes_later():
+    commands = SentCommands()
+    arm, first = commands.add(Sent(1, "arm")), commands.add(Sent(2, "base"))
+    for number in range(2000):
+        commands.add(Sent(number, "base"))
+    assert commands.get(arm).status.state is CommandState.RUNNING
+    assert (commands.get(first).status.state, len(commands.running())) == (CommandState.STOPPED, 2)
+    with pytest.raises(KeyError):
+        commands.get(first + 5000)

@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 
 from executive.mission.scenario import NO_SCENARIO, Scenario
 from executive.words.forms import Option
-from executive.words.forms import OptionGroup as Group
+from executive.words.forms import OptionGroup as Heading  # no name of a caller: its annotations are resolved late
 from executive.words.mission import QuestionPolicy
 from executive.words.robot_config import RobotConfig, parse_pose, parse_robots
 from executive.words.variation import NO_VARIATION, Variation
@@ -134,18 +134,18 @@ class Request:
     """
 
     sentence: Annotated[
-        str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say", group=Group.REQUEST)
+        str | None, Option('What is said, as in "Hey Alice, fetch me a drink".', "--say", group=Heading.REQUEST)
     ] = None
     file: Annotated[
         Path | None, Option("A file, or a name of `errand missions`.", metavar="MISSION", argument=True)
     ] = None
-    world: Annotated[str | None, Option("World by name or folder; flat unless said.", group=Group.WORLD)] = None
+    world: Annotated[str | None, Option("World by name or folder; flat unless said.", group=Heading.WORLD)] = None
     require_wake: Annotated[
         bool | None,
         Option(
             "Whether the robot's name must be said; by default if spoken, or where the world asks for it.",
             "--wake/--no-wake",
-            group=Group.REQUEST,
+            group=Heading.REQUEST,
         ),
     ] = None
     answers: Annotated[
@@ -153,22 +153,22 @@ class Request:
         Option(
             "Answers a question that the sentence leaves open; repeat it for further ones, in their order.",
             "--answer",
-            group=Group.REQUEST,
+            group=Heading.REQUEST,
         ),
     ] = ()
     questions: Annotated[
         QuestionPolicy | None,
         Option(
             "How to answer further questions; by default as the mission file says, else at the terminal, else not.",
-            group=Group.REQUEST,
+            group=Heading.REQUEST,
         ),
     ] = None
-    seed: Annotated[Seed, Option("Sets the objects in the world and all noise.", group=Group.WORLD)] = 1
-    out: Annotated[Path, Option("Folder for log, tree, recording and pictures.", group=Group.OUTPUT)] = Path("out")
+    seed: Annotated[Seed, Option("Sets the objects in the world and all noise.", group=Heading.WORLD)] = 1
+    out: Annotated[Path, Option("Folder for log, tree, recording and pictures.", group=Heading.OUTPUT)] = Path("out")
     record: Annotated[
         bool,
         Option(
-            "Leaves no recording and no pictures.", "--no-record", read=operator.not_, typed=bool, group=Group.OUTPUT
+            "Leaves no recording and no pictures.", "--no-record", read=operator.not_, typed=bool, group=Heading.OUTPUT
         ),
     ] = True
     stack: Annotated[
@@ -177,12 +177,12 @@ class Request:
             "A stack file: localiser, planners and so on; see errand stack show. 'no_map': for unknown places.",
             read=_stack_file,
             typed=Path,
-            group=Group.ROBOTS,
+            group=Heading.ROBOTS,
         ),
     ] = None
     map: Annotated[
         Path | None,
-        Option("The robot's map, a folder of `errand map build`; by default the world's own.", group=Group.ROBOTS),
+        Option("The robot's map, a folder of `errand map build`; by default the world's own.", group=Heading.ROBOTS),
     ] = None
     start: Annotated[
         Start | None,
@@ -190,7 +190,7 @@ class Request:
             "Where the robot stands (m, rad); 'unknown' puts it anywhere, and it finds out where.",
             metavar="X Y YAW",
             read=parse_start,
-            group=Group.ROBOTS,
+            group=Heading.ROBOTS,
         ),
     ] = None
     scenario: Scenario = NO_SCENARIO
@@ -200,7 +200,7 @@ class Request:
             "Adds the faults and events of a file: people walk, doors close, objects are moved.",
             "--scenario",
             metavar="FILE",
-            group=Group.DISTURBANCES,
+            group=Heading.DISTURBANCES,
         ),
     ] = ()
     variation: Variation = NO_VARIATION
@@ -212,7 +212,7 @@ class Request:
             metavar="NAME=VALUE",
             read=_given,
             typed=list[str],
-            group=Group.REQUEST,
+            group=Heading.REQUEST,
         ),
     ] = field(default_factory=dict)
     time_of_day: Annotated[
@@ -221,13 +221,13 @@ class Request:
             "Time of day when the run begins; by default the time on this machine.",
             metavar="HH:MM",
             read=_time_of_day,
-            group=Group.WORLD,
+            group=Heading.WORLD,
         ),
     ] = None
     time_limit_s: Annotated[
         LongDuration | None,
         Option(
-            'Ends the run after so long: seconds, or "2 h"; by default 20 min.', "--time-limit", group=Group.REQUEST
+            'Ends the run after so long: seconds, or "2 h"; by default 20 min.', "--time-limit", group=Heading.REQUEST
         ),
     ] = None
     robots: Annotated[
@@ -236,7 +236,7 @@ class Request:
             "The robots and their kinds, as in alice=spot,bob=fetch@1.0,2.0,0.0.",
             metavar="NAME=KIND,...",
             read=_robots,
-            group=Group.ROBOTS,
+            group=Heading.ROBOTS,
         ),
     ] = ()
     name: str = ""

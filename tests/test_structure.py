@@ -26,7 +26,7 @@ LINES = {
     "executive/view": 1553,
     "executive/testing": 818,
     "executive/app": 8194,
-    "executive/cli": 4901,
+    "executive/cli": 4905,
     "skills": 27350,
     "plant": 21259,
 }

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from executive.app.prepared import Prepared
     from executive.app.real_spot import Access
     from plant.spot_api.server.server import SpotServer
+    from plant.worlds.world import World
 
 USER: Final = "user"
 PASSWORD: Final = "simulated"  # of a simulator that only this machine reaches
@@ -50,6 +51,10 @@ PACE = Annotated[
     PaceOption, typer.Option("--pace", help="Wall time, or the client's calls step the robot, which is repeatable.")
 ]
 
+GRAPH = Annotated[
+    Path | None, typer.Option("--graph", metavar="FOLDER", help="Writes a GraphNav map of the world there first.")
+]
+
 
 def serve(
     world: WORLD = "flat",
@@ -57,14 +62,10 @@ def serve(
     port: Annotated[int, quantity_option(Port, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     no_tablet: NO_TABLET = False,
     pace: PACE = PaceOption.REAL,
-    graph: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Writes a GraphNav map of the world there first.")
-    ] = None,
+    graph: GRAPH = None,
 ) -> None:
     """Serves Spot's API for a simulated Spot, until Ctrl-C."""
-    if graph is not None:
-        _write_graph(world, graph)
-    with _server(world, seed, port, pace, tablet=not no_tablet) as server:
+    with _server(world, seed, port, pace, tablet=not no_tablet, graph=graph) as server:
         console = console_for(False)
         console.print(f"Spot's API: 127.0.0.1:{server.port} (Ctrl-C ends it)\n", markup=False)
         for name, value in _environment(server).items():
@@ -90,11 +91,12 @@ def run_program(
     seed: SEED = 1,
     no_tablet: NO_TABLET = False,
     pace: PACE = PaceOption.REAL,
+    graph: GRAPH = None,
 ) -> None:
     """Runs a program of Spot's SDK, unchanged, with a simulated Spot; exits as the program does."""
     if not script.is_file():
         raise InputError(f"{script}: there is no such program", hint="name a Python file, after the options of Errand")
-    with _server(world, seed, 0, pace, tablet=not no_tablet) as server:
+    with _server(world, seed, 0, pace, tablet=not no_tablet, graph=graph) as server:
         ended, code = Event(), list[int]()
 
         def run() -> None:
@@ -122,18 +124,6 @@ def _run(script: Path, arguments: list[str], server: SpotServer, pace: PaceOptio
     return subprocess.run([*launch, str(script), *arguments], env={**os.environ, **_environment(server)}).returncode
 
 
-def _write_graph(world: str, folder: Path) -> None:
-    """Writes a GraphNav map of a world. Raises InputError."""
-    _need_sdk()
-    from executive.app.placed_robots import DEFAULT_KIND
-    from executive.app.served_spot import world_map
-    from executive.app.worlds import open_world
-    from plant.spot_api.server.graph_map import write_map
-
-    with writing(folder, "name another --graph"):
-        write_map(world_map(open_world(world), DEFAULT_KIND), folder)
-
-
 def _environment(server: SpotServer) -> dict[str, str]:
     """Environment variables with which programs and drivers find the server, and log in."""
     return {
@@ -145,8 +135,20 @@ def _environment(server: SpotServer) -> dict[str, str]:
     }
 
 
+def _write_graph(world: World, folder: Path) -> None:
+    """Writes a GraphNav map of a world. Raises InputError."""
+    from executive.app.placed_robots import DEFAULT_KIND
+    from executive.app.served_spot import world_map
+    from plant.spot_api.server.graph_map import write_map
+
+    with writing(folder, "name another --graph"):
+        write_map(world_map(world, DEFAULT_KIND), folder)
+
+
 @contextmanager
-def _server(world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool) -> Iterator[SpotServer]:
+def _server(
+    world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool, graph: Path | None
+) -> Iterator[SpotServer]:
     """Builds the simulation with Alice, and serves her. Raises InputError without the SDK or a free port."""
     _need_sdk()
     from executive.app.picking import PointPicker
@@ -163,6 +165,8 @@ def _server(world: str, seed: int, port: int, pace: PaceOption, *, tablet: bool)
     from skills.manipulation.arm.kinematics import arm_model
 
     opened = open_world(world)
+    if graph is not None:
+        _write_graph(opened, graph)
     placed = only_robot("Alice", opened, seed=seed)
     compile_first()
     simulation = simulate(opened, {"Alice": placed}, seed=seed, record=False)

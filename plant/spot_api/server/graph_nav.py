@@ -356,6 +356,8 @@ class GraphNavService(Service):
             return number
         if _impaired(self._computer.snapshot).impaired_status != _Impaired.IMPAIRED_STATUS_OK:
             raise CannotError("ROBOT_IMPAIRED")
+        if self._computer.docked():  # the API has no status of its own for that
+            raise CannotError("COULD_NOT_UPDATE_ROUTE")
         if place is None or place.waypoint not in known.waypoints:
             raise CannotError("NOT_LOCALIZED_TO_MAP")
         if place.lost:
@@ -377,7 +379,7 @@ class GraphNavService(Service):
 
     def NavigationFeedback(self, request: Any, _call: Call) -> Any:
         """Returns how far a navigation has come, by default the last one."""
-        number = request.command_id or max(self._routes, default=0)
+        number = request.command_id or max(list(self._routes), default=0)
         if not number:
             return Feedback(status=Feedback.STATUS_NO_ROUTE)
         if number not in self._routes:

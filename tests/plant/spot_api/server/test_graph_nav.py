@@ -265,6 +265,12 @@ def test_the_cause_of_an_early_end_is_reported(spot, nav):
     assert ended(nav, number).status == Feedback.STATUS_LEASE_ERROR
 
 
+def test_a_docked_robot_does_not_leave_its_dock(spot, nav, monkeypatch):
+    monkeypatch.setattr(spot.served.server.computer, "docked", lambda: True)
+    with pytest.raises(graph_nav.RouteNotUpdatingError):
+        nav.navigate_to("c", 5.0)
+
+
 def test_a_navigation_that_cannot_begin_is_refused_with_its_status(spot, nav):
     far = graph_of({**AT, "alone": (5.0, 5.0, 0.0)})
     nav.upload_graph(graph=far)

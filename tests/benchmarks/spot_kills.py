@@ -21,7 +21,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 from typing import Any
 
@@ -54,15 +54,15 @@ def sdk_client(port: int, certificate: str, number: int, end_s: Any) -> None:
     robot.update_secure_channel_port(port)
     robot.authenticate(USER, PASSWORD)
     robot.time_sync.wait_for_sync()
+    LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True)
+    robot.power_on(update_frequency=20.0)
+    commands = robot.ensure_client(RobotCommandClient.default_service_name)
+    blocking_stand(commands, update_frequency=20.0)
     policy = Policy()
     policy.add_controlled_motors_off_action(OFF_AFTER_S)
     keepalive = robot.ensure_client(KeepaliveClient.default_service_name)
     policy_id = keepalive.modify_policy(to_add=policy).added_policy.policy_id
     end_s.value = 1.0  # the policy counts from now on
-    LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True)
-    robot.power_on(update_frequency=20.0)
-    commands = robot.ensure_client(RobotCommandClient.default_service_name)
-    blocking_stand(commands, update_frequency=20.0)
     for step in range(1000):
         keepalive.check_in(policy_id)
         if step % 10 == 0:
@@ -108,7 +108,7 @@ CLIENTS: dict[str, Callable[..., None]] = {"sdk": sdk_client, "adapter": adapter
 
 def quiet(client: str, *arguments: Any) -> None:
     """Runs a client, whose errors after its connection is cut nobody reads."""
-    with Path("/dev/null").open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+    with Path("/dev/null").open("w") as nowhere, redirect_stdout(nowhere), suppress(Exception):
         CLIENTS[client](*arguments)
 
 

@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -75,13 +75,15 @@ _LIMIT_S: Final = 150.0
 class Asked:
     """One goal of a command: its kind, the error from it, whether it is done, and the error then (m, or rad).
 
-    `cut` is the error of one that another command replaces before it is done.
+    `cut` is the error of one that another command replaces before it is done: from its path at that time, `on_path`,
+    where it has one.
     """
 
     command: int
     kind: str
     error: Error
     done: Callable[[Any], bool]
+    on_path: Error | None = None
     error_then: float | None = None
     cut: float | None = None
 
@@ -114,7 +116,7 @@ class Judge:
         X_WO = self.X_WB() @ snapshot.X_AB("body", "odom")
         self.asked += [Asked(number, *each) for each in (*self._base(named, tree, X_WO), *self._arm(named, tree, X_WO))]
 
-    def _base(self, named: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[str, Error, Any]]:
+    def _base(self, named: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
         base, part = named.mobility_command, basic_command_pb2
         if base.HasField("se2_trajectory_request"):
             request = base.se2_trajectory_request
@@ -154,7 +156,7 @@ class Judge:
     def _base_error(self, at_W: Any) -> Error:
         return lambda: float(np.linalg.norm(self.X_WB().translation()[:2] - at_W))
 
-    def _arm(self, named: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[str, Error, Any]]:
+    def _arm(self, named: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
         arm, part = named.arm_command, arm_command_pb2
 
         def hand_error(X_FH: RigidTransform, X_WF: Callable[[], RigidTransform], X_HT: RigidTransform) -> Error:
@@ -172,7 +174,8 @@ class Judge:
             task = SE3Pose.from_proto(request.root_tform_task)
             if not request.HasField("root_tform_task"):
                 task = SE3Pose.from_identity()
-            goal = root * task * SE3Pose.from_proto(request.pose_trajectory_in_task.points[-1].pose)
+            points = request.pose_trajectory_in_task.points
+            goal = root * task * SE3Pose.from_proto(points[-1].pose)
             X_HT = transform(tool.to_proto(), "tool")
             X_FH = transform(goal.to_proto(), "goal") @ X_HT.inverse()
             done = part.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
@@ -180,16 +183,29 @@ class Judge:
                 "hand",
                 hand_error(X_FH, (lambda: X_WO) if stays else self.X_WB, X_HT),
                 lambda told: told.arm_command_feedback.arm_cartesian_feedback.status == done,
+                self._off_path(
+                    request.pose_trajectory_in_task,
+                    [
+                        (X_WO @ transform((root * task * SE3Pose.from_proto(each.pose)).to_proto(), "")).translation()
+                        for each in points
+                    ],
+                    lambda wanted_W: float(np.linalg.norm((self.X_WH() @ X_HT).translation() - wanted_W)),
+                )
+                if stays
+                else None,
             )
         if arm.HasField("arm_joint_move_command"):
-            position = arm.arm_joint_move_command.trajectory.points[-1].position
-            q = np.array([getattr(position, name).value for name in JOINTS])
-            X_BH = arm_model(self.server.computer.capabilities).X_BH(q)
+            trajectory, model = arm.arm_joint_move_command.trajectory, arm_model(self.server.computer.capabilities)
+            q = [np.array([getattr(each.position, name).value for name in JOINTS]) for each in trajectory.points]
+            X_BH = model.X_BH(q[-1])
             done = part.ArmJointMoveCommand.Feedback.STATUS_COMPLETE
             yield (
                 "joints",
                 hand_error(X_BH, self.X_WB, RigidTransform()),
                 lambda told: told.arm_command_feedback.arm_joint_move_feedback.status == done,
+                self._off_path(
+                    trajectory, q, lambda wanted: hand_error(model.X_BH(wanted), self.X_WB, RigidTransform())()
+                ),
             )
         if arm.HasField("arm_gaze_command"):
             request = arm.arm_gaze_command
@@ -201,6 +217,15 @@ class Judge:
                 self._gaze_error(np.asarray(X_WO @ np.array([x, y, z]))),
                 lambda told: told.arm_command_feedback.arm_gaze_feedback.status == done,
             )
+
+    def _off_path(self, trajectory: Any, values: Sequence[Any], error: Callable[[Any], float]) -> Error | None:
+        """Error from the point of a timed path at the present time; None for a path without times."""
+        if not trajectory.HasField("reference_time"):
+            return None
+        begun_s = seconds(trajectory.reference_time)
+        times_s = [begun_s + seconds(each.time_since_reference) for each in trajectory.points]
+        columns = np.array(values).T
+        return lambda: error(np.array([np.interp(self.server.computer.now_s(), times_s, each) for each in columns]))
 
     def _gaze_error(self, target_W: Any) -> Error:
         def error() -> float:
@@ -220,7 +245,7 @@ class Judge:
                 if each.done(told):
                     each.error_then = each.error()
                 elif part.status == basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN:
-                    each.cut = each.error()
+                    each.cut = (each.on_path or each.error)()
 
 
 @contextmanager

@@ -20,7 +20,7 @@ READY_RAD: Final = (0.0, -0.9, 1.8, 0.0, -0.9, 0.0)
 CARRY_RAD: Final = (0.0, -2.6, 2.2, 0.0, 0.4, 0.0)
 """Named postures of the arm; the robot's own are near these."""
 USUAL_RAD_S: Final = 1.5
-_FASTEST_RAD_S: Final = 2.5
+_FASTEST_RAD_S: Final = 3.6
 _LEAST_S: Final = 0.2
 _SETTLING_S, _STILL_RAD_S, _NEAR_RAD = 1.0, 0.05, 0.1
 _STEPS: Final = 20
@@ -92,11 +92,11 @@ class ArmMotion:
 
 
 def smooth(start_rad: FloatArray, times_s: Sequence[float], positions_rad: Sequence[FloatArray]) -> ArmTrajectory:
-    """Returns a trajectory from rest to rest through postures at times, all later where a joint would be too fast.
+    """Returns a trajectory through postures at times, later where a joint would be too fast and then in time again.
 
     Between the postures it follows monotone cubic curves (Fritsch and Carlson, 1980).
     """
-    times = np.maximum.accumulate([0.0, *times_s]) + 1e-3 * np.arange(len(times_s) + 1)
+    times = np.maximum.accumulate([0.0, *times_s]) + 1e-4 * np.arange(len(times_s) + 1)
     postures = np.array([start_rad, *positions_rad])
     if len(times_s) == 1:  # eased in and out
         shares = np.linspace(0.0, 1.0, _STEPS + 1)
@@ -105,9 +105,11 @@ def smooth(start_rad: FloatArray, times_s: Sequence[float], positions_rad: Seque
     else:
         sampled = np.linspace(0.0, times[-1], max(_STEPS, int(times[-1] / _SAMPLE_S)) + 1)
         samples = PchipInterpolator(times, postures)(sampled)
-    fastest = float((np.abs(np.diff(samples, axis=0)).max(axis=1) / np.diff(sampled)).max())
-    length_s = max(times[-1] * max(1.0, fastest / _FASTEST_RAD_S), _LEAST_S)
-    return ArmTrajectory(sampled * (length_s / sampled[-1]), samples)
+    passed_s = [0.0]
+    needed_s = np.abs(np.diff(samples, axis=0)).max(axis=1) / _FASTEST_RAD_S + 1e-4
+    for at_s, least_s in zip(sampled[1:], needed_s, strict=True):
+        passed_s.append(max(at_s, passed_s[-1] + least_s))
+    return ArmTrajectory(np.array(passed_s) * max(1.0, _LEAST_S / passed_s[-1]), samples)
 
 
 class JointMove(ArmMotion):

@@ -50,7 +50,7 @@ class Cartesian(ArmMotion):
         if any(getattr(request, axis) != request.AXIS_MODE_POSITION for axis in axes):
             raise unsupported("arm_cartesian_command with an axis in force mode")
         given_m_s = request.max_linear_velocity.value if request.HasField("max_linear_velocity") else _USUAL_M_S
-        self._fastest_m_s = min(max(finite(given_m_s, "max_linear_velocity"), _SLOWEST_M_S), _USUAL_M_S)
+        self._fastest_m_s = max(finite(given_m_s, "max_linear_velocity"), _SLOWEST_M_S)
         self._out_of_reach = self._tracks = False
         self._tracked_s, self._stays = 0.0, frame in ("odom", "vision")
         given, field = request.pose_trajectory_in_task, "arm_cartesian_command.pose_trajectory_in_task"

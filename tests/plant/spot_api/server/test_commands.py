@@ -10,6 +10,7 @@ import math
 import time
 
 import bosdyn.client.robot_command as rc
+import numpy as np
 import pytest
 from bosdyn.api import (
     arm_command_pb2,
@@ -28,6 +29,7 @@ from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.geometry import EulerZXY
 
 from plant.spot_api.messages import timestamp
+from plant.spot_api.server.arm import smooth
 
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
 
@@ -403,3 +405,11 @@ def test_a_joint_move_that_would_be_too_fast_is_slower_and_says_so(spot):
         assert least_s < told.time_to_goal.seconds + 1e-9 * told.time_to_goal.nanos < least_s + 0.6
         block(spot, number)
         goal[5] = 0.0
+
+
+def test_a_path_whose_beginning_is_too_fast_is_in_time_again_later():
+    sweep = [np.array([2.0 - 0.1 * k]) for k in range(20)]
+    path = smooth(np.array([0.0]), [0.05 + 0.2 * k for k in range(20)], sweep)
+    speed = np.abs(np.diff(path.positions_rad[:, 0])) / np.diff(path.times_s)
+    assert speed.max() < 4.0
+    assert path.times_s[-1] == pytest.approx(0.05 + 0.2 * 19, abs=0.05)

@@ -144,7 +144,8 @@ def test_a_password_that_is_missing_is_named_where_nobody_can_type_it(served, mo
 
 def test_a_pressed_estop_ends_the_run_by_that_cause(request, served, tmp_path):
     def press():
-        while request.node.server.computer.motors.value != "on":
+        late_s = time.monotonic() + 30.0
+        while request.node.server.computer.motors.value != "on" and time.monotonic() < late_s:
             time.sleep(0.05)
         time.sleep(2.0)
         request.node.server.computer.estop._held["tablet"].level = 1

@@ -70,7 +70,8 @@ class Spot:
 
 
 @pytest.fixture
-def spot(served) -> Iterator[Spot]:
+def spot(served, monkeypatch) -> Iterator[Spot]:
+    monkeypatch.setattr("plant.spot_api.server.computer.POWER_ON_S", 0.1)
     robot = served.login()
     robot.time_sync.wait_for_sync(timeout_sec=5.0)
     with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_exit=True):

@@ -282,7 +282,7 @@ def run(program: str, *, seed: int = 1) -> Mapping[str, Any]:
     with judged(seed) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}
-        launch = [sys.executable, "-m", "plant.spot_api.launch", str(server.certificate), str(server.port)]
+        launch = [sys.executable, "-m", "plant.spot_api.launch", str(server.certificate), str(server.port), "real"]
 
         def execute() -> None:
             try:

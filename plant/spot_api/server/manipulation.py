@@ -82,6 +82,7 @@ class _ObjectTask(Task):
             yield from stow(computer)
             if not (yield from walk(computer, self._before(computer, point_O))):
                 return int(Api.MANIP_STATE_GRASP_FAILED)
+            points_O = np.vstack([points_O, depth_points_O(computer)])
         if self._picker is None:
             return int(Api.MANIP_STATE_DONE)
         self._picker.begin(computer.lease, point_O, points_O, self._allows)

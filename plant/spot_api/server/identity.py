@@ -192,13 +192,18 @@ class DirectoryService(Service):
         return Response(status=Response.STATUS_OK, service_entry=entry)
 
     def put(self, entry: Any, *, new: bool) -> bool:
-        """Stores the entry of a client's service; returns False if it exists, or with `new` False if it does not."""
+        """Stores the entry of a client's service; returns False if it exists, or with `new` False if it does not.
+
+        Clients say that a service is alive by registering it again.
+        """
         with self._lock:
-            if entry.name in self._own or (entry.name in self._entries) is new:
+            known = entry.name in self._entries
+            if entry.name in self._own or not (known or new):
                 return False
-            self._entries[entry.name] = entry
             self._heard_s[entry.name] = time.monotonic()
-        return True
+            if not (known and new):
+                self._entries[entry.name] = entry
+        return not (known and new)
 
     def silent(self) -> list[str]:
         """Names of the clients' services that have not updated their entries in time."""

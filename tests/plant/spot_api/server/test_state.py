@@ -12,6 +12,7 @@ from bosdyn.api import (
     world_object_pb2,
 )
 from bosdyn.api.spot import inverse_kinematics_pb2
+from bosdyn.client.directory_registration import ServiceAlreadyExistsError
 from bosdyn.client.exceptions import InvalidRequestError
 from bosdyn.client.fault import ServiceFaultAlreadyExistsError
 from bosdyn.client.frame_helpers import get_a_tform_b, get_odom_tform_body
@@ -194,6 +195,9 @@ def test_a_service_that_falls_silent_is_a_fault(robot):
     while not faults:
         faults = states.get_robot_state().service_fault_state.faults
     assert (faults[0].fault_id.service_name, faults[0].fault_id.fault_name) == ("mine", "liveness")
+    with pytest.raises(ServiceAlreadyExistsError):  # by which the SDK keeps a service alive
+        registration.register("mine", "my.Service", "mine.spot.robot", "127.0.0.1", 5000, liveness_timeout_secs=0.2)
+    assert not states.get_robot_state().service_fault_state.faults
 
 
 def test_a_fault_of_a_client_is_listed_once_until_it_is_cleared(robot):

@@ -52,5 +52,7 @@ def unknown_command(line: str) -> str | None:
     command, rest = _COMMANDS[words[1]], words[2:]
     while rest and rest[0] in getattr(command, "commands", {}):
         command, rest = command.commands[rest[0]], rest[1:]
+    if command.context_settings.get("allow_interspersed_args") is False:  # options of a program follow it
+        rest = rest[: next((k for k, word in enumerate(rest) if word.endswith(".py")), None)]
     known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
     return next((f"{command.name} has no {word}" for word in rest if word.startswith("-") and word not in known), None)

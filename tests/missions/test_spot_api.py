@@ -2,9 +2,9 @@
 
 go to the kitchen   fulfilled, as in process
 fetch a drink       fulfilled, as in process (nightly)
-graph_nav           localised by the robot, fulfilled
+graph_nav           localised by the robot, fulfilled (nightly)
 navigation          by the API, within 0.2 m
-cut for 4.5 s       paused; goes on by itself
+cut for 4.5 s       paused; goes on by itself (nightly)
 lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run
 """
 
@@ -74,6 +74,7 @@ def localised_by_a_person(step):
 
 
 @pytest.mark.mission
+@pytest.mark.nightly
 @pytest.mark.parametrize("localised", [True, False], ids=["localised", "not localised"])
 def test_graph_nav_localises_the_robot_of_a_mission(localised, tmp_path):
     (tmp_path / "stack.yaml").write_text("localiser: {use: graph_nav}\n")
@@ -154,6 +155,7 @@ class Cut(RunVisitor):
 
 
 @pytest.mark.mission
+@pytest.mark.nightly
 def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
     control, cuts = Control(attended=True, pace=None), []
 

@@ -218,7 +218,8 @@ class Computer:
     def left_s(self, robot_time_s: float) -> float:
         """Returns what is left until a robot time (s); in whole steps by a client's pace, whose clock is not exact."""
         left_s = robot_time_s - self.now_s()
-        return left_s if self.pace is Pace.REAL else PERIOD_S * round(left_s / PERIOD_S)
+        exact = self.pace is Pace.REAL or math.isinf(left_s)
+        return left_s if exact else PERIOD_S * round(left_s / PERIOD_S)
 
     def forever(self) -> float:
         """A time (robot's clock) that never comes."""

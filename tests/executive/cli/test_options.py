@@ -25,7 +25,7 @@ GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yam
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
     *("--view", "--view-for", "--view-port", "--foxglove", "--help"),
-    *("--robot", "--user", "--certificate", "--power-on", "--take"),
+    *("--robot", "--user", "--certificate", "--power-on", "--take", "--estop", "--padding"),
 }
 
 

@@ -118,7 +118,7 @@ class Ending:
         who = "The tree claims" if name is None else f"{name}'s tree claims"
         yield Verdict(who, self.claimed, f"{self.outcome}{cause}", self.message)
         if self.referee is None:
-            yield Verdict("No referee", None, VERDICTS[None], "nobody saw the truth; only the tree's claim counts")
+            yield Verdict("No referee", None, VERDICTS[None], "nobody saw the truth, so only the tree's claim counts")
             return
         counted, good = f" ({counts_text(self.referee)})" if counts else "", self.referee.success
         yield Verdict("The referee saw", good, VERDICTS[good], f"{self.referee.why}{counted}")

@@ -60,7 +60,7 @@ def test_the_report_of_a_run_without_a_referee_says_so(prepared):
     assert RunReport.from_json(told) == report
     lines = list(report.lines())
     assert lines[1] == (
-        "[bold]No referee:[/bold] [yellow]?[/yellow] not judged: nobody saw the truth; only the tree's claim counts"
+        "[bold]No referee:[/bold] [yellow]?[/yellow] not judged: nobody saw the truth, so only the tree's claim counts"
     )
     assert lines[2] == f"{report.sim_time_s:.1f} s, {report.ticks} ticks"
     page = (prepared.request.out / "report.html").read_text(encoding="utf-8")

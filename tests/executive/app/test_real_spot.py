@@ -19,8 +19,6 @@ import pytest
 
 pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
 sys.path.insert(0, str(Path(__file__).parents[2] / "plant" / "spot_api"))
-from lock_step import PASSWORD, USER, real_time
-
 from executive.app import real_spot
 from executive.app.real_spot import Access, connected
 from plant.spot_api.adapter import heartbeat
@@ -30,6 +28,7 @@ from plant.spot_api.server.computer import Motors
 from plant.spot_api.server.estop import Tablet
 from skills.files.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
+from tests.plant.spot_api.lock_step import PASSWORD, USER, real_time
 
 
 @pytest.fixture(scope="session")

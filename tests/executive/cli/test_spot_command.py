@@ -95,9 +95,8 @@ def served(request, tmp_path, monkeypatch):
     """Serves a scripted Spot; returns the options of `errand run` for it."""
     pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
     sys.path.insert(0, str(Path(__file__).parents[2] / "plant" / "spot_api"))
-    from lock_step import USER, real_time
-
     from plant.spot_api.server.identity import credentials
+    from tests.plant.spot_api.lock_step import USER, real_time
 
     held = credentials(tmp_path / "credentials")
     monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", SECRET)

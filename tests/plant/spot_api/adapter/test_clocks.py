@@ -5,28 +5,20 @@ drifting by 1 %                   as always, also 10 s after the last synchronis
 wall clock jumps in a motion      as always, on either side
 """
 
-import sys
-import threading
 import time
-from pathlib import Path
+from contextlib import ExitStack
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from lock_step import PASSWORD, USER
 
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter import connection
 from plant.spot_api.adapter.connection import Address, Connection, WallClock
 from plant.spot_api.adapter.robot import ApiRobot
 from plant.spot_api.server import computer
-from plant.spot_api.server.server import Options, SpotServer
-from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import ArmTrajectory
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import PASSWORD, USER, real_time
 
 END_S, STILL_S = 0.4, 0.3
 READY_RAD = [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]
@@ -56,32 +48,21 @@ class Clock:
 @pytest.fixture
 def serve(credentials, monkeypatch):
     """Returns a function that serves a robot in real time and connects to it, with a clock for each of the two."""
-    ending = []
+    with ExitStack() as ending:
 
-    def served(client, robot_side):
-        monkeypatch.setattr(connection, "time", client.module())
-        monkeypatch.setattr(computer, "time", robot_side.module())
-        monkeypatch.setattr(computer, "POWER_ON_S", 0.1)
-        clock = VirtualClock()
-        scripted = ScriptedRobot(clock, capabilities=spot_capabilities())
-        server = SpotServer(scripted, clock, arm_model(spot_capabilities()), credentials, Options({USER: PASSWORD}))
-        running, stopping = server.running(), threading.Event()
-        running.__enter__()
-        stepping = threading.Thread(target=server.computer.run, args=(stopping,), daemon=True)
-        stepping.start()
-        ending.append((running, stopping, stepping))
-        made = Connection(Address("127.0.0.1", server.port, credentials.certificate), USER, PASSWORD)
-        made.synchronise()
-        wall = WallClock(made)
-        robot = ApiRobot("Alice", made, wall, spot_capabilities())
-        wall.after.append(robot.poll)
-        return scripted, wall, robot, made
+        def served(client, robot_side):
+            monkeypatch.setattr(connection, "time", client.module())
+            monkeypatch.setattr(computer, "time", robot_side.module())
+            monkeypatch.setattr(computer, "POWER_ON_S", 0.1)
+            server, scripted = ending.enter_context(real_time(credentials))
+            made = Connection(Address("127.0.0.1", server.port, credentials.certificate), USER, PASSWORD)
+            made.synchronise()
+            wall = WallClock(made)
+            robot = ApiRobot("Alice", made, wall, spot_capabilities())
+            wall.after.append(robot.poll)
+            return scripted, wall, robot, made
 
-    yield served
-    for running, stopping, stepping in ending:
-        stopping.set()
-        stepping.join()
-        running.__exit__(None, None, None)
+        yield served
 
 
 def stand_up(wall, robot, made):

@@ -1,19 +1,15 @@
 """Docking through the adapter, in lock-step with the server. The dock is where the robot begins."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from lock_step import LockStep
 
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.server.docking import DOCK_ID
 from skills.robot import CommandCause, CommandState, Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import LockStep
 
 
 def scripted():

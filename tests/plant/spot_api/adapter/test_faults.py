@@ -1,6 +1,5 @@
-"""Every status of every response x every verb of the adapter, against a server with that fault.
+"""Every status of every response of the adapter, against a server with that fault; `test_refusals` has commands.
 
-command   each status, lease status, header error and gRPC code, and no answer: its cause, and nothing moves on
 feedback  each status of a part: done or running if it says so, else its cause, and nothing moves on
 lease     each status but OK: LeaseError; a lease that is not retained does not count
 picture   each status but OK: NoImageError
@@ -11,15 +10,11 @@ cut       commands are refused, those that run end, and nothing moves on
 """
 
 import math
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
-import grpc
 import numpy as np
 import pytest
 from bosdyn.api import (
-    header_pb2,
     image_pb2,
     lease_pb2,
     point_cloud_pb2,
@@ -29,25 +24,21 @@ from bosdyn.api import (
     time_sync_pb2,
 )
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from lock_step import PASSWORD, USER, LockStep
-
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection, LostError
 from plant.spot_api.adapter.robot import ApiRobot
-from plant.spot_api.adapter.statuses import CODES, trouble
+from plant.spot_api.adapter.statuses import trouble
 from plant.spot_api.server.faults import Fault
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, NoImageError
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import PASSWORD, USER, LockStep
 from tests.plant.spot_api.proxy import Proxy
 
 API = "bosdyn.api."
 COMMAND, FEEDBACK = API + "RobotCommandService/RobotCommand", API + "RobotCommandService/RobotCommandFeedback"
 WITHIN_S, EXPIRY_S = 1.0, 3.0
-CODES_SEEN = ("UNAVAILABLE", "UNAUTHENTICATED", "RESOURCE_EXHAUSTED", "INTERNAL", "UNIMPLEMENTED")
 ARM_RAD = np.array([0.0, -0.9, 1.8, 0.0, -0.9, 0.0])
-VERBS = ("drive", "stand", "sit", "move_arm", "set_gripper", "stop")
 VERBS_OF = {
     "mobility_command_feedback": ("drive", "stand", "sit"),
     "arm_command_feedback": ("move_arm",),
@@ -76,24 +67,6 @@ def status_fields(message, prefix="") -> Iterator[tuple[str, object]]:
             yield prefix + field.name, field.enum_type
         elif field.message_type is not None and field.name not in ("header", "request"):
             yield from status_fields(field.message_type, f"{prefix}{field.name}.")
-
-
-def refusals() -> dict[str, tuple[Fault, CommandCause]]:
-    """Faults of a command with their causes: each field `status` of its answer, and what any call can meet."""
-    made = {
-        f"{path} {name}": (Fault(fields={path: number}, handled=False), trouble(enum, number).cause)
-        for path, enum in status_fields(robot_command_pb2.RobotCommandResponse.DESCRIPTOR)
-        for number, name in statuses(enum, "STATUS_OK", "STATUS_UNMANAGED")
-        if trouble(enum, number) is not None
-    }
-    enum = header_pb2.CommonError.DESCRIPTOR.enum_types_by_name["Code"]
-    for number, name in statuses(enum, "CODE_OK", "CODE_UNSPECIFIED"):
-        made[name] = Fault(fields={"header.error.code": number}), trouble(enum, number).cause
-    for code in (grpc.StatusCode[name] for name in CODES_SEEN):
-        made[code.name] = Fault(code=code), CODES[code][0]
-    made["request lost"] = Fault(request_s=math.inf), CommandCause.NO_ANSWER
-    made["answer lost"] = Fault(answer_s=math.inf), CommandCause.NO_ANSWER
-    return made
 
 
 def feedbacks():
@@ -161,18 +134,6 @@ def moves(step):
     before = step.served.pose, step.served.q_rad.copy()
     step.advance(0.1)
     return step.served.pose != before[0] or bool(np.abs(step.served.q_rad - before[1]).max() > 1e-6)
-
-
-@pytest.mark.parametrize(("fault", "cause"), refusals().values(), ids=refusals())
-@pytest.mark.parametrize("verb", VERBS)
-def test_a_command_that_the_robot_does_not_confirm_has_its_cause_and_nothing_moves_on(step, verb, fault, cause):
-    begun_s = step.now()
-    with step.server.faults.fault(COMMAND, fault):
-        command = sent(step, verb)
-        status = ended(step, command)
-    assert (status.state, status.cause, bool(status.reason)) == (CommandState.REFUSED, cause, True)
-    step.until(lambda: step.now() - begun_s > (WITHIN_S if fault.handled else 0.0))
-    assert not moves(step)
 
 
 @pytest.mark.parametrize(("verb", "path", "enum", "number", "name"), list(feedbacks()))

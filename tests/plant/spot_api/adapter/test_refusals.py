@@ -1,14 +1,11 @@
 """Commands that the robot carries out although it refuses them, and refusals of power, E-stop and policy.
 
-Each has its cause within a second, and nothing moves on. `test_faults` has the robot that does as it says. Only a
-lease that does not count moves nothing. A robot that has begun to sit down or to stand up comes to rest there, and a
-gripper at its opening.
+Each has its cause within a second, and nothing moves on. Only a lease that does not count moves nothing. A robot that
+has begun to sit down or to stand up comes to rest there, and a gripper at its opening.
 """
 
 import math
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +18,6 @@ from bosdyn.api import (
 )
 from bosdyn.api.keepalive import keepalive_pb2
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from lock_step import LockStep
-
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import LostError
 from plant.spot_api.adapter.statuses import CODES, GOOD, MEANINGS
@@ -31,6 +25,7 @@ from plant.spot_api.server.faults import Fault
 from skills.robot import ArmTrajectory, CommandCause, CommandState
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import LockStep
 
 READY_RAD = np.array([0.0, -0.9, 1.8, 0.0, -0.9, 0.0])
 COMMANDS = "bosdyn.api.RobotCommandService"

@@ -8,10 +8,8 @@ no answer          old readings: drive refused, later a fault
 """
 
 import math
-import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import grpc
 import numpy as np
@@ -25,9 +23,6 @@ from bosdyn.api import (
 )
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-from lock_step import LockStep
-
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter import connection
 from plant.spot_api.adapter.connection import Address, Connection
@@ -39,6 +34,7 @@ from skills.robot import ArmTrajectory, CommandCause, CommandState, FrameTree, L
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import LockStep
 
 COMMANDS, TIME = "bosdyn.api.RobotCommandService", "bosdyn.api.TimeSyncService"
 STATE = "bosdyn.api.RobotStateService/GetRobotState"

@@ -1,7 +1,6 @@
 """A server with a scripted robot, stepped in a thread, and the SDK's robot logged in to it."""
 
 import os
-import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,15 +13,10 @@ from bosdyn.client.lease import LeaseKeepAlive
 from bosdyn.client.robot_command import RobotCommandClient, blocking_stand
 from bosdyn.client.robot_state import RobotStateClient
 
-from plant.robots.spot.kind import spot_capabilities
-from plant.spot_api.server.computer import Pace
-from plant.spot_api.server.server import Options, SpotServer
-from skills.manipulation.arm.kinematics import arm_model
+from plant.spot_api.server.server import SpotServer
 from skills.testing.blocks import Block
-from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
-
-USER, PASSWORD = "user", "right"
+from tests.plant.spot_api.lock_step import PASSWORD, USER, real_time
 
 
 @dataclass
@@ -42,17 +36,8 @@ class Served:
 
 @pytest.fixture
 def served(credentials) -> Iterator[Served]:
-    clock = VirtualClock()
-    scripted = ScriptedRobot(clock, capabilities=spot_capabilities(), blocks=[Block(1.7, -1.5, 1.9, 1.5)])
-    solver = arm_model(spot_capabilities())
-    server = SpotServer(scripted, clock, solver, credentials, Options({USER: PASSWORD}, pace=Pace.REAL))
-    stopping = threading.Event()
-    stepping = threading.Thread(target=server.computer.run, args=(stopping,), daemon=True)
-    with server.running():
-        stepping.start()
+    with real_time(credentials, blocks=[Block(1.7, -1.5, 1.9, 1.5)]) as (server, scripted):
         yield Served(server, scripted)
-        stopping.set()
-        stepping.join()
 
 
 @dataclass

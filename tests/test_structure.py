@@ -14,11 +14,11 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2988,
+    "executive/words": 2999,
     "executive/language": 7725,
     "executive/speech": 1582,
-    "executive/mission": 1590,
-    "executive/tree": 7704,
+    "executive/mission": 1617,
+    "executive/tree": 7714,
     "executive/run": 3135,
     "executive/record": 1377,
     "executive/store": 1666,
@@ -30,7 +30,7 @@ LINES = {
     "skills": 27350,
     "plant": 21270,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 490, 86, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 491, 87, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,8 @@ from executive.language.questions import Answerer, make_answerer
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.mission.load import load_mission, locate
 from executive.mission.parameters import round_source
-from executive.words.command import START, TIME_UNITS_S, Command, Task
+from executive.mission.world_names import in_world_names, unknown_names
+from executive.words.command import START, Command, Task
 from executive.words.condition import CONDITIONS, RANGES, Condition, DoorOpen, Look, LookFor, Question, ValueIs
 from executive.words.expression import Expression, ExpressionError, Value, literal
 from executive.words.forms import Strict
@@ -25,7 +26,6 @@ from executive.words.mission import Mission, Parameter, QuestionPolicy
 from executive.words.policy import Policy
 from executive.words.step import Step
 from executive.words.steps import ForEach, Group, Steps
-from skills.api import ObjectKind
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
@@ -230,10 +230,10 @@ class _Resolver:
         except ValueError as fault:
             raise error(path, str(fault), "write names in plain words") from fault
         problems = Problems()
-        for key, what, hint in _unknown_names(command, self.knowledge):
+        for key, what, hint in unknown_names(command, self.knowledge):
             problems.add(error((*path, key), what, hint))
         problems.raise_any()
-        return _in_world_names(command, self.knowledge)
+        return in_world_names(command, self.knowledge)
 
     def _person(self, error: _Error, name: str, path: KeyPath) -> str:
         """Own name of the person, perhaps anybody."""
@@ -399,43 +399,3 @@ def _refuse_top_keys(used: Mission, user: Mission) -> None:
         if key in used.model_fields_set and said is not None and said != getattr(user, key):
             hint = "remove it there, or say the same in both"
             raise used.error((key,), f"'{key}' of a file that is used cannot differ from that of its user", hint)
-
-
-def _unknown_names(command: Command, knowledge: Knowledge) -> Iterator[tuple[str, str, str]]:
-    """Yields the names that a world does not have: the key, a sentence and a hint for each."""
-
-    def unknown(kind: str, name: str, known: Sequence[str]) -> tuple[str, str]:
-        return f"unknown {kind} {name!r}", suggestion(name, knowledge.spellings(known), shown=known)
-
-    waits = command.task is Task.WAIT and command.object is not None and command.object.name in TIME_UNITS_S
-    for key, item in (("take", command.item), ("object", None if waits else command.object)):
-        person = command.task is Task.FIND and item is not None and knowledge.somebody(item.name) is not None
-        if item is not None and knowledge.object_name(item.name) is None and not person:
-            yield key, *unknown("object", item.name, knowledge.object_names())
-    goals = (*knowledge.place_names(), *knowledge.people, START)
-    if command.goal is not None and _goal(command.goal, knowledge) is None:
-        yield "to", *unknown("place or person", command.goal, goals)
-    if command.goal_at is not None and knowledge.place(command.goal_at) is None:
-        yield "to", *unknown("place", command.goal_at, knowledge.place_names())
-
-
-def _in_world_names(command: Command, knowledge: Knowledge) -> Command:
-    """Replaces the names of a command by the world's own names."""
-
-    def named(item: ObjectKind | None) -> ObjectKind | None:
-        known = item and (knowledge.object_name(item.name) or knowledge.somebody(item.name))
-        return item and ObjectKind(known or item.name, item.attributes)
-
-    return Command(
-        item=named(command.item),
-        goal=command.goal and _goal(command.goal, knowledge),
-        goal_at=command.goal_at and knowledge.place(command.goal_at),
-        task=command.task,
-        object=named(command.object),
-        item_count=command.item_count,
-        object_count=command.object_count,
-    )
-
-
-def _goal(name: str, knowledge: Knowledge) -> str | None:
-    return START if name == START else knowledge.place(name) or knowledge.person(name)

@@ -23,6 +23,8 @@ _ATTRIBUTE: Final = re.compile(
 _NOTHING: Final = "Nothing"
 START: Final = "start"
 """Goal at the pose where the robot stood when the speaker addressed it."""
+SPEAKER: Final = "speaker"
+"""Person who spoke to the robot, as the object of a task on people."""
 TIME_UNITS_S: Final = {"second": 1.0, "seconds": 1.0, "minute": 60.0, "minutes": 60.0, "hour": 3600.0, "hours": 3600.0}
 """Seconds of each time unit that a command to wait takes as its object: "do [wait] to [10 second]"."""
 _PLURAL: Final = "some"
@@ -34,13 +36,20 @@ _COUNTED: Final = re.compile(r'(?:(\d+|some) )?(?:([^"]*) )?(?:"([^"]+)"|([^"]+)
 
 
 class Task(enum.Enum):
-    """Task of a command at its goal. WAIT takes a time as its object, CHARGE none."""
+    """Task of a command at its goal. WAIT takes a time as its object, CHARGE none; FOLLOW, GUIDE and GREET a person."""
 
     GRASP = "grasp"
     FIND = "find"
     PLACE = "place"
     WAIT = "wait"
     CHARGE = "charge"
+    FOLLOW = "follow"  # until the person stands at the goal, or until told
+    GUIDE = "guide"
+    GREET = "greet"  # of an open number of people: each person at the goal once
+
+
+PEOPLE_TASKS: Final = frozenset({Task.FOLLOW, Task.GUIDE, Task.GREET})
+"""Tasks whose object is a person."""
 
 
 @dataclass(frozen=True)

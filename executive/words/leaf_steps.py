@@ -68,7 +68,9 @@ class Do(Step):
     take: Text | None = Field(default=None, description="The object to carry; a number may stand before it.")
     to: Goal | None = Field(default=None, description='The place or person, or "start", or "Robin at hall".')
     do: Task | None = Field(default=None, description="The task there, on the object.")
-    object: Text | None = Field(default=None, description="The object of the task, or the person to look for.")
+    object: Text | None = Field(
+        default=None, description='The object of the task, or a person: a name, "person" for anybody, or "speaker".'
+    )
     elsewhere: StrictBool | None = Field(default=None, description=_ELSEWHERE)
     gives: dict[str, Name] | None = Field(default=None, description=_GIVES)
 

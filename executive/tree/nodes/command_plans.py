@@ -218,12 +218,22 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     return builder.sequence(f"bring {count_of(count, str(item))} to the {goal}, one at a time", *trips)
 
 
+def _people_plan(builder: PlanBuilder) -> NodeSpec:
+    """Raises InputError: the robot has no plan for tasks on people yet."""
+    task = builder.command.task
+    assert task is not None
+    raise builder.error(f"the robot cannot {task.value} people yet", "ask it to go to the person, or to a place")
+
+
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
     Task.GRASP: grasp_plan,
     Task.FIND: find_plan,
     Task.PLACE: carry_plan,
     Task.WAIT: wait_plan,
     Task.CHARGE: charge_plan,
+    Task.FOLLOW: _people_plan,
+    Task.GUIDE: _people_plan,
+    Task.GREET: _people_plan,
     None: go_plan,
 }
 PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}

@@ -15,7 +15,7 @@ from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.pick_up import go_near_plan
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.command import Task
+from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.knowledge import ANYBODY, ANYTHING, Knowledge
 from executive.words.outlines import inside
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Publish, Surface
@@ -390,9 +390,9 @@ def set_answer_options(node: NodeSpec, keys: Mapping[str, str]) -> NodeSpec:
 
 
 def refuse_several(builder: PlanBuilder) -> None:
-    """Raises InputError for a command about several objects, or an open number; questions and times may have any."""
+    """Raises InputError for a command about several objects, or an open number, unless it asks, waits or greets."""
     command = builder.command
-    asked = 1 if command.task in (Task.FIND, Task.WAIT) else command.object_count
+    asked = 1 if command.task in (Task.FIND, Task.WAIT, *PEOPLE_TASKS) else command.object_count
     for item, count in ((command.item, command.item_count), (command.object, asked)):
         if count != 1:
             said = f"{count} of '{item}'" if count else f"an open number of '{item}'"

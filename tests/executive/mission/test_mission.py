@@ -110,7 +110,7 @@ def test_a_sentence_may_begin_with_the_missions_own_robot(load):
         ("world:", "wrold:", 2, "unknown key 'wrold'; did you mean 'world'?"),
         ("    object: 2", "    objekt: 2", 10, "unknown key 'objekt'; did you mean 'object'?"),
         ("name: tidy up\n", "", 1, "key 'name' is missing in the file; add 'name'"),
-        ("do: grasp", "do: juggle", 9, "'grasp', 'find', 'place', 'wait' or 'charge'"),
+        ("do: grasp", "do: juggle", 9, "'grasp', 'find', 'place', 'wait', 'charge', 'follow', 'guide' or 'greet'"),
         ("    object: 2 red spanner\n", "", 8, "'do' and 'object' go together"),
         ("{to: lounge}", "{to: lunge}", 7, "unknown place or person 'lunge'; did you mean 'lounge'?"),
         ("{to: lounge}", "{to: moon base}", 7, " more"),

@@ -1,8 +1,9 @@
-"""Walking people in a mission file."""
+"""People in a mission file: those who walk, and those whom the robot follows, guides and greets."""
 
 import pytest
 
 from executive.mission.load import load_mission, routes_of_people
+from executive.mission.resolve import mission_from_file
 from skills.files.errors import InputError
 
 WALKS = """\
@@ -72,3 +73,43 @@ def test_a_wrong_route_is_refused_at_its_line(tmp_path, old, new, line):
 def test_a_file_that_is_used_brings_no_people_of_its_own(compile_text):
     with pytest.raises(InputError, match="'people' of a file that is used"):
         compile_text("name: all\nsteps:\n  - use: busy.yaml\n", busy=WALKS)
+
+
+def resolved(tmp_path, parser, flat, parts):
+    path = tmp_path / "mission.yaml"
+    path.write_text(f"name: people\nsteps:\n  - {parts}\n", encoding="utf-8")
+    return mission_from_file(path, parser=parser, knowledge=flat)
+
+
+@pytest.mark.parametrize(
+    ("parts", "command"),
+    [
+        ("{do: follow, object: speaker}", "Take [Nothing] to [Nothing] and do [follow] to [speaker]"),
+        ("{to: kitchen, do: guide, object: robin}", "Take [Nothing] to [kitchen] and do [guide] to [Robin]"),
+        (
+            "{to: lounge, do: greet, object: some person}",
+            "Take [Nothing] to [living room] and do [greet] to [some person]",
+        ),
+    ],
+)
+def test_people_are_followed_guided_and_greeted_by_name(tmp_path, parser, flat, parts, command):
+    (step,) = resolved(tmp_path, parser, flat, parts).commands
+    assert str(step) == command
+
+
+@pytest.mark.parametrize(
+    ("parts", "says"),
+    [
+        ("{do: follow, object: Robyn}", "unknown person 'Robyn'; did you mean 'Robin'?"),
+        ("{do: follow, object: beer}", "unknown person 'beer'"),
+        ("{do: follow, object: tall person}", "unknown person 'tall person'"),
+        ("{to: kitchen, do: guide, object: some person}", "cannot guide several people"),
+        ("{do: guide, object: Robin}", "it is not said where to guide Robin; name the place under 'to'"),
+        ("{take: beer, to: kitchen, do: guide, object: Robin}", "the beer cannot be taken along by 'guide'"),
+    ],
+)
+def test_a_command_that_does_not_fit_people_is_refused(tmp_path, parser, flat, parts, says):
+    with pytest.raises(InputError) as error:
+        resolved(tmp_path, parser, flat, parts)
+    assert error.value.line == 3
+    assert says in str(error.value)

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from executive.words.command import Command, Task, parse_command, parse_object
+from executive.words.command import SPEAKER, Command, Task, parse_command, parse_object
 from skills.api import ObjectKind
 
 TEXT_FORMS = [
@@ -27,6 +27,14 @@ TEXT_FORMS = [
     (
         Command(item=ObjectKind("apple juice"), goal="desk"),
         "Take [apple juice] to [desk] and do [Nothing] to [Nothing]",
+    ),
+    (
+        Command(task=Task.FOLLOW, object=ObjectKind(SPEAKER)),
+        "Take [Nothing] to [Nothing] and do [follow] to [speaker]",
+    ),
+    (
+        Command(goal="living room", task=Task.GREET, object=ObjectKind("person"), object_count=0),
+        "Take [Nothing] to [living room] and do [greet] to [some person]",
     ),
     (Command(item=ObjectKind("red wine"), goal="desk"), 'Take ["red wine"] to [desk] and do [Nothing] to [Nothing]'),
     (

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 2999,
+    "executive/words": 3006,
     "executive/language": 7725,
     "executive/speech": 1582,
     "executive/mission": 1617,
@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 577,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 8194,
+    "executive/app": 8202,
     "executive/cli": 4905,
     "skills": 27350,
-    "plant": 21270,
+    "plant": 21389,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 491, 87, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 493, 88, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

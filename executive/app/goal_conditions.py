@@ -137,7 +137,15 @@ def _timed(
     if when is When.END_OF_MISSION and (let_go or (condition.kind is GoalKind.WENT and drove)):
         when = When.END_OF_STEP
     taken_s = tuple((move.from_s, move.until_s) for move in later)
-    return replace(condition, when=when, began_s=one.began_s, ended_s=one.ended_s, taken_s=taken_s)
+    spoken_s = tuple(said.t_s for said in result.said if not said.asked and one.began_s <= said.t_s <= ended_s)
+    return replace(
+        condition,
+        when=when,
+        began_s=one.began_s,
+        ended_s=one.ended_s,
+        spoken_s=spoken_s if condition.kind is GoalKind.GREETED else (),
+        taken_s=taken_s,
+    )
 
 
 def _moves(share: Share) -> Iterator[_Move]:

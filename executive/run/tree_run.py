@@ -254,5 +254,5 @@ class Gate:
 
 
 _OUTCOMES = {Status.SUCCESS: Outcome.SUCCESS, Status.FAILURE: Outcome.FAILURE}
-_GOALS_WITHOUT_NEWS = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN)
+_GOALS_WITHOUT_NEWS = (GoalKind.WENT, GoalKind.ANSWERED, GoalKind.DOOR_OPEN, GoalKind.MET)
 """Goals of a last step after which the claim is the answers alone: it would repeat one, or say where the robot is."""

@@ -17,6 +17,10 @@ class GoalKind(enum.Enum):
     ANSWERED = "answered"  # the answer is what is true of the source regions
     DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
+    FOLLOWED = "followed"  # the robot is near the person, who stands in a goal region, and never lost them for long
+    GUIDED = "guided"  # the person stands in a goal region, and the robot near them
+    MET = "met"  # the robot is close to the person
+    GREETED = "greeted"  # the robot spoke once beside each person who stood in the goal regions
 
 
 class When(enum.Enum):
@@ -59,7 +63,9 @@ class GoalCondition:
     `count` the number of objects (0 counts as 1). The robot takes the objects from `source` (empty: anywhere) or, for
     an answer, looks there; an answer may count or miss objects in `maybe`. `goal` is the destination of the objects or
     of the robot (any of the regions). `person` receives the object or, where the class is "person", is asked for (None:
-    anyone). `answer` is the answer that the robot gave at `answered_s` (None: now). `robot` must act (None: any).
+    anyone). To follow, guide, meet or greet a person, `person` (None: anyone) must stand in `goal` (empty: anywhere).
+    `answer` is the answer that the robot gave at `answered_s` (None: now), `spoken_s` has the times at which it spoke.
+    `robot` must act (None: any).
 
     `when` says at which times it must hold. The step ran from `began_s` (None: since `since_s`) to `ended_s` (None: it
     ends now). A later step of the same mission may lift the objects again within the intervals `taken_s`. Events before
@@ -75,6 +81,7 @@ class GoalCondition:
     person: str | None = None
     answer: bool | None = None
     answered_s: float | None = None
+    spoken_s: tuple[float, ...] = ()
     robot: str | None = None
     wanted: str = ""
     when: When = When.END_OF_MISSION

@@ -1,29 +1,18 @@
 """Judges goal conditions by the recorded truth. Pure functions: the same record gives the same verdict."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
-
-import numpy as np
 
 from executive.words.goal import GoalCondition, GoalKind, RefereeReport, Region, When
+from plant.referee.company import judge_company, judge_greeted
 from plant.referee.entities import Collision
+from plant.referee.findings import Finding, distance_m, is_past, region_at, step_end_s, the, where
 from plant.referee.object_history import ON_TRAY_GAP_S, SETTLE_S, Lift, ObjectHistory, TimedPath, Truth
 from skills.files.errors import definite, listing
 from skills.robot import FloatArray
 
-NEAR_PERSON_M = 2.0
-NAMED_REGIONS = 3
 PERSON = "person"
 DOOR_LOOK_S = 2.0
 """Longest time between the robot's look at a door and its answer."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """Finding on one condition: whether it holds, and a sentence that says why."""
-
-    holds: bool
-    sentence: str
 
 
 def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequence[Collision]) -> RefereeReport:
@@ -45,19 +34,9 @@ def judge(conditions: Sequence[GoalCondition], truth: Truth, *, collisions: Sequ
     )
 
 
-def _until_s(condition: GoalCondition, truth: Truth) -> float:
-    """Time when the step of a condition ended, or now."""
-    return truth.now_s if condition.ended_s is None else min(condition.ended_s, truth.now_s)
-
-
-def _is_past(condition: GoalCondition) -> bool:
-    """Returns whether a condition is about the past, not the end of the mission."""
-    return condition.when is not When.END_OF_MISSION and condition.ended_s is not None
-
-
 def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether a later step of the same mission lifted an object again."""
-    ended_s = _until_s(condition, truth)
+    ended_s = step_end_s(condition, truth)
     return any(
         lift.time_s > ended_s and from_s <= lift.time_s <= until_s + SETTLE_S
         for lift in history.lifts
@@ -67,7 +46,7 @@ def _taken_again(history: ObjectHistory, condition: GoalCondition, truth: Truth)
 
 def _judge_grasped(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects were lifted from the source, and held at the times at which they must be."""
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     from_s = condition.from_s if condition.when is When.SOME_TIME else condition.since_s
     candidates = ((one, _lift(one, condition, from_s, until_s)) for one in _of_class(condition, truth))
     lifted = {history: lift for history, lift in candidates if lift is not None}
@@ -105,10 +84,10 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
     people = {name: path for name, path in truth.persons.items() if condition.person in (None, name)}
     if not people:
         return Finding(False, f"There is no person {condition.person or ''} to hand anything to.".replace("  ", " "))
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     given = [one for one in objects if _was_given(one, people, condition, truth)]
-    if _is_past(condition):
+    if is_past(condition):
         done = given
     else:
         there = [one for one in objects if one.on_tray_of in people and not one.placed_by_person]
@@ -124,7 +103,7 @@ def _judge_handed_over(condition: GoalCondition, truth: Truth) -> Finding:
 
 def _was_given(history: ObjectHistory, people: Collection[str], condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object came to rest on the tray of a person, and stayed at the times at which it must."""
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     for person in people:
         for first_s, last_s in truth.given.get((history.name, person), ()):
             in_time = condition.from_s <= first_s <= until_s + SETTLE_S
@@ -141,29 +120,29 @@ def _why_not_handed(
     if not objects:
         return f"No {_wanted(condition)} was brought{_out_of(condition.source)}."
     history = next((one for one in objects if one.holder is not None), objects[0])
-    apart = min(_apart_m(history.last.p_WO, p) for p in people.values())
-    where = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
+    apart = min(distance_m(history.last.p_WO, p) for p in people.values())
+    there = f"{history.last.p_WO[2]:.2f} m high, {apart:.2f} m from {_either(people)}"
     if history.holder is not None:
-        return f"{definite(history.name)} is still in the gripper, {where}."
+        return f"{definite(history.name)} is still in the gripper, {there}."
     if history.on_tray_of in people:
         return f"{definite(history.name)} was not yet on the tray of {history.on_tray_of} at the end of its step."
-    return f"{definite(history.name)} {'rests' if history.resting else 'moves'} {where}, not on the tray."
+    return f"{definite(history.name)} {'rests' if history.resting else 'moves'} {there}, not on the tray."
 
 
 def _judge_placed(condition: GoalCondition, truth: Truth) -> Finding:
     """Judges whether the objects rest in the goal, released by the gripper."""
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     objects = [one for one in _of_class(condition, truth) if _lift(one, condition, condition.since_s, until_s)]
     done = {one: p_W for one in objects if (p_W := _put_in(one, condition, truth)) is not None}
     if len(done) >= condition.needed:
-        verb = "was put" if _is_past(condition) else "rests"
-        ons = (f"{definite(history.name)} {verb} on {_region_at(condition.goal, p)}" for history, p in done.items())
+        verb = "was put" if is_past(condition) else "rests"
+        ons = (f"{definite(history.name)} {verb} on {region_at(condition.goal, p)}" for history, p in done.items())
         return Finding(True, f"{' and '.join(ons)}.")
     if not objects:
         return Finding(False, f"No {_wanted(condition)} was brought{_out_of(condition.source)}.")
     elsewhere = [history for history in objects if history not in done]
     if not elsewhere:
-        return Finding(False, f"{_tally(done, condition)} put on {_where(condition.goal)}.")
+        return Finding(False, f"{_tally(done, condition)} put on {where(condition.goal)}.")
     missed = _where_it_is(elsewhere[0], condition, truth)
     return Finding(False, f"{_tally(done, condition)} put there; {missed}." if done else f"{missed}.")
 
@@ -172,23 +151,23 @@ def _where_it_is(history: ObjectHistory, condition: GoalCondition, truth: Truth)
     """Clause that says where an object is that does not, or did not, rest in the goal in time."""
     now = _rest_in(history, condition.goal)
     if now is not None and not history.placed_by_person:
-        return f"{definite(history.name)} was not on {_where(condition.goal)} at the end of its step"
+        return f"{definite(history.name)} was not on {where(condition.goal)} at the end of its step"
     x, y, z = history.last.p_WO
     state = "is in a gripper" if history.holder else "is" if history.resting else "moves"
-    return f"{definite(history.name)} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {_where(condition.goal)}"
+    return f"{definite(history.name)} {state} at ({x:.2f}, {y:.2f}, {z:.2f}), not resting on {where(condition.goal)}"
 
 
 def _put_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> FloatArray | None:
     """Place in the goal where a robot put an object; None if it was not there at the times at which it must be."""
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     if condition.when is When.SOME_TIME:
         rests = history.own_rests_W(condition.from_s, until_s + SETTLE_S)
-        return next((p_W for p_W in rests if _region_at(condition.goal, p_W) is not None), None)
+        return next((p_W for p_W in rests if region_at(condition.goal, p_W) is not None), None)
     now_W = None if history.placed_by_person else _rest_in(history, condition.goal)
     if condition.ended_s is None:
         return now_W
     put = history.rest_at(until_s)
-    if put is None or put[0] < condition.from_s or _region_at(condition.goal, put[1]) is None:
+    if put is None or put[0] < condition.from_s or region_at(condition.goal, put[1]) is None:
         return None
     if condition.when is not When.END_OF_MISSION or now_W is not None or _taken_again(history, condition, truth):
         return put[1]
@@ -201,25 +180,14 @@ def _judge_went(condition: GoalCondition, truth: Truth) -> Finding:
     if not robots:
         return Finding(False, f"There is no robot {condition.robot}.")
     if condition.person is not None:
-        return _judge_near_person(condition, robots[0], truth)
+        return judge_company(condition, truth)
     findings = [_judge_at(condition, name, truth) for name in robots]
     return next((finding for finding in findings if finding.holds), findings[0])
 
 
-def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
-    verb = "was" if _is_past(condition) else "is"
-    points = _points(condition, truth.robots[robot], truth)
-    inside = [_region_at(condition.goal, p_W) for p_W in points]
-    if (any if condition.when is When.SOME_TIME else all)(on is not None for on in inside):
-        return Finding(True, f"{robot} {verb} at {next(filter(None, inside))}.")
-    outside = next(p_W for p_W, on in zip(reversed(points), reversed(inside), strict=True) if on is None)
-    x, y, _ = outside
-    return Finding(False, f"{robot} {verb} at ({x:.2f}, {y:.2f}), not at {_where(condition.goal)}.")
-
-
 def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence[FloatArray]:
     """Positions of a path that count for a condition, in the order of time."""
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     if condition.when in (When.SOME_TIME, When.ALWAYS):
         return list(path.positions_between(condition.from_s, until_s))
     if condition.when is When.END_OF_MISSION:
@@ -227,21 +195,15 @@ def _points(condition: GoalCondition, path: TimedPath, truth: Truth) -> Sequence
     return [path.position_at(until_s)]
 
 
-def _judge_near_person(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
-    """Judges whether the robot was near a person, who may walk, at the times at which it must be."""
-    person, path = condition.person or "", truth.robots[robot]
-    other = truth.persons.get(person)
-    if other is None:
-        return Finding(False, f"there is no person {person} to go to.")
-    until_s = _until_s(condition, truth)
-    if condition.when is When.SOME_TIME:
-        apart_m = min(
-            _apart_m(p, other.position_at(until_s)) for p in path.positions_between(condition.from_s, until_s)
-        )
-    else:
-        apart_m = _apart_m(path.position_at(until_s), other.position_at(until_s))
-    verb = "was" if _is_past(condition) else "is"
-    return Finding(apart_m <= NEAR_PERSON_M, f"{robot} {verb} {apart_m:.1f} m from {person}.")
+def _judge_at(condition: GoalCondition, robot: str, truth: Truth) -> Finding:
+    verb = "was" if is_past(condition) else "is"
+    points = _points(condition, truth.robots[robot], truth)
+    inside = [region_at(condition.goal, p_W) for p_W in points]
+    if (any if condition.when is When.SOME_TIME else all)(on is not None for on in inside):
+        return Finding(True, f"{robot} {verb} at {next(filter(None, inside))}.")
+    outside = next(p_W for p_W, on in zip(reversed(points), reversed(inside), strict=True) if on is None)
+    x, y, _ = outside
+    return Finding(False, f"{robot} {verb} at ({x:.2f}, {y:.2f}), not at {where(condition.goal)}.")
 
 
 def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
@@ -253,9 +215,9 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
             (name, path.position_at(when_s)) for name, path in truth.persons.items() if condition.person in (None, name)
         )
         verb = "is" if then_s is None else "was"
-        there = [f"{name} {verb} in {on}" for name, p_W in people if (on := _region_at(condition.source, p_W))]
+        there = [f"{name} {verb} in {on}" for name, p_W in people if (on := region_at(condition.source, p_W))]
         who = condition.person or "nobody"
-        nothing = f"{who} {verb} {'not ' if condition.person else ''}in {_where(condition.source)}"
+        nothing = f"{who} {verb} {'not ' if condition.person else ''}in {where(condition.source)}"
     else:
         rest = [
             (each.name, p_W)
@@ -264,9 +226,9 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
             is not None
         ]
         verb = "is" if then_s is None else "was"
-        there = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.source, p_W))]
-        aside = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := _region_at(condition.maybe, p_W))]
-        nothing = f"there is no {_wanted(condition)}{f' on {_where(condition.source)}' if condition.source else ''}"
+        there = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := region_at(condition.source, p_W))]
+        aside = [f"{definite(name)} {verb} on {on}" for name, p_W in rest if (on := region_at(condition.maybe, p_W))]
+        nothing = f"there is no {_wanted(condition)}{f' on {where(condition.source)}' if condition.source else ''}"
     most = len(there) + len(aside)
     right = len(there) < condition.needed if condition.answer is False else most >= condition.needed
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
@@ -284,7 +246,7 @@ def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
     was = {frozenset(): "open", frozenset({0.0}): "open", frozenset({1.0}): "closed"}.get(frozenset(shares), "moving")
     right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
     said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    return Finding(right, f"the answer was {said}, and {_the(doorway.name)} was {was}.")
+    return Finding(right, f"the answer was {said}, and {the(doorway.name)} was {was}.")
 
 
 def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
@@ -292,37 +254,37 @@ def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
     source = condition.source
     there = [one for one in truth.histories if _was_in(one, condition, truth)]
     if not there:
-        return Finding(True, f"nothing stood on {_where(source)}.")
+        return Finding(True, f"nothing stood on {where(source)}.")
     if not condition.goal:
         left = [one for one in there if _is_left(one, condition, truth)]
         rest = f"{_names(left)} {'is' if len(left) == 1 else 'are'}" if left else "nothing is"
-        return Finding(not left, f"{rest} left on {_where(source)}.")
+        return Finding(not left, f"{rest} left on {where(source)}.")
     missing = [one for one in there if _put_in(one, condition, truth) is None]
     if not missing:
-        return Finding(True, f"{_names(there)} {'stands' if len(there) == 1 else 'stand'} on {_where(condition.goal)}.")
+        return Finding(True, f"{_names(there)} {'stands' if len(there) == 1 else 'stand'} on {where(condition.goal)}.")
     return Finding(
-        False, f"{_names(missing)} {'does' if len(missing) == 1 else 'do'} not stand on {_where(condition.goal)}."
+        False, f"{_names(missing)} {'does' if len(missing) == 1 else 'do'} not stand on {where(condition.goal)}."
     )
 
 
 def _was_in(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object rested in the source when the step began, or came to rest there during it."""
-    from_s, until_s = condition.from_s, _until_s(condition, truth)
+    from_s, until_s = condition.from_s, step_end_s(condition, truth)
     came = zip(history.rested_s, history.rests_W, strict=True)
     began_W = history.place_at(from_s)
     places = [*(p_W for when_s, p_W in came if from_s < when_s <= until_s), *(() if began_W is None else (began_W,))]
-    return any(_region_at(condition.source, p_W) is not None for p_W in places)
+    return any(region_at(condition.source, p_W) is not None for p_W in places)
 
 
 def _is_left(history: ObjectHistory, condition: GoalCondition, truth: Truth) -> bool:
     """Returns whether an object was in the source at the end of the step, or is there now without being put back."""
-    until_s = _until_s(condition, truth)
+    until_s = step_end_s(condition, truth)
     put = history.rest_at(until_s)
     then_W = put[1] if put is not None else history.place_at(until_s)
-    now = _region_at(condition.source, history.last.p_WO) is not None
+    now = region_at(condition.source, history.last.p_WO) is not None
     if condition.ended_s is None:
         return now
-    if then_W is not None and _region_at(condition.source, then_W) is not None:
+    if then_W is not None and region_at(condition.source, then_W) is not None:
         return True
     back = history.placed_by_person or _taken_again(history, condition, truth)
     return condition.when is When.END_OF_MISSION and now and not back
@@ -336,6 +298,10 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.ANSWERED: _judge_answered,
     GoalKind.DOOR_OPEN: _judge_door,
     GoalKind.CLEARED: _judge_cleared,
+    GoalKind.FOLLOWED: judge_company,
+    GoalKind.GUIDED: judge_company,
+    GoalKind.MET: judge_company,
+    GoalKind.GREETED: judge_greeted,
 }
 
 
@@ -351,7 +317,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until
             for lift in history.lifts_since(from_s)
             if lift.time_s <= until_s + SETTLE_S
             and condition.robot in (None, lift.robot)
-            and (not condition.source or _region_at(condition.source, lift.from_W) is not None)
+            and (not condition.source or region_at(condition.source, lift.from_W) is not None)
         ),
         None,
     )
@@ -359,22 +325,7 @@ def _lift(history: ObjectHistory, condition: GoalCondition, from_s: float, until
 
 def _rest_in(history: ObjectHistory, goal: Sequence[Region]) -> FloatArray | None:
     """Position of an object that rests in the goal now; None when it does not."""
-    return history.last.p_WO if history.resting and _region_at(goal, history.last.p_WO) is not None else None
-
-
-def _region_at(regions: Sequence[Region], p_W: FloatArray) -> str | None:
-    """Name, with its article, of the first region that contains a point."""
-    return next((_the(region.name) for region in regions if region.contains(p_W)), None)
-
-
-def _the(name: str) -> str:
-    """Name of a place with its article; a pose or a proper name has none."""
-    return name if name.startswith("(") or name[:1].isupper() else definite(name)
-
-
-def _apart_m(p: FloatArray, q: FloatArray) -> float:
-    """Horizontal distance between two points (m)."""
-    return float(np.hypot(p[0] - q[0], p[1] - q[1]))
+    return history.last.p_WO if history.resting and region_at(goal, history.last.p_WO) is not None else None
 
 
 def _names(histories: Iterable[ObjectHistory]) -> str:
@@ -398,18 +349,12 @@ def _tally(done: Collection[ObjectHistory], condition: GoalCondition) -> str:
 
 def _from(condition: GoalCondition, lift: Lift) -> str:
     """Phrase with the source of a lift."""
-    region = _region_at(condition.source, lift.from_W)
+    region = region_at(condition.source, lift.from_W)
     return "" if region is None else f" from {region}"
 
 
-def _where(regions: Sequence[Region]) -> str:
-    """Names of regions if there are few, else their number."""
-    names = tuple(dict.fromkeys(_the(region.name) for region in regions))
-    return " or ".join(names) if len(names) <= NAMED_REGIONS else f"any of {len(names)} places"
-
-
 def _out_of(regions: Sequence[Region]) -> str:
-    return f" from {_where(regions)}" if regions else ""
+    return f" from {where(regions)}" if regions else ""
 
 
 def _either(people: Iterable[str]) -> str:

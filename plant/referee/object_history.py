@@ -304,6 +304,10 @@ class TimedPath:
         """Position (3,) at a time."""
         return self.points[self._index(time_s), :3]
 
+    def positions_at(self, times_s: FloatArray) -> FloatArray:
+        """Positions (N, 3) at some times."""
+        return self.points[np.maximum(0, np.searchsorted(self.points[:, 3], times_s, side="right") - 1), :3]
+
     def positions_between(self, from_s: float, until_s: float) -> FloatArray:
         """Positions (N, 3) from just before one time until another."""
         first = max(0, int(np.searchsorted(self.points[:, 3], from_s)) - 1)
@@ -330,10 +334,15 @@ class Truth:
     doors: Mapping[Point, Sequence[tuple[float, float]]] = field(default_factory=dict)
 
 
-def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float) -> None:
-    """Adds a point with its time to a path when it is `PATH_STEP_M` from the last point."""
+def extend_path(path: list[FloatArray], p_W: FloatArray, time_s: float, most: float = math.inf) -> None:
+    """Adds a point with its time to a path when it is `PATH_STEP_M` from the last point.
+
+    Beyond `most` points, the older half of the path loses every other point.
+    """
     if not path or float(np.linalg.norm(p_W[:2] - path[-1][:2])) >= PATH_STEP_M:
         path.append(np.append(p_W, time_s))
+    if len(path) > most:
+        del path[1 : len(path) // 2 : 2]
 
 
 def extend_stays(stays: list[tuple[float, float]], time_s: float) -> None:

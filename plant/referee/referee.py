@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 PATH_VALUES = 4
 BEFORE_SAMPLES = 3
+MOST_POINTS = 20_000
+"""Most points of a person's path, so that a long run with a crowd needs a bounded memory."""
 
 
 DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, float]]]]
@@ -108,7 +110,7 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         for name, p_WB in self._bases.items():
             extend_path(self._paths[name], p_WB, time_s)
         for name, p_W in self._persons.items():
-            extend_path(self._person_paths[name], p_W, time_s)
+            extend_path(self._person_paths[name], p_W, time_s, MOST_POINTS)
         self._now_s = time_s
         neighbours = self._neighbours(pairs)
         for name, body in self._entities.objects.items():

@@ -1,0 +1,117 @@
+"""The referee judges whom the robot followed, guided, met and greeted by the recorded paths."""
+
+import numpy as np
+import pytest
+
+from executive.words.goal import GoalCondition, GoalKind, Region
+from plant.referee.judge import judge
+from plant.referee.object_history import PATH_STEP_M, TimedPath, Truth, extend_path
+
+OFFICE = Region("office", ((8.0, -2.0), (12.0, -2.0), (12.0, 2.0), (8.0, 2.0)))
+HALL = Region("hall", ((-2.0, -2.0), (4.0, -2.0), (4.0, 2.0), (-2.0, 2.0)))
+
+
+def path(*points):
+    """Path through points (x, y, t)."""
+    return TimedPath(np.array([(x, y, 0.0, t) for x, y, t in points], dtype=np.float64))
+
+
+def walked(x_from, x_to, from_s=0.0, y=0.0, speed_m_s=1.0):
+    """Path along x at a speed."""
+    along = np.arange(x_from, x_to, 0.1)
+    return path(*((x, y, from_s + (x - x_from) / speed_m_s) for x in along))
+
+
+def finding(condition, robot, **people):
+    return judge([condition], Truth(60.0, (), {"alice": robot}, people, {}), collisions=())
+
+
+FOLLOWED = GoalCondition(GoalKind.FOLLOWED, goal=(OFFICE,), person="Robin", robot="alice", began_s=0.0, ended_s=30.0)
+
+
+def test_a_robot_behind_a_person_who_stands_in_the_room_has_followed():
+    found = finding(FOLLOWED, walked(-1.5, 8.5), Robin=walked(0.0, 10.0))
+    assert found.success and "in the office" in found.why
+
+
+def test_a_robot_that_ends_far_from_the_person_has_not_followed():
+    assert not finding(FOLLOWED, walked(2.0, 6.5), Robin=walked(2.0, 10.0)).success
+
+
+def test_a_person_outside_the_room_was_not_followed_there():
+    found = finding(FOLLOWED, walked(-1.5, 3.0), Robin=walked(0.0, 4.5))
+    assert not found.success and "not in the office" in found.why
+
+
+@pytest.mark.parametrize(("late_s", "kept"), [(8.0, True), (18.0, False)])
+def test_a_person_who_was_away_for_long_was_lost(late_s, kept):
+    robot = path(*((x, 0.0, x + (late_s if x > 2.0 else 0.0)) for x in np.arange(0.0, 9.5, 0.1)))
+    found = finding(FOLLOWED, robot, Robin=walked(0.0, 10.0))
+    assert found.success is kept and "over 5 m away" in found.why
+
+
+def test_behind_somebody_else_nobody_was_followed():
+    found = finding(FOLLOWED, walked(-1.5, 8.5), Kim=walked(0.0, 10.0), Robin=walked(0.0, 10.0, y=50.0))
+    assert not found.success
+
+
+def test_anyone_may_be_followed():
+    someone = GoalCondition(GoalKind.FOLLOWED, goal=(OFFICE,), began_s=0.0, ended_s=30.0)
+    assert finding(someone, walked(-1.5, 8.5), Robin=walked(0.0, 10.0), Kim=path((50.0, 0.0, 0.0))).success
+
+
+GUIDED = GoalCondition(GoalKind.GUIDED, goal=(OFFICE,), person="Robin", began_s=0.0, ended_s=30.0)
+
+
+def test_a_person_who_stands_in_the_goal_beside_the_robot_was_guided():
+    assert finding(GUIDED, walked(0.0, 10.5), Robin=walked(-1.5, 9.0)).success
+
+
+@pytest.mark.parametrize(("robot_m", "person_m"), [(10.5, 3.0), (4.0, 9.0)])
+def test_a_guide_and_a_person_who_do_not_arrive_together_have_failed(robot_m, person_m):
+    assert not finding(GUIDED, walked(0.0, robot_m), Robin=walked(0.0, person_m)).success
+
+
+def test_a_robot_beside_the_person_has_met_them_where_they_were_then():
+    met = GoalCondition(GoalKind.MET, person="Robin", began_s=0.0, ended_s=10.0)
+    robin = path((5.0, 0.0, 0.0), (20.0, 0.0, 40.0))
+    assert finding(met, walked(0.0, 3.5), Robin=robin).success
+    assert not finding(met, walked(0.0, 2.5), Robin=robin).success
+    assert "no person" in finding(met, walked(0.0, 3.5), Kim=robin).why
+
+
+def greeted(*spoken_s):
+    return GoalCondition(GoalKind.GREETED, goal=(HALL,), began_s=0.0, ended_s=30.0, spoken_s=spoken_s)
+
+
+ROUND = path((0.0, 0.0, 0.0), (3.0, 0.0, 10.0))
+KIM, ROBIN = path((0.0, 1.5, 0.0)), path((3.0, 1.5, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("spoken_s", "right"),
+    [((5.0, 12.0), True), ((5.0,), False), ((5.0, 6.0), False), ((5.0, 12.0, 13.0), False), ((), False)],
+)
+def test_each_person_in_the_room_is_greeted_once(spoken_s, right):
+    assert finding(greeted(*spoken_s), ROUND, Kim=KIM, Robin=ROBIN).success is right
+
+
+def test_a_person_who_left_the_room_need_not_be_greeted():
+    leaves = path((0.0, 1.5, 0.0), (0.0, 5.0, 4.0))
+    assert finding(greeted(12.0), ROUND, Kim=leaves, Robin=ROBIN).success
+    assert finding(greeted(3.0, 12.0), ROUND, Kim=leaves, Robin=ROBIN).success
+
+
+def test_an_empty_room_holds_nobody_to_greet():
+    found = finding(greeted(), ROUND, Kim=path((30.0, 0.0, 0.0)))
+    assert found.success and "Nobody stood" in found.why
+
+
+def test_a_long_path_keeps_its_ends_and_its_memory():
+    points = []
+    for number in range(400):
+        extend_path(points, np.array([number * 2.0 * PATH_STEP_M, 0.0, 0.0]), float(number), most=100)
+    kept = TimedPath(np.array(points))
+    assert len(points) <= 100
+    assert kept.position_at(399.0)[0] == pytest.approx(399 * 2.0 * PATH_STEP_M)
+    assert kept.position_at(350.0)[0] == pytest.approx(350 * 2.0 * PATH_STEP_M, abs=0.2)

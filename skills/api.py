@@ -187,6 +187,35 @@ def nobody_to_ask(question: Question) -> Asked:
     return _Unheard(question)
 
 
+Listen = Callable[[], Job[str]]
+"""Waits for a remark of a person that ends the skill, such as "stop", "thank you" or "we are there".
+
+Returns at once; the job is done when a person has spoken, and its result is the remark. The skill withdraws the job in
+`end` and in `suspend`: while no skill waits, "stop" presses the stop button.
+"""
+
+
+@dataclass(frozen=True)
+class _Silence:
+    """Remark that nobody makes."""
+
+    def done(self) -> bool:
+        """Returns False."""
+        return False
+
+    def result(self) -> str:
+        """Raises RuntimeError."""
+        raise RuntimeError("nobody has spoken")
+
+    def withdraw(self) -> None:
+        """Does nothing."""
+
+
+def nobody_speaks() -> Job[str]:
+    """Waits for a remark that nobody makes; serves as a `Listen`."""
+    return _Silence()
+
+
 class Publish(Protocol):
     """Writes a message to the event log."""
 
@@ -251,6 +280,7 @@ class SkillContext:
     publish: Publish
     seed: int
     ask: Ask = nobody_to_ask
+    listen: Listen = nobody_speaks
     detector: Detector = NO_DETECTOR
     work: WorkCounter = NO_WORK_COUNTER
     stack: RobotStack = field(default_factory=default_stack)

@@ -15,19 +15,19 @@ ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
     "executive/words": 3006,
-    "executive/language": 7725,
+    "executive/language": 7728,
     "executive/speech": 1582,
     "executive/mission": 1617,
     "executive/tree": 7714,
-    "executive/run": 3135,
+    "executive/run": 3179,
     "executive/record": 1377,
     "executive/store": 1666,
-    "executive/conversation": 577,
+    "executive/conversation": 589,
     "executive/view": 1553,
     "executive/testing": 818,
     "executive/app": 8202,
     "executive/cli": 4905,
-    "skills": 27350,
+    "skills": 27380,
     "plant": 21389,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 493, 88, 12

@@ -148,7 +148,7 @@ class Conversation(RunVisitor):
             self._open = None
             return confirmation(NEVER_MIND)
         if remark is not None:
-            return self._remarks.answer_to(remark)
+            return self._remarks.answer_to(remark, text)
         for step in (self._answer_mission, self._answer_own, self._follow_up):
             reply = step(text, now_s)
             if reply is not None:

@@ -105,7 +105,9 @@ class RemarkAnswers:
         self.progress: Progress | None = None
         self._answers: Mapping[Remark, Callable[[], Reply]] = MappingProxyType(
             {
+                Remark.FREEZE: self._stop,
                 Remark.STOP: self._stop,
+                Remark.ENOUGH: lambda: answer("all right"),
                 Remark.WAIT: self._wait,
                 Remark.GO_ON: self._go_on,
                 Remark.CANCEL: self._cancel,
@@ -113,15 +115,25 @@ class RemarkAnswers:
                 Remark.DOING: lambda: answer(doing_in_words(self.progress, control.state, speech.robot_name)),
                 Remark.ABLE: lambda: answer(known_line(speech.knowledge)),
                 Remark.THANKS: lambda: answer("you are welcome"),
+                Remark.PRAISE: lambda: answer("you are welcome"),
             }
         )
 
-    def answer_to(self, remark: Remark) -> Reply:
-        """Carries out a remark and returns the reply."""
-        acts = remark in (Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
+    def answer_to(self, remark: Remark, text: str) -> Reply:
+        """Carries out a remark, said in the words of `text`, and returns the reply."""
+        acts = remark in (Remark.FREEZE, Remark.STOP, Remark.WAIT, Remark.GO_ON, Remark.CANCEL)
         if acts and self._control.state.mode is Mode.ENDED:
             return refusal(OVER)
+        ends = remark in (Remark.ENOUGH, Remark.THANKS) or (remark is Remark.STOP and not self._held)
+        if ends and self._control.tell(text.strip(), robot=self._speech.robot_name):
+            return confirmation("all right, that is done; say 'stop' once more to make me stand still")
         return self._answers[remark]()
+
+    @property
+    def _held(self) -> bool:
+        """Whether the robot stands still by order."""
+        state = self._control.state
+        return state.robots.get(self._speech.robot_name, state).mode in _HELD
 
     def _stop(self) -> Reply:
         self._control.stop_button(_STOP_REASON, robot=self._one)

@@ -152,14 +152,17 @@ _FORMS: Final = Patterns("followups.yaml")
 class Remark(enum.Enum):
     """Meaning of a remark about the run."""
 
-    STOP = "stop"  # stand still at once
+    FREEZE = "freeze"  # stand still at once
+    STOP = "stop"  # end what waits for that, such as following; else stand still
+    ENOUGH = "enough"  # end what waits for that
     WAIT = "wait"  # pause
     GO_ON = "go_on"  # go on after a pause or a stop
     CANCEL = "cancel"  # give the mission up
     WHERE = "where"  # where the robot is
     DOING = "doing"  # what it is doing, and why
     ABLE = "able"  # what it can do
-    THANKS = "thanks"  # nothing
+    THANKS = "thanks"  # as ENOUGH
+    PRAISE = "praise"  # nothing
 
 
 def parse_remark(text: str) -> Remark | None:

@@ -30,6 +30,7 @@ from executive.run.control_state import (
     MissionRequest,
     Mode,
     OpenQuestion,
+    PendingRemark,
     RobotMode,
     Turn,
 )
@@ -76,6 +77,7 @@ class Control:
         self.pace = pace
         self._changed = threading.Condition()
         self._questions: dict[str, PendingAnswer] = {}
+        self._remarks: tuple[PendingRemark, ...] = ()
         self._version = 0
         self._begun = self._ended = False
         self._requests = self._lasting = ControlRequests()
@@ -304,6 +306,24 @@ class Control:
         self._questions[question.id] = asked = PendingAnswer(opened, clock, self._take_default)
         self._note("question", f"{question.id}: {question.text}")
         return asked
+
+    def listen(self, robot: str = "") -> PendingRemark:
+        """Waits for a remark that ends a skill of the robot."""
+        remark = PendingRemark(robot)
+        self._remarks = (*(each for each in self._remarks if each.waits), remark)
+        return remark
+
+    def tell(self, text: str, *, robot: str | None = None) -> bool:
+        """Passes a person's remark to the skills of one robot, or of all, that wait to be ended by one.
+
+        Returns whether a skill waited for it; each skill hears one remark.
+        """
+        heard = [each for each in self._remarks if each.waits and robot in (None, each.robot)]
+        for each in heard:
+            each.text, each.waits = text, False
+        if heard:
+            self._note("told", text)
+        return bool(heard)
 
     def _take_default(self, pending: PendingAnswer, why: str) -> None:
         """Answers a question by its default, and notes the reason. May be called from any thread."""

@@ -46,6 +46,29 @@ class OpenQuestion:
         return self.question.options
 
 
+@dataclass
+class PendingRemark:
+    """Remark for which a robot's skill waits (`skills.api.Listen`); `waits` until it is made or withdrawn."""
+
+    robot: str
+    waits: bool = True
+    text: str | None = None
+
+    def done(self) -> bool:
+        """Returns whether a person has spoken."""
+        return self.text is not None
+
+    def result(self) -> str:
+        """Returns what the person said. Raises RuntimeError before that."""
+        if self.text is None:
+            raise RuntimeError("nobody has spoken yet")
+        return self.text
+
+    def withdraw(self) -> None:
+        """Ends the wait."""
+        self.waits = False
+
+
 @dataclass(frozen=True)
 class ControlState:
     """State of a run's control at one moment.

@@ -194,6 +194,7 @@ class RunRobot:
             seed=shared.settings.seed,
             board=Board(slug(entry.tree.robot_name)),
             ask=lambda question: control.ask(question, shared.clock, name),
+            listen=lambda: control.listen(name),
             stop_pressed=lambda: control.stop_pressed(name),
             presses=lambda: control.presses,
             day_began_s=shared.day_began_s,

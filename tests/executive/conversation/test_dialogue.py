@@ -109,6 +109,51 @@ def test_stop_presses_the_button_at_once(talk, control, text):
     assert control.state.mode is Mode.STOPPED
 
 
+@pytest.mark.parametrize(
+    "text", ["stop", "Thank you!", "that's enough", "We are there.", "This is my office", "you can stop now"]
+)
+def test_a_remark_ends_the_skill_that_waits_for_one_and_not_the_mission(talk, control, text):
+    conversation, remark = talk(), control.listen("Alice")
+    assert conversation.hear(text).kind is ReplyKind.DONE
+    assert (remark.done(), remark.result()) == (True, text)
+    assert (control.state.mode, control.poll().cancel) == (Mode.RUNNING, None)
+
+
+def test_stop_said_twice_ends_the_skill_and_presses_the_button(talk, control):
+    conversation, remark = talk(), control.listen("Alice")
+    conversation.hear("stop")
+    assert conversation.hear("stop").kind is ReplyKind.DONE
+    assert (remark.result(), control.state.mode) == ("stop", Mode.STOPPED)
+
+
+@pytest.mark.parametrize("text", ["freeze", "emergency stop", "stop stop", "don't move"])
+def test_an_emergency_stop_presses_the_button_whoever_waits_for_a_remark(talk, control, text):
+    conversation, remark = talk(), control.listen("Alice")
+    conversation.hear(text)
+    assert (remark.done(), control.state.mode) == (False, Mode.STOPPED)
+
+
+def test_stop_presses_the_button_of_a_paused_robot_whose_skill_waits_for_a_remark(talk, control):
+    conversation, remark = talk(), control.listen("Alice")
+    conversation.hear("wait")
+    conversation.hear("stop")
+    assert (remark.done(), control.state.mode) == (False, Mode.STOPPED)
+
+
+@pytest.mark.parametrize("text", ["great", "what are you doing", "cancel the mission"])
+def test_other_remarks_do_not_end_a_skill(talk, control, text):
+    conversation, remark = talk(), control.listen("Alice")
+    conversation.hear(text)
+    assert not remark.done()
+
+
+@pytest.mark.parametrize(("text", "says"), [("thank you", "you are welcome"), ("we are there", "all right")])
+def test_thanks_are_only_answered_while_no_skill_waits(talk, control, text, says):
+    conversation = talk()
+    control.listen("Alice").withdraw()
+    assert (conversation.hear(text).text, control.state.mode) == (says, Mode.RUNNING)
+
+
 @pytest.mark.parametrize("text", ["wait", "Wait a moment, please.", "hold on", "pause", "could you wait please"])
 def test_wait_holds_and_go_on_releases(talk, control, text):
     conversation = talk()

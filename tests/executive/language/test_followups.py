@@ -126,7 +126,7 @@ def test_any_text_is_read_without_an_error_and_soon(text):
         ("stop", Remark.STOP),
         ("Stop!", Remark.STOP),
         ("please stop right now", Remark.STOP),
-        ("don’t move", Remark.STOP),
+        ("don’t move", Remark.FREEZE),
         ("wait", Remark.WAIT),
         ("Wait a second, please.", Remark.WAIT),
         ("ok hold on", Remark.WAIT),

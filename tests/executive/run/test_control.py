@@ -11,7 +11,7 @@ from executive.run.outcome import Outcome
 from executive.run.run_robot import GuardedRobot
 from executive.run.visitor import RunVisitor
 from executive.run.watchdog import Watchdog
-from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_to_ask
+from skills.api import Cause, Failed, Question, Running, Succeeded, nobody_speaks, nobody_to_ask
 from skills.robot import Lease, Pose2D
 
 GRASP = "alice/fetch-drink/1-kitchen/grasp"
@@ -357,6 +357,37 @@ def test_a_skill_asks_the_operator_while_running(compiled, run_tree, make, contr
     script.ends["navigate"] = ask
     result = run_tree(compiled(GO), control=control, observer=observe)
     assert (result.outcome, said) == (Outcome.SUCCESS, ["retry"])
+
+
+def test_a_remark_ends_a_skill_that_waits_for_one(compiled, run_tree, make, control, script, notes):
+    said = []
+
+    def follow(skill):
+        skill.heard = getattr(skill, "heard", None) or skill.context.listen()
+        if not skill.heard.done():
+            return Running("following")
+        said.append(skill.heard.result())
+        return Succeeded("told to end")
+
+    told = {5: lambda: control.tell("thank you", robot="Bob"), 20: lambda: control.tell("stop", robot="Alice")}
+    script.ends["navigate"] = follow
+    result = run_tree(compiled(GO), control=control, observer=at_ticks(told))
+    assert (result.outcome, said, control.tell("stop")) == (Outcome.SUCCESS, ["stop"], False)
+
+
+def test_a_remark_is_heard_once_and_not_by_a_skill_that_has_ended(control):
+    ended, first = control.listen("Alice"), control.listen("Alice")
+    ended.withdraw()
+    assert (control.tell("that's it"), control.tell("stop")) == (True, False)
+    assert (ended.done(), first.result()) == (False, "that's it")
+    with pytest.raises(RuntimeError):
+        ended.result()
+
+
+def test_nobody_speaks_where_a_skill_runs_without_a_control():
+    remark = nobody_speaks()
+    remark.withdraw()
+    assert not remark.done()
 
 
 def test_a_pause_does_not_count_against_the_time_of_a_question(compiled, run_tree, control, script):

@@ -23,6 +23,10 @@ from numpy.typing import NDArray
 from skills.detection import NO_DETECTOR
 from skills.detection import Detection as Detection
 from skills.detection import Detector as Detector
+from skills.navigate.zones import FilterType as FilterType
+from skills.navigate.zones import Zone as Zone
+from skills.navigate.zones import ZoneKind as ZoneKind
+from skills.navigate.zones import ZoneMask as ZoneMask
 from skills.perception.doorway import Doorway
 from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
@@ -267,8 +271,8 @@ class _LastPose:
 class SkillContext:
     """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
-    `doors` are those on the robot's map, `tags` the AprilTags that it knows. `walls` are the map's columns (N, 2) of
-    cells that are solid at the arm's heights (`skills.manipulation.arm.solid_cells`).
+    `doors` and `zones` are those on the robot's map, `tags` the AprilTags that it knows. `walls` are the map's columns
+    (N, 2) of cells that are solid at the arm's heights (`skills.manipulation.arm.solid_cells`).
     """
 
     robot: Robot
@@ -289,6 +293,7 @@ class SkillContext:
     traffic: Traffic = NO_TRAFFIC
     doors: tuple[Doorway, ...] = ()
     tags: tuple[Tag, ...] = ()
+    zones: tuple[Zone, ...] = ()
     walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
 

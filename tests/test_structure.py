@@ -14,23 +14,23 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3006,
+    "executive/words": 3166,
     "executive/language": 7728,
     "executive/speech": 1582,
-    "executive/mission": 1617,
-    "executive/tree": 7714,
-    "executive/run": 3179,
+    "executive/mission": 1618,
+    "executive/tree": 7715,
+    "executive/run": 3180,
     "executive/record": 1377,
     "executive/store": 1666,
     "executive/conversation": 589,
     "executive/view": 1553,
     "executive/testing": 818,
-    "executive/app": 8202,
+    "executive/app": 8203,
     "executive/cli": 4905,
-    "skills": 27380,
+    "skills": 27441,
     "plant": 21389,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 493, 88, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 495, 90, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

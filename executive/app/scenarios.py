@@ -14,8 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 
 from executive.mission.request import Request
 from executive.mission.scenario import RandomFaults, Scenario
-from executive.words.knowledge import Corner, Knowledge
+from executive.words.knowledge import Knowledge
 from executive.words.mission import Route, Stop
+from executive.words.outlines import Corner
 from plant.robots.spot.kind import spot_capabilities
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map

@@ -10,8 +10,9 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 from executive.mission.parameters import Given, with_parameters
-from executive.words.knowledge import Corner, Knowledge, knowledge_of_source
+from executive.words.knowledge import Knowledge, knowledge_of_source
 from executive.words.mission import Mission, Route, Stop
+from executive.words.outlines import Corner
 from executive.words.step import Place, Step
 from skills.files.errors import Problems, suggestion
 from skills.files.outside import is_file, is_there
@@ -112,7 +113,7 @@ def knowledge_of_mission(mission: Mission, knowledge: Knowledge) -> Knowledge:
         what = "the robots of a mission do not stand in its knowledge"
         raise mission.error((_KEY, _ROBOTS), what, "write 'robots' at the top of the file")
     merged = _merged(knowledge.model_dump(mode="json", exclude_none=True), mission.knowledge)
-    return knowledge_of_source(document.below((_KEY,), merged), tuple(knowledge.things))
+    return knowledge_of_source(document.below((_KEY,), merged), tuple(knowledge.things), knowledge)
 
 
 def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

@@ -203,6 +203,7 @@ class RunRobot:
             stack=entry.stack,
             doors=entry.tree.doors,
             tags=entry.tree.tags,
+            zones=entry.tree.zones,
             walls=entry.walls,
             traffic=shared.traffic.view_of(name),
         )

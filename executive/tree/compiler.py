@@ -30,7 +30,7 @@ from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.slug import slug
 from executive.words.step import Step
-from skills.api import Surface, Tag
+from skills.api import Surface, Tag, Zone
 from skills.files.errors import InputError, suggestion, with_article
 from skills.perception.doorway import Doorway
 
@@ -41,8 +41,8 @@ __all__ = ["CompiledTree", "StepPart", "compile_mission"]
 class CompiledTree:
     """Tree of a mission for one robot, as data.
 
-    `parts` are its parts with goal conditions in order, `steps` the compiled steps, `doors`, `tags` (AprilTags) and
-    `surfaces` those of the knowledge file. Its root has monitors and interrupts above the mission: see
+    `parts` are its parts with goal conditions in order, `steps` the compiled steps, `doors`, `tags` (AprilTags),
+    `surfaces` and `zones` those of the knowledge file. Its root has monitors and interrupts above the mission: see
     `executive.tree.nodes.interrupts`.
     """
 
@@ -55,6 +55,7 @@ class CompiledTree:
     doors: tuple[Doorway, ...] = ()
     tags: tuple[Tag, ...] = ()
     surfaces: tuple[Surface, ...] = ()
+    zones: tuple[Zone, ...] = ()
 
     @property
     def mission(self) -> NodeSpec:
@@ -101,7 +102,7 @@ def compile_mission(
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
     tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.surfaces))
     own = (mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps)
-    return CompiledTree(*own, doors, tags, surfaces)
+    return CompiledTree(*own, doors, tags, surfaces, knowledge.known_zones())
 
 
 def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:

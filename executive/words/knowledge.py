@@ -9,8 +9,10 @@ from typing import Annotated, Final
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.words.command import Task
+from executive.words.outlines import Corner, Polygon
 from executive.words.robot_config import RobotsFile
-from skills.api import Tag
+from executive.words.zone import ZoneFacts, with_files
+from skills.api import Tag, Zone
 from skills.files.errors import InputError, suggestion
 from skills.files.schema import Name, validate
 from skills.files.yaml_source import YamlSource, read_yaml
@@ -28,8 +30,6 @@ _UNNAMED: Final = {
     EVERYTHING: EVERYTHING,
 }
 DOCK: Final = "dock"
-Corner = tuple[Coordinate, Coordinate]
-Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
 
 
 class _Facts(BaseModel):
@@ -146,6 +146,7 @@ class Knowledge(_Facts):
     things: dict[Name, ObjectFacts] = Field(default_factory=dict, description="the classes of objects by name")
     people: dict[Name, Person] = Field(default_factory=dict, description="the people by name")
     tags: tuple[TagFacts, ...] = Field(default=(), description="the AprilTags that the robot may use")
+    zones: dict[Name, ZoneFacts] = Field(default_factory=dict, description="where the robot minds a rule, by name")
     defaults: dict[str, dict[str, str]] = Field(
         default_factory=dict, description="for a task, the room for each class or category when the request names none"
     )
@@ -153,6 +154,11 @@ class Knowledge(_Facts):
     def known_tags(self) -> tuple[Tag, ...]:
         """Tags as the skills know them."""
         return tuple(Tag(tag.id, tag.size, tag.on, tag.at, tag.yaw) for tag in self.tags)
+
+    def known_zones(self) -> tuple[Zone, ...]:
+        """Zones as the skills know them, in the file's order."""
+        rooms = {name: place.polygon for name, place in self.places.items()}
+        return tuple(facts.zone(name, rooms) for name, facts in self.zones.items())
 
     def place(self, name: str) -> str | None:
         """Own name of the room or surface that `name` means; None when it is unknown."""
@@ -252,12 +258,17 @@ def load_knowledge(path: Path | str, own: Collection[str] = ()) -> Knowledge:
     return knowledge_of_source(read_yaml(path), own)
 
 
-def knowledge_of_source(source: YamlSource, own: Collection[str] = ()) -> Knowledge:
-    """Reads the knowledge of a parsed document. Raises InputError as `load_knowledge`."""
+def knowledge_of_source(source: YamlSource, own: Collection[str] = (), below: Knowledge | None = None) -> Knowledge:
+    """Reads the knowledge of a parsed document, which may repeat zones of the knowledge `below`.
+
+    Raises InputError as `load_knowledge`.
+    """
     knowledge = validate(Knowledge, source)
     for error in _cross_errors(knowledge, source, own):
         raise error
-    return with_own_objects(knowledge, own)
+    found = {} if below is None else below.zones
+    zones = {name: z if z == found.get(name) else with_files(source, name, z) for name, z in knowledge.zones.items()}
+    return with_own_objects(knowledge.model_copy(update={"zones": zones}), own)
 
 
 def with_own_objects(knowledge: Knowledge, own: Iterable[str]) -> Knowledge:
@@ -280,6 +291,9 @@ def _cross_errors(knowledge: Knowledge, source: YamlSource, own: Collection[str]
             yield from _unless_known(source, ("doors", index, "between", side), room, knowledge.places)
     for name, surface in knowledge.surfaces.items():
         yield from _unless_known(source, ("surfaces", name, "place"), surface.place, knowledge.places)
+    for name, zone in knowledge.zones.items():
+        if zone.place is not None:
+            yield from _unless_known(source, ("zones", name, "place"), zone.place, knowledge.places)
     for name, person in knowledge.people.items():
         yield from _unless_known(source, ("people", name, "at"), person.at, knowledge.place_names())
     tagged = [tag.on for tag in knowledge.tags if tag.on is not None]

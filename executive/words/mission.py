@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool
 
 from executive.words.command import Command
 from executive.words.forms import Strict
-from executive.words.knowledge import Corner
+from executive.words.outlines import Corner
 from executive.words.policy import OnFailure, OperatorQuestion, Policy
 from executive.words.robot_config import RobotsFile
 from executive.words.step import Given, Placed, Scalar, Step

@@ -6,12 +6,20 @@ import functools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import Field
+
+from skills.quantities import Coordinate
 
 if TYPE_CHECKING:
     import shapely
 
 Point = tuple[float, float]
+Corner = tuple[Coordinate, Coordinate]
+"""Corner of an outline in a file."""
+Polygon = Annotated[tuple[Corner, ...], Field(min_length=3)]
+"""Outline in a file."""
 
 
 @dataclass(frozen=True)

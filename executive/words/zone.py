@@ -1,0 +1,138 @@
+"""Zones of a knowledge file, and the filter masks of Nav2 that they name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Final
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from executive.words.outlines import Polygon
+from skills.api import FilterType, Zone, ZoneKind, ZoneMask
+from skills.files.errors import InputError
+from skills.files.outside import file_beside, is_file
+from skills.files.schema import Name, validate
+from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
+from skills.quantities import Angle, Number, Quantity, Speed
+
+_ROS: Final = "ros__parameters"
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+
+class FilterInfo(_Frozen):
+    """Filter info of a Nav2 mask: what its values mean. A value v, in percent, stands for base + multiplier * v."""
+
+    type: FilterType = Field(description="0 keep-out, 1 speed limit in percent of full speed, 2 speed limit in m/s")
+    base: Number = Field(default=0.0, description="of the limit, in percent or m/s")
+    multiplier: Number = Field(default=1.0, description="of the limit, for each percent of a cell's value")
+
+
+class ZoneFacts(_Frozen):
+    """Zone of the map. Its ground is a room (`place`), a `polygon`, or a `mask` of Nav2.
+
+    A mask of kind `keep_out` or `speed_limit` is read with its filter info, or without one as Nav2's examples write it:
+    a keep-out cell has the value 100 and smaller values are costs; a speed limit is 100 % less the value.
+    """
+
+    kind: ZoneKind = Field(description="what holds in it")
+    place: str | None = Field(default=None, description="the room that it covers")
+    polygon: Polygon | None = Field(default=None, description="outline, corners (x, y)")
+    mask: Name | None = Field(default=None, description="YAML file of a Nav2 filter mask, beside this file")
+    info: FilterInfo | Name | None = Field(
+        default=None, description="filter info of the mask, or the Nav2 parameter file beside this one that holds it"
+    )
+    speed: Speed | None = Field(default=None, description="speed limit, m/s")
+    share: Annotated[float, Quantity(gt=0.0, le=1.0)] | None = Field(
+        default=None, description="speed limit as a share of the robot's full speed"
+    )
+    direction: Angle | None = Field(default=None, description="direction of a one-way zone, radians")
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> ZoneFacts:
+        limited, one_way = self.kind is ZoneKind.SPEED_LIMIT, self.kind is ZoneKind.ONE_WAY
+        grounds = sum(each is not None for each in (self.place, self.polygon, self.mask))
+        limits = sum(each is not None for each in (self.speed, self.share))
+        faults = (
+            (grounds != 1, "give one of 'place', 'polygon' and 'mask'"),
+            (self.info is not None and self.mask is None, "'info' belongs to a 'mask'"),
+            (
+                self.mask is not None and self.kind not in (ZoneKind.KEEP_OUT, ZoneKind.SPEED_LIMIT),
+                "a zone with a 'mask' is of kind 'keep_out' or 'speed_limit'",
+            ),
+            (limits > 0 and not limited, f"'speed' and 'share' belong to the kind 'speed_limit', not '{self.kind}'"),
+            (
+                limits > 0 and self.mask is not None,
+                "the values of the 'mask' are its limits: remove 'speed' and 'share'",
+            ),
+            (limits != 1 and limited and self.mask is None, "a 'speed_limit' has one of 'speed' and 'share'"),
+            (one_way and self.direction is None, "a 'one_way' zone has a 'direction'"),
+            (
+                not one_way and self.direction is not None,
+                f"'direction' belongs to the kind 'one_way', not '{self.kind}'",
+            ),
+        )
+        wrong = next((message for bad, message in faults if bad), None)
+        if wrong is not None:
+            raise ValueError(wrong)
+        return self
+
+    def zone(self, name: str, rooms: Mapping[str, Polygon]) -> Zone:
+        """Zone as the skills know it; `rooms` are the outlines of the rooms by name."""
+        corners = rooms[self.place] if self.place is not None else self.polygon or ()
+        info = self.info if isinstance(self.info, FilterInfo) else _PLAIN_INFO.get(self.kind)
+        mask = ZoneMask(self.mask, info.type, info.base, info.multiplier) if self.mask and info else None
+        return Zone(name, self.kind, corners, mask, self.speed, self.share, self.direction or 0.0)
+
+
+_PLAIN_INFO: Final = {
+    ZoneKind.KEEP_OUT: FilterInfo(type=FilterType.KEEP_OUT),
+    ZoneKind.SPEED_LIMIT: FilterInfo(type=FilterType.SPEED_SHARE, base=100.0, multiplier=-1.0),
+}
+"""Filter info of a mask that has none, by the kind of its zone."""
+
+
+def with_files(source: YamlSource, name: str, facts: ZoneFacts) -> ZoneFacts:
+    """Finds the files that a zone names, beside its source, and reads its filter info. Raises InputError."""
+    if facts.mask is None:
+        return facts
+    path: KeyPath = ("zones", name)
+    mask = _file(source, (*path, "mask"), facts.mask)
+    info = facts.info
+    if isinstance(info, str):
+        info = _filter_info(_file(source, (*path, "info"), info), facts.kind)
+    if info is not None and (info.type is FilterType.KEEP_OUT) is not (facts.kind is ZoneKind.KEEP_OUT):
+        what = f"a filter of type {info.type:d} is not of kind '{facts.kind}'"
+        raise source.error((*path, "kind"), what, "type 0 is 'keep_out', types 1 and 2 are 'speed_limit'")
+    return facts.model_copy(update={"mask": str(mask.absolute()), "info": info})
+
+
+def _file(source: YamlSource, path: KeyPath, name: str) -> Path:
+    """File that the value at `path` names. Raises InputError in its line when there is none."""
+    try:
+        found = file_beside(source.path, name)
+    except InputError as error:
+        raise source.error(path, error.message, error.hint) from error
+    if not is_file(found):
+        raise source.error(path, f"there is no file {name!r} beside {source.path.name}", "name a file that exists")
+    return found
+
+
+def _filter_info(path: Path, kind: ZoneKind) -> FilterInfo:
+    """Reads the filter info of a Nav2 parameter file, of the server whose type fits the kind. Raises InputError."""
+    source = read_yaml(path)
+    servers = source.data if isinstance(source.data, dict) else {}
+    found = {
+        (name, _ROS): {key: value for key, value in node[_ROS].items() if key in FilterInfo.model_fields}
+        for name, node in servers.items()
+        if isinstance(node, dict) and isinstance(node.get(_ROS), dict) and "type" in node[_ROS]
+    }
+    infos = [validate(FilterInfo, source.below(place, data)) for place, data in found.items()]
+    fitting = [each for each in infos if (each.type is FilterType.KEEP_OUT) is (kind is ZoneKind.KEEP_OUT)]
+    if len(fitting) != 1:
+        what = f"{len(fitting)} costmap filter info servers in it are of kind '{kind}'"
+        raise InputError(what, hint="write 'info: {type: .., base: .., multiplier: ..}' for the zone", file=path)
+    return fitting[0]

@@ -1,0 +1,56 @@
+"""Zones of the map as skills know them: keep-out, preferred, speed limit, one way, silent."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+from skills.quantities import Angle, Coordinate, Share, Speed
+
+
+class ZoneKind(enum.StrEnum):
+    """Kind of a zone."""
+
+    KEEP_OUT = "keep_out"  # no part of the body enters
+    PREFERRED = "preferred"  # paths lead through it where that is not much longer
+    SPEED_LIMIT = "speed_limit"  # the base is no faster while a part of the body is in it
+    ONE_WAY = "one_way"  # the base moves in its direction, or across, and never against it
+    SILENT = "silent"  # the robot shows what it has to say, and does not speak
+
+
+class FilterType(enum.IntEnum):
+    """Type of a costmap filter of Nav2, by its number in `nav2_msgs/CostmapFilterInfo`."""
+
+    KEEP_OUT = 0
+    SPEED_SHARE = 1  # percent of the full speed
+    SPEED = 2  # m/s
+
+
+@dataclass(frozen=True)
+class ZoneMask:
+    """Filter mask of Nav2: the YAML file of its picture, and the values (type, base, multiplier) of its filter info.
+
+    The limit in a cell is base + multiplier * value, where value is the cell's occupancy in percent; 0 is no limit.
+    """
+
+    file: str
+    type: FilterType
+    base: float
+    multiplier: float
+
+
+@dataclass(frozen=True)
+class Zone:
+    """Zone of the map: its kind, and its ground as corners (x, y) in the world frame (m) or as a filter mask.
+
+    A speed limit is `speed_m_s`, or a `share` of the robot's full speed; a mask has its own. `direction_rad` is that of
+    a one-way zone.
+    """
+
+    name: str
+    kind: ZoneKind
+    corners_W: tuple[tuple[Coordinate, Coordinate], ...] = ()
+    mask: ZoneMask | None = None
+    speed_m_s: Speed | None = None
+    share: Share | None = None
+    direction_rad: Angle = 0.0

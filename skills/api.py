@@ -27,7 +27,7 @@ from skills.navigate.zones import FilterType as FilterType
 from skills.navigate.zones import Zone as Zone
 from skills.navigate.zones import ZoneKind as ZoneKind
 from skills.navigate.zones import ZoneMask as ZoneMask
-from skills.perception.doorway import Doorway
+from skills.perception.doorway import DoorMemory, Doorway
 from skills.robot import Clock, Image, Lease, Picture, Pose2D, Robot
 from skills.stack import RobotStack, default_stack
 from skills.world_model import FLOOR as FLOOR
@@ -271,8 +271,9 @@ class _LastPose:
 class SkillContext:
     """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
-    `doors` and `zones` are those on the robot's map, `tags` the AprilTags that it knows. `walls` are the map's columns
-    (N, 2) of cells that are solid at the arm's heights (`skills.manipulation.arm.solid_cells`).
+    `doors` and `zones` are those on the robot's map, with `door_memory` of the doors' states; `tags` are the AprilTags
+    that it knows. `walls` are the map's columns (N, 2) of cells that are solid at the arm's heights
+    (`skills.manipulation.arm.solid_cells`).
     """
 
     robot: Robot
@@ -292,6 +293,7 @@ class SkillContext:
     solid: SeenSolid = field(default_factory=SeenSolid)
     traffic: Traffic = NO_TRAFFIC
     doors: tuple[Doorway, ...] = ()
+    door_memory: DoorMemory = field(default_factory=DoorMemory)
     tags: tuple[Tag, ...] = ()
     zones: tuple[Zone, ...] = ()
     walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))

@@ -7,7 +7,7 @@ from typing import Final, TypeVar
 
 import numpy as np
 
-from executive.record.schemas import JOINTS, NAVIGATION, OUTCOME, POSE, SCAN, STATE, stamp
+from executive.record.schemas import DOORS, JOINTS, NAVIGATION, OUTCOME, POSE, SCAN, STATE, stamp
 from executive.run.control_state import MissionRequest, Turn
 from executive.run.outcome import Ending, Outcome, RobotResult, ending_of
 from executive.run.run_robot import RunRobot
@@ -21,10 +21,14 @@ from executive.tree.plan import start_key
 from executive.words.slug import slug
 from skills.api import Cause, LocalisationEstimate, ObstacleLayerView, ParticleView
 from skills.files.errors import disk_is_full
+from skills.navigate.cut_off import DoorWatch
+from skills.perception.doorway import Doorway, SeenDoor
 from skills.robot import Pose2D
 
 POSE_PERIOD_S: Final = 0.5
 SENSORS_PERIOD_S: Final = 1.0
+DOORS_PERIOD_S: Final = 10.0
+"""Steps of time in which the log has the age of what is known of a door."""
 MOST_PARTICLES: Final = 30
 LEASE_PATIENCE_S: Final = 60.0
 SILENT_S: Final = 3.0
@@ -68,6 +72,8 @@ class Session(RunRobot):
         self._pose_due_s = self._sensors_due_s = shared.clock.now()
         self._matched_s = -math.inf
         self._navigation: Mapping[str, object] = {}
+        self._doors = DoorWatch(self.context)
+        self._known_doors: tuple[tuple[str, float], ...] = ()
 
     @property
     def tree(self) -> CompiledTree:
@@ -133,6 +139,7 @@ class Session(RunRobot):
         if context.clock.now() >= self._sensors_due_s - _EPSILON_S:
             self._sensors_due_s += SENSORS_PERIOD_S
             self._publish_sensors()
+            self._watch_doors()
 
     def may_move(self) -> bool:
         """Returns whether the robot has its lease; a lost lease suspends the mission until the robot has it again.
@@ -394,3 +401,20 @@ class Session(RunRobot):
         if new != self._navigation:
             self._navigation = new
             self.context.publish(NAVIGATION, {"robot": self.name, **new})
+
+    def _watch_doors(self) -> None:
+        """Looks at the doors in view; logs the states of all doors when the memory of one is new."""
+        self._doors.look()
+        doors, memory = self.context.doors, self.context.door_memory
+        seen = [memory.last_seen(door) for door in doors]
+        known = tuple((one.state.value, one.seen_s // DOORS_PERIOD_S) for one in seen)
+        if known != self._known_doors:
+            self._known_doors = known
+            self.context.publish(DOORS, {"robot": self.name, "doors": list(map(_door_message, doors, seen))})
+
+
+def _door_message(door: Doorway, seen: SeenDoor) -> Mapping[str, object]:
+    """State of a door for the log: its two ends (x, y) in metres, and the time when the robot saw it (s)."""
+    ends = [[round(float(value), 3) for value in end] for end in door.ends()]
+    seen_s = round(seen.seen_s, 1) if math.isfinite(seen.seen_s) else None
+    return {"between": list(door.between), "ends": ends, "state": seen.state.value, "seen_s": seen_s}

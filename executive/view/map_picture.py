@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.history import Event
-from executive.record.schemas import MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
+from executive.record.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from skills.files.errors import InputError
 from skills.files.map_drawing import Names, with_legend
@@ -37,6 +37,11 @@ _LEGEND: Final = (
     ("obstacle that the map lacks", _OBSTACLE),
 )
 Colour = tuple[int, int, int]
+_DOORS: Final[Mapping[str, tuple[Colour, str]]] = {
+    "closed": ((40, 30, 200), "closed door"),
+    "open": (_TRAIL, "open door"),
+    "unknown": ((150, 150, 150), "door not seen"),
+}
 
 
 @dataclass(frozen=True)
@@ -73,8 +78,10 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     for robot in robots:
         own = [event for event in known if event.data.get("robot") == robot]
         _draw_robot(picture, frame, own, None if one else colours[robot])
+    doors = _draw_doors(picture, frame, [event.data["doors"] for event in known if event.topic == DOORS])
     _write_names(picture, frame, maps[-1], [event.data for event in known if event.topic == POSE])
-    entries = _LEGEND if one else [*((f"path of {name}", colours[name]) for name in robots), *_LEGEND[2:]]
+    entries = list(_LEGEND) if one else [*((f"path of {name}", colours[name]) for name in robots), *_LEGEND[2:]]
+    entries += [(text, colour) for state, (colour, text) in _DOORS.items() if state in doors]
     return with_legend(picture, frame.pixels_per_m, entries)
 
 
@@ -117,6 +124,16 @@ def _ground(data: Mapping[str, Any]) -> tuple[NDArray[np.uint8], _Frame]:
     picture = np.asarray(cv2.cvtColor(enlarged, cv2.COLOR_GRAY2BGR), np.uint8)
     origin = (float(data["origin_m"]["x"]), float(data["origin_m"]["y"]))
     return picture, _Frame(origin, size[1], scale / float(data["resolution_m"]))
+
+
+def _draw_doors(picture: NDArray[np.uint8], frame: _Frame, seen: Sequence[Sequence[Mapping[str, Any]]]) -> set[str]:
+    """Draws each door as a robot saw it last; returns the states that there are. A closed door is the thickest."""
+    doors = sorted((door for each in seen for door in each), key=lambda door: door["seen_s"] or -1.0)
+    latest = {str(door["ends"]): door for door in doors}.values()
+    for door in latest:
+        ends, closed = frame.pixels(door["ends"]).tolist(), door["state"] == "closed"
+        cv2.line(picture, ends[0], ends[1], _DOORS[door["state"]][0], 9 if closed else 4, cv2.LINE_AA)
+    return {door["state"] for door in latest}
 
 
 def _draw_robot(picture: NDArray[np.uint8], frame: _Frame, events: Sequence[Event], colour: Colour | None) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
-from skills.perception.doorway import Doorway, Opening, measure_opening
+from skills.perception.doorway import DoorState, Doorway, Opening, measure_opening
 from skills.quantities import Angle, Coordinate, Count, Delay, Length, Margin, Turn
 from skills.robot import Scan
 from skills.routine import PATIENCE_S, Routine, RoutineSkill, SkillFailure
@@ -75,7 +75,10 @@ class CheckDoor(RoutineSkill[CheckDoorInputs]):
                 yield from self.pause(self.options.pause_s, f"waiting until more is seen of the {inputs.door}")
             seen = yield from self._look(door, inputs.door)
             if seen.least_m >= self._needed_m() or seen.most_m < self._needed_m():
-                return self._answer(inputs, seen)
+                answer = self._answer(inputs, seen)
+                state = DoorState.OPEN if answer.outputs["open"] else DoorState.CLOSED
+                self.context.door_memory.note(door, state, self.context.clock.now())
+                return answer
         few = f"the scan shows hardly anything of the {inputs.door}"
         why = few if seen.rays < _FEW_RAYS else f"something stands in the {inputs.door} or before it"
         raise SkillFailure(Cause.POSTCONDITION, why)

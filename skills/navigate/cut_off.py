@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skills.api import ClearableCostmap, FreeSpace, SkillContext
 from skills.navigate.footprint import Footprint, clearance_on_grid, with_segments
-from skills.perception.doorway import Doorway, measure_opening
+from skills.perception.doorway import DoorState, Doorway, measure_opening
 from skills.quantities import Delay, Length, Margin, Turn
 from skills.robot import FloatArray, Pose2D
 
@@ -40,7 +40,8 @@ class DoorOptions:
 
     A scan shows a door from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is closed
     while all its gaps are narrower than `closed_m`. Where closed doors leave no path, the robot looks again every
-    `look_s`, for `patience_s`.
+    `look_s`, for `patience_s`. Plans avoid a door that was seen closed up to `trust_s` before the trip where they can;
+    where they cannot, the robot goes there and looks.
     """
 
     reach_m: Length = 4.0
@@ -48,42 +49,64 @@ class DoorOptions:
     closed_m: Margin = 0.1
     patience_s: Delay = 3.0
     look_s: Delay = 1.0
+    trust_s: Delay = 120.0
 
 
 class DoorWatch:
-    """Memory of the doors that the robot saw closed, until it sees them open."""
+    """The doors in view, and those of the robot's memory that count as closed on one trip."""
 
     def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
-        self._context = context
+        self._context, self._begun_s = context, context.clock.now()
         self._options = options or DoorOptions()
-        self._closed: dict[Doorway, None] = {}
+        self._doubted: frozenset[Doorway] = frozenset()
+        sides = [y for _, y in context.robot.capabilities().footprint_m]
+        self._width_m = max(sides) - min(sides)
 
     @property
     def closed(self) -> tuple[Doorway, ...]:
-        """The doors that were closed when they were last seen."""
-        return tuple(self._closed)
+        """The doors that the robot saw closed on this trip, or not long before, unless it doubts that."""
+        return tuple(door for door in self._context.doors if self._counts_as_closed(door))
+
+    def _counts_as_closed(self, door: Doorway) -> bool:
+        seen = self._context.door_memory.last_seen(door)
+        if seen.state is not DoorState.CLOSED or seen.seen_s >= self._begun_s:
+            return seen.state is DoorState.CLOSED
+        return door not in self._doubted and self._context.clock.now() <= seen.seen_s + self._options.trust_s
 
     def look(self) -> None:
         """Judges the doors in view by the newest scan."""
         scan, estimate = self._context.robot.scan(), self._context.localiser.estimate()
         if not self._context.doors or scan is None or not estimate.localised:
             return
-        X_WL, options = estimate.X_WO @ scan.X_OB @ scan.X_BL, self._options
+        X_WL, options, memory = estimate.X_WO @ scan.X_OB @ scan.X_BL, self._options, self._context.door_memory
         place = float(X_WL.translation()[0]), float(X_WL.translation()[1])
         for door in self._context.doors:
             if door.distance_m(place) > options.reach_m or door.view_angle_rad(place) > options.flattest_rad:
                 continue
             seen = measure_opening(door, [(scan, X_WL)])
             if seen.rays >= _FEW_RAYS and seen.most_m <= options.closed_m:
-                self._closed[door] = None
-            elif seen.least_m > options.closed_m:
-                self._closed.pop(door, None)
+                memory.note(door, DoorState.CLOSED, scan.stamp_s)
+            elif seen.least_m >= self._width_m:
+                memory.note(door, DoorState.OPEN, scan.stamp_s)
+            elif seen.least_m > options.closed_m and memory.last_seen(door).state is DoorState.CLOSED:
+                memory.note(door, DoorState.UNKNOWN, scan.stamp_s)
+
+    def doubt(self, doors: Sequence[Doorway]) -> bool:
+        """Lets plans lead to those `doors` that the robot has not seen on this trip, so that it looks at them again.
+
+        Returns whether there are any.
+        """
+        memory = self._context.door_memory
+        old = [door for door in doors if memory.last_seen(door).seen_s < self._begun_s]
+        self._doubted |= frozenset(old)
+        self._clear(old)
+        return bool(old)
 
     def costmap(self, costmap: FreeSpace) -> FreeSpace:
         """The costmap with the closed doors as obstacles."""
-        if not self._closed:
+        if not (closed := self.closed):
             return costmap
-        turns = [(door, door.through_rad) for door in self._closed]
+        turns = [(door, door.through_rad) for door in closed]
         panels = [(np.array(d.middle_W), np.array([-np.sin(a), np.cos(a)]), d.width_m) for d, a in turns]
         return with_segments(costmap, panels, _PANEL_M)
 
@@ -92,18 +115,23 @@ class DoorWatch:
 
         A door that is seen in part, through another door, may leave a gap that looks too narrow.
         """
-        costmap, place = self._context.costmap, (here.x_m, here.y_m)
-        far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M]
-        far = [door for door in far if door not in self._closed]
-        if not self._closed or not far or not isinstance(costmap, ClearableCostmap):
+        closed, place = self.closed, (here.x_m, here.y_m)
+        far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M and door not in closed]
+        return bool(closed) and self._clear(far)
+
+    def _clear(self, doors: Sequence[Doorway]) -> bool:
+        """Clears the costmap in doorways; returns whether a cell was cleared."""
+        costmap, discs = self._context.costmap, [[*door.middle_W, 0.5 * door.width_m + _JAMB_M] for door in doors]
+        if not discs or not isinstance(costmap, ClearableCostmap):
             return False
-        return bool(costmap.clear_obstacles(np.array([[*door.middle_W, 0.5 * door.width_m + _JAMB_M] for door in far])))
+        return bool(costmap.clear_obstacles(np.array(discs)))
 
     def regions(
         self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> Regions:
         """The regions in which a disc as wide as the robot can move, without people and with all other doors open."""
-        axes = [door.axis(_THROUGH_M, 0.5 * _CELL_M) for door in self._context.doors if door not in self._closed]
+        closed = self.closed
+        axes = [door.axis(_THROUGH_M, 0.5 * _CELL_M) for door in self._context.doors if door not in closed]
         discs = [np.array(place) + _PERSON_M for place in people_W]
         return Regions(
             self.costmap(self._context.costmap),
@@ -117,7 +145,7 @@ class DoorWatch:
         self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> tuple[Doorway, ...]:
         """The closed doors that block every path to the goals; none where a goal is reachable."""
-        if not self._closed:
+        if not self.closed:
             return ()
         regions = self.regions(footprint, here, goals, people_W)
         return regions.doors_between(self.closed) if regions.cut_off else ()

@@ -196,10 +196,16 @@ class TripPlanning:
             self.ask(map_alone=True)
 
     def _waits_for_doors(self) -> bool:
-        """Returns whether to wait for closed doors that leave no path. Raises SkillFailure once patience is over."""
+        """Returns whether to go to closed doors that leave no path, or to wait for them.
+
+        Raises SkillFailure once patience is over.
+        """
         doors, options = self._around.closed_doors(self._goals), self._options.doors
         if not doors:
             return False
+        if self._around.doors.doubt(doors):
+            self.ask()
+            return True
         if not self._closed.is_left():
             raise SkillFailure(Cause.PLANNING, closed_doors_sentence(doors, self._inputs.goal), final=True)
         self.obstacle_W = doors[0].middle_W

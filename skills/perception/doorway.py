@@ -1,10 +1,11 @@
-"""Doorways, and the width that a LiDAR scan shows to be open."""
+"""Doorways, the width that a LiDAR scan shows to be open, and the memory of their states."""
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,6 +50,11 @@ class Doorway:
         through = np.array([math.cos(self.through_rad), math.sin(self.through_rad)])
         return np.asarray(np.array(self.middle_W) + steps[:, None] * through)
 
+    def ends(self) -> FloatArray:
+        """Its two sides (2, 2)."""
+        along = np.array([-math.sin(self.through_rad), math.cos(self.through_rad)])
+        return np.asarray(np.array(self.middle_W) + np.array([[-0.5], [0.5]]) * self.width_m * along)
+
     def view_angle_rad(self, place_W: tuple[float, float]) -> float:
         """Angle between its direction and the view from a point: 0 straight before it, pi/2 from within its wall."""
         bearing = math.atan2(self.middle_W[1] - place_W[1], self.middle_W[0] - place_W[0])
@@ -66,6 +72,37 @@ class Opening:
     least_m: float
     most_m: float
     rays: int
+
+
+class DoorState(enum.Enum):
+    """State of a door as the robot knows it. A gap that the robot cannot use leaves it unknown."""
+
+    OPEN = "open"
+    CLOSED = "closed"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True)
+class SeenDoor:
+    """State of a door, and the time on the robot's clock when the robot saw it (s)."""
+
+    state: DoorState = DoorState.UNKNOWN
+    seen_s: float = -math.inf
+
+
+@dataclass
+class DoorMemory:
+    """States of the doors when the robot last saw them; one memory lasts for all missions of a run."""
+
+    _seen: dict[tuple[float, float], SeenDoor] = field(default_factory=dict)
+
+    def note(self, door: Doorway, state: DoorState, now_s: float) -> None:
+        """Notes what the robot sees of a door now."""
+        self._seen[door.middle_W] = SeenDoor(state, now_s)
+
+    def last_seen(self, door: Doorway) -> SeenDoor:
+        """The state in which the robot last saw a door."""
+        return self._seen.get(door.middle_W, SeenDoor())
 
 
 def measure_opening(door: Doorway, scans: Iterable[tuple[Scan, RigidTransform]]) -> Opening:

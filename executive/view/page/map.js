@@ -6,6 +6,7 @@
   const DASHES = [[5, 4], [2, 3], [9, 4], [9, 3, 2, 3], [1, 4], [14, 4]]; // one for each colour of a robot
   const RESERVED_PX = 9, FOOT_PX = 30; // the scale stands below the map
   const LENGTHS_M = [0.5, 1, 2, 5, 10, 20, 50];
+  const DOORS = { closed: ["--closed", 5, []], open: ["--success", 3, [2, 3]], unknown: ["--dim", 3, [1, 4]] };
   const OCCUPIED_BELOW = 100, FREE_ABOVE = 230;
 
   const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -120,6 +121,7 @@
         this.line(brush, frame, robot.trail, style.trail, []);
         if (robot.path) this.line(brush, frame, robot.path, style.path, style.dashes);
       }
+      for (const { ends, state } of this.doors()) this.line(brush, frame, ends, css(DOORS[state][0]), DOORS[state][2], DOORS[state][1]);
       this.drawThings(brush, frame);
       const said = [];
       for (const [name, robot] of this.view.robots) if (robot.pose) said.push(this.drawRobot(brush, frame, name, robot));
@@ -176,6 +178,7 @@
         ...(any((each) => each.seen.length) ? [["--failure", "obstacle that the map lacks"]] : []),
         ...(this.view.destinations.length || any((each) => each.held) ? [["--object", "object found"]] : []),
         ...(this.map && this.map.dock ? [["--dock", "dock"]] : []),
+        ...this.explainDoors(),
       ];
       const key = JSON.stringify(rows);
       if (key === this.explained) return;
@@ -188,11 +191,32 @@
       }));
     }
 
-    line(brush, { at }, points, colour, dashes) {
+    // The closed doors by name with their age, then the other states that there are.
+    explainDoors() {
+      const doors = this.doors(), age = (s) => (s < 90 ? "just now" : `${Math.round(s / 60)} min ago`);
+      const closed = doors.filter((door) => door.state === "closed");
+      const others = [["open", "open door"], ["unknown", "door not seen"]].filter(([state]) => doors.some((door) => door.state === state));
+      return [
+        ...closed.map(({ between, seen_s }) => [DOORS.closed[0], `closed: door between ${between.join(" and ")}, seen ${age(this.view.t - seen_s)}`]),
+        ...others.map(([state, text]) => [DOORS[state][0], text]),
+      ];
+    }
+
+    // The doors of all robots, each as it was seen last.
+    doors() {
+      const latest = new Map();
+      for (const [, robot] of this.view.robots) for (const door of robot.doors) {
+        const key = String(door.ends), known = latest.get(key);
+        if (!known || (door.seen_s ?? -1) > (known.seen_s ?? -1)) latest.set(key, door);
+      }
+      return [...latest.values()];
+    }
+
+    line(brush, { at }, points, colour, dashes, thick = 2) {
       brush.beginPath();
       points.forEach(([x, y], n) => brush[n ? "lineTo" : "moveTo"](...at(x, y)));
       brush.strokeStyle = colour;
-      brush.lineWidth = 2;
+      brush.lineWidth = thick;
       brush.setLineDash(dashes);
       brush.stroke();
       brush.setLineDash([]);

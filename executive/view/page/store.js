@@ -22,7 +22,7 @@
   }
 
   function robotOf(view, name) {
-    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], reserved: null, detections: null });
+    if (!view.robots.has(name)) view.robots.set(name, { pose: null, trail: [], path: null, state: null, held: null, particles: [], seen: [], doors: [], reserved: null, detections: null });
     return view.robots.get(name);
   }
 
@@ -75,6 +75,7 @@
       const pairs = (xs, ys) => xs.map((x, n) => [x, ys[n]]);
       Object.assign(robotOf(view, data.robot), { particles: pairs(data.particle_x, data.particle_y), seen: pairs(data.seen_x, data.seen_y) });
     },
+    doors(view, data) { robotOf(view, data.robot).doors = data.doors; },
     outcome(view, data) { view.outcomes.push(data); },
     wall(view, data) { view.late = data.overruns; },
   };

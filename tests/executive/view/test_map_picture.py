@@ -35,6 +35,12 @@ EVENTS = (
     Event("navigation", 1.5, {"robot": "Alice", "particle_x": [1], "particle_y": [2], "seen_x": [5], "seen_y": [0]}),
     pose(2.0, 4.0, 0.0),
 )
+CLOSED, UNKNOWN = (40, 30, 200), (150, 150, 150)
+
+
+def doors(stamp_s, state, seen_s):
+    door = {"between": ["hall", "kitchen"], "ends": [[3.0, 0.8], [3.0, 1.2]], "state": state, "seen_s": seen_s}
+    return Event("doors", stamp_s, {"robot": "Alice", "doors": [door]})
 
 
 def colour_at(picture, x, y):
@@ -55,6 +61,12 @@ DRAWN = [
 def test_obstacles_are_drawn_once_the_robot_has_seen_them(what, place, colour, known_s):
     assert colour_at(map_picture(EVENTS), *place) == colour
     assert colour_at(map_picture(EVENTS, known_s - 0.1), *place) != colour
+
+
+def test_a_door_is_drawn_in_the_state_in_which_it_was_last_seen():
+    events = (*EVENTS, doors(0.0, "unknown", None), doors(1.0, "closed", 1.0), doors(3.0, "open", 3.0))
+    drawn = [colour_at(map_picture(events, at_s), 3.0, 1.0) for at_s in (0.5, 1.5, 3.5)]
+    assert drawn == [UNKNOWN, CLOSED, TRAIL]
 
 
 def test_the_footprint_is_where_the_robot_was_at_that_time():

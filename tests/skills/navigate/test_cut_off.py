@@ -10,10 +10,10 @@ import pytest
 from planar_robot import Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.navigate.cut_off import DoorWatch, closed_doors_sentence
+from skills.navigate.cut_off import DoorOptions, DoorWatch, closed_doors_sentence
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.perception.doorway import Doorway
+from skills.perception.doorway import DoorState, Doorway, SeenDoor
 from skills.robot import Pose2D
 
 LEFT = Doorway((2.45, 4.05), 0.9, math.pi / 2, ("study", "corridor"))
@@ -27,9 +27,9 @@ def context_of(bench, doors=(LEFT, RIGHT)):
     return dataclasses.replace(bench.context(), doors=doors)
 
 
-def go(bench, goal, *, limit_s=40.0, nearby_m=(), each=lambda: None):
+def go(bench, goal, *, limit_s=40.0, nearby_m=(), each=lambda: None, context=None):
     """Runs the skill; returns the last step."""
-    skill = Navigate(context_of(bench))
+    skill = Navigate(context or context_of(bench))
     skill.begin(NavigateInputs(goal, nearby_m=nearby_m))
     begun_s = bench.clock.now()
     while isinstance(step := skill.step(), Running) and bench.clock.now() < begun_s + limit_s:
@@ -66,6 +66,34 @@ def test_a_door_that_opens_is_no_longer_closed():
         bench.tick()
     doors.look()
     assert doors.closed == ()
+
+
+def test_the_memory_of_doors_outlasts_the_trip():
+    bench, _ = watch(RIGHT_PANEL)
+    context = context_of(bench)
+    DoorWatch(context).look()
+    bench.clock.advance(20.0)
+    seen = context.door_memory.last_seen(RIGHT)
+    assert (seen.state, bench.clock.now() - seen.seen_s) == (DoorState.CLOSED, pytest.approx(20.0, abs=0.2))
+    assert context.door_memory.last_seen(LEFT) == SeenDoor(DoorState.UNKNOWN)
+    assert DoorWatch(context).closed == (RIGHT,)
+
+
+def test_a_door_seen_closed_long_ago_is_no_obstacle():
+    bench, _ = watch(RIGHT_PANEL)
+    context = context_of(bench)
+    DoorWatch(context).look()
+    bench.clock.advance(DoorOptions().trust_s + 1.0)
+    assert DoorWatch(context).closed == ()
+
+
+def test_robot_goes_and_looks_at_the_only_door_though_it_remembers_it_closed():
+    bench = Bench(BEFORE_RIGHT)
+    context = context_of(bench)
+    context.door_memory.note(RIGHT, DoorState.CLOSED, bench.clock.now())
+    bench.clock.advance(1.0)
+    assert isinstance(go(bench, KITCHEN, context=context), Succeeded)
+    assert context.door_memory.last_seen(RIGHT).state is DoorState.OPEN
 
 
 def test_only_doors_that_block_every_path_are_reported():

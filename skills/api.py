@@ -48,6 +48,7 @@ from skills.world_model import PlanningError as PlanningError
 from skills.world_model import ReturnsView as ReturnsView
 from skills.world_model import SearchingLocaliser as SearchingLocaliser
 from skills.world_model import Surface as Surface
+from skills.world_model import SurveyView as SurveyView
 from skills.world_model import Tag as Tag
 from skills.world_model import WorkCounter as WorkCounter
 

@@ -193,6 +193,14 @@ class ReturnsView(Protocol):
         """Returns the scan's stamp and those returns (N, 3) in the world; of one scan alone, so not confirmed."""
 
 
+@runtime_checkable
+class SurveyView(Protocol):
+    """Costmap on a survey of the place, which explains walls and furniture."""
+
+    def is_unexplained(self, points_W: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Returns whether each (x, y, z) row lies on surveyed ground and away from all that the survey shows."""
+
+
 class WorkCounter(Protocol):
     """Counts the computations of a run, so that a slower algorithm shows without a clock. Jobs may call it."""
 

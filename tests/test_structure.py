@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8203,
     "executive/cli": 4905,
-    "skills": 27517,
+    "skills": 27786,
     "plant": 21389,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 495, 90, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 496, 90, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

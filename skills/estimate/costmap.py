@@ -178,9 +178,12 @@ class LayeredCostmap:
         self._until_s[gone[:, 0], gone[:, 1]] = -math.inf
         return len(gone) > 0
 
+    def is_unexplained(self, points_W: FloatArray) -> NDArray[np.bool_]:
+        """Returns whether each (x, y, z) row lies on the grid and away from its occupied cells."""
+        return np.asarray(self.keepout.distance_m(points_W) > self._options.explained_m)
+
     def _unexplained(self, points_W: FloatArray) -> FloatArray:
-        """The (x, y, z) rows that lie on the grid and away from its occupied cells."""
-        return np.ascontiguousarray(points_W[self.keepout.distance_m(points_W) > self._options.explained_m])
+        return np.ascontiguousarray(points_W[self.is_unexplained(points_W)])
 
     def _outside_robots(self, points_W: FloatArray) -> FloatArray:
         """The (x, y, z) rows that do not lie where another robot reports to be."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import shapely
 
-from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
+from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded, SurveyView
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
 from skills.navigate.arm_footprint import ArmFootprint
@@ -15,7 +15,8 @@ from skills.navigate.base import MovingSkill
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
-from skills.perception.people import SeenPerson, add_person, located_people, people_detections, people_in_scan
+from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan
+from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
 from skills.ports import FindPeopleInputs, FindPeoplePorts
 from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
 from skills.robot import Image
@@ -52,19 +53,20 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Looks and turns until enough people were seen twice."""
         area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
-        seen, echoes, found = tuple[SeenPerson, ...](), list[SeenPerson](), list[SeenPerson]()
+        tracker, found = PeopleTracker(same_m), list[SeenPerson]()
         for look in range(self.options.looks):
             if look:
                 yield from self._turn()
             by_lidar = yield from self._in_scan(f"looking for people in the {inputs.place}")
             by_camera = yield from self._in_pictures(f"looking for people in the {inputs.place}")
-            echoes += [] if by_camera is None else by_lidar
-            for one in by_lidar if by_camera is None else by_camera:
-                seen = add_person(seen, one, same_m) if area.covers(shapely.Point(one.place_W)) else seen
+            tracker.update(by_lidar, by_scan=True, apart_m=SCAN_APART_M)
+            for people in by_camera or ():
+                tracker.update(people, by_scan=False, apart_m=same_m)
+            least = 0 if by_camera is None else 1
             found = [
                 one
-                for one in seen
-                if one.looks > 1 or any(math.dist(one.place_W, echo.place_W) <= same_m for echo in echoes)
+                for one in tracker.people
+                if one.looks >= least and one.looks + one.scans > 1 and area.covers(shapely.Point(one.place_W))
             ]
             if 0 < inputs.count <= len(found):
                 break
@@ -93,7 +95,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         said = f"saw {who} in the {found[0].surface}" if inputs.count == 1 else count_sentence(found, ())
         return Succeeded(said, {"observation": found[0], "observations": found})
 
-    def _in_pictures(self, message: str) -> Routine[Sequence[SeenPerson] | None]:
+    def _in_pictures(self, message: str) -> Routine[Sequence[Sequence[SeenPerson]] | None]:
         """Detects people in pictures of the body cameras, and publishes each picture with people, or else the first.
 
         Returns None if the detector has no class of people.
@@ -122,7 +124,8 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         for shown in [each for each in images if any(image is each for image, _ in detected)] or images[:1]:
             picture, found = turn_upright(shown, [one for image, one in detected if image is shown])
             self.context.publish("detections", {**detections_message(shown, found, ()), "image": picture})
-        return located_people(detected, X_WO, here_W, options.reach_m)
+        pairs = ([each for each in detected if each[0] is image] for image in images)
+        return [located_people(each, X_WO, here_W, options.reach_m) for each in pairs]
 
     def _in_scan(self, message: str) -> Routine[Sequence[SeenPerson]]:
         """Detects people in the newest scan. Raises SkillFailure when there is no new scan."""
@@ -131,8 +134,9 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             if not patience.is_left():
                 raise SkillFailure(Cause.PRECONDITION, "there is no new scan to see people in")
             yield Running(f"{message}; waits for a scan")
-        X_WB = self.context.localiser.estimate().X_WO @ robot.odometry().X_OB
-        return people_in_scan(scan, X_WB, robot.capabilities().footprint_m)
+        X_WB, costmap = self.context.localiser.estimate().X_WO @ scan.X_OB, self.context.costmap
+        survey = costmap if isinstance(costmap, SurveyView) else None
+        return people_in_scan(scan, X_WB, robot.capabilities().footprint_m, survey=survey)
 
 
 def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservation:

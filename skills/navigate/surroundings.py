@@ -14,7 +14,8 @@ from skills.navigate.footprint import Footprint, disc_centres, pose_array, with_
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
 from skills.perception.doorway import Doorway
-from skills.perception.people import PeopleOptions, PeopleWatch, SeenPerson
+from skills.perception.people import SeenPerson
+from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.quantities import Delay, Duration, Length, Margin, Speed, Tries, TurnRate
 from skills.robot import FloatArray, Pose2D
 from skills.routine import PATIENCE_S

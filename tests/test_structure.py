@@ -14,12 +14,12 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3166,
-    "executive/language": 7728,
+    "executive/words": 3211,
+    "executive/language": 7948,
     "executive/speech": 1582,
-    "executive/mission": 1618,
-    "executive/tree": 7715,
-    "executive/run": 3204,
+    "executive/mission": 1635,
+    "executive/tree": 7742,
+    "executive/run": 3205,
     "executive/record": 1378,
     "executive/store": 1666,
     "executive/conversation": 589,
@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8203,
     "executive/cli": 4905,
-    "skills": 27786,
+    "skills": 27804,
     "plant": 21389,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 496, 90, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 497, 90, 12
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -149,6 +149,12 @@ def trailing_cue(text: str) -> Clause | None:
     return Clause("", text[match.end() :].strip(" ,"), kind, match[0], before=text[:start].strip(" ,"))
 
 
+def begins_action(text: str) -> bool:
+    """Returns whether the first word is a verb of a clause."""
+    word = re.match(r"[\w']+", text)
+    return word is not None and word[0].lower() in _verbs()
+
+
 def verb_positions(text: str) -> Iterator[int]:
     """Positions after the first word where a clause may begin without a comma before it."""
     for match in re.finditer(r"[\w']+", text):

@@ -15,7 +15,7 @@ from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.spelling import CorrectedText, correct_spelling
-from executive.language.understand import Part, Status, Understanding, meaning, understand
+from executive.language.understand import Part, Status, Understanding, meaning, understand, with_rules
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 from executive.words.robot_config import display_name, find_robot
@@ -60,8 +60,12 @@ def understand_for_robots(
     forms = addressees(names).forms
     stranger = forms.stranger.match(text)
     addressed = True
-    try:
-        cut = split(said.text, names)
+
+    def read(text: str, known: Knowledge | None) -> Understanding:
+        """Understands a sentence without rules for rooms."""
+        nonlocal addressed
+        assert known is not None
+        cut = split(text, names)
         addressed = cut.listener is not None
         if not addressed and stranger is not None and forms.called.fullmatch(stranger["name"]) is None:
             what = f"there is no robot called {stranger['name']}; there are {listing(names)}"
@@ -70,7 +74,10 @@ def understand_for_robots(
             called = listing((f'"Hey {name}"' for name in names), last="or")
             reason = f"no robot's name was said; begin with {called}"
             return Understanding(sentence, Status.NOT_ADDRESSED, reason=reason)
-        found = _Reader(tuple(robots), Pipeline(parser, knowledge), knowledge).addressed(sentence, cut, memory)
+        return _Reader(tuple(robots), Pipeline(parser, known), known).addressed(sentence, cut, memory)
+
+    try:
+        found = with_rules(said.text, knowledge, read)
     except RefusalError as refusal:
         found = Understanding(sentence, Status.REFUSED, reason=refusal.reason, unknown_words=refusal.unknown)
         return replace(found, addressed=addressed)

@@ -15,6 +15,7 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import Answerer, ClarifyingQuestion, RefusalError, RefusalKind, insert_answer
 from executive.language.reference import Memory
 from executive.language.spelling import CorrectedText, correct_spelling
+from executive.language.zone_rules import RoomRules, read_rules
 from executive.words.command import Command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
@@ -147,8 +148,36 @@ def understand(
     said = CorrectedText(called.text)
     if correct and knowledge is not None:
         said = correct_spelling(called.text, knowledge, parser)
-    found = meaning(Trace(said.text, memory or Memory()), Pipeline(parser, knowledge))
+    try:
+        found = with_rules(
+            said.text, knowledge, lambda text, known: meaning(Trace(text, memory or Memory()), Pipeline(parser, known))
+        )
+    except RefusalError as refusal:
+        trace = Trace(said.text, refusal=refusal, refused_at="rules")
+        found = Understanding(said.text, Status.REFUSED, (), refusal.reason, refusal.unknown, trace=trace)
     return replace(found, text=sentence, notes=(*said.notes, *found.notes), addressed=addressed)
+
+
+def with_rules(
+    text: str, knowledge: Knowledge | None, understand_rest: Callable[[str, Knowledge | None], Understanding]
+) -> Understanding:
+    """Understands a sentence that may have rules for rooms, which become zones of a group around all steps.
+
+    Raises RefusalError for a rule that is not understood or has no work, and for work in a forbidden room.
+    """
+    rules = read_rules(text, knowledge)
+    if rules is None:
+        return understand_rest(text, knowledge)
+    meant = understand_rest(rules.rest, rules.knowledge)
+    return _under(rules, meant) if meant.status is Status.OK else meant
+
+
+def _under(rules: RoomRules, meant: Understanding) -> Understanding:
+    """Puts the steps, or those of each part, into a group with the rules. Raises RefusalError."""
+    if meant.parts:
+        parts = tuple(replace(part, meaning=_under(rules, part.meaning)) for part in meant.parts)
+        return replace(meant, parts=parts)
+    return replace(meant, steps=(rules.around(meant.all_steps),), notes=(*meant.notes, *rules.notes))
 
 
 def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:

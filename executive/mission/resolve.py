@@ -26,6 +26,7 @@ from executive.words.mission import Mission, Parameter, QuestionPolicy
 from executive.words.policy import Policy
 from executive.words.step import Step
 from executive.words.steps import ForEach, Group, Steps
+from executive.words.zone import ZoneFacts
 from skills.files.errors import InputError, Problems, listing, suggestion
 from skills.files.outside import is_file
 from skills.files.schema import validate
@@ -119,7 +120,7 @@ class _Resolver:
             with problems:
                 self._refuse_unknown(file, name, parameter)
         resolved: dict[str, Any] = {"world": self.world, "robot": self.robot_name}
-        for name in ("steps", "always", "while_", "when"):
+        for name in ("steps", "always", "while_", "when", "zones"):
             with problems:
                 alias = name.removesuffix("_")
                 resolved[name] = self._part(scope, file.error, getattr(file, name), (alias,))
@@ -186,7 +187,23 @@ class _Resolver:
                 return {key: self._part(scope, error, each, (*path, key)) for key, each in value.items()}
             case Strict():
                 return value.model_copy(update=self._parts(scope, error, value, path))
+            case ZoneFacts():
+                return self._zone(error, value, path)
         return value
+
+    def _zone(self, error: _Error, zone: ZoneFacts, path: KeyPath) -> ZoneFacts:
+        """Resolves the room of a zone to the world's own name."""
+        if zone.mask is not None:
+            what = "a zone of a mission has a room or a polygon, and no mask"
+            raise error((*path, "mask"), what, "write a zone with a mask below 'knowledge: zones:'")
+        if zone.place is None:
+            return zone
+        room = self.knowledge.place(zone.place)
+        if room not in self.knowledge.places:
+            rooms = self.knowledge.places
+            hint = suggestion(zone.place, self.knowledge.spellings(rooms), shown=tuple(rooms))
+            raise error((*path, "place"), f"unknown room '{zone.place[:60]}'", hint)
+        return zone.model_copy(update={"place": room})
 
     def _condition(self, scope: _Scope, error: _Error, condition: Condition, path: KeyPath) -> Condition:
         """Resolves a condition to the world's own names.

@@ -40,6 +40,7 @@ class TreeRun:
             context,
             publish=lambda topic, message: publish(topic, findings.message(topic, message)),
             endings=Endings(),
+            zones=tree.zones,
         )
         self.root = tree.build(context)
         self._ended_early = self._suspended = False

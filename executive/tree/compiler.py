@@ -18,7 +18,7 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import buttons_of
 from executive.tree.nodes.door_check import doorway
-from executive.tree.nodes.group import mission_plan
+from executive.tree.nodes.group import InZones, mission_plan
 from executive.tree.nodes.interrupts import watch_plan
 from executive.tree.nodes.policies import AskOperator, Skip, under_policy
 from executive.tree.plan import PICK_UPS, PlanBuilder, Registry, StepPart, start_key
@@ -102,7 +102,8 @@ def compile_mission(
     doors = tuple(doorway(knowledge, door) for door in knowledge.doors)
     tags, surfaces = knowledge.known_tags(), tuple(map(builder.surface, knowledge.surfaces))
     own = (mission.robot_name, mission.name, mission.commands, root, steps.parts, mission.steps)
-    return CompiledTree(*own, doors, tags, surfaces, knowledge.known_zones())
+    zones = knowledge.with_zones(mission.whole_zones).known_zones()
+    return CompiledTree(*own, doors, tags, surfaces, zones)
 
 
 def _whole(mission: Mission, builder: PlanBuilder, steps: tuple[NodeSpec, ...]) -> NodeSpec:
@@ -198,6 +199,8 @@ PLANS: Final[StepPlans] = {model: plan for page in _PAGES for model, plan in get
 
 def build(spec: NodeSpec, context: RunContext) -> Behaviour:
     """Builds the py_trees node of a spec for one run, with all nodes below it."""
+    if spec.kind == InZones.kind:
+        context = replace(context, zones=tuple(dict.fromkeys((*context.zones, *spec.options["zones"]))))
     children = [build(child, context) for child in spec.children]
     known = {**vars(context), "context": context, "children": children, "child": next(iter(children), None)}
     make: Any = KINDS[spec.kind]

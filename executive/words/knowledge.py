@@ -160,6 +160,11 @@ class Knowledge(_Facts):
         rooms = {name: place.polygon for name, place in self.places.items()}
         return tuple(facts.zone(name, rooms) for name, facts in self.zones.items())
 
+    def with_zones(self, zones: Mapping[str, ZoneFacts]) -> Knowledge:
+        """Adds the zones of a mission; one whose name is taken gets another."""
+        more = {f"{name} (mission)" if name in self.zones else name: facts for name, facts in zones.items()}
+        return self.model_copy(update={"zones": {**self.zones, **more}}) if more else self
+
     def place(self, name: str) -> str | None:
         """Own name of the room or surface that `name` means; None when it is unknown."""
         return _resolve(name, self.places) or _resolve(name, self.surfaces)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, PrivateAttr, StrictBool, field_validator, model_validator
@@ -14,7 +14,8 @@ from executive.words.outlines import Corner
 from executive.words.policy import OnFailure, OperatorQuestion, Policy
 from executive.words.robot_config import RobotsFile
 from executive.words.step import Given, Placed, Scalar, Step
-from executive.words.steps import Branch, Handler, Steps, While
+from executive.words.steps import Branch, Group, Handler, Steps, While
+from executive.words.zone import ZONES, ZoneFacts, Zones
 from skills.files.errors import SourceLine
 from skills.files.schema import Name, Text
 from skills.files.yaml_source import YamlSource
@@ -144,6 +145,7 @@ class Mission(_Whole):
         default=None,
         description="Changes of the world's knowledge: values here replace those of the world, key by key.",
     )
+    zones: Zones | None = Field(default=None, description=ZONES)
     people: dict[Name, Route] | None = Field(
         default=None, description="People who walk while the mission runs, by name: new ones, or those of the world."
     )
@@ -233,8 +235,14 @@ class Mission(_Whole):
 
     @property
     def is_framed(self) -> bool:
-        """Returns whether the mission watches a condition, or has steps at its end."""
-        return bool(self.always) or self.while_ is not None or self.when is not None
+        """Returns whether the mission watches a condition, or has steps at its end, or zones."""
+        return bool(self.always) or self.while_ is not None or self.when is not None or bool(self.zones)
+
+    @property
+    def whole_zones(self) -> Mapping[str, ZoneFacts]:
+        """Zones that hold for the whole mission: its own, and those of a group that is its only step."""
+        lone = self.steps[0] if len(self.steps) == 1 else None
+        return {**((isinstance(lone, Group) and lone.zones) or {}), **(self.zones or {})}
 
     def walk(self) -> Iterator[Step]:
         """Yields all steps in order; a step with steps inside comes before them."""

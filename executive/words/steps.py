@@ -31,6 +31,7 @@ from executive.words.leaf_steps import (
     steps_of_commands,
 )
 from executive.words.step import Fault, Scalar, Step, unreadable
+from executive.words.zone import ZONES, Zones
 from skills.files.errors import InputError, listing
 from skills.files.schema import Name, Text
 from skills.files.yaml_source import parse_yaml, yaml_of
@@ -213,6 +214,7 @@ class Group(Step):
     when: tuple[Handler, ...] | None = Field(
         default=None, description="Conditions that interrupt the group, the most important first."
     )
+    zones: Zones | None = Field(default=None, description=ZONES)
 
     @property
     def inner_steps(self) -> Steps:

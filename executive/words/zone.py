@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from executive.words.outlines import Polygon
 from skills.api import FilterType, Zone, ZoneKind, ZoneMask
@@ -87,6 +87,36 @@ class ZoneFacts(_Frozen):
         mask = ZoneMask(self.mask, info.type, info.base, info.multiplier) if self.mask and info else None
         return Zone(name, self.kind, corners, mask, self.speed, self.share, self.direction or 0.0)
 
+
+def _by_name(value: Any) -> Any:
+    """Names the zones of a list, each written as its kind with a room: `keep_out: bathroom`. Raises ValueError."""
+    if not isinstance(value, list):
+        return value
+    zones: dict[str, Any] = {}
+    for each in value:
+        kinds = [kind for kind in ZoneKind if isinstance(each, dict) and kind in each]
+        if len(kinds) != 1 or not isinstance(each[kinds[0]], str):
+            raise ValueError(f"a zone of a list is written as its kind with a room, as '{_EXAMPLE}'")
+        (kind,) = kinds
+        room = each[kind]
+        name = room if room not in zones else f"{room}, {kind.replace('_', ' ')}"
+        zones[name] = {"kind": kind, "place": room, **{key: more for key, more in each.items() if key != kind}}
+    return zones
+
+
+_EXAMPLE: Final = "keep_out: bathroom"
+if TYPE_CHECKING:
+    Zones = dict[str, ZoneFacts]
+else:
+    Zones = Annotated[
+        dict[Name, ZoneFacts],
+        BeforeValidator(_by_name, json_schema_input_type=dict[Name, ZoneFacts] | list[dict[str, str | float]]),
+    ]
+"""Zones by name in a mission."""
+ZONES: Final = (
+    "Zones that hold while the steps run, besides those of the world: by name as in knowledge, or a list of kinds with "
+    f"rooms, as in `{_EXAMPLE}`."
+)
 
 _PLAIN_INFO: Final = {
     ZoneKind.KEEP_OUT: FilterInfo(type=FilterType.KEEP_OUT),

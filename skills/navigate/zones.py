@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from typing import Final
 
 from skills.quantities import Angle, Coordinate, Share, Speed
 
@@ -54,3 +55,20 @@ class Zone:
     speed_m_s: Speed | None = None
     share: Share | None = None
     direction_rad: Angle = 0.0
+
+    @property
+    def words(self) -> str:
+        """Rule of the zone in words, with its name: "keep out of: bathroom"."""
+        speed = (
+            f"{self.speed_m_s:g} m/s" if self.speed_m_s is not None else f"{100 * (self.share or 1):g} % of full speed"
+        )
+        return f"{_WORDS[self.kind].format(speed=speed if self.mask is None else 'the speed of its mask')}: {self.name}"
+
+
+_WORDS: Final = {
+    ZoneKind.KEEP_OUT: "keep out of",
+    ZoneKind.PREFERRED: "preferably through",
+    ZoneKind.SPEED_LIMIT: "at most {speed} in",
+    ZoneKind.ONE_WAY: "one way through",
+    ZoneKind.SILENT: "silent in",
+}

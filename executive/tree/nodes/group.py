@@ -7,7 +7,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.assembly import PYTHON_TYPES, Assembler, Flow, StepPlans
-from executive.tree.behaviour import cause_of, message_of
+from executive.tree.behaviour import ExplainedDecorator, cause_of, message_of
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.decision_nodes import MustHold, MustNotBegin, instant_decision
@@ -22,6 +22,7 @@ from executive.words.expression import Expression, Template, kind_of, literal
 from executive.words.goal import GoalCondition, GoalKind, When
 from executive.words.leaf_steps import UseMission
 from executive.words.mission import Mission
+from skills.api import Zone
 from skills.files.errors import InputError
 
 
@@ -62,6 +63,24 @@ class Always(Afterwards):
         first, then = self.children
         if first.status == Status.SUCCESS and then.status == Status.FAILURE:
             self._end(cause_of(then), f"{message_of(first)}, but then: {message_of(then)}")
+
+
+class InZones(ExplainedDecorator):
+    """Decorator whose subtree minds `zones`, besides those of the nodes above it.
+
+    | child | status |
+    |---|---|
+    | RUNNING, SUCCESS | as the child |
+    | FAILURE | FAILURE with its cause |
+    | halted | INVALID with CANCELLED |
+    """
+
+    kind = "zones"
+    zones: tuple[Zone, ...]
+
+    def update(self) -> Status:
+        """Returns the child's status."""
+        return self.pass_on()
 
 
 def _plan(assembler: Assembler, block: model.Group, builder: PlanBuilder) -> Assembled:
@@ -107,6 +126,11 @@ def frame_plan(
         last = assembler.row(group.always, builder.at("always"), "in the end")
         parts += last.parts
         node = builder.node("always", "in the end, whatever happens", node, *last.nodes, part="whatever-happens")
+    if group.zones:
+        known = assembler.knowledge
+        zones = known.with_zones(group.zones).known_zones()[len(known.zones) :]
+        words = "; ".join(zone.words for zone in zones)
+        node = builder.node("zones", words, node, part="zones", zones=zones)
     return Assembled((node,), parts)
 
 

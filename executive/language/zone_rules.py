@@ -1,0 +1,178 @@
+"""Rules for rooms in a sentence: which to keep out of, where to drive slowly, where to be quiet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pydantic import ValidationError
+
+from executive.language.clauses import begins_action
+from executive.language.lexicon import Patterns, any_of, read_table
+from executive.language.questions import RefusalError
+from executive.language.spelling import synonyms_for
+from executive.words.knowledge import Knowledge
+from executive.words.step import Step
+from executive.words.steps import Group
+from executive.words.zone import ZoneFacts
+from skills.api import ZoneKind
+
+SLOWLY_M_S: Final = 0.3
+"""Speed limit of "slowly"."""
+_FORMS: Final = Patterns("zones.yaml")
+_NUMBERS: Final = {
+    **{"half": 0.5, "quarter": 0.25, "three quarters": 0.75, "one": 1.0, "two": 2.0, "three": 3.0, "four": 4.0},
+    **{"five": 5.0, "ten": 10.0, "twenty": 20.0, "thirty": 30.0, "forty": 40.0, "fifty": 50.0},
+}
+_UNITS_M_S: Final = {"m": 1.0, "c": 0.01, "k": 1.0 / 3.6}
+_SPEEDS: Final = ("slowly", "at_most")
+_LEFT: Final = (*_SPEEDS, "silent", "other")
+"""Rules that no other part of the language refuses."""
+_ADDRESS: Final = re.compile(r"\W*(?:(?:hey|hi|hello|ok|okay)\W+)?\w+\W*", re.IGNORECASE)
+Zones = Mapping[str, ZoneFacts]
+
+
+@dataclass(frozen=True)
+class RoomRules:
+    """Rules of a sentence as zones by name, and the `rest` of it.
+
+    In the `knowledge` for the rest no object is expected in a room that a rule forbids.
+    """
+
+    rest: str
+    zones: Zones
+    knowledge: Knowledge
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Note on each rule."""
+        return tuple(f"until it is done, {facts.zone(name, {name: ()}).words}" for name, facts in self.zones.items())
+
+    def around(self, steps: Sequence[Step]) -> Group:
+        """Puts steps into a group with the zones. Raises RefusalError for work in a forbidden room."""
+        forbidden = _forbidden(self.zones)
+        for command in (command for step in steps for each in step.walk() for command in each.commands):
+            place = self.knowledge.place(command.goal_at or command.goal or "")
+            if place is not None and (room := self.knowledge.room(place)) in forbidden:
+                what = "and send me there" if place == room else f"and the {place} is in it"
+                raise RefusalError(f"you keep me out of the {room}, {what}; say one of the two", [room])
+        return Group(steps=tuple(steps), zones=dict(self.zones))
+
+
+def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules | None:
+    """Reads the rules for rooms in a sentence; None where it has none.
+
+    Raises RefusalError for a rule without work, and for one that is not understood.
+    """
+    if knowledge is None or _FORMS.mentions.search(text) is None:
+        return None
+    rest, zones = take_rules(text, knowledge)
+    if not zones:
+        return None
+    if not re.search(r"\w", rest):
+        example = f"'{text.strip(' .!')} and bring me a drink'"
+        what = f"a rule for a room needs work in the same sentence, as in {example}; `errand world zone add` lasts"
+        raise RefusalError(what, [text])
+    return RoomRules(rest, zones, _without(knowledge, _forbidden(zones)))
+
+
+def _forbidden(zones: Zones) -> frozenset[str]:
+    """Rooms that the robot keeps out of."""
+    return frozenset(zone.place for zone in zones.values() if zone.place and zone.kind is ZoneKind.KEEP_OUT)
+
+
+def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
+    """Takes the rules for rooms out of a sentence; returns the rest of it, and the zones by name.
+
+    Raises RefusalError for a speed limit that is no clause of its own, or that no robot can keep.
+    """
+    zones: dict[str, ZoneFacts] = {}
+    own = {
+        word.lower(): name
+        for name in knowledge.places
+        for spelling in knowledge.spellings([name])
+        for word in (*synonyms_for(spelling), spelling)
+        if knowledge.place(word) in (None, name)
+    }
+    names = rf"(?:{any_of(own)})(?![\w'-])"
+    room = rf"(?:(?:the|my|our|your) )?{names}"
+    rooms = rf"(?P<rooms>{room}(?:(?:,? (?:and|or|nor)|,)(?: {_FORMS.text('into')})? {room})*)"
+    patterns, rules = _FORMS.with_words(rooms=rooms), read_table("zones.yaml")["rules"] if own else {}
+    forms = {kind: [*map(patterns.compiled, rows)] for kind, rows in rules.items()}
+    for kind, form in ((kind, form) for kind, rows in forms.items() for form in rows if kind != "other"):
+        for match in [*form.finditer(text)][::-1]:
+            if (end := _end(text, match)) is not None:
+                for said in re.findall(names, match["rooms"], re.IGNORECASE):
+                    name = own[said.lower()]
+                    facts = _facts(kind, match, name)
+                    zones[name if name not in zones else f"{name}, {facts.kind.replace('_', ' ')}"] = facts
+                text = _joined(text[: match.start()], text[end:])
+    unread = (form.search(text) for kind in _LEFT for form in forms.get(kind, ()))
+    left = next((match for match in unread if match is not None), None)
+    if left is not None and _FORMS.speaks.search(text[: left.start()]) is None:
+        raise RefusalError(f"I do not understand '{left[0]}' here; say it as a clause of its own", [left[0]])
+    return text, zones
+
+
+def _end(text: str, match: re.Match[str]) -> int | None:
+    """End of the clause of a rule; None where it is no clause of its own, depends on something, or is spoken."""
+    begin, tail = text[: match.start()], _FORMS.tail.match(text, match.end())
+    end = match.end() if tail is None else tail.end()
+    sentence = re.split(r"[.;!?]", begin)[-1]
+    if _FORMS.depends.search(sentence) or _FORMS.speaks.search(sentence):
+        return None
+    if not match[0].lower().startswith("without") and _FORMS.before.search(begin) is None:
+        return None
+    behind = text[end:]
+    after = _FORMS.joined.match(behind)
+    goes_on = after is not None and begins_action(behind[after.end() :])
+    return end if goes_on or _FORMS.ends.match(behind) else None
+
+
+def _joined(begin: str, behind: str) -> str:
+    """Joins the words before and behind a rule."""
+    joint = _FORMS.text("joined")
+    begin = re.sub(rf"{joint}$", "", begin, flags=re.IGNORECASE)
+    rest = re.sub(rf"^(?:{joint}|[.;!?])*", "", behind, flags=re.IGNORECASE)
+    if not re.search(r"\w", behind):
+        return begin
+    if not begin or _ADDRESS.fullmatch(begin):
+        return f"{begin}, {rest}" if begin else rest
+    ends = re.match(r"[\s,]*[.;!?]", behind) or re.search(r"[.;!?]$", begin)
+    return f"{begin.rstrip('.;!?')}. {rest}" if ends else f"{begin}, and {rest}"
+
+
+def _facts(kind: str, match: re.Match[str], room: str) -> ZoneFacts:
+    """Zone of a rule for a room. Raises RefusalError for a speed that no robot keeps."""
+    if kind not in _SPEEDS:
+        return ZoneFacts(kind=ZoneKind(kind), place=room)
+    said = match.groupdict()
+    number = said.get("amount") or "one"
+    unit = said.get("unit") or "m"
+    speed = _NUMBERS.get(number.lower()) or float(number)
+    try:
+        limit = SLOWLY_M_S if kind == "slowly" else round(speed * _UNITS_M_S[unit[0].lower()], 3)
+        return ZoneFacts(kind=ZoneKind.SPEED_LIMIT, place=room, speed=limit)
+    except ValidationError as error:
+        raise RefusalError(f"I cannot keep a limit of {number} {unit}; say 0.1 to 3 m/s", [number]) from error
+
+
+def _without(knowledge: Knowledge, rooms: Collection[str]) -> Knowledge:
+    """Knowledge in which objects are usually in other rooms than these."""
+    if not rooms:
+        return knowledge
+
+    def is_open(place: str) -> bool:
+        return knowledge.room(place) not in rooms
+
+    things = {
+        name: facts.model_copy(update={"usual": tuple(filter(is_open, facts.usual))})
+        for name, facts in knowledge.things.items()
+    }
+    defaults = {
+        task: {word: place for word, place in table.items() if is_open(place)}
+        for task, table in knowledge.defaults.items()
+    }
+    return knowledge.model_copy(update={"things": things, "defaults": defaults})

@@ -21,12 +21,14 @@ from executive.cli.options import START, StartCommand, start_pose
 from executive.cli.output import new_folder, writing
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import inside
+from executive.words.zone import ZoneFacts
 from plant.worlds.world import World, WorldError
+from skills.api import ZoneKind
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError, count_text, listing, suggestion
 from skills.files.outside import read_text
 from skills.files.schema import first_error
-from skills.quantities import Angle, Coordinate, Opening, Quantity
+from skills.quantities import Angle, Coordinate, Opening, Quantity, Share, Speed
 from skills.robot import Pose2D
 
 if TYPE_CHECKING:
@@ -111,13 +113,11 @@ def add(
     surface: Annotated[str | None, typer.Option("--on", help="The surface on which the object lies.")] = None,
 ) -> None:
     """Adds furniture, an object, a person, a dock, or the name of a room to a world of your own."""
-    if not folder.is_dir():
-        raise InputError("there is no such folder", hint="`errand world from-map` makes a world", file=folder)
+    site = _site(folder)
     if name is None and what is not Addition.DOCK:
         raise InputError(f"a {what.value} needs a name", hint=f"write errand world add {what.value} {folder} NAME")
     if not all(map(math.isfinite, (*(at or ()), *(size or ())))):
         raise InputError("--at and --size are numbers", hint="write them in metres and radians")
-    site = _Site(folder, open_world(str(folder)))
     try:
         with _restored(folder):
             said = _ADDED.get(what, _add_furniture)(site, _Wanted(what, name or "", room, at, size, surface))
@@ -259,6 +259,105 @@ def _restored(folder: Path) -> Iterator[None]:
         for file, data in kept.items():
             file.write_bytes(data)
         raise
+
+
+zone = typer.Typer(name="zone", help="Zones of a world: keep-out, speed limit and so on.", rich_markup_mode=None)
+world.add_typer(zone)
+_WORLD: Final = typer.Argument(metavar="WORLD", help="Folder of the world.", show_default=False)
+_ZONE: Final = typer.Argument(metavar="NAME", help="Name of the zone.", show_default=False)
+
+
+@zone.command("add")
+def add_zone(
+    folder: Annotated[Path, _WORLD],
+    name: Annotated[str, _ZONE],
+    kind: Annotated[ZoneKind, typer.Option(help="What holds in it.")],
+    place: Annotated[str | None, typer.Option("--in", metavar="ROOM", help="The room that it covers.")] = None,
+    polygon: Annotated[
+        str | None, typer.Option(metavar='"X Y, X Y, X Y"', help="Its outline: three or more corners, m.")
+    ] = None,
+    mask: Annotated[
+        Path | None, typer.Option(help="YAML file of a Nav2 filter mask, in the folder of the world.")
+    ] = None,
+    info: Annotated[
+        Path | None, typer.Option(help="Nav2 parameters that say what the values of the mask mean.")
+    ] = None,
+    speed: Annotated[float | None, quantity_option(Speed, help="Speed limit, m/s.")] = None,
+    share: Annotated[float | None, quantity_option(Share, help="Speed limit as a share of full speed.")] = None,
+    direction: Annotated[float | None, quantity_option(Angle, help="Direction of a one-way zone, rad.")] = None,
+) -> None:
+    """Adds a zone to the knowledge of a world of your own: a room, an outline, or a filter mask of Nav2."""
+    from plant.worlds.builder.furnish import with_entry
+
+    site = _site(folder)
+    room = None if place is None else site.room(place)
+    files = {key: str(file.resolve()) for key, file in (("mask", mask), ("info", info)) if file is not None}
+    home = f"{folder.resolve()}/"
+    outside = next((file for file in files.values() if not file.startswith(home)), None)
+    if outside is not None:
+        what = f"{Path(outside).name} does not lie in the folder of the world"
+        raise InputError(what, hint="copy it there with its picture", file=folder)
+    given = {"place": room, "polygon": None if polygon is None else _corners(polygon), "speed": speed, "share": share}
+    values = {**given, **{key: file.removeprefix(home) for key, file in files.items()}, "direction": direction}
+    facts = {"kind": kind.value, **{key: value for key, value in values.items() if value is not None}}
+    try:
+        ZoneFacts.model_validate(facts)
+    except ValidationError as error:
+        where, what, _ = first_error(error.errors())
+        hint = "see `errand world zone add --help`"
+        raise InputError(": ".join((*map(str, where), what)), hint=hint) from error
+    _rewrite(site, lambda file: with_entry(file, "zones", name, facts))
+    (made,) = (each for each in knowledge_of(open_world(str(folder))).known_zones() if each.name == name)
+    typer.echo(f"{folder}: {made.words}")
+
+
+def _corners(text: str) -> list[list[float]]:
+    """Parses the corners of an outline. Raises InputError."""
+    try:
+        return [[float(number) for number in corner.split()] for corner in text.split(",")]
+    except ValueError as error:
+        raise InputError(f"--polygon {text[:60]}: no corners", hint='write --polygon "0 0, 2 0, 2 1.5"') from error
+
+
+@zone.command("remove")
+def remove_zone(folder: Annotated[Path, _WORLD], name: Annotated[str, _ZONE]) -> None:
+    """Removes a zone from the knowledge of a world of your own."""
+    from plant.worlds.builder.furnish import without_entry
+
+    site = _site(folder)
+    if name not in (zones := site.facts.zones):
+        hint = suggestion(name, zones) if zones else "it has no zones"
+        raise InputError(f"there is no zone '{name}'", hint=hint, file=folder)
+    _rewrite(site, lambda file: without_entry(file, "zones", name))
+    typer.echo(f"{folder}: no zone '{name}' any more")
+
+
+@zone.command("list")
+def list_zones(folder: Annotated[str, typer.Argument(metavar="WORLD", help="A world by name or folder.")]) -> None:
+    """Lists the zones of a world."""
+    zones = knowledge_of(open_world(folder)).known_zones()
+    for each in zones:
+        typer.echo(each.words)
+    if not zones:
+        typer.echo(f"{folder} has no zones", err=True)
+
+
+def _site(folder: Path) -> _Site:
+    """Opens the world of a folder. Raises InputError."""
+    if not folder.is_dir():
+        raise InputError("there is no such folder", hint="`errand world from-map` makes a world", file=folder)
+    return _Site(folder, open_world(str(folder)))
+
+
+def _rewrite(site: _Site, change: Callable[[Path], str]) -> None:
+    """Changes the text of a world's knowledge, if the result can be read. Raises InputError."""
+    file = site.folder / "knowledge.yaml"
+    try:
+        with _restored(site.folder):
+            file.write_text(change(file), encoding="utf-8")
+            knowledge_of(open_world(str(site.folder)))
+    except WorldError as error:
+        raise InputError(str(error), hint="see `errand world zone list`", file=site.folder) from error
 
 
 @world.command(cls=StartCommand)

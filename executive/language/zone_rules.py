@@ -73,7 +73,8 @@ def read_rules(text: str, knowledge: Knowledge | None) -> RoomRules | None:
         return None
     if not re.search(r"\w", rest):
         example = f"'{text.strip(' .!')} and bring me a drink'"
-        what = f"a rule for a room needs work in the same sentence, as in {example}; `errand world zone add` lasts"
+        lasting = "`errand world zone add` makes a lasting rule for a world of your own"
+        what = f"a rule for a room needs work in the same sentence, as in {example}; {lasting}"
         raise RefusalError(what, [text])
     return RoomRules(rest, zones, _without(knowledge, _forbidden(zones)))
 

@@ -27,6 +27,7 @@ from plant.worlds.builder.rooms import (
 )
 from plant.worlds.geometry_files import OWN_PACKAGE
 from plant.worlds.world import WORLDS_FOLDER, Polygon, World, WorldError
+from skills.files.errors import InputError
 from skills.files.yaml_source import parse_yaml, read_yaml, yaml_of
 from skills.robot import Pose2D
 
@@ -309,6 +310,28 @@ def with_entry(file: Path, key: str, name: str | None, value: Any, *, usual: str
     expected: Any = [value, *held] if name is None else {name: value, **dict(held)}
     if parse_yaml(new, file).data != {**dict(data), key: expected}:
         raise WorldError(f"{file.name} has a form that cannot be extended; add it there:\n{key}:\n{entry}")
+    return new
+
+
+def without_entry(file: Path, key: str, name: str) -> str:
+    """Returns a file's text without the entry of a name under a key; comments stay.
+
+    Raises WorldError when the file's form does not allow it.
+    """
+    text = file.read_text(encoding="utf-8")
+    source, lines = parse_yaml(text, file), text.splitlines(keepends=True)
+    left = {other: value for other, value in source.data[key].items() if other != name}
+    first = source.line((key, name) if left else (key,)) - 1
+    indent = len(lines[first]) - len(lines[first].lstrip())
+    ends = (n for n in range(first + 1, len(lines)) if not lines[n].startswith((" " * (indent + 1), "\n")))
+    new = "".join((*lines[:first], *lines[next(ends, len(lines)) :]))
+    expected = {**source.data, key: left} if left else {one: data for one, data in source.data.items() if one != key}
+    try:
+        unchanged = parse_yaml(new, file).data == expected
+    except InputError:
+        unchanged = False
+    if not unchanged:
+        raise WorldError(f"'{name}' stands in {file.name} in a form that cannot be changed; remove it there")
     return new
 
 

@@ -222,3 +222,64 @@ def test_an_unknown_class_is_refused_and_the_files_are_restored(own):
     refused = invoke("world", "add", "object", own, "unicorn", "--on", "table")
     assert (refused.exit_code, "unicorn" in refused.stderr) == (2, True), refused.output
     assert (own / "knowledge.yaml").read_text() == before
+
+
+def zone(*words: object):
+    return invoke("world", "zone", *words)
+
+
+def test_zones_are_added_listed_and_removed_and_comments_stay(own):
+    file = own / "knowledge.yaml"
+    before = f"# mine\n{file.read_text()}"
+    file.write_text(before)
+    slow = ("--kind", "speed_limit", "--polygon", "3 0, 5 0, 5 2", "--speed", 0.3)
+    assert zone("add", own, "slow", *slow).stdout.endswith("at most 0.3 m/s in: slow\n")
+    assert zone("add", own, "private", "--kind", "keep_out", "--in", "room 2").exit_code == 0
+    assert set(zone("list", own).stdout.splitlines()) == {"at most 0.3 m/s in: slow", "keep out of: private"}
+    zones = load_knowledge(file).zones
+    assert (zones["slow"].polygon, zones["private"].place) == (((3.0, 0.0), (5.0, 0.0), (5.0, 2.0)), "room 2")
+    assert file.read_text().startswith("# mine\n")
+    for name in ("slow", "private"):
+        assert zone("remove", own, name).exit_code == 0
+    assert file.read_text().rstrip() == before.rstrip()
+
+
+def test_a_filter_mask_in_the_folder_of_a_world_becomes_a_zone(own, map_file):
+    for name in ("room.yaml", "room.pgm"):
+        (own / name).write_bytes((map_file.parent / name).read_bytes())
+    added = zone("add", own, "walls", "--kind", "keep_out", "--mask", own / "room.yaml")
+    assert added.exit_code == 0, added.output
+    (made,) = load_knowledge(own / "knowledge.yaml").known_zones()
+    assert Path(made.mask.file) == own / "room.yaml"
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("add", "{own}", "a", "--kind", "silent", "--in", "attic"), "there is no room 'attic'"),
+        (("add", "{own}", "a", "--kind", "silent"), "give one of 'place', 'polygon' and 'mask'"),
+        (("add", "{own}", "a", "--kind", "speed_limit", "--in", "room 1"), "one of 'speed' and 'share'"),
+        (("add", "{own}", "a", "--kind", "keep_out", "--polygon", "0 0, 1 0"), "polygon: should have 3"),
+        (("add", "{own}", "a", "--kind", "keep_out", "--polygon", "here"), "--polygon here: no corners"),
+        (("add", "{own}", "a", "--kind", "keep_out", "--mask", "/tmp/mask.yaml"), "does not lie in the folder"),
+        (("add", "{own}", "a", "--kind", "keep_out", "--mask", "{own}/mask.yaml"), "there is no file 'mask.yaml'"),
+        (("add", "nowhere", "a", "--kind", "keep_out", "--in", "hall"), "there is no such folder"),
+        (("remove", "{own}", "a"), "there is no zone 'a'"),
+    ],
+)
+def test_a_zone_that_does_not_fit_is_refused_and_changes_nothing(own, words, why):
+    before = (own / "knowledge.yaml").read_bytes()
+    refused = zone(*(str(word).replace("{own}", str(own)) for word in words))
+    assert (refused.exit_code, why in refused.stderr) == (2, True), refused.output
+    assert (own / "knowledge.yaml").read_bytes() == before
+
+
+def test_a_zone_in_one_line_with_others_is_not_removed(own):
+    file = own / "knowledge.yaml"
+    file.write_text(
+        f"{file.read_text()}zones: {{a: {{kind: silent, place: room 1}}, b: {{kind: silent, place: room 2}}}}\n"
+    )
+    before = file.read_text()
+    refused = zone("remove", own, "a")
+    assert (refused.exit_code, "in a form that cannot be changed" in refused.stderr) == (2, True), refused.output
+    assert file.read_text() == before

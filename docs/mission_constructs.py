@@ -179,6 +179,15 @@ SMALL = (
         "not rise.",
     ),
     Construct(
+        "open",
+        "Has a door opened: the robot looks at it, and where it is closed asks aloud for it and waits before it, for "
+        "`within` at most (two minutes by default).",
+        """- open: {door: [hall, kitchen], within: 1 min}
+""",
+        "SUCCESS when the door is open. FAILURE with TIMEOUT when it is not opened in time.",
+        "timeout",
+    ),
+    Construct(
         "speak",
         "Says a text to the people around. Expressions stand in braces; `{{` is a brace.",
         """- speak: The battery is at {round(battery * 100)} percent.
@@ -217,7 +226,11 @@ CONDITIONS = (
     ("`object`, perhaps `at`", "`{object: beer, at: kitchen}`", "goes there and looks; no only after all views"),
     ("`person`, perhaps `at`", "`{person: anybody, at: office}`", "goes there and looks around"),
     ("`look`", "`{look: is there a hammer in the workshop}`", "looks for the answer to a question in English"),
-    ("`door`", "`{door: [hall, kitchen]}`", "goes there and looks whether it is open"),
+    (
+        "`door`",
+        "`{door: [hall, kitchen]}`",
+        "goes there and looks whether it is open; before the door it looks at once",
+    ),
     ("`button`", "`{button: go}`", "at once: pressed since a `wait` or `repeat` began, else since the mission began"),
     (
         "`max_age_s`",
@@ -228,7 +241,8 @@ CONDITIONS = (
 )
 VALUES = """\
 Each time that a condition is checked (in each round, at each `every` of a `wait`, in each attempt) the robot looks
-again, unless `max_age_s` (seconds, or a text such as `2 min`) lets an earlier answer count.
+again, unless `max_age_s` (seconds, or a text such as `2 min`) lets an earlier answer count. What the robot saw of a
+door on its way counts as an answer, too.
 
 A value has a name and a type: a number, a text, or true and false. It comes from `variables` (the file's values at
 the beginning), from `set`, and from `gives`: `{answer: NAME}` beside a question, a `check` or an `ask`, `{count:

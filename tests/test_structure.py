@@ -14,11 +14,11 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3211,
+    "executive/words": 3243,
     "executive/language": 7949,
     "executive/speech": 1582,
     "executive/mission": 1635,
-    "executive/tree": 7742,
+    "executive/tree": 7850,
     "executive/run": 3205,
     "executive/record": 1378,
     "executive/store": 1666,
@@ -28,7 +28,7 @@ LINES = {
     "executive/app": 8203,
     "executive/cli": 5004,
     "skills": 27804,
-    "plant": 21412,
+    "plant": 21423,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 497, 90, 12
 """All modules; those that one other imports; file names that stand more than once."""

@@ -43,11 +43,15 @@ def clearing_goals(get: Command, bring: Command, knowledge: Knowledge) -> tuple[
     return GoalCondition(GoalKind.CLEARED, source=source), GoalCondition(GoalKind.CLEARED, source=source, goal=goal)
 
 
-def door_goal(knowledge: Knowledge, between: tuple[str, str]) -> GoalCondition:
-    """Goal condition of the question whether a door is open. Raises StopIteration if the world has no such door."""
+def door_goal(knowledge: Knowledge, between: tuple[str, str], kind: GoalKind = GoalKind.DOOR_OPEN) -> GoalCondition:
+    """Goal condition of the question whether a door is open, or that it is open at the end of a step (DOOR_OPENED).
+
+    Raises StopIteration if the world has no such door.
+    """
     (x, y) = next(door.at for door in knowledge.doors if set(door.between) == set(between))
     square = square_region(f"door between {between[0]} and {between[1]}", Pose(x=x, y=y, yaw=0.0), DOOR_NEAR_M)
-    return GoalCondition(GoalKind.DOOR_OPEN, source=(square,))
+    when = When.END_OF_STEP if kind is GoalKind.DOOR_OPENED else When.END_OF_MISSION
+    return GoalCondition(kind, source=(square,), when=when)
 
 
 def surfaces_to_search(knowledge: Knowledge, item: str, place: str | None) -> tuple[str, ...]:

@@ -131,8 +131,13 @@ class DoorOpen(_Looking):
         one, other = self.door
         return one, other
 
+    @property
+    def name(self) -> str:
+        """The door by its rooms."""
+        return f"door between {' and '.join(self.door)}" if len(self.door) > 1 else f"door of {self.door[0]}"
+
     def __str__(self) -> str:
-        return f"the door between {self.door[0]} and {self.door[-1]} is open"
+        return f"the {self.name} is open"
 
 
 class ButtonPressed(Strict):

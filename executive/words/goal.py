@@ -16,6 +16,7 @@ class GoalKind(enum.Enum):
     WENT = "went"  # the robot's body in a goal region
     ANSWERED = "answered"  # the answer is what is true of the source regions
     DOOR_OPEN = "door open"  # the answer is whether the door in the source region is open
+    DOOR_OPENED = "door opened"  # the door in the source region is open
     CLEARED = "cleared"  # nothing rests in the source regions; with goal regions, all that did rests there, let go
     FOLLOWED = "followed"  # the robot is near the person, who stands in a goal region, and never lost them for long
     GUIDED = "guided"  # the person stands in a goal region, and the robot near them

@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from executive.words.command import Command, Task, command_of_parts, parts_of_command
-from executive.words.condition import Condition
+from executive.words.condition import Condition, DoorOpen
 from executive.words.expression import Expression, Template, literal
 from executive.words.forms import Strict
 from executive.words.step import Fault, Scalar, Step, unreadable
@@ -282,6 +282,31 @@ class Speak(Step):
     def faults(self) -> Iterator[Fault]:
         """Faults of a text that cannot be parsed."""
         yield from unreadable(("speak",), lambda: self.text)
+
+
+class DoorToOpen(DoorOpen):
+    """Door that is to be open, and the time until then."""
+
+    within_s: Annotated[
+        Duration, Field(alias="within", description='Time until the door is open: seconds, or a text such as "2 min".')
+    ] = 120.0
+
+    @property
+    def words(self) -> str:
+        """What is to happen to the door."""
+        return f"have the {self.name} opened"
+
+
+class OpenDoor(Step):
+    """`open`: has a door opened, and waits until it is open; does nothing when it is open already."""
+
+    key: ClassVar[str] = "open"
+    door: Annotated[DoorToOpen, Field(alias="open", description="Have a door opened, and wait until it is open.")]
+
+    @property
+    def words(self) -> str:
+        """Name of the step, with its door."""
+        return self.door.words
 
 
 class Set(Step):

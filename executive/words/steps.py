@@ -23,6 +23,7 @@ from executive.words.leaf_steps import (
     Check,
     Do,
     Dock,
+    OpenDoor,
     Say,
     Set,
     Speak,
@@ -298,7 +299,7 @@ class Ask(Answering):
 
 
 _BLOCKS: Final[Mapping[str, type[Step]]] = MappingProxyType(
-    {each.key: each for each in (Choose, Repeat, Try, Together, Wait, Check, Dock, Group, Speak, Ask, Set)}
+    {each.key: each for each in (Choose, Repeat, Try, Together, Wait, Check, Dock, OpenDoor, Group, Speak, Ask, Set)}
 )
 BLOCKS: Final = tuple(_BLOCKS)
 FORMS: Final = f"'say', some of 'take', 'to', 'do' and 'object', 'skill', 'use', or one of {listing(BLOCKS, last='or')}"

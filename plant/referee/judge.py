@@ -237,16 +237,26 @@ def _judge_answered(condition: GoalCondition, truth: Truth) -> Finding:
 
 
 def _judge_door(condition: GoalCondition, truth: Truth) -> Finding:
-    """Judges an answer by the state of the door while the robot looked; while it moves, both answers are right."""
-    then_s = truth.now_s if condition.answered_s is None else condition.answered_s
+    """Judges an answer by the state of the door while the robot looked; while it moved, both answers are right."""
+    was = _door_state(condition, truth, truth.now_s if condition.answered_s is None else condition.answered_s)
+    right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
+    said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
+    return Finding(right, f"the answer was {said}, and {the(condition.source[0].name)} was {was}.")
+
+
+def _judge_opened(condition: GoalCondition, truth: Truth) -> Finding:
+    """Judges whether a door was open at the end of the step."""
+    was = _door_state(condition, truth, step_end_s(condition, truth))
+    return Finding(was != "closed", f"{the(condition.source[0].name)} was {was}.")
+
+
+def _door_state(condition: GoalCondition, truth: Truth, then_s: float) -> str:
+    """State of a door in the time before `then_s` in which a robot looks at it: open, closed or moving."""
     (doorway,) = condition.source
     changes = next((each for (x, y), each in truth.doors.items() if doorway.contains((x, y, 0.0))), ())
     before = [share for begun_s, share in changes if begun_s <= then_s - DOOR_LOOK_S]
     shares = {*before[-1:], *(share for begun_s, share in changes if then_s - DOOR_LOOK_S < begun_s <= then_s)}
-    was = {frozenset(): "open", frozenset({0.0}): "open", frozenset({1.0}): "closed"}.get(frozenset(shares), "moving")
-    right = condition.answer is not None and was in ("moving", "open" if condition.answer else "closed")
-    said = {True: "yes", False: "no", None: "nothing"}[condition.answer]
-    return Finding(right, f"the answer was {said}, and {the(doorway.name)} was {was}.")
+    return {frozenset(): "open", frozenset({0.0}): "open", frozenset({1.0}): "closed"}.get(frozenset(shares), "moving")
 
 
 def _judge_cleared(condition: GoalCondition, truth: Truth) -> Finding:
@@ -297,6 +307,7 @@ _JUDGES: Mapping[GoalKind, Callable[[GoalCondition, Truth], Finding]] = {
     GoalKind.WENT: _judge_went,
     GoalKind.ANSWERED: _judge_answered,
     GoalKind.DOOR_OPEN: _judge_door,
+    GoalKind.DOOR_OPENED: _judge_opened,
     GoalKind.CLEARED: _judge_cleared,
     GoalKind.FOLLOWED: judge_company,
     GoalKind.GUIDED: judge_company,

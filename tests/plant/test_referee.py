@@ -590,6 +590,13 @@ def test_an_answer_about_a_door_is_judged_by_how_it_was_while_the_robot_looked(a
     assert {answer for answer, verdict in told.items() if verdict.success} == right
 
 
+@pytest.mark.parametrize(("ended_s", "opened"), [(5.0, False), (15.0, True), (30.0, False)])
+def test_a_door_is_opened_when_it_is_open_at_the_end_of_the_step(ended_s, opened):
+    truth = Truth(40.0, (), {"alice": TimedPath(np.zeros((0, 4)))}, {}, {}, {(2.5, 0.0): OPENS_AND_CLOSES})
+    asked = GoalCondition(GoalKind.DOOR_OPENED, source=(DOORWAY,), began_s=0.0, ended_s=ended_s)
+    assert judge([asked], truth, collisions=()).success is opened
+
+
 def test_a_door_that_never_moves_is_open():
     stage = Stage().watch()
     asked = GoalCondition(GoalKind.DOOR_OPEN, source=(DOORWAY,), answer=True)

@@ -301,8 +301,9 @@ def look_plan(builder: PlanBuilder, number: int, look: Look | DoorOpen, key: str
     """Plans a look of a decision; returns its node, and its part with the goal."""
     below = builder.at(f"look-{number}")
     if isinstance(look, DoorOpen):
-        part = StepPart(below.path_id, goal=door_goal(builder.knowledge, look.between))
-        return door_plan(below, look.between, key), part
+        plan = door_plan(below, look.between, key, look.max_age_s)
+        check = next(node for node in plan.walk() if node.kind == Check.kind)
+        return plan, StepPart(check.path_id, goal=door_goal(builder.knowledge, look.between))
     below = replace(below, command=look.command)
     refuse_several(below)
     goal = command_goal(look.command, builder.knowledge)

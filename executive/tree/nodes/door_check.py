@@ -1,4 +1,4 @@
-"""Check whether a door is open: the robot goes to a viewpoint before it and looks, or else on its other side.
+"""Doors: a look whether one is open, from before it, or else from its other side; and a door that is to be opened.
 
 A closed door may bar the path to its viewpoint, so the robot also looks from the pose where its drive ended.
 """
@@ -6,17 +6,35 @@ A closed door may bar the path to its viewpoint, so the robot also looks from th
 import math
 from collections.abc import Iterator
 from itertools import product
-from typing import Final
+from types import MappingProxyType
+from typing import ClassVar, Final
 
+from py_trees.common import Status
+
+from executive.tree.assembly import Assembler, StepPlans
+from executive.tree.behaviour import ExplainedLeaf, MemoryComposite
+from executive.tree.context import RunContext
+from executive.tree.goals import door_goal
 from executive.tree.node import NodeSpec
-from executive.tree.plan import PlanBuilder, pose_2d
+from executive.tree.plan import Assembled, PlanBuilder, StepPart, pose_2d
+from executive.words.goal import GoalKind
 from executive.words.knowledge import Door, Knowledge
+from executive.words.leaf_steps import OpenDoor
 from executive.words.outlines import Point, distance_m, fits, nearest_side
+from skills.api import Cause
 from skills.files.errors import InputError
-from skills.perception.doorway import Doorway
+from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
 
 CHECK_DOOR: Final = "check_door"
+_FROM_EITHER: Final = "look from one side, or else from the other"
+_CANNOT_TELL: Final = frozenset({Cause.PRECONDITION, Cause.PLANNING, Cause.EXECUTION, Cause.POSTCONDITION})
+_LOOKS: Final = 1000
+"""Limit of the looks at a door that cannot be judged, as while people walk through; the time limit comes first."""
+_IF_CLOSED: Final = MappingProxyType({False: 1})
+_HERE_M: Final = 2.0
+_HERE_RAD: Final = 0.9
+"""Largest distance and angle from which a robot looks at a door without driving to a better viewpoint."""
 _BEFORE_M: Final = ((1.5, 1.2, 1.8), (0.9, 0.7))
 """Distances before a door, the better ones first."""
 _ASIDE_RAD: Final = tuple(map(math.radians, (0.0, 20.0, -20.0, 40.0, -40.0)))
@@ -26,35 +44,119 @@ _BODY_M: Final = (1.3, 0.7)
 """Length and width of the body, with a margin."""
 
 
-def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str) -> NodeSpec:
-    """Goes before the door in the room on one side, or else on the other, and looks; the answer goes to `key`.
+class KnownDoor(ExplainedLeaf):
+    """Leaf that applies while the robot knows a door as it was up to `max_age_s` ago; SUCCESS, with `key` for open."""
 
-    The room with more doors comes first, since the robot can reach it more easily when this door is closed.
+    kind = "known door"
+    output_types: ClassVar = {"key": bool}
+    door: Doorway
+    max_age_s: float
+    key: str
+    context: RunContext
+
+    def applies(self) -> bool:
+        """Returns whether the robot saw the door lately."""
+        seen = self.context.door_memory.last_seen(self.door)
+        return seen.state is not DoorState.UNKNOWN and self.context.clock.now() - seen.seen_s <= self.max_age_s
+
+    def update(self) -> Status:
+        """Writes the answer."""
+        seen = self.context.door_memory.last_seen(self.door)
+        self.context.board.put(self.key, seen.state is DoorState.OPEN)
+        return self.say(f"{seen.state.value} when it was seen, {self.context.clock.now() - seen.seen_s:.0f} s ago")
+
+
+class BeforeDoor(MemoryComposite):
+    """Composite that applies while the robot stands where it sees through a door; status as its only child."""
+
+    kind = "before door"
+    door: Doorway
+    context: RunContext
+
+    def applies(self) -> bool:
+        """Returns whether the robot stands before the door."""
+        pose = self.context.known_pose()
+        here = None if pose is None else (pose.x_m, pose.y_m)
+        if here is None or self.door.distance_m(here) > _HERE_M:
+            return False
+        return self.door.view_angle_rad(here) < _HERE_RAD
+
+
+def door_plan(builder: PlanBuilder, between: tuple[str, str], key: str, max_age_s: float = 0.0) -> NodeSpec:
+    """Looks at a door; the answer goes to `key`. What the robot knows counts up to `max_age_s`.
 
     Raises InputError when the world has no such door.
     """
-    door = next((each for each in builder.knowledge.doors if set(each.between) == set(between)), None)
-    if door is None:
-        what = f"there is no door between {between[0]} and {between[1]}"
-        raise InputError.at(builder.source, what, hint="add it under 'doors' in the knowledge file")
-    through_rad = _through_rad(builder.knowledge, door)
-    sides = sorted(between, key=lambda room: -sum(room in other.between for other in builder.knowledge.doors))
-    views = [(room, view) for room in sides if (view := view_of(builder.knowledge, door, room)) is not None]
-    views = views or [(room, pose_2d(builder.knowledge.places[room].pose)) for room in sides]
-    name = f"door between {between[0]} and {between[1]}"
-    ports = {"middle_W": door.at, "width_m": door.width, "through_rad": through_rad, "door": name}
+    door = _door(builder, between)
+    below = builder.at("look") if max_age_s else builder
+    look = below.node("selector", _FROM_EITHER, *_looks(below, door, key), part="look")
+    name, question = f"is the {_name(door)} open?", f"is the {_name(door)} open"
+    check = below.node("check", name, look, question=question, key=key)
+    return _known_or(builder, door, check, key, max_age_s) if max_age_s else check
 
-    def look_from(room: str, view: Pose2D) -> NodeSpec:
+
+def _known_or(builder: PlanBuilder, door: Door, look: NodeSpec, key: str, max_age_s: float) -> NodeSpec:
+    """Takes what is known of a door, or else a look."""
+    options = {"door": doorway(builder.knowledge, door), "max_age_s": max_age_s, "key": key}
+    known = builder.node("known door", "what is known of it", part="known", **options)
+    return builder.node("selector", f"is the {_name(door)} open?", known, look)
+
+
+def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
+    """Looks from where the robot stands before the door, else from the room on one side, else from the other.
+
+    The room with more doors comes first, since the robot can reach it more easily when this door is closed.
+    """
+    knowledge, name = builder.knowledge, _name(door)
+    ports = {"middle_W": door.at, "width_m": door.width, "through_rad": _through_rad(knowledge, door), "door": name}
+    sides = sorted(door.between, key=lambda room: -sum(room in other.between for other in knowledge.doors))
+    views = [(room, view) for room in sides if (view := view_of(knowledge, door, room)) is not None]
+    views = views or [(room, pose_2d(knowledge.places[room].pose)) for room in sides]
+    here = builder.at("here")
+    look = here.skill(CHECK_DOOR, ports, {"open": key})
+    yield here.node("before door", "look from here", look, door=doorway(knowledge, door))
+    for room, view in views:
         below = builder.at(f"from-{room}")
         stay = below.pause("stay", "look from here", _LOOK_S)
         near = below.node(
             "selector", "stand before it, or stay", below.navigate(view, f"the {name}"), stay, part="near"
         )
-        return below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
+        yield below.sequence(f"look from the {room}", near, below.skill(CHECK_DOOR, ports, {"open": key}))
 
-    looks = (look_from(room, view) for room, view in views)
-    look = builder.node("selector", "look from one side, or else from the other", *looks, part="look")
-    return builder.node("check", f"is the {name} open?", look, question=f"is the {name} open", key=key)
+
+def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled:
+    """Looks at a door; where it is closed, asks the people there to open it, and waits before it."""
+    door, key, wanted = _door(builder, block.door.between), builder.key("open"), block.door
+    look, again = builder.at("look"), builder.at("again")
+    first = look.node("selector", _FROM_EITHER, *_looks(look, door, key), part="look")
+    first = _known_or(look, door, first, key, wanted.max_age_s)
+    ask = builder.at("ask").skill("speak", {"text": f"Please open the {_name(door)}."})
+    looks = again.node("selector", _FROM_EITHER, *_looks(again, door, key), part="look")
+    patient = again.node("retry", "look until it can tell", looks, attempts=_LOOKS, causes=_CANNOT_TELL)
+    wait = builder.node(
+        "wait for", f"wait until {wanted}", patient, part="wait", key=key, words=str(wanted), every_s=2.0
+    )
+    work = builder.sequence("ask, and wait", ask, wait, part="ask-and-wait")
+    opened = builder.node("choose", f"{wanted}?", first, work, part="choose", branches=_IF_CLOSED, key=key)
+    late = f"the {_name(door)} was not opened"
+    node = builder.node("timeout", wanted.words, opened, limit_s=wanted.within_s, late=late)
+    goal = door_goal(builder.knowledge, door.between, GoalKind.DOOR_OPENED)
+    return Assembled((node,), (StepPart(node.path_id, goal=goal),))
+
+
+PLANS: Final[StepPlans] = {OpenDoor: _open_plan}
+
+
+def _door(builder: PlanBuilder, between: tuple[str, str]) -> Door:
+    door = next((each for each in builder.knowledge.doors if set(each.between) == set(between)), None)
+    if door is None:
+        what = f"there is no door between {between[0]} and {between[1]}"
+        raise InputError.at(builder.source, what, hint="add it under 'doors' in the knowledge file")
+    return door
+
+
+def _name(door: Door) -> str:
+    return f"door between {door.between[0]} and {door.between[1]}"
 
 
 def view_of(knowledge: Knowledge, door: Door, room: str) -> Pose2D | None:

@@ -36,7 +36,7 @@ STOP: Final = "stop"
 
 
 class Timeout(ExplainedDecorator):
-    """Decorator with a time limit on the robot's clock; suspended time does not count.
+    """Decorator with a time limit on the robot's clock; suspended time does not count. `late` is said at the limit.
 
     | child | time | status |
     |---|---|---|
@@ -50,6 +50,7 @@ class Timeout(ExplainedDecorator):
     kind = "timeout"
     limit_s: float
     clock: Clock
+    late: str = "not done"
 
     def initialise(self) -> None:
         """Starts the time."""
@@ -64,7 +65,7 @@ class Timeout(ExplainedDecorator):
         self._time.go_on()
         late = self._time.elapsed_s() > self.limit_s
         if late and self.decorated.status != Status.FAILURE:
-            return self.fail(Failed(Cause.TIMEOUT, f"not done within {self.limit_s:g} s"))
+            return self.fail(Failed(Cause.TIMEOUT, f"{self.late} within {self.limit_s:g} s"))
         return self.pass_on()
 
 

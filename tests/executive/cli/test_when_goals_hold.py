@@ -8,12 +8,13 @@ from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.condition import DoorOpen, Look, ValueIs
 from executive.words.goal import GoalKind, When
-from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, Set, Wait
+from executive.words.leaf_steps import Awaited, CallSkill, Check, Do, DoorToOpen, OpenDoor, Set, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
 from executive.words.steps import Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
+from skills.speak.skill import Speak
 from tests.executive.conftest import KNOWLEDGE, scripted_skill
 
 AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
@@ -91,11 +92,22 @@ def test_each_check_of_a_condition_is_judged_at_its_time(ran):
     assert looks[0].answered_s < looks[1].answered_s
 
 
-def test_each_check_of_a_door_is_judged_at_its_time(ran, knowledge, registry, script, monkeypatch):
-    doors = [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}]
-    monkeypatch.setattr(knowledge, "__dict__", knowledge.model_validate({**KNOWLEDGE, "doors": doors}).__dict__)
-    registry["check_door"] = scripted_skill(script, "check_door", CheckDoorInputs, {"open": bool})
-    script.ends["check_door"] = lambda skill: Succeeded("seen", {"open": script.begun.count("check_door") == 1})
+@pytest.fixture
+def looks_at_door(knowledge, registry, script, monkeypatch):
+    """Adds a door between hall and kitchen; scripted looks answer whether it is open, by the number of the look."""
+
+    def answers(open_at):
+        doors = [{"between": ["hall", "kitchen"], "at": [2.5, 0.0], "width": 1.0}]
+        monkeypatch.setattr(knowledge, "__dict__", knowledge.model_validate({**KNOWLEDGE, "doors": doors}).__dict__)
+        registry["speak"] = Speak
+        registry["check_door"] = scripted_skill(script, "check_door", CheckDoorInputs, {"open": bool})
+        script.ends["check_door"] = lambda _: Succeeded("seen", {"open": open_at(script.begun.count("check_door"))})
+
+    return answers
+
+
+def test_each_check_of_a_door_is_judged_at_its_time(ran, looks_at_door):
+    looks_at_door(lambda number: number == 1)
     door = DoorOpen(door=("hall", "kitchen"))
     tree, result = ran(block(Choose(condition=door, then=(go("hall"),))), block(Check(condition=door)))
     looks = [one for one in conditions_of(tree, result) if one.kind is GoalKind.DOOR_OPEN]
@@ -104,6 +116,28 @@ def test_each_check_of_a_door_is_judged_at_its_time(ran, knowledge, registry, sc
         (False, "door between hall and kitchen"),
     ]
     assert looks[0].answered_s < looks[1].answered_s
+
+
+def test_a_closed_door_is_asked_for_until_it_opens(ran, looks_at_door, script):
+    looks_at_door(lambda number: number == 4)
+    tree, result = ran(OpenDoor(door=DoorToOpen(door=("hall", "kitchen"))))
+    assert [said.text for said in result.said] == ["Please open the door between hall and kitchen."]
+    assert script.begun.count("check_door") == 4
+    (opened,) = conditions_of(tree, result)
+    assert (opened.kind, opened.when, opened.ended_s) == (GoalKind.DOOR_OPENED, AT_STEP, result.executions[-1].ended_s)
+
+
+def test_nobody_is_asked_to_open_an_open_door(ran, looks_at_door):
+    looks_at_door(lambda _: True)
+    _, result = ran(OpenDoor(door=DoorToOpen(door=("hall", "kitchen"))))
+    assert (result.outcome, result.said) == (Outcome.SUCCESS, ())
+
+
+def test_a_door_that_nobody_opens_ends_the_step_by_name(ran, looks_at_door):
+    looks_at_door(lambda _: False)
+    _, result = ran(OpenDoor(door=DoorToOpen(door=("hall", "kitchen"), within_s=20.0)))
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.TIMEOUT)
+    assert result.message == "the door between hall and kitchen was not opened within 20 s"
 
 
 def test_each_round_of_repeat_is_asked_for(asked):

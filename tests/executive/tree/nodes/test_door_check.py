@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from executive.tree.nodes.door_check import door_plan, view_of
+from executive.tree.nodes.door_check import BeforeDoor, KnownDoor, door_plan, doorway, view_of
 from executive.tree.plan import PlanBuilder
 from executive.words.command import Command
 from executive.words.knowledge import Door, Knowledge
@@ -13,7 +13,9 @@ from skills.check_door.skill import CheckDoor
 from skills.clear_costmap.skill import ClearCostmap
 from skills.files.errors import InputError
 from skills.navigate.skill import Navigate
+from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
+from tests.executive.tree.scripted import Leaf
 
 SKILLS = {skill.name: skill for skill in (Navigate, CheckDoor, ClearCostmap, BackOff)}
 SOUTH, NORTH = [[0, 0], [6, 0], [6, 4], [0, 4]], [[0, 4.1], [6, 4.1], [6, 8], [0, 8]]
@@ -45,7 +47,7 @@ def test_it_goes_before_the_door_and_looks_and_else_does_so_from_the_other_side(
     check = plan(world())
     (looks,) = check.children
     assert (check.kind, check.path_id, looks.kind) == ("check", "alice/m/1-check", "selector")
-    assert [[step.path_id.rpartition("/")[2] for step in side.children] for side in looks.children] == [
+    assert [[step.path_id.rpartition("/")[2] for step in side.children] for side in looks.children[1:]] == [
         ["near", "check-door"],
         ["near", "check-door"],
     ]
@@ -62,7 +64,7 @@ def test_the_skill_learns_where_the_door_is_and_answers_under_the_key():
 
 
 def test_a_robot_with_a_barred_path_looks_from_where_it_stands():
-    near = plan(world()).children[0].children[0].children[0]
+    near = plan(world()).children[0].children[1].children[0]
     assert [near.kind, *(child.kind for child in near.children)] == ["selector", "recover", "pause"]
 
 
@@ -72,7 +74,7 @@ def test_the_side_from_which_there_are_more_ways_comes_first():
     told["places"]["cellar"] = cellar
     told["doors"] = (*told["doors"], {"between": ["cellar", "hall"], "at": (6.05, 6.0), "width": 0.9})
     (looks,) = plan(Knowledge.model_validate(told)).children
-    assert [side.name for side in looks.children] == ["look from the hall", "look from the kitchen"]
+    assert [side.name for side in looks.children[1:]] == ["look from the hall", "look from the kitchen"]
 
 
 def test_path_ids_are_unique():
@@ -122,3 +124,40 @@ def test_a_door_where_two_rooms_meet_without_a_wall():
     assert view_of(knowledge, Door(between=("kitchen", "hall"), at=(2.5, 4.0), width=0.9), "hall") == Pose2D(
         2.5, 5.5, -1.5708
     )
+
+
+DOOR = doorway(world(), world().doors[0])
+
+
+@pytest.mark.parametrize(("middle_W", "looks"), [((0.0, 1.5), True), ((0.0, 3.5), False), ((1.8, 0.5), False)])
+def test_a_robot_before_the_door_looks_from_there(context, middle_W, looks):
+    door = Doorway(middle_W, 0.9, math.pi / 2)
+    node = BeforeDoor(path_id="a", name="", children=[Leaf("S")], door=door, context=context)
+    assert node.applies() is looks
+
+
+# State and age (s) of what is known -> whether it counts for a condition with `max_age_s: 60`, and as open.
+@pytest.mark.parametrize(
+    ("state", "age_s", "counts", "is_open"),
+    [
+        (DoorState.OPEN, 50.0, True, True),
+        (DoorState.CLOSED, 50.0, True, False),
+        (DoorState.OPEN, 70.0, False, None),
+        (DoorState.UNKNOWN, 0.0, False, None),
+    ],
+)
+def test_knowledge_of_a_door_answers_while_it_is_new(context, clock, state, age_s, counts, is_open):
+    context.door_memory.note(DOOR, state, clock.now())
+    clock.advance(age_s)
+    known = KnownDoor(path_id="a", name="", door=DOOR, max_age_s=60.0, key="alice/open", context=context)
+    assert known.applies() is counts
+    if counts:
+        known.tick_once()
+        assert context.board.get("alice/open") is is_open
+
+
+def test_only_a_condition_with_an_age_uses_what_is_known():
+    builder = PlanBuilder(world(), SKILLS, "alice/m/1-check", "start", Command(), None)
+    kinds = [child.kind for child in door_plan(builder, ("kitchen", "hall"), "k", 60.0).children]
+    assert kinds == ["known door", "check"]
+    assert all(node.kind != "known door" for node in plan(world()).walk())

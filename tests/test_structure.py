@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
     "executive/words": 3243,
-    "executive/language": 7949,
+    "executive/language": 8166,
     "executive/speech": 1582,
     "executive/mission": 1635,
     "executive/tree": 7850,
@@ -30,7 +30,7 @@ LINES = {
     "skills": 27804,
     "plant": 21423,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 497, 90, 12
+MODULES, ONE_IMPORTER, SAME_NAME = 498, 91, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -35,7 +35,7 @@ def check_feasible(actions: Sequence[Action], knowledge: Knowledge | None) -> No
         raise RefusalError(f"I bring objects to one person at a time, not to {', '.join(shared)}; name one", shared)
     people = [f"{one.verb} {target.text}" for one, target in carrying if target.person]
     if people:
-        raise RefusalError(f"I cannot carry or lead people: {', '.join(people)}; {ABLE}", people)
+        raise RefusalError(f"I cannot carry people: {', '.join(people)}; {ABLE}", people)
     if knowledge is not None:
         rooms = [one for one in actions if one.kind is VerbKind.GO and one.goal is not None and one.goal.every_room]
         actions = [replace(one, objects=()) if _asks_for_people(one) else one for one in actions if one not in rooms]

@@ -12,7 +12,7 @@ from typing import Any, Final
 from executive.words.mission import QuestionPolicy
 from skills.files.errors import listing
 
-ABLE: Final = "I can fetch, take, put and find objects, go to places, wait and charge"
+ABLE: Final = "I can fetch, take, put and find objects, go to places, follow and guide people, wait and charge"
 ALIKE_SOUND: Final = 0.2
 _LONG_WORD: Final = re.compile(r"(\S{40})\S{20,}")
 
@@ -155,6 +155,7 @@ class RefusalKind(Enum):
     NOT_UNDERSTOOD = "not_understood"  # words that lie outside of what the robot does
     NOTHING_TO_DO = "nothing_to_do"  # it asks for no action
     NO_SUCH_DOOR = "no_such_door"
+    ABOUT_PEOPLE = "about_people"  # whom to follow, guide or greet, or where to
     OTHER = "other"
 
 

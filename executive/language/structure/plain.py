@@ -148,7 +148,7 @@ class PlainReader:
         first = commands[0] if commands else None
         if first is not None and state.held is not None and first.task is Task.GRASP and first.object == state.held:
             commands = commands[1:]
-        return PlainReading(commands, self._after(commands, trace.memory, state), trace)
+        return PlainReading(commands, self.state_after(commands, trace.memory, state), trace)
 
     def read_items(self, text: str) -> tuple[Item, ...]:
         """Reads the items of some words."""
@@ -252,7 +252,7 @@ class PlainReader:
         memory = replace(memory, objects=(target,), where=where, place=where or memory.place, locations=locations)
         return replace(state, memory=memory)
 
-    def _after(self, commands: tuple[Command, ...], memory: Memory, state: State) -> State:
+    def state_after(self, commands: tuple[Command, ...], memory: Memory, state: State) -> State:
         """State after some commands."""
         held, goal = state.held, state.goal
         for command in commands:

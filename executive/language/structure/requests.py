@@ -28,6 +28,7 @@ from executive.words.step import Step
 from executive.words.steps import Steps
 from skills.files.errors import listing, with_article
 
+_INTRODUCTION: Final = "Hello, I am the robot here. I bring things, and I follow and guide people."
 _WAITING: Final = Patterns("structures.yaml", "waiting", AMOUNTS)
 
 Done = tuple[Steps, State, tuple[str, ...]]
@@ -143,6 +144,8 @@ def parse_speech(text: str, reader: PlainReader) -> SpeechRequest | None:
         return SpeechRequest(_words(match["text"], parser), None)
     if (match := forms.greet.fullmatch(text)) is not None:
         return SpeechRequest("hello", _listener(match))
+    if (match := forms.introduce.fullmatch(text)) is not None:
+        return SpeechRequest(_INTRODUCTION, _listener(match))
     if (match := forms.announce_to.fullmatch(text)) is not None:
         return SpeechRequest(_told(match["text"]), _listener(match))
     if (match := ACTS.announce.fullmatch(text)) is not None:
@@ -187,7 +190,7 @@ def _words(text: str, parser: DependencyParser) -> str:
     """Words to say. Raises RefusalError when they describe the text, or name an unknown person."""
     clause = _clause(text, parser)
     whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
-    if whom is not None and not clause:
+    if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
         raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])
     if ACTS.named.match(text) and not clause:
         raise RefusalError(f"what are the words of '{text}'?", [text])

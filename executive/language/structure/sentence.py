@@ -17,6 +17,7 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.conditions import parse_condition
 from executive.language.structure.decisions import DecisionBuilder
+from executive.language.structure.people import commands_on_people, parse_people
 from executive.language.structure.plain import (
     ATTACHED,
     LastCheck,
@@ -43,7 +44,7 @@ from executive.language.structure.requests import (
     search_for,
     steps_for_everyone,
 )
-from executive.words.command import Task
+from executive.words.command import PEOPLE_TASKS, Task
 from executive.words.condition import Look
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
@@ -96,7 +97,7 @@ class SentenceBuilder(DecisionBuilder):
         if ACTS.idle.fullmatch(text) is not None:
             self.flush(row)
             return at + 1
-        for act in (self._waits, self._asks, self._says, self._checks):
+        for act in (self._people, self._waits, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
         found = trailing_cue(text)
@@ -107,6 +108,36 @@ class SentenceBuilder(DecisionBuilder):
             if (end := act(row, clauses, at)) is not None:
                 return end
         row.plain.append(clause)
+        return at + 1
+
+    def _people(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
+        """Follows, guides, meets or greets people."""
+        try:
+            return self._people_at(row, clauses, at)
+        except RefusalError as refusal:
+            refusal.kind = RefusalKind.ABOUT_PEOPLE
+            raise
+
+    def _people_at(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
+        """Builds a request about people; one to find somebody counts only before another request about them."""
+        text = clauses[at].text
+        found = trailing_cue(text)
+        decides = found is not None and found.kind in (Cue.IF, Cue.UNLESS, Cue.EVERY, Cue.TIMES)
+        request = parse_people(found.before if found is not None and decides else text, self.reader.knowledge)
+        if request is None:
+            return None
+        if request.form == "find":
+            then = clauses[at + 1] if at + 1 < len(clauses) else None
+            follows = then is not None and then.kind is None and parse_people(then.text, self.reader.knowledge)
+            if not follows and not (self.special and request.refers):
+                return None
+        if found is not None and decides:
+            self.modify(row, clauses[at], found)
+            return at + 1
+        self.flush(row)
+        commands, state, notes = commands_on_people(request, row.state, self.reader)
+        self.put_done(row, (steps_of_commands(commands), state, notes))
+        self.special = True
         return at + 1
 
     def _answered(self, row: StepRow) -> bool:
@@ -181,6 +212,14 @@ class SentenceBuilder(DecisionBuilder):
         where = with_preposition(self.reader.read_items(to.where), "in" if who else "to") if to.where else ()
         going = (verb("come"), Adverb(here=True)) if to.speaker else (verb("go"), *who, *where)
         reading = self.reader.commands_from_items(going, row.state)
+        last = row.steps[-1].commands if row.steps else ()
+        if (
+            last
+            and last[-1].task in PEOPLE_TASKS
+            and str(last[-1].object) == reading.commands[-1].goal
+            and not to.where
+        ):
+            return  # the robot has just followed or guided that person
         if reading.commands[-1].goal != row.state.goal or reading.commands[-1].goal_at is not None:
             self.add(row, reading)
 
@@ -210,6 +249,8 @@ class SentenceBuilder(DecisionBuilder):
             if match is not None:
                 answer = "no" if match["no"] else "yes"
                 rest = rest[match.end() :].strip(" ,")
+            chosen = clause.kind is None and not any(found.values()) and ACTS.brings_it.match(rest)
+            answer = "yes" if chosen else answer
             if answer is None or found[answer]:
                 break
             end = end_of_scope(clauses, at + 1, branch=True)

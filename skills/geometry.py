@@ -35,6 +35,16 @@ def relative_pose(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
     return compose(inverse(X_WA), X_WB)
 
 
+def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
+    """Returns poses at a distance from a point that face it, the nearest first."""
+    poses = []
+    for k in range(count):
+        yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
+        x, y = point_W[0] - stand_off_m * math.cos(yaw), point_W[1] - stand_off_m * math.sin(yaw)
+        poses.append(Pose2D(x, y, wrap(yaw)))
+    return sorted(poses, key=lambda pose: math.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
+
+
 def grid_inside(
     polygon: tuple[tuple[float, float], ...], step_m: float, *, first_m: float = 0.0, margin_m: float = 0.0
 ) -> FloatArray:

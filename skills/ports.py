@@ -138,13 +138,14 @@ class FindPeopleInputs:
     """Area to search: the corners (x, y) of `area_W`, with the name `place`.
 
     `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
-    counts all people.
+    counts all people. People near the positions of `avoid` do not count.
     """
 
     area_W: tuple[tuple[Coordinate, Coordinate], ...]
     place: str
     person: str = PERSON
     count: Tries = 1
+    avoid: tuple[ObjectObservation, ...] = ()
 
 
 class FindPeoplePorts(Skill[FindPeopleInputs]):
@@ -165,6 +166,65 @@ class FindPeoplePorts(Skill[FindPeopleInputs]):
     }
     default_timeout_s = 60.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
+
+
+@dataclass(frozen=True)
+class MeetPersonInputs:
+    """Name of a person and of their room, and the point (x, y) where they were seen; None: the nearest one ahead."""
+
+    person: str
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    place: str = ""
+
+
+class MeetPersonPorts(Skill[MeetPersonInputs]):
+    """Goes beside a person, also if they move on, and faces them. The output `person` is where they are."""
+
+    done_by: ClassVar[str] = "skills.meet_person.skill:MeetPerson"
+    name = "meet_person"
+    Inputs = MeetPersonInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE})
+    outputs: ClassVar[Mapping[str, type]] = {"person": ObjectObservation}
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan",
+        Cause.PLANNING: "there is no free place to stand beside the person, or no path",
+        Cause.EXECUTION: "the robot did not reach the place to stand",
+        Cause.POSTCONDITION: "nobody is seen there, or the person walks on",
+    }
+    default_timeout_s = 180.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5, "person": 2.0}
+
+
+@dataclass(frozen=True)
+class GuidePersonInputs:
+    """Name of a person for messages, the robot's pose at the goal, and the name of the goal.
+
+    The person was seen at `place_W` (x, y); None: the nearest one ahead. They must stand in the outline `area_W` in the
+    end; without one, near the robot.
+    """
+
+    person: str
+    goal: Pose2D
+    place: str
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    area_W: tuple[tuple[Coordinate, Coordinate], ...] = ()
+
+
+class GuidePersonPorts(Skill[GuidePersonInputs]):
+    """Goes ahead of a person to a place: at their pace, waits for them, and goes back for them."""
+
+    done_by: ClassVar[str] = "skills.guide_person.skill:GuidePerson"
+    name = "guide_person"
+    Inputs = GuidePersonInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE, Part.VOICE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "there is no new scan, or localisation is lost",
+        Cause.PLANNING: "there is no path to the place, or back to the person",
+        Cause.EXECUTION: "the robot makes no progress or refuses to drive",
+        Cause.POSTCONDITION: "the person is lost, does not come along, or ends it on the way",
+    }
+    default_timeout_s = 600.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
 
 @dataclass(frozen=True)

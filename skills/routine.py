@@ -64,6 +64,10 @@ _OFF_PATH_RAD = 0.2
 """Largest distance of an arm from a trajectory that it continues."""
 
 
+ENDED_EARLY: Final = Succeeded("ended early")
+"""Result of a skill that another one ended, because enough was done."""
+
+
 class SkillFailure(Exception):  # noqa: N818 - a failed attempt is no program error
     """Failure of a routine: the cause, one plain sentence, the outputs, and whether it is final (see `Failed`)."""
 
@@ -353,13 +357,20 @@ class RoutineSkill(Skill[InputsT]):
 
         yield from self.persist(attempt, message)
 
-    def perform(self, skill: Skill[OtherT], inputs: OtherT) -> Routine[Succeeded]:
-        """Lets another skill do its work as part of this one. Raises SkillFailure with its cause and message."""
+    def perform(
+        self, skill: Skill[OtherT], inputs: OtherT, enough: Callable[[], bool] = lambda: False
+    ) -> Routine[Succeeded]:
+        """Lets another skill do its work as part of this one; returns `ENDED_EARLY` once `enough` holds.
+
+        Raises SkillFailure with its cause and message.
+        """
         skill.begin(inputs)
         self._inner_skill, self._inner = skill, lambda: skill.resume(inputs)
         try:
             while isinstance(step := skill.step(), Running):
                 yield step
+                if enough():
+                    return ENDED_EARLY
         finally:
             self._inner_skill = self._inner = None
             skill.end()

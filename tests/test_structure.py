@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 8166,
     "executive/speech": 1582,
     "executive/mission": 1635,
-    "executive/tree": 7850,
+    "executive/tree": 8277,
     "executive/run": 3205,
     "executive/record": 1378,
     "executive/store": 1666,
@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8203,
     "executive/cli": 5004,
-    "skills": 27804,
+    "skills": 28264,
     "plant": 21423,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 498, 91, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 503, 95, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

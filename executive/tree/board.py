@@ -1,7 +1,6 @@
 """Blackboard of one run, whose keys begin with the robot's name, and the last known places of objects on it."""
 
 import enum
-import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final, Protocol
@@ -105,22 +104,15 @@ class BesideBoard(FromBoard):
 
 
 @dataclass(frozen=True)
-class BeforePerson(FromBoard):
-    """Binding of a port to a pose that faces the person seen under a blackboard key, at a distance (m) on a side.
+class PlaceOf(FromBoard):
+    """Binding of a port to the place (x, y) of the person seen under a blackboard key."""
 
-    The side is that of the point `from_W`; someone who is nearer to it is met there.
-    """
+    gives: ClassVar[Any] = tuple[Coordinate, Coordinate]
 
-    gives: ClassVar[Any] = Pose2D
-    from_W: tuple[float, float]
-    apart_m: float
-
-    def read(self, board: Board) -> Pose2D:
-        """Returns the pose. Raises KeyError when nobody was seen yet."""
+    def read(self, board: Board) -> tuple[float, float]:
+        """Returns the place. Raises KeyError when nobody was seen yet."""
         seen: ObjectObservation = board.get(self.key)
-        x_m, y_m = seen.position_W[0] - self.from_W[0], seen.position_W[1] - self.from_W[1]
-        on_m, yaw_rad = max(0.0, math.hypot(x_m, y_m) - self.apart_m), math.atan2(y_m, x_m)
-        return Pose2D(self.from_W[0] + on_m * math.cos(yaw_rad), self.from_W[1] + on_m * math.sin(yaw_rad), yaw_rad)
+        return seen.position_W[0], seen.position_W[1]
 
 
 @dataclass(frozen=True)

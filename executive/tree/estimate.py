@@ -334,6 +334,7 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "selector": _first_of,
     "round": _all_that_can,
     "only if known": _if_known,
+    "only if near": _if_known,
     "try": _first_of,
     "choose": _one_of,
     "together": _together,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Final
 
-from executive.words.command import START, Command, Task
+from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.goal import GoalCondition, GoalKind, Region, When
 from executive.words.knowledge import ANYBODY, Knowledge, Pose
 from skills.api import ObjectKind
@@ -24,6 +24,7 @@ FLOOR_M: Final = (-0.05, 0.30)
 NEAR_M: Final = 0.75
 POSE_NEAR_M: Final = 0.25
 DOOR_NEAR_M: Final = 0.3
+_Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
 
 
 def command_goal(command: Command, knowledge: Knowledge, elsewhere: Iterable[str] = ()) -> GoalCondition | None:
@@ -124,8 +125,23 @@ def _went(command: Command, knowledge: Knowledge, elsewhere: tuple[str, ...]) ->
     assert command.goal is not None
     person = knowledge.person(command.goal)
     if person is not None:
-        return GoalCondition(GoalKind.WENT, person=person, when=When.END_OF_STEP)  # the person may walk on
+        return GoalCondition(GoalKind.MET, person=person, when=When.END_OF_STEP)  # the person may walk on
     return GoalCondition(GoalKind.WENT, goal=(_place_region(knowledge, command.goal),))
+
+
+def _with_person(kind: GoalKind) -> _Goal:
+    """Makes the goal of a command about a person: a known one, or anybody, in the room of its goal."""
+
+    def goal(command: Command, knowledge: Knowledge, _: tuple[str, ...]) -> GoalCondition | None:
+        name = "" if command.object is None else command.object.name
+        if (kind, name) == (GoalKind.GREETED, SPEAKER):
+            return None  # nobody knows who spoke, and the speech is judged by itself
+        place = None if command.goal in (None, START) else knowledge.place(command.goal)
+        rooms = () if place is None else (knowledge.room(place),)
+        regions = tuple(Region(room, knowledge.places[room].polygon) for room in rooms)
+        return GoalCondition(kind, person=knowledge.person(name), goal=regions, when=When.END_OF_STEP)
+
+    return goal
 
 
 def _charged(_: Command, knowledge: Knowledge, __: tuple[str, ...]) -> GoalCondition | None:
@@ -148,7 +164,6 @@ def square_region(name: str, pose: Pose, near_m: float = NEAR_M) -> Region:
     return Region(name, tuple((pose.x + dx, pose.y + dy) for dx, dy in sides))
 
 
-_Goal = Callable[[Command, Knowledge, tuple[str, ...]], GoalCondition | None]
 _GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
     {
         Task.GRASP: _grasped,
@@ -156,6 +171,9 @@ _GOALS: Final[Mapping[Task | None, _Goal]] = MappingProxyType(
         Task.PLACE: _carried,
         Task.WAIT: lambda command, *known: None if command.goal is None else _went(command, *known),
         Task.CHARGE: _charged,
+        Task.FOLLOW: _with_person(GoalKind.FOLLOWED),
+        Task.GUIDE: _with_person(GoalKind.GUIDED),
+        Task.GREET: _with_person(GoalKind.GREETED),
         None: _went,
     }
 )

@@ -50,6 +50,9 @@ def assignable(source: Any, target: Any) -> bool:
         return True
     if typing.get_origin(target) in (Union, types.UnionType):
         return any(assignable(source, option) for option in typing.get_args(target))
+    parts = typing.get_args(source), typing.get_args(target)
+    if typing.get_origin(source) is typing.get_origin(target) is tuple and len(parts[0]) == len(parts[1]):
+        return all(each is other or assignable(each, other) for each, other in zip(*parts, strict=True))
     plain = isinstance(source, type) and isinstance(target, type)
     return plain and issubclass(source, target)
 

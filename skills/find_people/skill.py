@@ -25,6 +25,8 @@ from skills.routine import Patience, Routine, SkillFailure
 _SCAN_AGE_S = 1.0
 _AHEAD_RAD = 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
+_AVOID_M = 0.9
+"""Distance within which somebody counts as a person who is already known."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
         """Looks and turns until enough people were seen twice."""
         area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
+        area = area.difference(shapely.MultiPoint([one.position_W[:2] for one in inputs.avoid]).buffer(_AVOID_M))
         tracker, found = PeopleTracker(same_m), list[SeenPerson]()
         for look in range(self.options.looks):
             if look:
@@ -89,7 +92,8 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...]) -> Succeeded:
         """Returns the result. Raises SkillFailure when too few people were found."""
         if not found or len(found) < inputs.count:
-            few = count_sentence(found, ()) if found else f"nobody is seen in the {inputs.place} from here"
+            else_ = " else" if inputs.avoid else ""
+            few = count_sentence(found, ()) if found else f"nobody{else_} is seen in the {inputs.place} from here"
             raise SkillFailure(Cause.POSTCONDITION, few)
         who = "somebody" if found[0].kind.name == PERSON else found[0].kind.name
         said = f"saw {who} in the {found[0].surface}" if inputs.count == 1 else count_sentence(found, ())

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from skills.api import Cause, Failed, Part, Running, Skill, Step, Succeeded
+from skills.api import Cause, Failed, Part, Running, Skill, SkillContext, Step, Succeeded
 from skills.quantities import Delay
 
 SPEECH_TOPIC: Final = "speech"
@@ -46,11 +46,10 @@ class Speak(Skill[SpeakInputs]):
         """Says the text, unless that is refused."""
         self._text = " ".join(inputs.text.split())
         self._refusal = _refusal(self._text)
-        self._begun_s = begun_s = self.context.clock.now()
+        self._begun_s = self.context.clock.now()
         self._lasts_s = max(self.options.at_least_s, self.options.word_s * len(self._text.split()))
         if self._refusal is None:
-            message = {"robot": self.context.robot.name, "text": self._text, "t": round(begun_s, 6)}
-            self.context.publish(SPEECH_TOPIC, message)
+            say(self.context, self._text)
 
     def step(self) -> Step:
         """Waits until the text is said."""
@@ -66,6 +65,12 @@ class Speak(Skill[SpeakInputs]):
         """Says the text again only after a restart, when nobody knows how much of it was heard."""
         if self._begun_s is None:
             self.begin(inputs)
+
+
+def say(context: SkillContext, text: str) -> None:
+    """Says a text, without waiting until it is said."""
+    message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
+    context.publish(SPEECH_TOPIC, message)
 
 
 def _refusal(text: str) -> Failed | None:

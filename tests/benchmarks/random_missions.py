@@ -46,7 +46,6 @@ from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Ste
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError
-from skills.speak.skill import SpeakInputs
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
 from tests.executive.conftest import PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
 from tests.executive.conftest import default_end as usual_end
@@ -315,7 +314,6 @@ class Robotics:
         """The skills by name."""
         ports: dict[str, tuple[type, Mapping[str, type]]] = {
             **PORTS,
-            "speak": (SpeakInputs, {}),
             "check_door": (CheckDoorInputs, {"open": bool}),
         }
         return {name: self._skill(name, *both) for name, both in ports.items()}
@@ -370,6 +368,9 @@ class Robotics:
             seen = ObjectObservation(0.0, ObjectKind("person"), (0.5, 4.5, 0.9), (0.5, 0.5, 1.7), 0.0, 0.9)
             some = Succeeded("seen", {"observation": seen, "observations": (seen,)})
             return some if self.rng.random() < 0.5 else Failed(Cause.POSTCONDITION, "nobody is there")
+        if name == "meet_person":
+            at, size = (*skill.inputs.place_W, 0.9), (0.5, 0.5, 1.7)
+            return Succeeded("met", {"person": ObjectObservation(0.0, ObjectKind("person"), at, size, 0.0, 0.9)})
         if name in ("place", "hand_over"):
             self.robot.holding = False
         found: Any = usual_end(self.script, name)(skill)
@@ -382,6 +383,7 @@ class Robotics:
             "navigate": world.navigate,
             "detect": world.detect,
             "find_people": world.find_people,
+            "meet_person": world.meet_person,
             "charge": world.charge,
             "check_door": world.check_door,
             "grasp": world.grasp,

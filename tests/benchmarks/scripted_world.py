@@ -124,10 +124,14 @@ class ScriptedWorld:
     def navigate(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """Be at the goal."""
         if not self.lie(now_s, "navigate"):
-            self.robot_W = (inputs.goal.x_m, inputs.goal.y_m)
-            self.drives.append((now_s, self.robot_W))
-            extend_path(self.path, np.array([*self.robot_W, 0.5]), now_s)
+            self.drive_to(now_s, (inputs.goal.x_m, inputs.goal.y_m))
         return Succeeded("there")
+
+    def drive_to(self, now_s: float, place_W: tuple[float, float]) -> None:
+        """Bring the robot to a place."""
+        self.robot_W = place_W
+        self.drives.append((now_s, self.robot_W))
+        extend_path(self.path, np.array([*self.robot_W, 0.5]), now_s)
 
     def detect(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """See what is on the surfaces."""
@@ -148,12 +152,22 @@ class ScriptedWorld:
         """See who is in a room."""
         wanted = None if inputs.person in (ANYBODY, "person") else inputs.person
         there = [p for name, p in PEOPLE.items() if wanted in (None, name) and inside(inputs.area_W, p)]
+        there = [p for p in there if all(math.dist(p, one.position_W[:2]) > 0.9 for one in inputs.avoid)]
         if self.lie(now_s, "find_people"):
             there = [] if there else [(0.0, 0.0)]
         if not there:
             return Failed(Cause.POSTCONDITION, "nobody is there")
         size = (0.5, 0.5, 1.7)
         return _seen([ObjectObservation(now_s, ObjectKind("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
+
+    def meet_person(self, now_s: float, inputs: Any) -> Succeeded | Failed:
+        """Stand beside whoever is at a place."""
+        if not any(math.dist(p, inputs.place_W) < 1.0 for p in PEOPLE.values()):
+            return Failed(Cause.POSTCONDITION, "nobody is there")
+        self.drive_to(now_s, inputs.place_W)
+        at, size = (*inputs.place_W, 0.9), (0.5, 0.5, 1.7)
+        person = ObjectObservation(now_s, ObjectKind("person"), at, size, 0.0, 0.9, inputs.place)
+        return Succeeded("beside them", {"person": person})
 
     def charge(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """Charge, at the dock only."""
@@ -337,7 +351,7 @@ class _Person:
     def done(self, goal: GoalCondition, begun_s: float, ended_s: float) -> bool:
         """Whether it was so when it was to be so."""
         needed = max(1, goal.count)
-        if goal.kind is GoalKind.WENT:
+        if goal.kind in (GoalKind.WENT, GoalKind.MET):
             x, y = self.robot_at(ended_s)
             if goal.person is not None:
                 return math.dist((x, y), PEOPLE[goal.person]) <= NEAR_PERSON_M

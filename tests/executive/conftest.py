@@ -34,6 +34,7 @@ from skills.api import (
     Surface,
 )
 from skills.api import Step as SkillStep
+from skills.quantities import Coordinate
 from skills.robot import (
     Battery,
     Capabilities,
@@ -313,6 +314,32 @@ class FindPeopleInputs:
     place: str
     person: str
     count: int
+    avoid: tuple[ObjectObservation, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeetPersonInputs:
+    person: str
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    place: str = ""
+
+
+@dataclass(frozen=True)
+class FollowPersonInputs(MeetPersonInputs):
+    until_W: tuple[tuple[float, float], ...] | None = None
+    until: str = ""
+
+
+@dataclass(frozen=True)
+class GuidePersonInputs(MeetPersonInputs):
+    goal: Pose2D | None = None
+    place: str = ""
+    area_W: tuple[tuple[float, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class SpeakInputs:
+    text: str
 
 
 @dataclass(frozen=True)
@@ -332,6 +359,10 @@ PORTS: dict[str, tuple[type, dict[str, type]]] = {
         FindPeopleInputs,
         {"observation": ObjectObservation, "observations": tuple[ObjectObservation, ...]},
     ),
+    "meet_person": (MeetPersonInputs, {"person": ObjectObservation}),
+    "follow_person": (FollowPersonInputs, {}),
+    "guide_person": (GuidePersonInputs, {}),
+    "speak": (SpeakInputs, {}),
     "approach": (ApproachInputs, {"observation": ObjectObservation}),
     "grasp": (GraspInputs, {"tried": tuple[int, ...]}),
     "place": (PlaceInputs, {}),

@@ -17,12 +17,12 @@ import numpy as np
 from py_trees.common import Status
 
 from executive.tree.behaviour import ExplainedLeaf
-from executive.tree.board import BeforePerson, BesideBoard, FromBoard
+from executive.tree.board import BesideBoard, FromBoard
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.aside import floor_square
 from executive.tree.nodes.guard import Holds
-from executive.tree.nodes.pick_up import LOOK_AGAIN_S, NEARBY_M, go_near_plan, held_plan, pick_up_plan
+from executive.tree.nodes.pick_up import LOOK_AGAIN_S, go_near_plan, held_plan, pick_up_plan
 from executive.tree.nodes.recovery import Recovery, Trigger
 from executive.tree.nodes.search import BACK_M, HALF_M, detect_plan, place_phrase
 from executive.tree.plan import PlanBuilder, pose_2d
@@ -32,9 +32,6 @@ from skills.api import FLOOR, Cause, Failed, ObjectKind, Surface
 from skills.geometry import compose
 from skills.quantities import Coordinate, Height
 from skills.robot import Pose2D
-
-MEET_AT_M: Final = 1.2
-"""Distance at which the robot stands before a person, from body to body."""
 
 
 def carry_plan(builder: PlanBuilder) -> NodeSpec:
@@ -140,22 +137,6 @@ def person_pose(builder: PlanBuilder, person: str, at: str | None) -> Pose2D:
     if facts.pose is None or builder.knowledge.room(place) != builder.knowledge.room(builder.place(facts.at)):
         return pose_2d(stand)
     return Pose2D(stand.x, stand.y, math.atan2(facts.pose.y - stand.y, facts.pose.x - stand.x))
-
-
-def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
-    """Drives to a place, to the start, or to a person's place, where the robot looks for them and goes near."""
-    to = goal_in_words(builder, goal)
-    drive = go_near_plan(builder, goal_pose(builder, goal), to)
-    person = builder.knowledge.person(goal)
-    if person is None:
-        return drive
-    place = builder.place(builder.command.goal_at or builder.knowledge.people[person].at)
-    room, stand = builder.knowledge.room(place), builder.knowledge.place_pose(place)
-    key, meet = builder.key("person"), builder.at("meet")
-    ports = {"area_W": builder.knowledge.places[room].polygon, "place": room, "person": person, "count": 1}
-    look = meet.skill("find_people", ports, {"observation": key})
-    before = BeforePerson(key, (stand.x, stand.y), MEET_AT_M)
-    return meet.sequence(f"meet {person}", drive, look, meet.navigate(before, to, nearby_m=NEARBY_M))
 
 
 def _person_at_start(builder: PlanBuilder) -> str:

@@ -1,4 +1,4 @@
-"""Plans of commands: grasp, find, carry, go, wait, charge; and of pairs of commands with trips or rounds."""
+"""Plans of commands: grasp, find, carry, go, wait, charge, people; and of pairs of commands with trips or rounds."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -8,10 +8,11 @@ from executive.mission.gripper import held_after, is_same
 from executive.tree.assembly import Assembler, StepPlans
 from executive.tree.goals import clearing_goals, command_goal, surfaces_to_search
 from executive.tree.node import NodeSpec
-from executive.tree.nodes.carry import carried_along_plan, carry_plan, go_to_goal_plan, goal_in_words
+from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_words
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
+from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan
 from executive.tree.nodes.pick_up import held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
     find_plan,
@@ -218,22 +219,15 @@ def trips_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     return builder.sequence(f"bring {count_of(count, str(item))} to the {goal}, one at a time", *trips)
 
 
-def _people_plan(builder: PlanBuilder) -> NodeSpec:
-    """Raises InputError: the robot has no plan for tasks on people yet."""
-    task = builder.command.task
-    assert task is not None
-    raise builder.error(f"the robot cannot {task.value} people yet", "ask it to go to the person, or to a place")
-
-
 _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
     Task.GRASP: grasp_plan,
     Task.FIND: find_plan,
     Task.PLACE: carry_plan,
     Task.WAIT: wait_plan,
     Task.CHARGE: charge_plan,
-    Task.FOLLOW: _people_plan,
-    Task.GUIDE: _people_plan,
-    Task.GREET: _people_plan,
+    Task.FOLLOW: follow_plan,
+    Task.GUIDE: guide_plan,
+    Task.GREET: greet_plan,
     None: go_plan,
 }
 PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}

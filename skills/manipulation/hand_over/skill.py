@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.api import Cause, PlanningError, Question, Running, Succeeded
-from skills.geometry import wrap
+from skills.geometry import facing_poses
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.manipulation.arm.collision import ArmScene, Box
 from skills.manipulation.arm.forces import PullWatch
@@ -21,7 +21,7 @@ from skills.navigate.footprint import footprint_clear
 from skills.perception.people import SeenPerson, people_in_scan
 from skills.ports import HandOverInputs, HandOverPorts, NavigateInputs
 from skills.quantities import Duration, Force, Height, Length
-from skills.robot import FloatArray, Pose2D
+from skills.robot import FloatArray
 from skills.routine import Patience, Routine, SkillFailure
 
 _FACING_RAD = 0.5
@@ -229,16 +229,6 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
     def _ahead(self, person: SeenPerson) -> FloatArray:
         """Axis (x, y) of the person in the body frame."""
         return np.asarray((self.X_WB().inverse() @ np.array([*person.place_W, 0.0]))[:2])
-
-
-def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
-    """Returns poses at a distance from a point that face it, the nearest first."""
-    poses = []
-    for k in range(count):
-        yaw = math.atan2(point_W[1] - here.y_m, point_W[0] - here.x_m) + 2 * math.pi * k / count
-        x, y = point_W[0] - stand_off_m * math.cos(yaw), point_W[1] - stand_off_m * math.sin(yaw)
-        poses.append(Pose2D(x, y, wrap(yaw)))
-    return sorted(poses, key=lambda pose: math.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
 
 
 def hold_out_configuration(

@@ -67,7 +67,7 @@ def test_a_person_is_named(knowledge):
 
 def test_going_to_a_person_asks_for_that_person(knowledge):
     (condition,) = conditions(knowledge, "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]")
-    assert (condition.kind, condition.person) == (GoalKind.WENT, "Sam")
+    assert (condition.kind, condition.person) == (GoalKind.MET, "Sam")
 
 
 @pytest.mark.parametrize(

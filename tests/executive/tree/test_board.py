@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from executive.tree.board import BeforePerson, BesideBoard, Board, FromBoardOr, SurfaceOfDetection
+from executive.tree.board import BesideBoard, Board, FromBoardOr, PlaceOf, SurfaceOfDetection
 from skills.api import Surface
 from skills.robot import Pose2D
 
@@ -32,15 +32,10 @@ def test_a_port_may_be_a_pose_beside_one_on_the_board():
 
 
 # The robot's side is (1, 1). Someone at (4, 5), 5 m off, is met 1.25 m from there; someone at (1, 2) where it stands.
-@pytest.mark.parametrize(
-    ("person_W", "pose"),
-    [((4.0, 5.0, 0.9), (3.25, 4.0, math.atan2(4.0, 3.0))), ((1.0, 2.0, 0.9), (1.0, 1.0, math.pi / 2))],
-)
-def test_a_port_may_be_a_pose_before_a_person(make, person_W, pose):
+def test_a_port_may_be_the_place_of_a_person(make):
     board = Board("alice")
-    board.put("alice/person", replace(make.COKE, position_W=person_W))
-    found = BeforePerson("alice/person", (1.0, 1.0), 1.25).read(board)
-    assert (found.x_m, found.y_m, found.yaw_rad) == pytest.approx(pose)
+    board.put("alice/person", replace(make.COKE, position_W=(4.0, 5.0, 0.9)))
+    assert PlaceOf("alice/person").read(board) == (4.0, 5.0)
 
 
 def test_a_port_may_be_the_surface_of_a_detection(make):

@@ -7,7 +7,7 @@ import numpy as np
 from planar_people import PeopleDetector, person_at
 from planar_robot import LENS, TWO_ROOMS, Bench, Box
 
-from skills.api import Running, Succeeded
+from skills.api import ObjectKind, ObjectObservation, Running, Succeeded
 from skills.find_people.skill import FindPeople, FindPeopleInputs
 from skills.robot import Pose2D
 
@@ -61,3 +61,16 @@ def test_the_pictures_with_a_person_are_published_with_their_boxes(monkeypatch):
     shown = [message for topic, message in bench.published if topic == "detections"]
     assert all(message["detections"][0]["class_name"] == "person" for message in shown)
     assert shown
+
+
+def test_people_near_avoided_positions_do_not_count():
+    bench = Bench(Pose2D(1.5, 2.0, 0.0), unmapped=(Box(2.8, 1.8, 3.2, 2.2),), surveyed=TWO_ROOMS, cameras=False)
+    for _ in range(10):
+        bench.tick()
+    known = ObjectObservation(0.0, ObjectKind("person"), (3.3, 2.2, 0.8), (0.5, 0.5, 1.7), 0.0, 1.0, "room")
+    skill = FindPeople(bench.context())
+    skill.begin(FindPeopleInputs(ROOM, "room", avoid=(known,)))
+    while isinstance(step := skill.step(), Running):
+        bench.tick()
+    skill.end()
+    assert step.message == "nobody else is seen in the room from here"

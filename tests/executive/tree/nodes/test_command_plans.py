@@ -6,7 +6,7 @@ from executive.app.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.board import Constant
 from executive.words.goal import GoalKind
-from skills.api import Cause, Failed, Succeeded
+from skills.api import Succeeded
 from skills.files.errors import InputError
 
 TWO = (
@@ -94,24 +94,3 @@ def test_an_object_that_left_the_gripper_is_looked_for_again(compiled, run_tree,
     go = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
     run_tree(compiled(GET, go, *PUT))
     assert script.begun.count("grasp") > 1
-
-
-TO_SAM = "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]"
-
-
-def test_robot_looks_for_a_person_and_goes_near(compiled, run_tree, script, make):
-    seen = {"observation": make.COKE, "observations": (make.COKE,)}
-    script.ends["find_people"] = lambda skill: Succeeded("saw Sam", seen)
-    assert run_tree(compiled(TO_SAM)).outcome is Outcome.SUCCESS
-    assert [each for each in script.begun if each in ("navigate", "find_people")] == [
-        "navigate",
-        "find_people",
-        "navigate",
-    ]
-
-
-def test_robot_does_not_claim_to_have_met_a_person_whom_it_does_not_see(compiled, run_tree, script):
-    script.ends["find_people"] = lambda skill: Failed(Cause.POSTCONDITION, "nobody is seen in the bedroom from here")
-    (result,) = run_tree(compiled(TO_SAM)).robots
-    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
-    assert "nobody is seen" in result.message

@@ -10,8 +10,9 @@ from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
 from table_scene import BLUE, GREY, Can
 
 from skills.api import Cause, Failed, Running, Succeeded
+from skills.geometry import facing_poses
 from skills.manipulation.arm.forces import levers_m
-from skills.manipulation.hand_over.skill import HandOver, HandOverInputs, facing_poses
+from skills.manipulation.hand_over.skill import HandOver, HandOverInputs
 from skills.manipulation.hand_over.verification import Release
 from skills.robot import CommandState, Gripper, Pose2D, Scan
 

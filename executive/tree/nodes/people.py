@@ -1,0 +1,438 @@
+"""People: finding the one who is meant, going there, following, guiding, and greeting; the plans and the nodes.
+
+The robot knows nobody by face. Where several people may be meant, it asks each "Are you Robin?".
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import field
+from types import MappingProxyType
+from typing import ClassVar, Final
+
+from py_trees.behaviour import Behaviour
+from py_trees.common import Status
+
+from executive.tree.behaviour import ExplainedLeaf, MemoryComposite, cause_of, message_of
+from executive.tree.board import Board, FromBoard, FromBoardOr, PlaceOf
+from executive.tree.context import RunContext
+from executive.tree.node import NodeSpec
+from executive.tree.nodes.carry import goal_in_words, goal_pose
+from executive.tree.nodes.pick_up import go_near_plan
+from executive.tree.nodes.policies import FINAL_CAUSES
+from executive.tree.nodes.recovery import OnlyIfKnown
+from executive.tree.nodes.speech import AskPeople
+from executive.tree.plan import PlanBuilder, pose_2d
+from executive.words.command import SPEAKER, START
+from executive.words.expression import Template
+from executive.words.knowledge import ANYBODY, Place
+from executive.words.outlines import inside
+from executive.words.slug import slug
+from skills.api import Cause, Failed, ObjectObservation
+from skills.quantities import Coordinate
+from skills.robot import Pose2D
+
+Seen = tuple[ObjectObservation, ...]
+MOST_PEOPLE: Final = 12
+ANSWER_WITHIN_S: Final = 12.0
+"""Time for the answer to "Are you Robin?"."""
+STILL_NEAR_M: Final = 3.5
+STILL_NEAR_S: Final = 120.0
+"""Distance and time within which a person whom an earlier step has met is still the same one."""
+_YES: Final = ("yes", "yeah", "yep", "yes i am", "i am", "that is me", "that's me", "yes that's me", "yes that is me")
+_NO: Final = ("no", "nope", "no i am not", "no i'm not", "i am not", "i'm not", "not me")
+_MEANING: Final = MappingProxyType({**dict.fromkeys(_YES, "yes"), **dict.fromkeys(_NO, "no")})
+
+
+class OnlyIfNear(OnlyIfKnown):
+    """Composite that applies while the robot is near the person under `key`, whom it met a short time ago.
+
+    Status as its only child.
+    """
+
+    kind = "only if near"
+    context: RunContext
+
+    def applies(self) -> bool:
+        """Returns whether a person was met here a short time ago."""
+        if not super().applies():
+            return False
+        met, here = self.board.get(self.key), self.context.pose()
+        near = math.dist(met.position_W[:2], (here.x_m, here.y_m)) <= STILL_NEAR_M
+        return near and self.context.clock.now() - met.stamp_s <= STILL_NEAR_S
+
+
+class AskWhoItIs(AskPeople):
+    """Leaf that makes sure that the person before the robot, seen under `seen`, is `person`.
+
+    | case | status |
+    |---|---|
+    | not `always`, and only one person is among `observations` | SUCCESS: taken for `person` |
+    | not answered yet | RUNNING |
+    | yes | SUCCESS |
+    | no | FAILURE with POSTCONDITION |
+    | nobody answers within `limit_s` | FAILURE with TIMEOUT |
+    | halted | INVALID with CANCELLED; the question is withdrawn |
+
+    After a success the observation of the person stands under `met`.
+    """
+
+    kind = "who is it"
+    output_types: ClassVar = {"met": ObjectObservation}
+    person: str
+    seen: str
+    observations: str
+    met: str
+    always: bool
+
+    def initialise(self) -> None:
+        """Asks, if there is any doubt."""
+        known = self.context.board
+        self._asks = self.always or (self.observations in known and len(known.get(self.observations)) > 1)
+        self.clear_explanation()
+        if self._asks:
+            super().initialise()
+
+    def update(self) -> Status:
+        """Acts on the answer when there is one."""
+        if not self._asks:
+            return self._met(f"{describe_seen(self._here())}, taken for {self.person}, since nobody else is known")
+        status = super().update()
+        if status == Status.RUNNING:
+            return status
+        where = describe_seen(self._here())
+        if status == Status.FAILURE:
+            why = f"{where} did not say whether they are {self.person}"
+            return self.fail(Failed(self.cause or Cause.TIMEOUT, why if self.cause is Cause.TIMEOUT else self.message))
+        if self.context.board.get(self.key) != "yes":
+            return self.fail(Failed(Cause.POSTCONDITION, f"{where} is not {self.person}"))
+        return self._met(f"{where} is {self.person}")
+
+    def _here(self) -> ObjectObservation:
+        here: ObjectObservation = self.context.board.get(self.seen)
+        return here
+
+    def _met(self, message: str) -> Status:
+        self.context.board.put(self.met, self._here())
+        return self.say(message)
+
+
+def describe_seen(seen: ObjectObservation) -> str:
+    """Text of a person whom the robot sees: "somebody at (1.20, 3.40) in the kitchen"."""
+    place = f" in the {seen.surface}" if seen.surface else ""
+    return f"somebody at ({seen.position_W[0]:.2f}, {seen.position_W[1]:.2f}){place}"
+
+
+class EachInTurn(MemoryComposite):
+    """Composite of a look for one more person or room (first child) and an action there; rounds of both.
+
+    What the look finds stands under `found`, all whose turn is over under `over`. With `first`, one success is enough.
+
+    | look | action | status |
+    |---|---|---|
+    | RUNNING | idle | RUNNING |
+    | SUCCESS | ticked in the same tick | as below |
+    | SUCCESS after `limit` rounds | idle | FAILURE with POSTCONDITION |
+    | FAILURE with POSTCONDITION, all had success | idle | SUCCESS |
+    | FAILURE with POSTCONDITION, nobody found, or some without success | idle | FAILURE with POSTCONDITION |
+    | FAILURE with another cause | idle | FAILURE with its cause |
+    | SUCCESS | RUNNING | RUNNING |
+    | SUCCESS | SUCCESS | with `first` SUCCESS, else RUNNING; the next tick looks again |
+    | SUCCESS | FAILURE | RUNNING; the next tick looks again |
+    | SUCCESS | FAILURE with ERROR or CANCELLED | FAILURE with its cause |
+    | halted | halted | INVALID with CANCELLED |
+
+    With `first` and `expected`, a single person who gave no answer counts at the end; the message says so.
+    """
+
+    kind = "each in turn"
+    output_types: ClassVar = {"over": Seen}
+    found: str
+    over: str
+    first: bool
+    did: str = ""
+    where: str = "here"
+    met: str = ""
+    whom: str = ""
+    expected: bool = False
+    limit: int = MOST_PEOPLE
+    board: Board
+    _whys: tuple[str, ...] = field(default=(), init=False)
+    _silent: tuple[ObjectObservation, ...] = field(default=(), init=False)
+
+    def tick(self) -> Iterator[Behaviour]:
+        """Looks again in each round; until then the results of the round before stay visible."""
+        if self._index == 0 and self.children[0].status != Status.RUNNING:
+            self._reset_children()
+        yield from super().tick()
+
+    def _following(self, child: Behaviour) -> int | None:
+        found = child.status == Status.SUCCESS and len(self._over()) < self.limit
+        return 1 if self._index == 0 and found else None
+
+    def _restart(self) -> None:
+        super()._restart()
+        self._whys, self._silent = (), ()
+
+    def _forget(self) -> None:
+        self.board.forget((self.over,))
+
+    def _take_over(self, child: Behaviour) -> None:
+        look, action = self.children
+        if child.status == Status.RUNNING:
+            self._go_on(message_of(child))
+        elif child is action:
+            self._action_ended(action)
+        elif look.status == Status.SUCCESS:
+            self._end(Cause.POSTCONDITION, f"there are more than {self.limit} {self.where}")
+        elif cause_of(look) is Cause.POSTCONDITION:
+            self._nobody_left(message_of(look))
+        else:
+            self._end(cause_of(look), message_of(look))
+
+    def _action_ended(self, action: Behaviour) -> None:
+        """Notes the person, and ends or begins the next look."""
+        seen = self.board.get(self.found)
+        self.board.put(self.over, (*self._over(), seen))
+        if action.status == Status.SUCCESS:
+            if self.first:
+                self._end(None, message_of(action))
+                return
+        else:
+            cause, why = cause_of(action), message_of(action)
+            if cause in FINAL_CAUSES:
+                self._end(cause, why)
+                return
+            self._whys = (*self._whys, why)
+            self._silent = (*self._silent, seen) if cause is Cause.TIMEOUT else self._silent
+        self._index = 0
+        self._go_on("looks on")
+
+    def _nobody_left(self, nobody: str) -> None:
+        """Ends after a look that found nobody else."""
+        people = len(self._over())
+        if not people:
+            self._end(Cause.POSTCONDITION, nobody)
+        elif self.first and self.expected and people == len(self._silent) == 1:
+            self.board.put(self.met, self._silent[0])
+            self._end(None, f"{describe_seen(self._silent[0])}, taken for {self.whom}, which nobody confirmed")
+        elif self._whys:
+            more = f"; and {len(self._whys) - 4} more" if len(self._whys) > 4 else ""
+            self._end(Cause.POSTCONDITION, "; ".join(self._whys[:4]) + more)
+        else:
+            self._end(None, f"{self.did} {people} {'person' if people == 1 else 'people'} {self.where}")
+
+    def _over(self) -> Seen:
+        over: Seen = self.board.get(self.over) if self.over in self.board else ()
+        return over
+
+
+class NextRoom(ExplainedLeaf):
+    """Leaf that chooses the nearest of `places` whose turn is not `over`, and writes its name, pose and outline.
+
+    SUCCESS while there is one, else FAILURE with POSTCONDITION.
+    """
+
+    kind = "next room"
+    output_types: ClassVar = {"room": str, "pose": Pose2D, "area": tuple[tuple[Coordinate, Coordinate], ...]}
+    places: Mapping[str, Place]
+    room: str
+    pose: str
+    area: str
+    over: str
+    context: RunContext
+
+    def update(self) -> Status:
+        """Chooses a room."""
+        board, here = self.context.board, self.context.pose()
+        over = board.get(self.over) if self.over in board else ()
+        left = {name: pose_2d(place.pose) for name, place in self.places.items() if name not in over}
+        if not left:
+            return self.fail(Failed(Cause.POSTCONDITION, "there is no other room"))
+        room = min(left, key=lambda name: math.hypot(left[name].x_m - here.x_m, left[name].y_m - here.y_m))
+        board.put(self.room, room)
+        board.put(self.pose, left[room])
+        board.put(self.area, self.places[room].polygon)
+        return self.say(f"the next room is the {room}")
+
+
+def met_key(builder: PlanBuilder, person: str) -> str:
+    """Blackboard key of the person as they were met last, the same in all steps of a mission."""
+    return f"{builder.start_key.rpartition('/')[0]}/met-{slug(person)}"
+
+
+def person_text(person: str) -> str:
+    """Name of a person in a sentence."""
+    return {SPEAKER: "the person who asked", ANYBODY: "somebody"}.get(person, person)
+
+
+def person_of(builder: PlanBuilder) -> str:
+    """Returns whom the command is about: a known person, `ANYBODY` or `SPEAKER`. Raises InputError otherwise."""
+    whom = builder.command.object
+    name = "" if whom is None else whom.name
+    person = SPEAKER if name == SPEAKER else builder.knowledge.somebody(name)
+    if person is None:
+        raise builder.error("the command names no known person", "name one of the people of the knowledge file")
+    return person
+
+
+def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> NodeSpec:
+    """Finds a person and goes beside them: near the robot if it has just met them, else where they are looked for.
+
+    That is `place`, where the person is said to be, or else their usual room, then all other rooms, the nearest first.
+    """
+    knowledge, met = builder.knowledge, met_key(builder, person)
+    usual = knowledge.room(builder.place(knowledge.people[person].at))
+    said = usual if place is None else knowledge.room(place)
+    others = tuple(dict.fromkeys(room for room in (usual, *knowledge.places) if room != said))
+    here = builder.at("here")
+    near = here.node("only if near", f"{person} is near", _go_beside(here, person, met), key=met)
+    there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, _ports_of(builder, said)))
+    elsewhere = (_elsewhere_plan(builder.at("elsewhere"), person, others),) if others else ()
+    return builder.node(
+        "selector",
+        f"find {person}",
+        near,
+        there,
+        *elsewhere,
+        exhausted_cause=Cause.POSTCONDITION,
+        exhausted_message=f"{person} is not found",
+    )
+
+
+def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -> NodeSpec:
+    """Goes through rooms until the person is met."""
+    room, pose, area, over = (builder.key(name) for name in ("room", "pose", "area", "rooms"))
+    places = MappingProxyType({each: builder.knowledge.places[each] for each in rooms})
+    following = builder.node(
+        "next room", "the next room", part="next", places=places, room=room, pose=pose, area=area, over=over
+    )
+    ports: dict[str, object] = {"place": FromBoard(room), "area_W": FromBoard(area)}
+    drive = builder.navigate(FromBoard(pose), "the next room")
+    visit = builder.sequence(
+        "look there", drive, _meet_one_plan(builder.at("there"), person, ports, expected=False), part="visit"
+    )
+    title = f"look for {person} in all other rooms"
+    return builder.node("each in turn", title, following, visit, found=room, over=over, first=True, limit=len(rooms))
+
+
+def _ports_of(builder: PlanBuilder, room: str) -> dict[str, object]:
+    """Inputs of a look for people in a room."""
+    return {"area_W": builder.knowledge.places[room].polygon, "place": room}
+
+
+def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], *, expected: bool = True) -> NodeSpec:
+    """Goes beside one person after the other, until one of them is the one who is meant."""
+    seen, observations, met = builder.key("seen"), builder.key("all"), met_key(builder, person)
+    who = builder.node(
+        "who is it",
+        f"is it {person}?",
+        part="who",
+        text=Template(f"Are you {person}?"),
+        keys=MappingProxyType({}),
+        options=("yes", "no"),
+        names=_MEANING,
+        gives=str,
+        limit_s=ANSWER_WITHIN_S,
+        default=None,
+        key=builder.key("answer"),
+        person=person,
+        seen=seen,
+        observations=observations,
+        met=met,
+        always=len(builder.knowledge.people) > 1 or not expected,
+    )
+    visit = builder.sequence(f"meet {person}", _go_beside(builder, person, seen, ports["place"]), who, part="visit")
+    options = {"met": met, "whom": person, "expected": expected, "first": True}
+    return _each_person(builder, f"is {person} here?", person, ports, visit, **options)
+
+
+def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
+    """Goes to a room, or to another place in it where somebody stands at its pose; then does something there."""
+    drive = go_near_plan(builder, pose_2d(builder.knowledge.places[room].pose), f"the {room}")
+    return builder.sequence(f"in the {room}", drive, then)
+
+
+def _each_person(
+    builder: PlanBuilder, title: str, person: str, ports: dict[str, object], visit: NodeSpec, **options: object
+) -> NodeSpec:
+    """Builds rounds of a look for one more person and a visit."""
+    seen, over = builder.key("seen"), builder.key("over")
+    avoid = {"avoid": FromBoardOr(over, ())} if builder.has_ports("find_people", ("avoid",)) else {}
+    outputs = {"observation": seen, "observations": builder.key("all")}
+    look = builder.skill("find_people", {**ports, "person": person, "count": 1, **avoid}, outputs)
+    return builder.node("each in turn", title, look, visit, part="each", found=seen, over=over, **options)
+
+
+def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "") -> NodeSpec:
+    """Goes beside the person who was seen under a key, in a room called `place`; notes there where they are now."""
+    ports = {"person": person_text(person), "place_W": PlaceOf(key), "place": place}
+    return builder.skill("meet_person", ports, {"person": key})
+
+
+def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
+    """Drives to a place or to the start; or finds a person and goes beside them."""
+    person = builder.knowledge.person(goal)
+    if person is None:
+        return go_near_plan(builder, goal_pose(builder, goal), goal_in_words(builder, goal))
+    at = builder.command.goal_at
+    return meet_plan(builder.at("meet"), person, None if at is None else builder.place(at))
+
+
+def follow_plan(builder: PlanBuilder) -> NodeSpec:
+    """Follows a person, after finding them; the speaker, or anybody, is the person before the robot."""
+    person, goal = person_of(builder), builder.command.goal
+    ports: dict[str, object] = {"person": person_text(person)}
+    if goal is not None:
+        room = builder.knowledge.room(builder.place(goal))
+        ports |= {"until": room, "until_W": builder.knowledge.places[room].polygon}
+    to = "" if goal is None else f" to the {goal}"
+    return _with_person(builder, person, f"follow {person_text(person)}{to}", "follow_person", ports)
+
+
+def guide_plan(builder: PlanBuilder) -> NodeSpec:
+    """Guides a person to a place, after finding them."""
+    person, goal = person_of(builder), builder.command.goal
+    if goal is None:
+        raise builder.error(f"it is not said where to guide {person_text(person)}", "name a place")
+    to = goal_in_words(builder, goal)
+    ports = {"person": person_text(person), "goal": goal_pose(builder, goal), "place": to}
+    area = {"area_W": _guided_area(builder, goal)}
+    return _with_person(builder, person, f"guide {person_text(person)} to {to}", "guide_person", {**ports, **area})
+
+
+def _guided_area(builder: PlanBuilder, goal: str) -> tuple[tuple[float, float], ...]:
+    """Outline of the room to which a person is guided; the room around the start, or of another person's place."""
+    knowledge, person = builder.knowledge, builder.knowledge.person(goal)
+    if goal == START:
+        at = (knowledge.start.x, knowledge.start.y)
+        return next((place.polygon for place in knowledge.places.values() if inside(place.polygon, at)), ())
+    place = builder.place(goal if person is None else knowledge.people[person].at)
+    return knowledge.places[knowledge.room(place)].polygon
+
+
+def _with_person(builder: PlanBuilder, person: str, title: str, skill: str, ports: dict[str, object]) -> NodeSpec:
+    if person in (SPEAKER, ANYBODY):
+        return builder.sequence(title, builder.skill(skill, ports))
+    find = meet_plan(builder.at("meet"), person)
+    return builder.sequence(title, find, builder.skill(skill, {**ports, "place_W": PlaceOf(met_key(builder, person))}))
+
+
+def greet_plan(builder: PlanBuilder) -> NodeSpec:
+    """Greets a person, or each person in a room once. Raises InputError when the room is not said."""
+    person, goal = person_of(builder), builder.command.goal
+    place = None if goal is None else builder.place(goal)
+    if person == SPEAKER:
+        return builder.sequence("greet the person who asked", builder.skill("speak", {"text": "Hello!"}))
+    if person != ANYBODY:
+        greet = builder.skill("speak", {"text": f"Hello {person}!"})
+        return builder.sequence(f"greet {person}", meet_plan(builder.at("meet"), person, place), greet)
+    if place is None:
+        raise builder.error("it is not said where the people are", "name the room")
+    room = builder.knowledge.room(place)
+    greet = builder.skill("speak", {"text": "Hello!"})
+    visit = builder.sequence(
+        "greet somebody", _go_beside(builder, ANYBODY, builder.key("seen"), room), greet, part="visit"
+    )
+    options = {"first": False, "did": "greeted", "where": f"in the {room}"}
+    each = _each_person(builder, "greet each person here", ANYBODY, _ports_of(builder, room), visit, **options)
+    return _in_room(builder, room, each)

@@ -1,0 +1,1 @@
+"""The guide_person skill: goes ahead of a person to a place."""

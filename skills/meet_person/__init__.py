@@ -1,0 +1,1 @@
+"""The meet_person skill: goes beside a person."""

@@ -1,0 +1,132 @@
+"""The meet_person skill: goes beside a person whom the robot has seen, and checks that they are still there."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+import numpy as np
+
+from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
+from skills.geometry import facing_poses, wrap
+from skills.manipulation.approach.base_placement import go_to_one
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import footprint_clear
+from skills.perception.people import SeenPerson
+from skills.perception.people_tracking import PeopleOptions, PeopleWatch
+from skills.ports import MeetPersonInputs, MeetPersonPorts, NavigateInputs
+from skills.quantities import Delay, Length, Tries, Turn
+from skills.robot import Pose2D
+from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
+
+PERSON_SIZE_M: Final = (0.5, 0.5, 1.7)
+_SCAN_AGE_S = 1.0
+_ARM_M = 0.5
+"""Distance from a person's axis up to which their own body is in the costmap."""
+_STEP_M = 0.1
+_MOST_POSES = 4
+
+
+@dataclass(frozen=True)
+class MeetPersonOptions:
+    """Positions of the robot beside a person: `apart_m` from the person's axis, turned to them within `facing_rad`.
+
+    A robot that is nearer than `near_m` and faces the person stays. A person seen within `same_m` of the expected place
+    is the one; within `reach_m` of the robot they are looked for during `look_s`. When the person has walked on, the
+    robot goes after them, in `tries` drives at most.
+    """
+
+    apart_m: Length = 1.3
+    near_m: Length = 1.7
+    facing_rad: Turn = 0.6
+    same_m: Length = 1.2
+    ahead_m: Length = 3.0
+    reach_m: Length = 5.0
+    look_s: Delay = 1.5
+    tries: Tries = 4
+
+
+class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
+    """Implementation of `MeetPersonPorts`."""
+
+    Options: ClassVar[type] = MeetPersonOptions
+    options: MeetPersonOptions
+
+    def run(self, inputs: MeetPersonInputs) -> Routine[Succeeded]:
+        """Drives beside the person, again if they have moved meanwhile."""
+        place_W, person = inputs.place_W, None
+        if place_W is None:
+            person = yield from self._look(inputs.person, None)
+            place_W = person.place_W if person else None
+        for _ in range(self.options.tries):
+            if place_W is None:
+                raise SkillFailure(Cause.POSTCONDITION, f"nobody stands within {self.options.ahead_m:g} m ahead")
+            if person is not None and self._is_beside(person):
+                return self._met(inputs, person)
+            yield from self._go_beside(place_W, inputs.person)
+            person = yield from self._look(inputs.person, place_W)
+            if person is None:
+                x, y = place_W
+                why = f"{inputs.person} is no longer at ({x:.2f}, {y:.2f})"
+                raise SkillFailure(Cause.POSTCONDITION, why)
+            place_W = person.place_W
+        if person is not None and self._is_beside(person):
+            return self._met(inputs, person)
+        raise SkillFailure(Cause.POSTCONDITION, f"{inputs.person} does not stay where the robot goes")
+
+    def _look(self, name: str, place_W: tuple[float, float] | None) -> Routine[SeenPerson | None]:
+        """Looks for the person nearest to a place (None: nearest ahead); None when nobody is there."""
+        clock, patience = self.context.clock, Patience(self.context.clock)
+        watch, end_s = PeopleWatch(self.context, PeopleOptions(track_m=self.options.reach_m)), -math.inf
+        while True:
+            scan = self.context.robot.scan()
+            if scan is None or scan.stamp_s < clock.now() - _SCAN_AGE_S:
+                if not patience.is_left():
+                    raise SkillFailure(Cause.PRECONDITION, f"there is no new scan to see {name} in")
+                end_s = -math.inf
+            else:
+                end_s = clock.now() + self.options.look_s if end_s < 0.0 else end_s
+                watch.step(np.zeros(3))
+                if found := self._candidates(watch.tracks(), place_W):
+                    return found[0]
+                if clock.now() >= end_s:
+                    return None
+            yield Running(f"looking for {name}")
+
+    def _candidates(self, people: Sequence[SeenPerson], place_W: tuple[float, float] | None) -> list[SeenPerson]:
+        """People who may be the one, the likeliest first."""
+        if place_W is None:
+            near = [one for one in people if one.distance_m <= self.options.ahead_m]
+            return sorted(near, key=lambda one: (abs(self._bearing_rad(one)) > math.pi / 3, one.distance_m))
+        near = [one for one in people if math.dist(one.place_W, place_W) <= self.options.same_m]
+        return sorted(near, key=lambda one: math.dist(one.place_W, place_W))
+
+    def _bearing_rad(self, one: SeenPerson) -> float:
+        here = self.context.pose()
+        return wrap(math.atan2(one.place_W[1] - here.y_m, one.place_W[0] - here.x_m) - here.yaw_rad)
+
+    def _is_beside(self, person: SeenPerson) -> bool:
+        return person.distance_m <= self.options.near_m and abs(self._bearing_rad(person)) <= self.options.facing_rad
+
+    def _go_beside(self, place_W: tuple[float, float], name: str) -> Routine[None]:
+        """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
+        poses = facing_poses(place_W, self.context.pose(), self.options.apart_m)
+        footprint, costmap = ArmFootprint(self.context).now(), self.context.costmap
+        free = [pose for pose in poses if footprint_clear(costmap, footprint, pose) and self._sees(pose, place_W)]
+        if not free:
+            raise SkillFailure(Cause.PLANNING, f"there is no free place to stand beside {name}")
+        yield from go_to_one(self, [NavigateInputs(pose, 0.15, 0.2) for pose in free[:_MOST_POSES]])
+
+    def _sees(self, pose: Pose2D, place_W: tuple[float, float]) -> bool:
+        """Returns whether no wall or table is between a pose and a person."""
+        from_m = np.arange(_ARM_M, self.options.apart_m, _STEP_M)[:, None]
+        direction = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
+        return bool(np.all(self.context.costmap.clearance_m(np.array(place_W) - from_m * direction) > 0.0))
+
+    def _met(self, inputs: MeetPersonInputs, person: SeenPerson) -> Succeeded:
+        x, y = person.place_W
+        middle_W, kind = (x, y, PERSON_SIZE_M[2] / 2), ObjectKind(inputs.person)
+        found = ObjectObservation(
+            person.stamp_s, kind, middle_W, PERSON_SIZE_M, 0.0, person.score, inputs.place or None
+        )
+        return Succeeded(f"beside {inputs.person} at ({x:.2f}, {y:.2f})", {"person": found})

@@ -1,0 +1,224 @@
+"""People: who it is, where they are, greeting each once, and what is said when nobody confirms it."""
+
+import math
+
+import pytest
+
+from executive.run.control import Control
+from executive.run.outcome import Outcome
+from executive.tree.board import Constant
+from executive.words.goal import GoalKind
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
+from skills.files.errors import InputError
+from skills.robot import Pose2D
+from tests.visitors import OnTick
+
+TO_ROBIN = "Take [Nothing] to [Robin] and do [Nothing] to [Nothing]"
+GREET = "Take [Nothing] to [hall] and do [greet] to [some person]"
+ROOMS = {"hall": (0.0, 0.0), "kitchen": (4.0, 0.0), "bedroom": (-4.0, 0.0), "bathroom": (0.5, 4.0)}
+
+
+def person_at(x, y, room):
+    return ObjectObservation(0.0, ObjectKind("person"), (x, y, 0.8), (0.5, 0.5, 1.7), 0.0, 0.9, room)
+
+
+@pytest.fixture
+def control():
+    return Control(pace=None)
+
+
+@pytest.fixture
+def there(script, robot):
+    """People by name, at the places where a scripted look finds them; the robot is where it last drove."""
+    people = {}
+
+    def look(skill):
+        inputs = skill.inputs
+        avoided = [each.position_W[:2] for each in inputs.avoid]
+        seen = [
+            person_at(x, y, inputs.place)
+            for x, y, room in people.values()
+            if room == inputs.place and all(math.dist((x, y), each) > 0.9 for each in avoided)
+        ]
+        if not seen:
+            return Failed(Cause.POSTCONDITION, f"nobody is seen in the {inputs.place} from here")
+        return Succeeded("saw somebody", {"observation": seen[0], "observations": tuple(seen)})
+
+    def meet(skill):
+        x, y = skill.inputs.place_W
+        near = [(px, py, room) for px, py, room in people.values() if math.dist((px, py), (x, y)) < 1.0]
+        if not near:
+            return Failed(Cause.POSTCONDITION, "nobody is there any more")
+        px, py, room = near[0]
+        robot.standing = Pose2D(px - 1.0, py, 0.0)
+        return Succeeded("beside them", {"person": person_at(px, py, room)})
+
+    def drive(skill):
+        robot.standing = skill.inputs.goal
+        return Succeeded("there")
+
+    script.ends |= {"find_people": look, "meet_person": meet, "navigate": drive}
+    return people
+
+
+@pytest.fixture
+def asked(control, there, robot):
+    """Lets the person beside the robot answer "Are you ...?"; returns the list of the questions."""
+    questions = []
+
+    def answer(*_):
+        for each in control.state.questions:
+            questions.append(each.question.text)
+            here = (robot.standing.x_m + 1.0, robot.standing.y_m)
+            name = next(name for name, (x, y, _) in there.items() if math.dist((x, y), here) < 0.5)
+            if name != "mute":
+                control.answer(each.question.id, "yes" if each.question.text == f"Are you {name}?" else "no")
+
+    return questions, OnTick(answer)
+
+
+@pytest.fixture
+def result_of(compiled, run_tree, control, asked):
+    def run(*texts):
+        _, answers = asked
+        long = {"time_limit_s": 1e4}
+        return run_tree(compiled(*texts), control=control, visitors=[answers], settings=long).robots[0]
+
+    return run
+
+
+def test_robot_asks_each_person_in_the_usual_room_until_one_is_meant(result_of, there, asked):
+    there |= {"Sam": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall")}
+    result = result_of(TO_ROBIN)
+    assert result.outcome is Outcome.SUCCESS, result.message
+    assert asked[0] == ["Are you Robin?", "Are you Robin?"]
+
+
+def test_the_claim_says_where_the_person_is(result_of, there):
+    there["Robin"] = (4.0, 1.0, "kitchen")
+    result = result_of(TO_ROBIN)
+    states = [state.message for state in result.states.values()]
+    assert "somebody at (4.00, 1.00) in the kitchen is Robin" in states
+    assert result.outcome is Outcome.SUCCESS
+
+
+def test_a_person_who_is_not_in_the_usual_room_is_looked_for_in_the_nearest_others_first(result_of, there, script):
+    there["Robin"] = (-4.5, 0.0, "bedroom")
+    drives = []
+    drive = script.ends["navigate"]
+    script.ends["navigate"] = lambda skill: (
+        drives.append((skill.inputs.goal.x_m, skill.inputs.goal.y_m)) or drive(skill)
+    )
+    assert result_of(TO_ROBIN).outcome is Outcome.SUCCESS
+    assert drives[0] == ROOMS["hall"]
+    assert drives[-1] == ROOMS["bedroom"]
+    assert len(drives) == len(set(drives))
+
+
+def test_robot_says_that_the_person_is_not_found_when_all_others_say_no(result_of, there):
+    there |= {"Sam": (1.0, 0.0, "hall"), "Maya": (4.0, 1.0, "kitchen")}
+    result = result_of(TO_ROBIN)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
+    assert result.message.startswith("Robin is not found: somebody at (1.00, 0.00) in the hall is not Robin")
+
+
+def test_the_claim_says_that_nobody_confirmed_who_it_is(result_of, there):
+    there["mute"] = (1.0, 0.0, "hall")
+    result = result_of(TO_ROBIN)
+    assert result.outcome is Outcome.SUCCESS
+    assert "taken for Robin, which nobody confirmed" in "".join(state.message for state in result.states.values())
+
+
+def test_somebody_who_does_not_answer_elsewhere_is_not_taken_for_the_person(result_of, there):
+    there["mute"] = (4.0, 1.0, "kitchen")
+    result = result_of(TO_ROBIN)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
+
+
+def test_the_only_known_person_in_the_usual_room_is_not_asked(result_of, there, asked, knowledge):
+    del knowledge.people["Sam"]
+    there["Robin"] = (1.0, 0.0, "hall")
+    assert result_of(TO_ROBIN).outcome is Outcome.SUCCESS
+    assert asked[0] == []
+
+
+def test_the_only_known_person_is_asked_where_several_people_are_seen(result_of, there, asked, knowledge):
+    del knowledge.people["Sam"]
+    there |= {"guest": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall")}
+    assert result_of(TO_ROBIN).outcome is Outcome.SUCCESS
+    assert asked[0][0] == "Are you Robin?"
+
+
+def test_a_person_who_was_met_is_followed_without_a_second_search(result_of, there, script, asked):
+    there["Robin"] = (4.0, 1.0, "kitchen")
+    assert result_of(TO_ROBIN, "Take [Nothing] to [Nothing] and do [follow] to [Robin]").outcome is Outcome.SUCCESS
+    assert (script.begun.count("follow_person"), len(asked[0])) == (1, 1)
+
+
+def test_a_person_who_left_is_looked_for_again(result_of, there, script):
+    there["Robin"] = (4.0, 1.0, "kitchen")
+    leave = lambda skill: there.update(Robin=(0.0, 0.0, "hall")) or Succeeded("said")  # noqa: E731
+    script.ends["guide_person"] = leave
+    guide = "Take [Nothing] to [kitchen] and do [guide] to [Robin]"
+    assert result_of(guide, TO_ROBIN).outcome is Outcome.SUCCESS
+    assert script.begun.count("find_people") == 3
+
+
+def test_each_person_in_the_room_is_greeted_once(result_of, there, script):
+    there |= {"Sam": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall"), "Maya": (4.0, 0.0, "kitchen")}
+    result = result_of(GREET)
+    assert (result.outcome, result.message) == (Outcome.SUCCESS, "greeted 2 people in the hall")
+    assert script.begun.count("speak") == 2
+
+
+def test_greeting_an_empty_room_fails_and_says_so(result_of, there, script):
+    result = result_of(GREET)
+    assert (result.outcome, result.message) == (Outcome.FAILURE, "nobody is seen in the hall from here")
+    assert "speak" not in script.begun
+
+
+def test_a_person_who_cannot_be_reached_is_not_claimed_to_be_greeted(result_of, there, script):
+    there |= {"Sam": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall")}
+    meet = script.ends["meet_person"]
+    blocked = Failed(Cause.PLANNING, "there is no free place to stand")
+    script.ends["meet_person"] = lambda skill: blocked if skill.inputs.place_W == (1.0, 0.0) else meet(skill)
+    result = result_of(GREET)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
+    assert "no free place" in result.message
+    assert script.begun.count("speak") == 1
+
+
+def test_the_speaker_is_followed_and_guided_without_a_search(compiled):
+    for task in ("follow", "guide"):
+        tree = compiled(f"Take [Nothing] to [kitchen] and do [{task}] to [speaker]")
+        (leaf,) = [node for node in tree.mission.walk() if node.kind == "skill"]
+        assert leaf.name == f"{task}_person"
+        assert "place_W" not in leaf.options["inputs"]
+
+
+def test_following_ends_in_the_room_of_the_goal(compiled, knowledge):
+    tree = compiled("Take [Nothing] to [counter] and do [follow] to [Robin]")
+    (leaf,) = [node for node in tree.mission.walk() if node.name == "follow_person"]
+    assert leaf.options["inputs"]["until_W"] == Constant(knowledge.places["kitchen"].polygon)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "person", "regions"),
+    [
+        (TO_ROBIN, GoalKind.MET, "Robin", []),
+        ("Take [Nothing] to [kitchen] and do [follow] to [Robin]", GoalKind.FOLLOWED, "Robin", ["kitchen"]),
+        ("Take [Nothing] to [Nothing] and do [follow] to [speaker]", GoalKind.FOLLOWED, None, []),
+        ("Take [Nothing] to [counter] and do [guide] to [Robin]", GoalKind.GUIDED, "Robin", ["kitchen"]),
+        (GREET, GoalKind.GREETED, None, ["hall"]),
+    ],
+)
+def test_the_goal_condition_of_a_command_about_people(compiled, text, kind, person, regions):
+    (part,) = compiled(text).parts
+    assert (part.goal.kind, part.goal.person) == (kind, person)
+    assert [region.name for region in part.goal.goal] == regions
+
+
+def test_a_command_that_does_not_say_where_the_people_are_is_refused(compiled):
+    with pytest.raises(InputError, match="where the people are") as error:
+        compiled("Take [Nothing] to [Nothing] and do [greet] to [some person]")
+    assert error.value.hint

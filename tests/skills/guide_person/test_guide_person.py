@@ -1,0 +1,176 @@
+"""The guide_person skill: at the person's pace, waiting, going back, and what is claimed when they are lost."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from planar_people import person_at
+from planar_robot import TWO_ROOMS, Bench
+
+from executive.run.control import Control
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.guide_person.skill import GuidePerson, GuidePersonOptions
+from skills.ports import GuidePersonInputs
+from skills.robot import Pose2D
+
+START, GOAL = Pose2D(3.5, 5.4, math.pi), Pose2D(3.2, 2.0, -1.5)
+ROOM = ((0.0, 0.0), (4.95, 0.0), (4.95, 4.0), (0.0, 4.0))
+ROBIN = (2.0, 5.4)
+INPUTS = GuidePersonInputs("Robin", GOAL, "the kitchen", ROBIN, ROOM)
+STEP_M, APART_M = 0.05, 1.4
+
+
+class Guided:
+    """A bench with a person who walks along the robot's path, and what the robot says."""
+
+    def __init__(self, at=ROBIN, unmapped=(), **options):
+        self.bench = Bench(START, unmapped=unmapped, surveyed=TWO_ROOMS, cameras=False)
+        self.at, self.trail, self.body = at, [], None
+        self.stays = lambda now_s: False
+        self.control = Control(pace=None)
+        self.stand(at)
+        for _ in range(10):
+            self.bench.tick()
+        context = replace(self.bench.context(), listen=self.control.listen)
+        self.skill = GuidePerson(context, GuidePersonOptions(**options))
+
+    def stand(self, at):
+        """Puts the person somewhere; None: nowhere."""
+        boxes = self.bench.robot.boxes
+        if self.body is not None:
+            boxes.remove(self.body)
+        self.at, self.body = at, None if at is None else person_at(*at)
+        if self.body is not None:
+            boxes.append(self.body)
+
+    def walk(self):
+        """Lets the person go on along the robot's path, behind the robot."""
+        pose = self.bench.robot.pose
+        here = (pose.x_m, pose.y_m)
+        if not self.trail or math.dist(here, self.trail[-1]) > 0.1:
+            self.trail.append(here)
+        while self.trail and math.dist(self.at, self.trail[0]) < 0.15:
+            self.trail.pop(0)
+        if self.trail and math.dist(self.at, here) > APART_M:
+            off = math.dist(self.at, self.trail[0])
+            share = min(1.0, STEP_M / max(off, 1e-6))
+            self.stand(tuple(a + share * (b - a) for a, b in zip(self.at, self.trail[0], strict=True)))
+
+    def tick(self):
+        self.bench.tick()
+        if self.at is not None and not self.stays(self.bench.clock.now()):
+            self.walk()
+
+    def go(self, inputs=INPUTS, at_s=(), limit_s=150.0):
+        """Runs the skill; `at_s` maps times to changes."""
+        changes = sorted(dict(at_s).items())
+        self.skill.begin(inputs)
+        while isinstance(step := self.skill.step(), Running) and self.bench.clock.now() < limit_s:
+            while changes and changes[0][0] <= self.bench.clock.now():
+                changes.pop(0)[1]()
+            self.tick()
+        self.skill.end()
+        return step
+
+    @property
+    def said(self):
+        return [message["text"] for topic, message in self.bench.published if topic == "speech"]
+
+    def apart_m(self):
+        return math.dist(self.at, (self.bench.robot.pose.x_m, self.bench.robot.pose.y_m))
+
+
+def test_robot_and_person_arrive_together():
+    guided = Guided()
+    step = guided.go()
+    assert isinstance(step, Succeeded), step
+    assert guided.apart_m() < 3.0
+    assert guided.at[1] < 4.0
+    assert guided.said == ["Please follow me to the kitchen.", "Here we are: the kitchen."]
+
+
+def test_robot_waits_and_goes_back_for_a_person_who_stops():
+    guided = Guided()
+    guided.stays = lambda now_s: 3.5 < now_s < 22.0
+    step = guided.go()
+    assert isinstance(step, Succeeded), step
+    assert guided.said.count("Please follow me to the kitchen.") >= 2
+    assert "I wait for you." in guided.said
+
+
+def test_robot_does_not_claim_to_have_guided_a_person_who_is_lost():
+    guided = Guided()
+    step = guided.go(at_s={9.0: lambda: guided.stand(None)})
+    assert isinstance(step, Failed)
+    assert step.cause is Cause.POSTCONDITION
+    assert step.message.startswith("lost Robin on the way to the kitchen")
+
+
+def test_robot_does_not_claim_to_have_guided_a_person_who_stays_behind():
+    guided = Guided(returns=1)
+    guided.stays = lambda now_s: True
+    step = guided.go()
+    assert (type(step), step.cause) == (Failed, Cause.POSTCONDITION)
+    assert "does not come along" in step.message
+
+
+def test_somebody_else_far_from_the_place_is_not_guided():
+    guided = Guided(at=(8.5, 5.4))
+    guided.stays = lambda now_s: True
+    assert guided.go().cause is Cause.POSTCONDITION
+
+
+def test_the_person_must_be_in_the_area_at_the_goal():
+    guided = Guided(returns=0, arrive_s=1.0)
+    elsewhere = replace(INPUTS, area_W=((5.1, 0.0), (9.9, 0.0), (9.9, 4.0)))
+    assert isinstance(guided.go(elsewhere), Failed)
+
+
+def test_a_remark_before_both_are_there_ends_it_and_is_no_success():
+    guided = Guided()
+    step = guided.go(at_s={6.0: lambda: guided.control.tell("stop")})
+    assert (type(step), step.cause) == (Failed, Cause.POSTCONDITION)
+    assert "'stop' was said before Robin was at the kitchen" in step.message
+    assert not guided.bench.robot.driving
+
+
+def test_without_a_path_to_the_goal_the_planner_gives_the_cause():
+    closed = tuple(person_at(x, 4.05) for x in (2.1, 2.45, 2.8, 7.1, 7.45, 7.8))
+    guided = Guided(unmapped=closed)
+    step = guided.go()
+    assert (type(step), step.cause) == (Failed, Cause.PLANNING)
+
+
+def test_a_suspended_robot_stands_and_goes_on_afterwards():
+    guided = Guided()
+    guided.skill.begin(INPUTS)
+    while not (guided.bench.robot.driving and guided.bench.robot.pose.y_m < 5.0):
+        assert isinstance(guided.skill.step(), Running)
+        guided.tick()
+    guided.skill.suspend()
+    assert not guided.bench.robot.driving
+    assert not guided.control.tell("stop")
+    for _ in range(40):
+        guided.tick()
+    guided.skill.resume(INPUTS)
+    while isinstance(step := guided.skill.step(), Running) and guided.bench.clock.now() < 150.0:
+        guided.tick()
+    guided.skill.end()
+    assert isinstance(step, Succeeded), step
+
+
+def test_a_cancel_stops_the_robot_and_hears_no_remark():
+    guided = Guided()
+    guided.skill.begin(INPUTS)
+    while not guided.bench.robot.driving:
+        assert isinstance(guided.skill.step(), Running)
+        guided.tick()
+    guided.skill.end()
+    assert not guided.bench.robot.driving
+    assert not guided.control.tell("stop")
+
+
+@pytest.mark.parametrize(("at", "ends"), [(ROBIN, Succeeded), ((8.5, 5.4), Failed)])
+def test_without_a_place_the_person_ahead_is_guided(at, ends):
+    guided = Guided(at=at)
+    assert isinstance(guided.go(replace(INPUTS, place_W=None)), ends)

@@ -55,6 +55,8 @@ from skills.world_model import WorkCounter as WorkCounter
 if TYPE_CHECKING:
     from pydrake.math import RigidTransform, RotationMatrix
 
+    from skills.navigate.zone_map import ZoneMap
+
 ResultT = TypeVar("ResultT")
 ReadT = TypeVar("ReadT")
 ResultT_co = TypeVar("ResultT_co", covariant=True)
@@ -272,6 +274,8 @@ class _LastPose:
 class SkillContext:
     """Robot, estimators and services that a skill may use. `seed` derives from the run's seed and the leaf's path id.
 
+    Where the body goes, a skill asks `free_space` rather than `costmap`, which does not know the zones.
+
     `doors` and `zones` are those on the robot's map, with `door_memory` of the doors' states; `tags` are the AprilTags
     that it knows. `walls` are the map's columns (N, 2) of cells that are solid at the arm's heights
     (`skills.manipulation.arm.solid_cells`).
@@ -299,6 +303,22 @@ class SkillContext:
     zones: tuple[Zone, ...] = ()
     walls: NDArray[np.int64] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     _last_pose: _LastPose = field(default_factory=_LastPose, init=False, repr=False, compare=False)
+
+    def zone_map(self) -> ZoneMap:
+        """Returns the zones drawn on the ground. Raises InputError for a mask that cannot be read."""
+        from skills.navigate.zone_map import zone_map
+
+        full_m_s = self.robot.capabilities().max_speed_m_s
+        return zone_map(self.zones, min(full_m_s, getattr(self.stack.controller, "max_speed_m_s", full_m_s)))
+
+    def free_space(self) -> FreeSpace:
+        """Returns the costmap with the keep-out zones as obstacles; one in which the robot stands, as far as it may."""
+        if not self.zones:
+            return self.costmap
+        from skills.navigate.footprint import Footprint
+        from skills.navigate.zone_map import KeepOut
+
+        return KeepOut(self.zone_map()).space(self.costmap, Footprint.of(self.robot.capabilities()), self.pose())
 
     def X_WB(self) -> RigidTransform:
         """Returns the body's estimated pose in the world."""

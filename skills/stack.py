@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from skills.navigate.follower import Drive
     from skills.navigate.footprint import Footprint
     from skills.navigate.path import Path as WayPath
+    from skills.navigate.zone_map import ZoneMap
     from skills.world_model import Costmap, FreeSpace, Localiser, WorkCounter
 
 __all__ = [
@@ -95,10 +96,12 @@ class GlobalPlanner(Protocol):
         *,
         max_speed_m_s: float,
         work: WorkCounter = ...,
+        zones: ZoneMap | None = ...,
     ) -> Callable[[], WayPath]:
         """Samples the costmap now; returns a function that plans on that sample, in any thread.
 
-        That function raises PlanningError, and counts its computations in `work`.
+        That function raises PlanningError, and counts its computations in `work`. `zones` has the costs and directions
+        of motions; keep-out zones are obstacles of the costmap already.
         """
 
 

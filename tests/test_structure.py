@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8203,
     "executive/cli": 5004,
-    "skills": 28264,
+    "skills": 28840,
     "plant": 21423,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 503, 95, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 504, 94, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

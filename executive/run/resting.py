@@ -48,7 +48,7 @@ class SteppingAside:
         here, footprint = self._context.pose(), self._skill.outline()
         if not self._giving.blocked_robots(here, footprint):
             return
-        place = self._giving.waiting_pose(self._context.costmap, footprint, here)
+        place = self._giving.waiting_pose(self._context.free_space(), footprint, here)
         if place is not None:
             self._skill = Navigate(self._context)
             self._skill.begin(NavigateInputs(place))

@@ -98,7 +98,7 @@ class BackOff(BackOffPorts, MovingSkill[BackOffInputs]):
         steps = np.arange(1, max(1, round(most_m / _STEP_M)) + 1) * _STEP_M
         here = self.context.pose()
         poses = [compose(here, Pose2D(s * math.cos(direction_rad), s * math.sin(direction_rad), 0.0)) for s in steps]
-        clearances = footprint_clearance_m(self.context.costmap, footprint, pose_array([here, *poses]))
+        clearances = footprint_clearance_m(self.context.free_space(), footprint, pose_array([here, *poses]))
         allowed = np.minimum(SAFE_MARGIN_M, np.maximum.accumulate(clearances)[:-1] + 1e-3)
         blocked = np.flatnonzero(clearances[1:] < allowed)
         return float(steps[-1] if len(blocked) == 0 else (steps[blocked[0] - 1] if blocked[0] > 0 else 0.0))

@@ -131,6 +131,59 @@ def load_grid_map(path: Path) -> GridMap:
 
     Raises InputError, with file and line, when the file is no such map or its picture cannot be used.
     """
+    source, file, picture, remarks = _read(path)
+    occupied, unknown = _classify(picture, file)
+    notes = (*remarks, *_notes(picture, file, occupied, unknown))
+    if file.origin[2] != 0.0:
+        return _turned(occupied, unknown, file, source, notes)
+    return GridMap(occupied, file.resolution, file.origin[:2], unknown, file.height_band_m, notes)
+
+
+@dataclass(frozen=True)
+class FilterMask:
+    """A filter mask of Nav2: `percent` (rows, columns), row 0 at the bottom, with -1 for unknown cells.
+
+    `origin` is the world pose x, y (m), yaw (rad) of the outer corner of cell [0, 0].
+    """
+
+    percent: NDArray[np.int16]
+    resolution_m: float
+    origin: tuple[float, float, float]
+
+    @property
+    def corners_W(self) -> FloatArray:
+        """World (x, y) of its four corners, (4, 2)."""
+        rows, columns = self.percent.shape
+        x, y, yaw = self.origin
+        ends = np.array([(0, 0), (columns, 0), (columns, rows), (0, rows)]) * self.resolution_m
+        return np.asarray(ends @ [[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]] + (x, y))
+
+    def at(self, points_W: FloatArray) -> NDArray[np.int16]:
+        """Values at points (N, 2); -1 off the mask."""
+        x, y, yaw = self.origin
+        turned = (points_W - (x, y)) @ [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+        column, row = np.floor(turned / self.resolution_m).astype(np.int64).T
+        rows, columns = self.percent.shape
+        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        return np.where(inside, self.percent[row.clip(0, rows - 1), column.clip(0, columns - 1)], np.int16(-1))
+
+
+def load_filter_mask(path: Path) -> FilterMask:
+    """Reads a filter mask of Nav2, in the map_server form. Raises InputError as `load_grid_map`."""
+    _, file, picture, _ = _read(path)
+    occupied, unknown = _classify(picture, file)
+    percent = np.where(occupied, 100, 0).astype(np.int16)
+    if file.read_as == "raw":
+        percent = np.flipud(np.rint(255.0 * picture.shares)).astype(np.int16)
+    elif file.read_as == "scale":
+        probability = np.flipud(picture.shares if file.negate else 1.0 - picture.shares)
+        share = (probability - file.free_thresh) / (file.occupied_thresh - file.free_thresh)
+        percent = np.rint(100.0 * share.clip(0.0, 1.0)).astype(np.int16)
+    return FilterMask(np.where(unknown, np.int16(-1), percent), file.resolution, file.origin)
+
+
+def _read(path: Path) -> tuple[YamlSource, _MapFile, Brightness, tuple[str, ...]]:
+    """The file of a map, its keys, its picture, and remarks on both. Raises InputError."""
     _refuse_other_files(path)
     source, strange = _without_unknown_keys(read_yaml(path))
     file = validate(_MapFile, source)
@@ -140,11 +193,7 @@ def load_grid_map(path: Path) -> GridMap:
     if file.trinary is not None and file.mode is not None and file.trinary != (file.mode == "trinary"):
         raise source.error(("trinary",), f"trinary: 'mode' says {file.mode}", "remove 'trinary'")
     picture, moved = _picture(source, file)
-    occupied, unknown = _classify(picture, file)
-    notes = (*strange, *moved, *_notes(picture, file, occupied, unknown))
-    if file.origin[2] != 0.0:
-        return _turned(occupied, unknown, file, source, notes)
-    return GridMap(occupied, file.resolution, file.origin[:2], unknown, file.height_band_m, notes)
+    return source, file, picture, (*strange, *moved)
 
 
 _PICTURES: Final = frozenset({".pgm", ".png", ".bmp", ".ppm", ".jpg", ".jpeg", ".gif", ".tif", ".tiff", ".webp"})

@@ -78,7 +78,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     def _turn(self) -> Routine[None]:
         """Turns in place as far as the footprint stays clear."""
         turn_rad_s, for_s = self.options.turn_rad_s, self.options.turn_rad / self.options.turn_rad_s
-        costmap, footprint = self.context.costmap, ArmFootprint(self.context).now()
+        costmap, footprint = self.context.free_space(), ArmFootprint(self.context).now()
 
         def lacks_clearance() -> bool:
             here = self.context.pose()

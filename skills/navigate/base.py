@@ -1,13 +1,18 @@
 """Drive commands for skills: each one is short-lived, and the last one ends with the skill."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skills.api import Cause, InputsT, Running, SkillContext
-from skills.robot import CommandCause, CommandId, CommandState
+from skills.geometry import compose
+from skills.navigate.footprint import Footprint, pose_array
+from skills.robot import CommandCause, CommandId, CommandState, Pose2D
 from skills.routine import Patience, Routine, RoutineSkill, SkillFailure
+
+_LOOK_AHEAD_S = 0.4
 
 
 class Base:
@@ -20,15 +25,31 @@ class Base:
         self._context = context
         self._command: CommandId | None = None
         self._cause = CommandCause.NONE  # of the last refusal
+        self._footprint = Footprint.of(context.robot.capabilities())
         self.accepted = False
         self.patience = Patience(context.clock)
         self.last_velocity: NDArray[np.float64] = np.zeros(3)
 
     def drive(self, velocity: tuple[float, float, float]) -> None:
-        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call; without one the drive expires."""
+        """Moves at a body-frame velocity (m/s, m/s, rad/s) until the next call; without one the drive expires.
+
+        Zones with speed limits slow it down.
+        """
+        velocity = self._within_limits(velocity)
         until_s = self._context.clock.now() + self._context.robot.capabilities().drive_expiry_s
         self._command = self._context.robot.drive(*velocity, until_s=until_s, lease=self._context.lease)
         self.last_velocity = np.array(velocity)
+
+    def _within_limits(self, velocity: tuple[float, float, float]) -> tuple[float, float, float]:
+        """The velocity, slower where zones about the robot want that."""
+        speed = math.hypot(velocity[0], velocity[1])
+        if not self._context.zones or speed == 0.0:
+            return velocity
+        here = self._context.pose()
+        ahead = [compose(here, Pose2D(*(_LOOK_AHEAD_S * n * v for v in velocity))) for n in range(2)]
+        most = self._context.zone_map().speed_m_s(self._footprint, pose_array(ahead), np.zeros(2))
+        share = min(1.0, most / speed)
+        return velocity[0] * share, velocity[1] * share, velocity[2] * share
 
     def refusal(self) -> str | None:
         """Reason why the robot refused the last command, None when it did not."""

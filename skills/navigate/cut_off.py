@@ -127,14 +127,22 @@ class DoorWatch:
         return bool(costmap.clear_obstacles(np.array(discs)))
 
     def regions(
-        self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
+        self,
+        footprint: Footprint,
+        here: Pose2D,
+        goals: Sequence[Pose2D],
+        people_W: Sequence[tuple[float, float]] = (),
+        costmap: FreeSpace | None = None,
     ) -> Regions:
-        """The regions in which a disc as wide as the robot can move, without people and with all other doors open."""
+        """The regions in which a disc as wide as the robot can move, without people and with all other doors open.
+
+        `costmap` replaces that of the context.
+        """
         closed = self.closed
         axes = [door.axis(_THROUGH_M, 0.5 * _CELL_M) for door in self._context.doors if door not in closed]
         discs = [np.array(place) + _PERSON_M for place in people_W]
         return Regions(
-            self.costmap(self._context.costmap),
+            self.costmap(costmap or self._context.costmap),
             footprint,
             here,
             goals,
@@ -142,12 +150,17 @@ class DoorWatch:
         )
 
     def blocking_doors(
-        self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
+        self,
+        footprint: Footprint,
+        here: Pose2D,
+        goals: Sequence[Pose2D],
+        people_W: Sequence[tuple[float, float]] = (),
+        costmap: FreeSpace | None = None,
     ) -> tuple[Doorway, ...]:
         """The closed doors that block every path to the goals; none where a goal is reachable."""
         if not self.closed:
             return ()
-        regions = self.regions(footprint, here, goals, people_W)
+        regions = self.regions(footprint, here, goals, people_W, costmap)
         return regions.doors_between(self.closed) if regions.cut_off else ()
 
 

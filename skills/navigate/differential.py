@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skills.geometry import wrap
 from skills.navigate.lattice import Lattice
-from skills.navigate.motion_cost import Space, clearance_needed, drive_cost, segment_cost
+from skills.navigate.motion_cost import Space, clearance_needed, drive_cost, segment_cost, zone_factor
 from skills.navigate.path import clearances
 from skills.robot import FloatArray
 
@@ -113,6 +113,11 @@ def driven_poses(space: Space, knots: FloatArray) -> FloatArray:
     return np.array([*poses, last])
 
 
+def _allowed(space: Space, poses: FloatArray) -> bool:
+    """Returns whether no motion between poses goes against a one-way zone."""
+    return all(math.isfinite(zone_factor(space, *a[:2], *(b - a)[:2])) for a, b in pairwise(poses))
+
+
 _Leg = tuple[FloatArray, FloatArray, float]
 
 
@@ -147,6 +152,7 @@ def _rounded(space: Space, first: _Leg, second: _Leg, free_m: float) -> list[Flo
         x = begin[0] + side * (np.sin(angles) - math.sin(course))
         y = begin[1] - side * (np.cos(angles) - math.cos(course))
         arc = np.column_stack([x, y, yaws])
-        if float(np.min(clearances(space, arc))) >= max(clearance_needed(space, x[0], y[0]), space.needs.margin_m):
+        clear = float(np.min(clearances(space, arc))) >= max(clearance_needed(space, x[0], y[0]), space.needs.margin_m)
+        if clear and _allowed(space, arc):
             return list(arc)
     return None

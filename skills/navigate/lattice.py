@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
-from skills.navigate.motion_cost import Space, Weights, clearance_needed, motion_seconds, nearness
+from skills.navigate.motion_cost import Space, Weights, clearance_needed, mean_zone_factor, motion_seconds, nearness
 from skills.robot import FloatArray
 
 IntArray = NDArray[np.int64]
@@ -55,6 +55,8 @@ def cost_to_go(space: Space, lattice: Lattice, goal_row: int, goal_column: int, 
             v = round((lattice.y0_m + i * lattice.cell_m - field.y0_m) / field.cell_m)
             if 0 <= v < values.shape[0] and 0 <= u < values.shape[1] and values[v, u] > least_m:
                 factor[i, j] = nearness(values[v, u] - inscribed_m + field.cell_m, weights)
+                if space.zones.factor.shape[0] > 0:
+                    factor[i, j] *= space.zones.least[v, u]
     cost = np.full((rows, columns), np.inf)
     cost[goal_row, goal_column] = 0.0
     heap = [(0.0, goal_row * columns + goal_column)]
@@ -223,7 +225,8 @@ def _move_cost(
             pose = here + t * (there - here)
             if clearance_at(space.field, pose[0], pose[1], pose[2]) < need:
                 return math.inf
-    return seconds * nearness(clear[new], space.weights)
+    zones = mean_zone_factor(space, here[0], here[1], there[0] - here[0], there[1] - here[1])
+    return seconds * nearness(clear[new], space.weights) * zones
 
 
 @compiled

@@ -3,6 +3,9 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import ClearanceField, clearance_at
 from skills.robot import FloatArray
@@ -11,6 +14,10 @@ TURNING_RADIUS_M = 0.6
 """Distance (m) that the outline moves in a turn of one radian, at least."""
 _PLAIN_STEP_M = 0.06
 _LONGEST_STEP_M = 0.3
+_ZONE_STEP_M = 0.1
+"""Longest distance between the points of a motion at which zones are looked up."""
+_BACK_SHARE = -0.02
+"""Cosine between a motion and a one-way direction below which the motion goes against it."""
 _SLOWER_SHARE = 0.3
 """Share of the shorter of shift and turn by which doing both at once takes longer."""
 
@@ -37,12 +44,28 @@ class Needs(NamedTuple):
     y_m: float
 
 
+class ZoneCosts(NamedTuple):
+    """Costs of zones at the points of a clearance field; arrays without rows where there are none.
+
+    `factor`, 1 or more, raises the cost of a motion; motions do not go against `course` (rad; NaN is any direction).
+    `least` is the least factor about each point.
+    """
+
+    factor: NDArray[np.float32]
+    course: NDArray[np.float32]
+    least: NDArray[np.float32]
+
+
+NO_ZONES = ZoneCosts(*3 * [np.empty((0, 0), dtype=np.float32)])
+
+
 class Space(NamedTuple):
-    """Input of a plan: the sampled clearance, the required clearance, and the weights of the cost."""
+    """Input of a plan: the sampled clearance, the required clearance, the weights of the cost, and the zones."""
 
     field: ClearanceField
     needs: Needs
     weights: Weights
+    zones: ZoneCosts = NO_ZONES
 
 
 @compiled
@@ -71,6 +94,33 @@ def nearness(clearance: float, weights: Weights) -> float:
 
 
 @compiled
+def zone_factor(space: Space, x: float, y: float, dx: float, dy: float) -> float:
+    """Factor, 1 or more, by which the zones at (x, y) raise the cost of a motion; infinite against a one-way zone."""
+    if space.zones.factor.shape[0] == 0:
+        return 1.0
+    field, factor = space.field, space.zones.factor
+    i, j = round((y - field.y0_m) / field.cell_m), round((x - field.x0_m) / field.cell_m)
+    if not (0 <= i < factor.shape[0] and 0 <= j < factor.shape[1]):
+        return 1.0
+    course = space.zones.course[i, j]
+    if not math.isnan(course) and math.cos(course) * dx + math.sin(course) * dy < _BACK_SHARE * math.hypot(dx, dy):
+        return math.inf
+    return float(factor[i, j])
+
+
+@compiled
+def mean_zone_factor(space: Space, x: float, y: float, dx: float, dy: float) -> float:
+    """Mean of `zone_factor` along a motion (dx, dy) from (x, y)."""
+    if space.zones.factor.shape[0] == 0:
+        return 1.0
+    count, total = max(1, math.ceil(math.hypot(dx, dy) / _ZONE_STEP_M)), 0.0
+    for n in range(count):
+        t = (n + 0.5) / count
+        total += zone_factor(space, x + t * dx, y + t * dy, dx, dy)
+    return total / count
+
+
+@compiled
 def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> float:
     """Cost of a straight motion from pose a to pose b with an even turn; infinite where clearance falls below need.
 
@@ -87,10 +137,11 @@ def segment_cost(space: Space, a: FloatArray, b: FloatArray, need: float) -> flo
         if least < need:
             return math.inf
         spare = least - need
+        begun = gone - part
+        zones = mean_zone_factor(space, a[0] + begun * dx, a[1] + begun * dy, part * dx, part * dy)
         midway = a[2] + (gone - 0.5 * part) * dyaw
-        cost += motion_seconds(part * dx, part * dy, part * dyaw, midway, space.weights) * nearness(
-            least, space.weights
-        )
+        seconds = motion_seconds(part * dx, part * dy, part * dyaw, midway, space.weights)
+        cost += seconds * nearness(least, space.weights) * zones
     return cost
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from skills.estimate.compiled import compiled
 from skills.navigate.footprint import clearance_at
-from skills.navigate.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost
+from skills.navigate.motion_cost import TURNING_RADIUS_M, Space, clearance_needed, drive_cost, segment_cost, zone_factor
 from skills.robot import FloatArray, Pose2D
 
 TURN_M_PER_RAD = 0.4
@@ -126,9 +126,24 @@ def relax(space: Space, poses: FloatArray, rounds: int, margin_m: float, wide_m:
                 push = 0.02 * (wide_m - clearance[n]) / wide_m
                 x, y = x + push * gx, y + push * gy
             new = clearance_at(space.field, x, y, yaw)
-            if new >= min(margin_m, clearance[n]):
+            if new >= min(margin_m, clearance[n]) and not _dearer(space, poses, n, x, y):
                 poses[n, 0], poses[n, 1], poses[n, 2], clearance[n] = x, y, yaw, new
     return poses
+
+
+@compiled
+def _dearer(space: Space, poses: FloatArray, n: int, x: float, y: float) -> bool:
+    """Returns whether zones make the motions to and from a pose dearer when it moves to (x, y)."""
+    if space.zones.factor.shape[0] == 0:
+        return False
+    before, after = 0.0, 0.0
+    for k, sign in ((n - 1, 1.0), (n + 1, -1.0)):
+        px, py = poses[k, 0], poses[k, 1]
+        before += zone_factor(space, poses[n, 0], poses[n, 1], sign * (poses[n, 0] - px), sign * (poses[n, 1] - py))
+        after += zone_factor(space, x, y, sign * (x - px), sign * (y - py))
+        after += zone_factor(space, px, py, sign * (x - px), sign * (y - py))
+        before += zone_factor(space, px, py, sign * (poses[n, 0] - px), sign * (poses[n, 1] - py))
+    return after > before
 
 
 @compiled

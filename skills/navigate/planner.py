@@ -13,8 +13,10 @@ from skills.geometry import wrap
 from skills.navigate.differential import CELL_SHARE, Links, courses, driven_poses, links
 from skills.navigate.footprint import SAFE_MARGIN_M, ClearanceField, Footprint, clearance_at, clearance_on_grid
 from skills.navigate.lattice import Lattice, cost_to_go, lattice_moves, search
-from skills.navigate.motion_cost import TURNING_RADIUS_M, Needs, Space, Weights, segment_cost
+from skills.navigate.motion_cost import NO_ZONES, TURNING_RADIUS_M, Needs, Space, Weights, ZoneCosts, segment_cost
 from skills.navigate.path import Path, clearances, densify, relax, shortcut
+from skills.navigate.zone_map import ZoneMap
+from skills.navigate.zones import ZoneKind, zones_sentence
 from skills.quantities import Count, Factor, Length, Margin, Speed, TurnRate
 from skills.robot import BaseKind, FloatArray, Pose2D
 
@@ -81,10 +83,12 @@ class LatticePlanner:
         *,
         max_speed_m_s: float,
         work: WorkCounter = NO_WORK_COUNTER,
+        zones: ZoneMap | None = None,
     ) -> Callable[[], Path]:
         """Samples the costmap now; returns a function that plans on that sample, or raises PlanningError."""
         options = replace(self, forward_m_s=min(self.forward_m_s, max_speed_m_s))
-        return partial(solve, problem_of(costmap, footprint, start, goal, options, self.around_m, work))
+        problem = problem_of(costmap, footprint, start, goal, options, self.around_m, work)
+        return partial(solve, problem) if zones is None else partial(_solve_with_zones, problem, zones)
 
 
 @dataclass(frozen=True)
@@ -97,6 +101,7 @@ class Problem:
     goal: Pose2D
     options: LatticePlanner
     work: WorkCounter = NO_WORK_COUNTER
+    zones: ZoneCosts = NO_ZONES
 
     @property
     def sideways(self) -> bool:
@@ -155,9 +160,28 @@ def solve(problem: Problem) -> Path:
         return _solve(replace(problem, options=replace(options, margin_m=options.least_margin_m)))
 
 
+def _solve_with_zones(problem: Problem, zones: ZoneMap) -> Path:
+    """Plans as `solve` does, and minds the costs and directions of zones, which a start inside may leave."""
+    field, start = problem.field, problem.start
+    xs, ys = (
+        c0 + field.cell_m * np.arange(n)
+        for c0, n in zip((field.x0_m, field.y0_m), field.values.shape[::-1], strict=True)
+    )
+    costs = partial(zones.costs, xs, ys, problem.options.forward_m_s)
+    try:
+        return solve(replace(problem, zones=costs()))
+    except NoPathError as error:
+        if zones.names_with_origin(ZoneKind.ONE_WAY, start):
+            return solve(replace(problem, zones=costs(leave=start)))
+        against = zones.against(solve(problem).poses)
+        if not against:
+            raise
+        raise NoPathError(f"{error} {zones_sentence(against, 'one-way zone')}") from error
+
+
 def _solve(problem: Problem) -> Path:
     """Plans with the margin of the options."""
-    space = Space(problem.field, _needs(problem), problem.options.weights(problem.footprint))
+    space = Space(problem.field, _needs(problem), problem.options.weights(problem.footprint), problem.zones)
     _check_goal(problem)
     for yaw0_rad in (0.0, problem.goal.yaw_rad) if problem.sideways else (0.0,):
         rough = _search(problem, space, yaw0_rad)

@@ -1,8 +1,8 @@
 """Perception of the navigate skill: obstacles, people, doors, other robots, and the robot's own footprint."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,10 @@ from skills.navigate.collision_guard import CollisionGuard, GuardOptions
 from skills.navigate.cut_off import DoorOptions, DoorWatch
 from skills.navigate.footprint import Footprint, disc_centres, pose_array, with_discs
 from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
+from skills.navigate.path import progress_m
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
+from skills.navigate.zone_map import KeepOut, ZoneMap
+from skills.navigate.zones import ZoneKind
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
@@ -185,6 +188,8 @@ class Surroundings:
     def __init__(self, context: SkillContext, options: NavigateOptions) -> None:
         self._context, self._space = context, options.space
         self._outline = ArmFootprint(context)
+        self._zones = context.zone_map() if context.zones else None
+        self._keep_out = None if self._zones is None else KeepOut(self._zones)
         self.footprint = self._outline.now()
         self._measured_s = -math.inf
         self.room_m = options.space.room_m
@@ -205,6 +210,8 @@ class Surroundings:
         """Updates footprint and doors before a plan; restores `room_m` once nobody is near."""
         if not self.persons():
             self.room_m = self._space.room_m
+        if self._keep_out is not None:
+            self._keep_out.reset()
         self.doors.look()
         self.footprint = self._pace.footprint = self._guard.footprint = self._outline.now()
         self._measured_s = self._context.clock.now()
@@ -227,9 +234,34 @@ class Surroundings:
         self.room_m = self._space.least_room_m
         return True
 
+    def free_space(self) -> FreeSpace:
+        """The costmap with keep-out zones; one in which the robot stands, as far as it may."""
+        if self._keep_out is None:
+            return self._context.costmap
+        return self._keep_out.space(self._context.costmap, self.footprint, self._context.pose())
+
+    def zone_costs(self, start: Pose2D) -> Mapping[str, ZoneMap]:
+        """The planner's argument for the costs of zones, where there are any."""
+        return {"zones": self._zones} if self._zones is not None and self._zones.has_costs(start) else {}
+
+    def forbidding_zones(self, goal: Pose2D) -> tuple[str, ...]:
+        """Names of the keep-out zones into which the body reaches at a goal."""
+        return () if self._zones is None else self._zones.names_at(ZoneKind.KEEP_OUT, self.footprint, goal)
+
+    def zones_between(self, goals: Sequence[Pose2D]) -> tuple[str, ...]:
+        """Names of the keep-out zones that leave no path to any of the goals."""
+        if self._zones is None or not self.cut_off(goals):
+            return ()
+        return self._zones.names_between(lambda zones: self._cut_off_by(zones, goals))
+
+    def _cut_off_by(self, zones: ZoneMap, goals: Sequence[Pose2D]) -> bool:
+        here, costmap = self._context.pose(), self._context.costmap
+        space = KeepOut(zones).space(costmap, self.footprint, here)
+        return self.doors.regions(self.footprint, here, goals, costmap=space).cut_off
+
     def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
-        """The costmap with closed doors, robots, and as much clearance around people as `here` and the goal allow."""
-        costmap = self.robots.costmap(self.doors.costmap(self._context.costmap), avoided)
+        """The costmap with zones, closed doors, robots, and people as far from them as `here` and the goal allow."""
+        costmap = self.robots.costmap(self.doors.costmap(self.free_space()), avoided)
         return with_people(costmap, self.footprint, (here, goal), self.persons(), self.room_m)
 
     def danger(self, follower: LocalController, most_m_s: float) -> tuple[float, float] | None:
@@ -237,18 +269,23 @@ class Surroundings:
         return self._guard.danger(self._context.pose(), follower, most_m_s)
 
     def pace(self, follower: LocalController, most_m_s: float, goal: Pose2D) -> Pace:
-        """The speed that people near the path allow, at most `most_m_s`."""
-        ahead = follower.ahead(self._space.look_ahead_m)
-        return self._pace.pace(self._context.clock.now(), self._context.pose(), ahead, self.persons(), most_m_s, goal)
+        """The speed that people near the path and zones allow, at most `most_m_s`."""
+        ahead, here = follower.ahead(self._space.look_ahead_m), self._context.pose()
+        pace = self._pace.pace(self._context.clock.now(), here, ahead, self.persons(), most_m_s, goal)
+        if self._zones is None:
+            return pace
+        poses = np.vstack([pose_array([here]), follower.ahead(self._zones.braking_m(most_m_s))])
+        ahead_m = np.concatenate([[0.0], progress_m(poses[1:])])
+        return replace(pace, most_m_s=min(pace.most_m_s, self._zones.speed_m_s(self.footprint, poses, ahead_m)))
 
     def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
         """The closed doors that leave no path to any of the goals."""
         people_W = [one.place_W for one in self.persons()]
-        return self.doors.blocking_doors(self.footprint, self._context.pose(), goals, people_W)
+        return self.doors.blocking_doors(self.footprint, self._context.pose(), goals, people_W, self.free_space())
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
         """Returns whether all goals are certainly out of reach."""
-        return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
+        return self.doors.regions(self.footprint, self._context.pose(), goals, costmap=self.free_space()).cut_off
 
     def clear_obstacles(self) -> bool:
         """Clears the obstacle layer of the costmap; returns whether a cell was cleared."""

@@ -10,6 +10,7 @@ from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
 from skills.navigate.surroundings import NavigateOptions, Surroundings
+from skills.navigate.zones import zones_sentence
 from skills.ports import NavigateInputs
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure
@@ -76,17 +77,28 @@ class TripPlanning:
         """
         context, around = self._context, self._around
         around.refresh()
+        self._check_zones()
         begin, self._map_alone = start or context.pose(), map_alone
         avoided = self.avoided if self.aside is None else Avoided.BODIES
         plan = context.stack.planner.problem(
-            context.costmap if map_alone else around.costmap(begin, self.goal, avoided),
+            around.free_space() if map_alone else around.costmap(begin, self.goal, avoided),
             around.footprint,
             begin,
             self.goal,
             max_speed_m_s=max(0.1, self._inputs.max_speed_m_s),
             work=context.work,
+            **around.zone_costs(begin),
         )
         self._job = context.worker.submit(plan, latency_s=self._options.planning_latency_s, name="plan a path")
+
+    def _check_zones(self) -> None:
+        """Raises SkillFailure when the body would reach into a keep-out zone at the goal."""
+        zones = self._around.forbidding_zones(self._inputs.goal)
+        if zones:
+            sentence = (
+                f"{zones_sentence(zones, 'keep-out zone')} The robot does not stand at {_place(self._inputs.goal)}."
+            )
+            raise SkillFailure(Cause.PLANNING, sentence, final=all(map(self._around.forbidding_zones, self._goals)))
 
     def path(self) -> Path | None:
         """The path of a finished plan, returned once; None when there is none to follow. Raises PlanningError."""
@@ -133,7 +145,7 @@ class TripPlanning:
         self._tried = () if forget else self._tried
         place = None
         if len(self._tried) < self._options.giving_way.places:
-            place = robots.waiting_pose(context.costmap, self._around.footprint, context.pose(), self._tried)
+            place = robots.waiting_pose(self._around.free_space(), self._around.footprint, context.pose(), self._tried)
         if place is None:
             robots.let_pass(first)
             self._asked_due_s = self._now() + self._options.giving_way.again_s
@@ -187,6 +199,10 @@ class TripPlanning:
         if not may_go and self._looks_again():
             return
         if self.obstacle_W is None or self._replans >= self._options.replans:
+            zones = () if may_go else self._around.zones_between(self._goals)
+            if zones:
+                sentence = f"{zones_sentence(zones, 'keep-out zone')} No path leads to {_place(self._inputs.goal)}."
+                raise SkillFailure(Cause.PLANNING, sentence, final=True)
             who = self._around.robots.name_at(self.obstacle_W) or "an obstacle"
             seen = f" The path is blocked by {who} at {place_text(self.obstacle_W)}." if self.obstacle_W else ""
             final = not may_go and self._around.cut_off(self._goals)
@@ -238,6 +254,10 @@ class TripPlanning:
         self._around.robots.reserve_goal(self._context.pose(), self.goal, self._around.footprint)
         self._around.clear_obstacles()
         return True
+
+
+def _place(pose: Pose2D) -> str:
+    return place_text((pose.x_m, pose.y_m))
 
 
 def place_text(place_W: tuple[float, float] | None) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -72,3 +73,10 @@ _WORDS: Final = {
     ZoneKind.ONE_WAY: "one way through",
     ZoneKind.SILENT: "silent in",
 }
+
+
+def zones_sentence(names: Sequence[str], what: str) -> str:
+    """ "The bathroom is a keep-out zone." or "The hall and the lab are keep-out zones."."""
+    *first, last = (f"the {name}" for name in names)
+    said = f"{', '.join(first)} and {last} are {what}s" if first else f"{last} is a {what}"
+    return f"{said[0].upper()}{said[1:]}."

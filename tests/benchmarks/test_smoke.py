@@ -153,6 +153,11 @@ def test_somebody_crosses_the_way():
 
 
 @pytest.mark.nightly
+def test_a_drive_among_zones_is_judged():
+    assert result_of("zone_drives", "--drives", 1)["entered_keep_out"] == 0
+
+
+@pytest.mark.nightly
 def test_two_robots_meet_at_a_door(tmp_path):
     assert result_of("traffic", "--what", "door", "--count", 1, "--out", tmp_path)
 

@@ -226,7 +226,7 @@ class Fallen(ExplainedLeaf):
 
     def _towards_free_floor(self) -> Pose2D:
         """Robot's pose, turned by the least angle to free floor; a robot at a table has the table ahead."""
-        pose, costmap = self.context.pose(), self.context.costmap
+        pose, costmap = self.context.pose(), self.context.free_space()
         turned = [compose(pose, Pose2D(0.0, 0.0, turn)) for turn in _TURNS_RAD]
         middles = [compose(each, Pose2D(self.set_down_ahead_m, 0.0, 0.0)) for each in turned]
         clear_m = costmap.clearance_m(np.array([[middle.x_m, middle.y_m] for middle in middles]))

@@ -78,7 +78,7 @@ class Approach(ApproachPorts, LookingSkill[ApproachInputs]):
         here, point_W = context.pose(), (seen.position_W[0], seen.position_W[1])
         comfortable, enough = is_comfortable(here, point_W, self.arm), self.options.good_grasp
         footprint, distances_m = Footprint.of(context.robot.capabilities()), self.arm.standing_m
-        free = free_placements(point_W, here, context.costmap, footprint, distances_m, distances_m[0])
+        free = free_placements(point_W, here, context.free_space(), footprint, distances_m, distances_m[0])
         off_m = math.hypot(point_W[0] - here.x_m, point_W[1] - here.y_m)
         heights_m = body_heights_m(seen.position_W[2] - 0.5 * seen.size_m[2], context.robot.capabilities())
         check_now = reach_check(self, seen, own_surfaces(inputs), beyond_m=off_m)

@@ -195,7 +195,8 @@ class HandOver(HandOverPorts, HandOverVerification[HandOverInputs]):
         """Drives to the nearest free pose that faces the person."""
         poses = facing_poses(person.place_W, self.context.pose(), self.options.stand_off_m)
         footprint = ArmFootprint(self.context).now()
-        free = [pose for pose in poses if footprint_clear(self.context.costmap, footprint, pose)]
+        space = self.context.free_space()
+        free = [pose for pose in poses if footprint_clear(space, footprint, pose)]
         if not free:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand before {name}")
         yield from go_to_one(self, [NavigateInputs(pose, 0.08, 0.1, 0.5) for pose in free[:3]])

@@ -248,9 +248,9 @@ class Place(PlacePorts, PlaceVerification[PlaceInputs]):
         """
         yield from self._draw_in(search.held)
         context, pose, arm = self.context, self.context.pose(), self.arm
-        footprint, best_m = ArmFootprint(context).now(), arm.standing_m[0]
+        footprint, best_m, space = ArmFootprint(context).now(), arm.standing_m[0], context.free_space()
         before = [
-            (spot, free_placements((float(spot[0]), float(spot[1])), pose, context.costmap, footprint, each, best_m))
+            (spot, free_placements((float(spot[0]), float(spot[1])), pose, space, footprint, each, best_m))
             for spot, each in itertools.product(candidates, (arm.standing_m, arm.nearer_m))
         ]
         choose = partial(first_reachable_spot, before, self._reach(search))

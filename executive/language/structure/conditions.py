@@ -16,6 +16,7 @@ from executive.language.spelling import synonyms_of
 from executive.language.structure.plain import IS, IT, PlainReader, SpokenCondition, State, with_preposition
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Not, ValueIs
 from executive.words.knowledge import Knowledge
+from executive.words.leaf_steps import DoorToOpen, OpenDoor
 from skills.files.errors import listing
 
 _SIGNS: Final = {
@@ -115,6 +116,21 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
     known = replace(state, door=door, goal=None, at=None)
     found = SpokenCondition(door, words, known, known)
     return found if opens != bool(match.groupdict().get("not")) else found.negate(words)
+
+
+def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoor, State] | None:
+    """Parses a request to have a door opened, with the state after it; None for other texts.
+
+    Raises RefusalError when the robot is to open the door itself, and see `_between`.
+    """
+    text = re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE)
+    match = next((found for form in _P.each("opening") if (found := form.fullmatch(text)) is not None), None)
+    if match is None or (match["it"] and state.door is None):
+        return None
+    if match.groupdict().get("own"):
+        raise RefusalError(f"I cannot open doors; say 'ask somebody to open {match['door'] or 'it'}'", [text])
+    door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
+    return OpenDoor(door=DoorToOpen(door=door.door)), replace(state, door=door, goal=None, at=None)
 
 
 def _between(match: re.Match[str], knowledge: Knowledge) -> tuple[str, str]:

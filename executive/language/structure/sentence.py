@@ -15,7 +15,7 @@ from executive.language.pipeline import Pipeline, Trace
 from executive.language.questions import RefusalError, RefusalKind
 from executive.language.reference import Memory
 from executive.language.roles import Location
-from executive.language.structure.conditions import parse_condition
+from executive.language.structure.conditions import parse_condition, parse_opening
 from executive.language.structure.decisions import DecisionBuilder
 from executive.language.structure.people import commands_on_people, parse_people
 from executive.language.structure.plain import (
@@ -44,7 +44,7 @@ from executive.language.structure.requests import (
     search_for,
     steps_for_everyone,
 )
-from executive.words.command import PEOPLE_TASKS, Task
+from executive.words.command import PEOPLE_TASKS, SPEAKER, START, Command, Task
 from executive.words.condition import Look
 from executive.words.leaf_steps import Awaited, Check, Do, Speak, Wait, steps_of_commands
 from executive.words.step import Step
@@ -97,7 +97,7 @@ class SentenceBuilder(DecisionBuilder):
         if ACTS.idle.fullmatch(text) is not None:
             self.flush(row)
             return at + 1
-        for act in (self._people, self._waits, self._asks, self._says, self._checks):
+        for act in (self._opens, self._people, self._waits, self._asks, self._says, self._checks):
             if (end := act(row, clauses, at)) is not None:
                 return end
         found = trailing_cue(text)
@@ -108,6 +108,17 @@ class SentenceBuilder(DecisionBuilder):
             if (end := act(row, clauses, at)) is not None:
                 return end
         row.plain.append(clause)
+        return at + 1
+
+    def _opens(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
+        """Has a door opened."""
+        if not ACTS.opens.match(clauses[at].text):
+            return None
+        done = parse_opening(clauses[at].text, self._known(row), self.reader)
+        if done is None:
+            return None
+        self.flush(row)
+        self.put(row, *done)
         return at + 1
 
     def _people(self, row: StepRow, clauses: Sequence[Clause], at: int) -> int | None:
@@ -391,7 +402,17 @@ def _structured(plain: Trace, clauses: Sequence[Clause], pipeline: Pipeline, mem
     parts = tuple(" | ".join(filter(None, (each.joint.strip(" ,;."), each.cue, each.text))) for each in clauses)
     commands = tuple(command for step in steps for each in step.walk() for command in each.commands)
     found = Trace(plain.text, state.memory, opened=plain.opened, tokens=plain.tokens, commands=commands)
-    return replace(found, notes=tuple(dict.fromkeys(builder.notes)), parts=parts, steps=steps)
+    notes = [*builder.notes, *([_BACK] if _returns_to_speaker(commands) else [])]
+    return replace(found, notes=tuple(dict.fromkeys(notes)), parts=parts, steps=steps)
+
+
+_BACK: Final = "I bring it to the place where you have spoken to me, not to where you are then"
+
+
+def _returns_to_speaker(commands: Sequence[Command]) -> bool:
+    """Returns whether an object is brought to the speaker, with whom the robot has gone elsewhere before."""
+    moved = next((n for n, one in enumerate(commands) if str(one.object) == SPEAKER), len(commands))
+    return any(one.item is not None and one.goal == START for one in commands[moved:])
 
 
 def _depth(step: Step) -> int:

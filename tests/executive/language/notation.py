@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
-from executive.words.leaf_steps import Check, Do, Dock, Speak, Wait
+from executive.words.leaf_steps import Check, Do, Dock, OpenDoor, Speak, Wait
 from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Group, Repeat, Together, Try
 
@@ -44,6 +44,8 @@ def _step(step: Step) -> str:
             return f"Check ({_condition(step.condition)})"
         case Dock():
             return "Dock" if step.level is None else f"Dock to {step.level:g}"
+        case OpenDoor():
+            return f"Open {_quoted(step.door.between[0])} - {_quoted(step.door.between[1])}"
         case Speak():
             return f"Say {_quoted(step.speak)}"
         case Ask():

@@ -44,6 +44,21 @@ def test_a_near_miss_is_refused_with_its_words(meant, world, sentence, part):
     assert part.lower() in answer.reason.lower()
 
 
+@pytest.mark.parametrize(
+    ("sentence", "notes"),
+    [
+        ("take Robin home", ("I take Robin's home to be the living room",)),
+        (
+            "follow me to the kitchen, then bring me a coke",
+            ("I bring it to the place where you have spoken to me, not to where you are then",),
+        ),
+        ("bring me a coke, then follow me", ()),
+    ],
+)
+def test_a_note_says_which_place_is_meant(meant, sentence, notes):
+    assert meant(sentence).notes == notes
+
+
 def test_all_commands_stand_in_their_order(meant):
     answer = meant("if there is a beer in the kitchen bring it, otherwise go to the hall")
     assert [command.goal for command in answer.commands] == ["kitchen", "start", "hall"]

@@ -50,7 +50,9 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self.work: Counter[str] = Counter()
         sensors = SensorOptions(world.scene_graph, self.context, seed=seed, scene=world.scene, work=self.work)
         self.robots = {name: body.kind.drive(body, sensors) for name, body in world.robots.items()}
-        self.walkers = Walkers(world, self.context)
+        self.words: list[tuple[float, str, str]] = []
+        """Words of people to a robot near them: the time (s), the person's name and the words."""
+        self.walkers = Walkers(world, self.context, lambda name, text: self.words.append((self.now(), name, text)))
         self._sleepers = Sleepers(world, self.root_context)
         plant = world.plant
         loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
@@ -106,7 +108,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
     def _before_step(self, later: int, holding: Sequence[str]) -> None:
         """Moves people, doors and objects before the next step, or before a `later` one."""
         now_s = (self._steps + later) * TIME_STEP_S
-        self.walkers.before_step(TIME_STEP_S, standing=self.receivers.busy)
+        self.walkers.before_step(TIME_STEP_S, self.receivers.busy, self.doors.barriers)
         self.receivers.before_step(now_s, TIME_STEP_S, holding)
         self.doors.before_step(now_s, TIME_STEP_S)
         if self.moves is not None:

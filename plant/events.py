@@ -29,6 +29,8 @@ HEIGHT_M, THICKNESS_M, ABOVE_FLOOR_M = 2.0, 0.04, 0.02
 SPEED_M_S = 0.6
 CLEAR_M = 0.12
 """A panel waits while a robot or a person is nearer than this to the doorway's middle line."""
+AJAR = 0.05
+"""A door that is closed to more than this share stops people."""
 _KG = 40.0
 _COLOUR = np.array([0.55, 0.42, 0.30, 1.0])
 _FRICTION = CoulombFriction(0.6, 0.5)
@@ -69,6 +71,12 @@ def _pose(door: DoorRule, share: float) -> FloatArray:
     open_m = (1.0 - share) * door.width
     x, y = door.at
     return np.array([x + open_m * math.cos(door.yaw), y + open_m * math.sin(door.yaw), door.yaw])
+
+
+def _doorway(door: DoorRule) -> tuple[Point, Point]:
+    """Ends (x, y) of a doorway's middle line."""
+    x, y, dx, dy = *door.at, 0.5 * door.width * math.cos(door.yaw), 0.5 * door.width * math.sin(door.yaw)
+    return (x - dx, y - dy), (x + dx, y + dy)
 
 
 def slide(
@@ -127,6 +135,12 @@ class Doors(Stateful, saved=("_panels",)):
         """Changes of each door by its position (x, y): time (s) and state, 0 open, 1 closed, 0.5 moving."""
         return {door.at: tuple(self._panels[name].history) for name, door in self._doors.items()}
 
+    @property
+    def barriers(self) -> Sequence[tuple[Point, Point]]:
+        """Ends (x, y) of the doorways that nobody should enter now, because the door is not open."""
+        ajar = (door for name, door in self._doors.items() if self._panels[name].share > AJAR)
+        return [_doorway(door) for door in ajar]
+
     def before_step(self, now_s: float, dt_s: float) -> None:
         """Sets the pose of each panel, and the velocity that brings it to its next pose within dt_s."""
         for name, door in self._doors.items():
@@ -148,8 +162,7 @@ class Doors(Stateful, saved=("_panels",)):
 
     def _occupied(self, door: DoorRule) -> bool:
         """Returns whether a robot or a person is in the doorway."""
-        half = 0.5 * door.width * np.array([math.cos(door.yaw), math.sin(door.yaw)])
-        line = shapely.LineString([np.array(door.at) - half, np.array(door.at) + half])
+        line = shapely.LineString(_doorway(door))
         return any(shapely.distance(line, shapely.Polygon(each)) < CLEAR_M for each in self._outlines())
 
 

@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3243,
+    "executive/words": 3286,
     "executive/language": 8203,
     "executive/speech": 1582,
     "executive/mission": 1635,
@@ -28,9 +28,9 @@ LINES = {
     "executive/app": 8203,
     "executive/cli": 5004,
     "skills": 28840,
-    "plant": 21423,
+    "plant": 21811,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 504, 94, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 506, 96, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -19,7 +19,7 @@ from executive.words.zone import ZONES, ZoneFacts, Zones
 from skills.files.errors import SourceLine
 from skills.files.schema import Name, Text
 from skills.files.yaml_source import YamlSource
-from skills.quantities import Delay, Speed
+from skills.quantities import Delay, Margin, Quantity, Share, Speed
 
 DEFAULT_WORLD: Final = "flat"
 
@@ -32,6 +32,10 @@ class QuestionPolicy(enum.Enum):
     REFUSE = "refuse"  # the sentence is refused
 
 
+Distractions = Annotated[int, Quantity(ge=0, le=10)]
+"""Number of distractions that the seed draws."""
+
+
 class Stop(Strict):
     """Waypoint at which a person stands for a while."""
 
@@ -39,11 +43,22 @@ class Stop(Strict):
     pause: Delay = Field(default=0.0, description="Time for which the person stands there, in seconds.")
 
 
-class Route(Strict):
-    """Route of a walking person around walls and furniture."""
+class Distraction(Strict):
+    """Lapse of a walking person's attention: a stop, perhaps after some steps back."""
 
-    waypoints: Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)] = Field(
-        description="Points (x, y) in metres or names of places, in order; the person begins at the first."
+    after: Margin = Field(description="Path that the person has walked by then, in metres.")
+    stop: Delay = Field(default=3.0, description="Time for which the person stands, in seconds.")
+    back: Margin = Field(default=0.0, description="Path that the person first walks back, in metres.")
+
+
+ANY_ROBOT: Final = "robot"
+
+
+class Route(Strict):
+    """Route of a walking person around walls, furniture and closed doors."""
+
+    waypoints: tuple[Corner | Name | Stop, ...] = Field(
+        default=(), description="Points (x, y) in metres or names of places, in order; the person begins at the first."
     )
     speed: Speed = Field(default=1.2, description="Speed of the person, in m/s.")
     loop: StrictBool = Field(
@@ -51,6 +66,34 @@ class Route(Strict):
     )
     start: Delay = Field(default=0.0, description="Time at which the person sets off, in seconds from the beginning.")
     yields: StrictBool = Field(default=True, description="Whether the person stops for a robot that is close ahead.")
+    apart: StrictBool = Field(
+        default=False, description="Whether the person keeps apart from other people; who follows or wanders does."
+    )
+    pace: Annotated[Share, Field(lt=1.0)] = Field(
+        default=0.0, description="Share by which the seed changes the speed every 3 m, up and down."
+    )
+    distractions: Distractions | tuple[Distraction, ...] = Field(
+        default=(), description="Lapses of attention, or how many the seed draws."
+    )
+    follows: Name | None = Field(
+        default=None,
+        description="A robot by its name, or `robot` for any: once it speaks within 3 m of the person, the person "
+        "follows it. A distracted one waits until the robot comes near or speaks.",
+    )
+    wanders: StrictBool = Field(
+        default=False, description="Whether the person walks between free points that the seed draws, after the route."
+    )
+    says: Text | None = Field(
+        default=None, description="Words to the nearest robot within 3 m, once, at the end of the route."
+    )
+
+    @model_validator(mode="after")
+    def _leads_somewhere(self) -> Self:
+        if not self.waypoints and self.follows is None and not self.wanders:
+            raise ValueError("a route needs 'waypoints', or 'follows' or 'wanders'")
+        if self.follows is not None and (self.wanders or self.loop):
+            raise ValueError("a person who follows a robot neither wanders nor walks a loop; take one of them out")
+        return self
 
 
 class LooseObject(Strict):

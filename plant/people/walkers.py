@@ -1,276 +1,33 @@
-"""People who walk: before each step of the plant, each person is moved along a planned route.
+"""People who walk: before each step of the plant, each person is moved along a planned path.
 
 The body of a walking person slides on a planar joint. Its pose and velocity are prescribed; it touches robots and loose
-objects, and passes through the scenery. Shortest paths on a grid of the world's collision shapes lead around that. The
-pose of a standing person is set only if something has pushed the person.
+objects, and passes through the scenery. Shortest paths on a grid of the world's collision shapes lead around that, and
+closed doors stop people. The pose of a standing person is set only if something has pushed the person.
+
+What a person does depends on the seed, the robots and the doors alone.
 """
 
 from __future__ import annotations
 
-import bisect
 import contextlib
-import copy
 import itertools
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator, Sequence
+from functools import cache
 
-import cv2
 import numpy as np
-from numpy.typing import NDArray
-from pydrake.geometry import SceneGraphInspector
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import BodyIndex, SpatialInertia
+from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
 
+from executive.words.mission import ANY_ROBOT
 from plant.diagram import WorldDiagram
 from plant.events import slide
+from plant.people.ground import Ground
+from plant.people.walk import Leg, Walk
 from plant.saved_state import Stateful
-from plant.sensors.ray_shapes import ShapeKind, shape_row
 from plant.worlds.seeding import PointRoute
 from plant.worlds.world import Point, WorldError
 from skills.robot import FloatArray
-
-BAND_M = (0.05, 1.8)
-"""Shapes between these heights are obstacles for a person."""
-SHOULDERS_M = 0.30
-"""Clearance of a person's centre from obstacles on the path."""
-LEAST_M = 0.20
-"""Clearance of a person's centre from obstacles at a waypoint."""
-_CELL_M = 0.05
-_NEAR_WAYPOINT_M = 0.5
-_ROUND_SIDES = 16
-_STEPS = ((0, 1, 1.0), (1, 0, 1.0), (1, 1, math.sqrt(2.0)), (1, -1, math.sqrt(2.0)))
-
-
-class Ground:
-    """Walkable ground of a world: a grid with the clearance of each cell."""
-
-    def __init__(self, outlines_W: Sequence[FloatArray], points_W: Iterable[Point]) -> None:
-        """`outlines_W` are the convex outlines (K, 2) of obstacles; the grid covers these and `points_W`."""
-        corners = np.concatenate([*outlines_W, np.array([*points_W], dtype=np.float64).reshape(-1, 2)])
-        self._low = corners.min(axis=0) - 1.0
-        columns, rows = np.ceil((corners.max(axis=0) + 1.0 - self._low) / _CELL_M).astype(int)
-        self._free = np.full((rows, columns), 255, np.uint8)
-        self._block(outlines_W)
-
-    @staticmethod
-    def from_plant(plant: MultibodyPlant, inspector: SceneGraphInspector, points_W: Iterable[Point]) -> Ground:
-        """Builds the ground of a finalized plant, with the shapes that are fixed to the world as obstacles."""
-        return Ground([*_outlines_W(plant, inspector)], points_W)
-
-    def with_obstacles(self, outlines_W: Iterable[FloatArray]) -> Ground:
-        """Returns the same ground with more obstacles."""
-        other = copy.copy(self)
-        other._free = self._free.copy()
-        other._block(outlines_W)
-        return other
-
-    def _block(self, outlines_W: Iterable[FloatArray]) -> None:
-        for outline in outlines_W:
-            cells = np.round(((outline - self._low) / _CELL_M - 0.5) * 16).astype(np.int32)
-            cv2.fillConvexPoly(self._free, cells, 0, shift=4)
-        self._clearance_m = cv2.distanceTransform(self._free, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL_M
-
-    def plan_path(self, start_W: Point, goal_W: Point, *, who: str) -> tuple[Point, ...]:
-        """Plans the corners of a short path, start and goal included. Raises WorldError when `who` finds none."""
-        for point in (start_W, goal_W):
-            if self._clear_m(np.array([point]))[0] < LEAST_M:
-                raise WorldError(f"{who} cannot stand at {_text(point)}: something is there; choose a free point")
-        if self._straight(start_W, goal_W, (start_W, goal_W)):
-            return (start_W, goal_W)
-        cells = self._cells_between(start_W, goal_W)
-        if cells is None:
-            raise WorldError(f"{who} finds no path from {_text(start_W)} to {_text(goal_W)}; choose other waypoints")
-        return self._shortened((start_W, *cells, goal_W))
-
-    def _cells_between(self, start_W: Point, goal_W: Point) -> list[Point] | None:
-        """Centres of the cells of a shortest path; None when there is none."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import dijkstra
-
-        rows, columns = self._clearance_m.shape
-        free = self._free_for((start_W, goal_W))
-        index = np.arange(rows * columns).reshape(rows, columns)
-        a, b, lengths = [], [], []
-        for down, right, length in _STEPS:
-            here = (slice(0, rows - down), slice(max(0, -right), columns - max(0, right)))
-            there = (slice(down, rows), slice(max(0, right), columns - max(0, -right)))
-            both = free[here] & free[there]
-            a.append(index[here][both])
-            b.append(index[there][both])
-            lengths.append(np.full(np.count_nonzero(both), length))
-        graph = coo_array(
-            (np.concatenate(lengths), (np.concatenate(a), np.concatenate(b))), shape=(index.size, index.size)
-        ).tocsr()
-        begin, end = (int(index[tuple(self._cell(point))]) for point in (start_W, goal_W))
-        _, before = dijkstra(graph, directed=False, indices=begin, return_predecessors=True)
-        cells = [end]
-        while cells[-1] != begin:
-            if before[cells[-1]] < 0:
-                return None
-            cells.append(int(before[cells[-1]]))
-        row, column = np.divmod(np.array(cells[::-1]), columns)
-        return [(float(x), float(y)) for x, y in (np.column_stack([column, row]) + 0.5) * _CELL_M + self._low]
-
-    def _free_for(self, ends_W: Sequence[Point]) -> NDArray[np.bool_]:
-        """Mask of the cells where a person can be on a path between these ends."""
-        free: NDArray[np.bool_] = self._clearance_m >= SHOULDERS_M
-        rows, columns = np.indices(free.shape)
-        for end in ends_W:
-            row, column = self._cell(end)
-            near = np.hypot(rows - row, columns - column) * _CELL_M < _NEAR_WAYPOINT_M
-            free |= near & (self._clearance_m >= LEAST_M)
-        return free
-
-    def _shortened(self, path: Sequence[Point]) -> tuple[Point, ...]:
-        """The path without the corners that can be cut."""
-        ends, corners, here = (path[0], path[-1]), [path[0]], 0
-        while here < len(path) - 1:
-            after = len(path) - 1
-            while after > here + 1 and not self._straight(path[here], path[after], ends):
-                after = here + max(1, (after - here) // 2)
-            while after < len(path) - 1 and self._straight(path[here], path[after + 1], ends):
-                after += 1
-            corners.append(path[after])
-            here = after
-        return tuple(corners)
-
-    def _straight(self, a: Point, b: Point, ends_W: Sequence[Point]) -> bool:
-        """Returns whether a person can go straight from a to b; near the ends less clearance is enough."""
-        points = np.linspace(a, b, max(2, math.ceil(math.dist(a, b) / (0.5 * _CELL_M))))
-        near = np.any([np.hypot(*(points - end).T) < _NEAR_WAYPOINT_M for end in ends_W], axis=0)
-        return bool(np.all(self._clear_m(points) >= np.where(near, LEAST_M, SHOULDERS_M) - 0.5 * _CELL_M))
-
-    def _clear_m(self, points_W: FloatArray) -> FloatArray:
-        cells = self._cell(points_W)
-        return np.asarray(self._clearance_m[cells[..., 0], cells[..., 1]])
-
-    def _cell(self, points_W: Point | FloatArray) -> NDArray[np.int64]:
-        """Row and column of a point, or of each point of an array."""
-        cells: NDArray[np.int64] = np.floor((np.asarray(points_W) - self._low) / _CELL_M).astype(np.int64)
-        return cells[..., ::-1]
-
-
-def _outlines_W(plant: MultibodyPlant, inspector: SceneGraphInspector) -> Iterable[FloatArray]:
-    """Outlines (K, 2) from above of the shapes that are fixed to the world and reach into the band."""
-    context = plant.CreateDefaultContext()
-    for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
-        if not plant.IsAnchored(body):
-            continue
-        X_WB = plant.EvalBodyPoseInWorld(context, body)
-        for geometry in plant.GetCollisionGeometriesForBody(body):
-            kind, half_m, X_BG = shape_row(inspector, geometry)
-            corners_W = (X_WB @ X_BG).multiply((_unit_corners(kind) * half_m).T).T
-            if corners_W[:, 2].max() > BAND_M[0] and corners_W[:, 2].min() < BAND_M[1]:
-                yield cv2.convexHull(corners_W[:, :2].astype(np.float32)).reshape(-1, 2).astype(np.float64)
-
-
-def _unit_corners(kind: ShapeKind) -> FloatArray:
-    """Corner points (N, 3) around a shape with half extents of 1."""
-    turn = np.arange(_ROUND_SIDES) * math.tau / _ROUND_SIDES
-    ring = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=np.float64)
-    if kind is not ShapeKind.BOX:
-        ring = np.column_stack([np.cos(turn), np.sin(turn)])
-    return np.vstack([np.column_stack([ring, np.full(len(ring), z)]) for z in (-1.0, 1.0)])
-
-
-def _text(point: Point) -> str:
-    return f"({point[0]:g}, {point[1]:g})"
-
-
-TURN_RAD_S = 4.0
-
-
-@dataclass(frozen=True)
-class Leg:
-    """Path between two stops as corners (x, y), at least one, and the pause (s) at its end."""
-
-    corners_W: tuple[Point, ...]
-    pause_s: float
-
-    def lengths_m(self) -> tuple[float, ...]:
-        """Lengths (m) of the path from its first corner to each corner."""
-        lengths = [0.0]
-        for a, b in itertools.pairwise(self.corners_W):
-            lengths.append(lengths[-1] + math.dist(a, b))
-        return tuple(lengths)
-
-
-class Walk(Stateful, saved=("_leg", "_done_m", "_wait_s", "_detour", "place_W", "yaw_rad", "heading_rad", "held_s")):
-    """A person on the legs of a route, who faces along the path. Call `advance` once a step.
-
-    `held_s` is the time for which the person has waited for a robot.
-    """
-
-    def __init__(
-        self, legs: Sequence[Leg], *, at_W: Point, yaw_rad: float, speed_m_s: float, start_s: float, loops: bool
-    ) -> None:
-        """The person stands at `at_W` until `start_s`; the last leg of a looped route ends where the first begins."""
-        self._legs, self._lengths_m = tuple(legs), [leg.lengths_m() for leg in legs]
-        self._speed_m_s, self._loops = speed_m_s, loops
-        self._leg, self._done_m, self._wait_s = 0, 0.0, start_s
-        self._detour: tuple[Leg, tuple[float, ...]] | None = None
-        self.held_s = 0.0
-        self.place_W, self.yaw_rad, self.heading_rad = at_W, yaw_rad, yaw_rad
-
-    @property
-    def done(self) -> bool:
-        """Returns whether the person has reached the end of the route."""
-        return self._leg >= len(self._legs)
-
-    @property
-    def walks(self) -> bool:
-        """Returns whether the person is on a leg, and not in a pause."""
-        return not self.done and self._wait_s <= 0.0
-
-    def set_off(self) -> None:
-        """Ends the pause."""
-        self._wait_s = 0.0
-
-    def take_detour(self, corners_W: tuple[Point, ...]) -> None:
-        """Replaces the rest of the leg by another path to the next stop."""
-        leg = Leg(corners_W, self._legs[self._leg].pause_s)
-        self._detour, self._done_m = (leg, leg.lengths_m()), 0.0
-
-    @property
-    def next_stop_W(self) -> Point:
-        """End of the present leg. Raises IndexError when the route is done."""
-        return self._legs[self._leg].corners_W[-1]
-
-    @property
-    def on_detour(self) -> bool:
-        """Returns whether the person walks on a detour."""
-        return self._detour is not None
-
-    def advance(self, dt_s: float) -> None:
-        """Walks or waits for dt_s."""
-        if self.done:
-            return
-        if self._wait_s > 0.0:
-            self._wait_s -= dt_s
-            return
-        leg, lengths_m = self._detour or (self._legs[self._leg], self._lengths_m[self._leg])
-        corners = leg.corners_W
-        self._done_m = min(self._done_m + self._speed_m_s * dt_s, lengths_m[-1])
-        after = min(bisect.bisect_right(lengths_m, self._done_m), len(corners) - 1)
-        if after > 0:
-            self._stand_between(corners[after - 1], corners[after], self._done_m - lengths_m[after - 1], dt_s)
-        if self._done_m >= lengths_m[-1]:
-            self._wait_s, self._done_m, self._leg, self._detour = leg.pause_s, 0.0, self._leg + 1, None
-            if self._loops and self.done:
-                self._leg = 0
-
-    def _stand_between(self, a: Point, b: Point, from_a_m: float, dt_s: float) -> None:
-        """Sets the position at a distance from corner a towards corner b, and turns towards b."""
-        length_m = math.dist(a, b)
-        share = from_a_m / length_m if length_m > 0.0 else 1.0
-        self.place_W = (a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]))
-        if length_m > 0.0:
-            self.heading_rad = math.atan2(b[1] - a[1], b[0] - a[0])
-            off_rad = math.remainder(self.heading_rad - self.yaw_rad, math.tau)
-            self.yaw_rad += max(-TURN_RAD_S * dt_s, min(TURN_RAD_S * dt_s, off_rad))
-
 
 BODY_KG, BODY_M = 75.0, (0.2, 1.75)
 """Mass of a person, and radius and height of the cylinder with the same inertia."""
@@ -279,26 +36,56 @@ YIELD_M = 0.8
 AHEAD_RAD = 1.2
 """Angle to either side of the heading that counts as ahead."""
 PATIENCE_S = 4.0
-"""A person who has yielded this long looks for a detour around the robots, and again after the same time."""
+"""A person who has waited this long looks for another path, and again after the same time."""
 PASS_M = 0.22
 """On a detour, a person stops only for an outline nearer than this."""
+APART_M, PASS_APART_M = 0.8, 0.45
+"""People who keep apart stop for the centre of a person ahead nearer than this; on a detour, than the second."""
+STEPS_M = 0.15
+DOOR_M = 0.6
+"""People stop for a closed door that crosses their path within this length."""
+HEARS_M = 3.0
+"""People hear a robot within this distance, and a robot hears them."""
+BEHIND_M, SETS_OFF_M = 1.5, 1.9
+"""Length of the path to the robot at which a person behind it stops, and at which the person sets off again."""
+NEAR_M = 2.0
+"""A robot nearer than this ends the lapse of a person who follows it."""
+PLAN_S = 0.7
+"""Time between two paths of a person who follows a robot."""
+WANDERS_M, WANDERER_CLEAR_M, PAUSES_S = 2.0, 0.45, (0.5, 4.0)
+_DRAWS = 20
+_BODY_OUTLINE_M = 0.2 * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+
+Barriers = Sequence[tuple[Point, Point]]
+"""Ends (x, y) of each doorway whose door is not open."""
 
 
-class Walkers(Stateful, saved=("_walks",)):
+class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now_s")):
     """The people of one plant who walk, by name; call `before_step` before each step."""
 
-    def __init__(self, world: WorldDiagram, context: Context) -> None:
-        """`context` is the plant's. Raises WorldError when a waypoint is in an obstacle, or no path leads there."""
+    def __init__(
+        self, world: WorldDiagram, context: Context, say: Callable[[str, str], None] = lambda name, words: None
+    ) -> None:
+        """`context` is the plant's; `say` is called with a person's name and words.
+
+        Raises WorldError when a waypoint is in an obstacle, or no path leads there.
+        """
         routes = {model.name: model.route for model in world.config.models if model.route is not None}
-        self._plant, self._context, self._routes = world.plant, context, routes
-        self._robots = tuple(world.robots.values())
+        self._plant, self._context, self._routes, self._say = world.plant, context, routes, say
+        self._robots = world.robots
         self._instances = {name: world.models[name] for name in routes}
         inertia = SpatialInertia.SolidCylinderWithMass(BODY_KG, *BODY_M, np.array([0.0, 0.0, 1.0]))
         for instance in self._instances.values():
             (body,) = (world.plant.get_body(index) for index in world.plant.GetBodyIndices(instance))
             body.SetSpatialInertiaInBodyFrame(context, inertia)
         self._walks: dict[str, Walk] = {}
+        self._leaders: dict[str, str] = {}
+        self._plans_s: dict[str, float] = {}
+        self._spoke: tuple[str, ...] = ()
+        self._now_s = 0.0
         self._ground: Ground | None = None
+        self._barriers: Barriers = ()
+        self._busy = any(each.follows or each.wanders or each.says for each in routes.values())
         if routes:
             points = (stop.at_W for route in routes.values() for stop in route.stops)
             self._ground = ground = Ground.from_plant(world.plant, world.scene_graph.model_inspector(), points)
@@ -317,55 +104,158 @@ class Walkers(Stateful, saved=("_walks",)):
         """Positions (x, y) of all people who walk."""
         yield from (walk.place_W for walk in self._walks.values())
 
-    def before_step(self, dt_s: float, standing: Collection[str] = ()) -> None:
+    def hear(self, robot: str) -> None:
+        """Lets the people near a robot hear it speak: who follows robots follows this one from now on."""
+        for name, route in self._routes.items():
+            if route.follows in (robot, ANY_ROBOT) and self._away_m(robot, self._walks[name]) <= HEARS_M:
+                self._leaders[name], self._walks[name].lapsed = robot, False
+
+    def before_step(self, dt_s: float, standing: Collection[str] = (), barriers: Barriers = ()) -> None:
         """Sets the pose of each person, and the velocity that leads to the next pose within dt_s.
 
-        The people in `standing` stay where they are.
+        The people in `standing` stay where they are; nobody passes the `barriers`.
         """
+        self._barriers = barriers
+        self._now_s += dt_s
         for name, walk in self._walks.items():
             before = (*walk.place_W, walk.yaw_rad)
-            if name in standing:
-                pass
-            elif walk.walks and self._held(name, walk):
-                self._wait(name, walk, dt_s)
-            else:
-                walk.held_s = 0.0
-                walk.advance(dt_s)
+            if name not in standing:
+                self._move(name, walk, dt_s)
             after = (*walk.place_W, walk.yaw_rad)
             velocity = (np.array(after) - before) / dt_s
             slide(self._plant, self._context, self._instances[name], np.array(before), velocity)
 
+    def _move(self, name: str, walk: Walk, dt_s: float) -> None:
+        """Moves a person for dt_s, if nothing is in the way."""
+        if self._busy and not self._decide(name, walk):
+            walk.held_s = 0.0
+        elif walk.walks and self._held(name, walk):
+            self._wait(name, walk, dt_s)
+        else:
+            walk.held_s = 0.0
+            walk.advance(dt_s)
+
+    def _decide(self, name: str, walk: Walk) -> bool:
+        """Chooses the next path of a person without one; returns whether the person may walk on."""
+        route = self._routes[name]
+        if route.follows is not None and (walk.done or name in self._leaders):
+            return self._follow(name, walk)
+        if walk.done and route.says is not None and name not in self._spoke:
+            self._speak(name, walk, route.says)
+        if walk.done and route.wanders and self._plans_now(name):
+            ground = self._blocked_ground(())
+            rng = np.random.default_rng([*route.stream, round(self._now_s / PLAN_S)])
+            goals_W = ground.free_points(walk.place_W, WANDERS_M, WANDERER_CLEAR_M, rng, _DRAWS)
+            any(self._set_off(walk, ground, goal_W, pause_s=float(rng.uniform(*PAUSES_S))) for goal_W in goals_W)
+        return True
+
+    def _plans_now(self, name: str) -> bool:
+        """Returns whether it is time for a person's next path, and notes it."""
+        if self._plans_s.get(name, 0.0) > self._now_s:
+            return False
+        self._plans_s[name] = self._now_s + PLAN_S
+        return True
+
+    def _speak(self, name: str, walk: Walk, words: str) -> None:
+        """Says something once, when a robot is near."""
+        if any(self._away_m(robot, walk) <= HEARS_M for robot in self._robots):
+            self._spoke += (name,)
+            self._say(name, words)
+
+    def _set_off(
+        self, walk: Walk, ground: Ground, goal_W: Point, *, pause_s: float = 0.0, short_m: float = 0.0
+    ) -> bool:
+        """Gives a person a path that ends short of a goal; returns whether there is one."""
+        with contextlib.suppress(WorldError):
+            path = Leg(ground.plan_path(walk.place_W, goal_W, who="somebody"), pause_s)
+            length_m = path.lengths_m()[-1]
+            if length_m > short_m:
+                walk.take_path(path.part(0.0, length_m - short_m), pause_s)
+                return True
+        return False
+
+    def _follow(self, name: str, walk: Walk) -> bool:
+        """Keeps a person behind the robot that leads; returns whether the person may walk on."""
+        leader = self._leaders.get(name)
+        if leader is None:
+            return False
+        if walk.lapsed and self._away_m(leader, walk) < NEAR_M and not walk.pauses and not walk.goes_back:
+            walk.lapsed = False
+        if walk.lapsed or walk.pauses:
+            return walk.pauses or walk.goes_back
+        close = walk.done and self._away_m(leader, walk) < SETS_OFF_M
+        if not walk.on_detour and not close and self._plans_now(name):
+            x, y, _ = self._plant.EvalBodyPoseInWorld(self._context, self._robots[leader].body).translation()
+            if not self._set_off(walk, self._blocked_ground(()), (float(x), float(y)), short_m=BEHIND_M):
+                walk.drop_path()
+        return True
+
     def _wait(self, name: str, walk: Walk, dt_s: float) -> None:
-        """Waits for a robot; after a while, looks for a detour."""
+        """Waits for a robot, a person or a door; after a while, looks for another path."""
         walk.held_s += dt_s
-        if walk.held_s < PATIENCE_S or self._ground is None:
+        if walk.held_s < self._patience_s(name, walk):
             return
         walk.held_s = 0.0
+        if walk.turn_round():
+            return
+        people = self._people_near(name, walk) if self._routes[name].apart else ()
+        near = [*self._outlines_W(walk), *(np.array(at_W) + _BODY_OUTLINE_M for at_W in people)]
         with contextlib.suppress(WorldError):
-            ground = self._ground.with_obstacles(self._outlines_W(walk))
-            walk.take_detour(ground.plan_path(walk.place_W, walk.next_stop_W, who=name))
+            path = self._blocked_ground(near).plan_path(walk.place_W, walk.next_stop_W, who=name)
+            walk.take_detour(path, passing=bool(near))
+            return
+        if self._routes[name].wanders:
+            walk.drop_path()
+
+    def _patience_s(self, name: str, walk: Walk) -> float:
+        """Time for which a person waits before looking for another path: of two people, the first by name less."""
+        if self._routes[name].apart and any(self._people_near(name, walk)):
+            return 0.5 + 0.5 * sorted(self._walks).index(name)
+        return PATIENCE_S
+
+    def _blocked_ground(self, outlines_W: Sequence[FloatArray]) -> Ground:
+        """Ground with closed doors and some outlines as obstacles."""
+        assert self._ground is not None
+        doors = (np.array([a, b, b]) for a, b in self._barriers)
+        blocked = [*outlines_W, *doors]
+        return self._ground.with_obstacles(blocked) if blocked else self._ground
 
     def _held(self, name: str, walk: Walk) -> bool:
-        """Returns whether a person must wait for a robot."""
-        if not self._routes[name].yields:
-            return False
-        return any(self._close_ahead(walk, outline_W) for outline_W in self._outlines_W(walk))
+        """Returns whether a person must wait for a robot, a person or a door."""
+        route = self._routes[name]
+        path = walk.ahead_W(DOOR_M) if self._barriers else ()
+        if any(_cross(part, door) for part in itertools.pairwise(path) for door in self._barriers):
+            return True
+        if route.apart and any(self._people_near(name, walk)):
+            return True
+        return route.yields and any(self._close_ahead(walk, outline_W) for outline_W in self._outlines_W(walk))
+
+    def _people_near(self, name: str, walk: Walk) -> Iterator[Point]:
+        """Positions of the other walking people near a person, whom the next steps of the person bring nearer."""
+        reach_m = PASS_APART_M if walk.on_detour else APART_M
+        for other, there in self._walks.items():
+            away_m = math.dist(there.place_W, walk.place_W)
+            if other != name and away_m < reach_m and math.dist(there.place_W, walk.ahead_W(STEPS_M)[-1]) < away_m:
+                yield there.place_W
+
+    def _away_m(self, robot: str, walk: Walk) -> float:
+        """Distance between a robot's body and a person, in metres."""
+        p_WB = self._plant.EvalBodyPoseInWorld(self._context, self._robots[robot].body).translation()
+        return math.dist(p_WB[:2], walk.place_W)
 
     def _outlines_W(self, walk: Walk) -> Iterator[FloatArray]:
         """Outlines (K, 2) of the robots that are near a person."""
-        for robot in self._robots:
-            p_WB = self._plant.EvalBodyPoseInWorld(self._context, robot.body).translation()
+        for name, robot in self._robots.items():
             reach_m = float(np.linalg.norm(robot.kind.capabilities().footprint_m, axis=1).max())
-            if math.dist(p_WB[:2], walk.place_W) < YIELD_M + reach_m:
+            if self._away_m(name, walk) < YIELD_M + reach_m:
                 yield robot.outline_W(self._context)
 
     def _close_ahead(self, walk: Walk, outline_W: FloatArray) -> bool:
         """Returns whether an outline is close to the person and ahead."""
-        offset = _nearest_on(outline_W, np.array(walk.place_W)) - walk.place_W
-        if float(np.hypot(*offset)) > (PASS_M if walk.on_detour else YIELD_M):
+        nearest_W = _nearest_on(outline_W, np.array(walk.place_W))
+        if float(np.hypot(*(nearest_W - walk.place_W))) > (PASS_M if walk.on_detour else YIELD_M):
             return False
-        bearing_rad = math.remainder(math.atan2(offset[1], offset[0]) - walk.heading_rad, math.tau)
-        return abs(bearing_rad) < AHEAD_RAD
+        return _is_ahead(walk, nearest_W)
 
 
 def _walk(name: str, route: PointRoute, ground: Ground) -> Walk:
@@ -373,6 +263,13 @@ def _walk(name: str, route: PointRoute, ground: Ground) -> Walk:
     stops = [*route.stops, *(route.stops[:1] if route.loops else ())]
     legs = [Leg(ground.plan_path(a.at_W, b.at_W, who=name), b.pause_s) for a, b in itertools.pairwise(stops)]
     first = route.stops[0]
+
+    @cache
+    def pace(part: int) -> float:
+        """Factor of the speed on a part of the path."""
+        rng = np.random.default_rng([*route.stream, 1, part])
+        return float(rng.uniform(1.0 - route.pace, 1.0 + route.pace))
+
     return Walk(
         legs,
         at_W=first.at_W,
@@ -380,7 +277,25 @@ def _walk(name: str, route: PointRoute, ground: Ground) -> Walk:
         speed_m_s=route.speed_m_s,
         start_s=route.start_s + first.pause_s,
         loops=route.loops and len(route.stops) > 1,
+        pace=pace if route.pace > 0.0 else None,
+        lapses=route.lapses,
     )
+
+
+def _is_ahead(walk: Walk, point_W: Sequence[float] | FloatArray) -> bool:
+    """Returns whether a point lies ahead of a person."""
+    bearing_rad = math.atan2(point_W[1] - walk.place_W[1], point_W[0] - walk.place_W[0])
+    return abs(math.remainder(bearing_rad - walk.heading_rad, math.tau)) < AHEAD_RAD
+
+
+def _cross(a: tuple[Point, Point], b: tuple[Point, Point]) -> bool:
+    """Returns whether two segments cross."""
+
+    def side(line: tuple[Point, Point], p: Point) -> float:
+        (x0, y0), (x1, y1) = line
+        return (x1 - x0) * (p[1] - y0) - (y1 - y0) * (p[0] - x0)
+
+    return side(a, b[0]) * side(a, b[1]) < 0.0 and side(b, a[0]) * side(b, a[1]) < 0.0
 
 
 def _nearest_on(polygon: FloatArray, point: FloatArray) -> FloatArray:

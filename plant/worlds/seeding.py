@@ -27,10 +27,21 @@ class PointStop:
 
 
 @dataclass(frozen=True)
+class Lapse:
+    """Lapse of a person's attention after a walked path (m): some way back (m), then a stop (s)."""
+
+    after_m: float
+    stop_s: float
+    back_m: float = 0.0
+
+
+@dataclass(frozen=True)
 class PointRoute:
     """Route of a walking person: begins at `start_s`, and goes back from the last stop to the first if it `loops`.
 
-    A person who `yields` stops for a robot that is close ahead.
+    A person who `yields` stops for a robot that is close ahead, one who keeps `apart` for people as well. `pace` is the
+    share by which the speed changes. Who `follows` a robot does so once it has spoken; who `wanders` draws further
+    stops. The person `says` something at the end of the route. `stream` seeds what is drawn meanwhile.
     """
 
     stops: tuple[PointStop, ...]
@@ -39,6 +50,13 @@ class PointRoute:
     start_s: float = 0.0
     yields: bool = True
     yaw_rad: float | None = None
+    apart: bool = False
+    pace: float = 0.0
+    lapses: tuple[Lapse, ...] = ()
+    follows: str | None = None
+    wanders: bool = False
+    says: str | None = None
+    stream: tuple[int, ...] = ()
 
     def from_pose(self, at_W: Point, yaw_rad: float) -> PointRoute:
         """Returns the route for a person who stands at a pose first."""
@@ -53,16 +71,42 @@ class PointRoute:
         return math.atan2(y1 - y0, x1 - x0)
 
 
-def point_route(route: Route, standing: Mapping[str, Point]) -> PointRoute:
-    """Resolves the places of a route by `standing`."""
+def point_route(route: Route, standing: Mapping[str, Point], stream: Sequence[int] = (0,)) -> PointRoute:
+    """Resolves the places of a route by `standing`, and draws its distractions from the seeds `stream`."""
     stops = (each if isinstance(each, Stop) else Stop(at=each) for each in route.waypoints)
     points = (PointStop(standing[each.at] if isinstance(each.at, str) else each.at, each.pause) for each in stops)
-    return PointRoute(tuple(points), route.speed, route.loop, route.start, route.yields)
+    return PointRoute(
+        tuple(points),
+        route.speed,
+        route.loop,
+        route.start,
+        route.yields,
+        apart=route.apart or route.wanders or route.follows is not None,
+        pace=route.pace,
+        lapses=_lapses(route, np.random.default_rng(stream)),
+        follows=route.follows,
+        wanders=route.wanders,
+        says=route.says,
+        stream=tuple(stream),
+    )
 
 
+def _lapses(route: Route, rng: np.random.Generator) -> tuple[Lapse, ...]:
+    """Distractions of a route: as given, or as many as the route asks for, one every few metres."""
+    if not isinstance(route.distractions, int):
+        return tuple(Lapse(each.after, each.stop, each.back) for each in route.distractions)
+    after_m = np.cumsum(rng.uniform(*_LAPSE_EVERY_M, size=route.distractions))
+    backs_m = rng.uniform(*_LAPSE_BACK_M, size=route.distractions) * (rng.random(route.distractions) < 0.5)
+    return tuple(
+        Lapse(float(at_m), float(rng.uniform(*_LAPSE_STOP_S)), float(back_m))
+        for at_m, back_m in zip(after_m, backs_m, strict=True)
+    )
+
+
+_LAPSE_EVERY_M, _LAPSE_BACK_M, _LAPSE_STOP_S = (4.0, 10.0), (1.0, 3.0), (2.0, 6.0)
 ATTEMPTS = 500
 ROUND_SIDES = 16
-_OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM = 1, 2, 3
+_OBJECT_STREAM, _PEOPLE_STREAM, _FORM_STREAM, _WALK_STREAM = 1, 2, 3, 13
 
 
 @dataclass(frozen=True)
@@ -175,7 +219,8 @@ def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> I
 
 
 def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, index: int) -> Placement:
-    route = None if rule.route is None else point_route(rule.route, world.standing)
+    stream = (seed, _WALK_STREAM, index)
+    route = None if rule.route is None else point_route(rule.route, world.standing, stream)
     if rule.ranges is not None:
         x, y, yaw = _before_start(world, rule.ranges, np.random.default_rng([seed, _PEOPLE_STREAM, index]))
         route = None if route is None else route.from_pose((x, y), yaw)
@@ -210,7 +255,7 @@ def standing_points_W(world: World) -> FloatArray:
                 direction = world.start.yaw_rad + bearing
                 x, y = world.start.x_m + distance * np.cos(direction), world.start.y_m + distance * np.sin(direction)
                 places.append((float(x), float(y)))
-        elif rule.route is not None:
+        elif rule.route is not None and rule.route.waypoints:
             places.append(point_route(rule.route, world.standing).stops[0].at_W)
     return np.array(places).reshape(-1, 2)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -98,6 +98,9 @@ class PersonRule(_Strict):
         if self.distance_m is None or self.bearing_rad is None or self.turned_rad is None:
             return None
         return self.distance_m, self.bearing_rad, self.turned_rad
+
+
+_MANNERS: Final = ("receives", "pull_n", "reaction_s")
 
 
 class DoorRule(_Strict):
@@ -203,9 +206,8 @@ class World:
         """
         rules = self.seed_rules
         before = {rule.name: rule for rule in rules.people}
-        walking = {
-            name: PersonRule(name=name, route=route, **_receiving(before.get(name))) for name, route in routes.items()
-        }
+        manners = {name: rule.model_dump(include={*_MANNERS}) for name, rule in before.items()}
+        walking = {n: PersonRule(name=n, route=route, **manners.get(n, {})) for n, route in routes.items()}
         changed = rules.model_copy(update={"people": tuple({**before, **walking}.values())})
         _check_people(changed, self.standing)
         return replace(self, seed_rules=changed)
@@ -426,11 +428,6 @@ def _check_models(rules: SeedRules, imports: Mapping[str, Import]) -> None:
             raise WorldError(f"{rule.model!r} is of photographs: no mesh to place", path=("objects", index, "model"))
 
 
-def _receiving(rule: PersonRule | None) -> dict[str, Any]:
-    """Values of a rule on the receiving of objects."""
-    return {} if rule is None else rule.model_dump(include={"receives", "pull_n", "reaction_s"})
-
-
 def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
     """Raises WorldError when a name is given twice, or a place on a route is unknown."""
     taken = set[str]()
@@ -442,9 +439,10 @@ def _check_people(rules: SeedRules, standing: Mapping[str, Point]) -> None:
             raise WorldError(what, path=(kind, index, "name"))
         taken.add(name)
     for index, rule in enumerate(rules.people):
-        for waypoint in () if rule.route is None else rule.route.waypoints:
-            at = waypoint.at if isinstance(waypoint, Stop) else waypoint
+        path, waypoints = ("people", index, "route"), () if rule.route is None else rule.route.waypoints
+        if rule.ranges is None and not waypoints:
+            raise WorldError(f"{rule.name} stands nowhere at first; give the route a first waypoint", path=path)
+        for at in (each.at if isinstance(each, Stop) else each for each in waypoints):
             if isinstance(at, str) and at not in standing:
                 hint = suggestion(at, standing, "give a point (x, y)")
-                what = f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}"
-                raise WorldError(what, path=("people", index, "route"))
+                raise WorldError(f"{rule.name} cannot walk to {at!r}: no place in knowledge.yaml; {hint}", path=path)

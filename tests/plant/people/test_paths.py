@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from plant.people.walkers import LEAST_M, SHOULDERS_M, Ground
+from plant.people.ground import LEAST_M, SHOULDERS_M, Ground
 from plant.worlds.world import WorldError
 
 A, B = (0.0, 0.0), (4.0, 0.0)

@@ -1,6 +1,7 @@
 """People who walk in the plant."""
 
 import math
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -9,20 +10,20 @@ from pydrake.math import RigidTransform
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
-from plant.people.walkers import Leg, Walk
+from plant.people.walk import Leg, Walk
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
-from plant.worlds.seeding import PointRoute, PointStop
-from plant.worlds.world import WorldError
+from plant.worlds.seeding import Lapse, PointRoute, PointStop
+from plant.worlds.world import DoorRule, WorldError
 from skills.robot import Pose2D
 
 STEP_S = 0.0125
 
 
-def walk_of(*legs, loops=False, start_s=0.0, speed_m_s=1.0):
+def walk_of(*legs, loops=False, start_s=0.0, speed_m_s=1.0, **options):
     first = legs[0].corners_W[0] if legs else (0.0, 0.0)
-    return Walk(legs, at_W=first, yaw_rad=0.0, speed_m_s=speed_m_s, start_s=start_s, loops=loops)
+    return Walk(legs, at_W=first, yaw_rad=0.0, speed_m_s=speed_m_s, start_s=start_s, loops=loops, **options)
 
 
 def after(walk, seconds):
@@ -93,44 +94,54 @@ PERSON = load_catalogue()["person"].forms["standing"].path()
 class Hall:
     """A floor with a wall, a robot and a person, and the referee."""
 
-    def __init__(self, folder, route, robot=START):
+    def __init__(self, folder, route, robot=START, doors=(), **others):
         for name, text in (("floor", FLOOR), ("wall", WALL)):
             (folder / f"{name}.sdf").write_text(text)
         (folder / "world.dmd.yaml").write_text(
             WORLD % tuple((folder / f"{name}.sdf").as_uri() for name in ("floor", "wall"))
         )
-        (x, y), models = route.stops[0].at_W, []
-        models.append(LooseModel("Kim", PERSON, RigidTransform([x, y, 0.0]), route=route))
+        models = [
+            LooseModel(name, PERSON, RigidTransform([*each.stops[0].at_W, 0.0]), route=each)
+            for name, each in {"Kim": route, **others}.items()
+        ]
         self.world = build_diagram(
             DiagramConfig(
                 directives=folder / "world.dmd.yaml",
                 models=models,
                 robots=[PlacedRobot("Alice", "spot", robot)],
+                doors=doors,
                 visuals=False,
                 render=False,
             )
         )
         self.engine = Engine(self.world)
         self.referee = Referee(
-            self.world.plant, [], robots={"Alice": SPOT}, persons=["Kim"], scenery=self.world.scenery
+            self.world.plant, [], robots={"Alice": SPOT}, persons=["Kim", *others], scenery=self.world.scenery
         )
         self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
 
     @property
     def person_W(self):
-        body = self.world.plant.GetBodyByName("person")
+        body = self.world.plant.GetBodyByName("person", self.world.models["Kim"])
         return Pose2D.from_transform(self.world.plant.EvalBodyPoseInWorld(self.engine.context, body))
+
+    @property
+    def gap_m(self):
+        """Distance between the robot's body and Kim."""
+        x, y, _ = self.referee.path("Alice")[-1]
+        return math.dist((x, y), (self.person_W.x_m, self.person_W.y_m))
 
     def drive(self, vx, seconds):
         robot = self.engine.robots["Alice"]
-        robot.drive(vx, 0.0, 0.0, until_s=self.engine.now() + seconds, lease=robot.acquire_lease("test"))
+        lease = robot.take_lease("test")
+        robot.drive(vx, 0.0, 0.0, until_s=self.engine.now() + seconds, lease=lease)
         self.engine.advance(seconds)
 
 
 @pytest.fixture
 def hall(tmp_path):
-    return lambda *points, robot=START, **options: Hall(
-        tmp_path, PointRoute(tuple(PointStop(point) for point in points), **options), robot
+    return lambda *points, robot=START, doors=(), others=MappingProxyType({}), **options: Hall(
+        tmp_path, PointRoute(tuple(PointStop(point) for point in points), **options), robot, doors, **others
     )
 
 
@@ -224,3 +235,107 @@ def test_a_detour_continues_after_a_restart(hall):
     stage.engine.advance(1.0)
     assert stage.engine.walkers["Kim"].on_detour
     assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
+
+
+LINE = ((0.0, 0.0), (9.0, 0.0))
+
+
+def test_a_distracted_person_stops_and_walks_on():
+    walk = after(walk_of(Leg(LINE, 0.0), lapses=(Lapse(2.0, 3.0),)), 4.0)
+    assert walk.place_W == pytest.approx((2.0, 0.0), abs=0.05) and walk.lapsed
+    assert after(walk, 2.0).place_W == pytest.approx((3.0, 0.0), abs=0.05)
+
+
+def test_a_distracted_person_walks_back_first():
+    walk = after(walk_of(Leg(LINE, 0.0), lapses=(Lapse(4.0, 2.0, 1.5),)), 6.0)
+    assert walk.place_W == pytest.approx((2.5, 0.0), abs=0.05)
+    assert abs(walk.heading_rad) == pytest.approx(math.pi)
+    assert after(walk, 3.0).place_W == pytest.approx((4.0, 0.0), abs=0.05)
+    assert after(walk, 9.0).place_W == (9.0, 0.0)
+
+
+def test_something_behind_ends_the_walk_back():
+    walk = after(walk_of(Leg(LINE, 0.0), lapses=(Lapse(4.0, 2.0, 3.0),)), 4.5)
+    assert walk.turn_round() and walk.pauses and not walk.goes_back
+    assert after(walk, 3.5).place_W == pytest.approx((5.0, 0.0), abs=0.1)
+
+
+def test_the_pace_changes_on_the_path():
+    walk = walk_of(Leg(LINE, 0.0), pace=lambda part: (1.0, 0.5)[part % 2])
+    assert after(walk, 5.0).place_W == pytest.approx((4.0, 0.0), abs=0.05)
+
+
+def test_a_walk_back_continues_from_a_state():
+    leg, lapses = Leg(LINE, 0.0), (Lapse(2.0, 1.0, 1.5),)
+    walk, other = after(walk_of(leg, lapses=lapses), 2.5), walk_of(leg, lapses=lapses)
+    other.restore(walk.state())
+    assert walk.goes_back and after(other, 4.0).state() == after(walk, 4.0).state()
+
+
+def test_a_person_follows_the_robot_that_has_spoken_near_them(hall):
+    stage = hall((-4.5, 0.0), robot=Pose2D(-3.0, 0.0, 0.0), follows="robot", apart=True)
+    stage.drive(0.8, 3.0)
+    assert stage.gap_m > 3.2
+    stage.engine.walkers.hear("Alice")
+    stage.drive(-0.8, 2.0)
+    assert stage.person_W.x_m == pytest.approx(-4.5)
+    stage.engine.walkers.hear("Alice")
+    stage.drive(0.5, 4.0)
+    assert 1.3 < stage.gap_m < 2.2 and not stage.referee.collisions
+
+
+def test_a_distracted_follower_waits_until_the_robot_is_near(hall):
+    lapses = (Lapse(0.5, 0.5, 0.4),)
+    stage = hall((-5.0, 0.0), robot=Pose2D(-3.0, 0.0, 0.0), follows="robot", lapses=lapses)
+    stage.engine.walkers.hear("Alice")
+    stage.drive(0.8, 3.0)
+    assert stage.person_W.x_m == pytest.approx(-4.9, abs=0.1)
+    stage.drive(-0.8, 3.5)
+    stage.drive(0.8, 3.0)
+    assert stage.person_W.x_m > -4.0
+
+
+DOOR = DoorRule(name="gate", at=(2.0, -6.5), yaw=0.0, width=3.0, closes=0.0, opens=2.0)
+
+
+def test_a_person_waits_before_a_closed_door(hall):
+    door = DOOR.model_copy(update={"at": (-1.0, 0.5), "width": 30.0})
+    stage = hall((-1.0, -1.0), (-1.0, 2.5), speed_m_s=1.5, doors=(door,))
+    stage.engine.advance(2.0)
+    assert stage.person_W.y_m == pytest.approx(-0.1, abs=0.05)
+    for _ in range(25):
+        stage.engine.walkers.before_step(0.1, (), ())
+    assert stage.engine.walkers["Kim"].place_W == pytest.approx((-1.0, 2.5))
+
+
+def test_a_person_takes_another_path_around_a_closed_door(hall):
+    door = DOOR.model_copy(update={"at": (-1.0, 0.5), "width": 2.0, "opens": 60.0})
+    stage = hall((-1.0, -1.0), (-1.0, 2.5), speed_m_s=1.5, doors=(door,))
+    stage.engine.advance(9.0)
+    assert stage.person_W.y_m == pytest.approx(2.5)
+
+
+def test_people_who_meet_pass_each_other_apart(hall):
+    other = PointRoute((PointStop((-1.0, 3.0)), PointStop((-1.0, -3.0))), apart=True)
+    stage = hall((-1.0, -3.0), (-1.0, 3.0), apart=True, others={"Robin": other})
+    apart_m = []
+    stage.engine.observe(lambda _: apart_m.append(math.dist(*stage.engine.walkers.places_W())), every=4)
+    stage.engine.advance(12.0)
+    assert min(apart_m) > 0.4
+    assert [round(y, 3) for _, y in stage.engine.walkers.places_W()] == [3.0, -3.0]
+
+
+def test_wandering_people_walk_to_free_points_that_their_seeds_draw(hall):
+    other = PointRoute((PointStop((-1.0, 0.0)),), wanders=True, stream=(8,))
+    stage = hall((-1.0, 0.0), wanders=True, stream=(7,), others={"Robin": other})
+    stage.engine.advance(3.0)
+    kim, robin = (stage.engine.walkers[name].next_stop_W for name in ("Kim", "Robin"))
+    assert kim != robin and math.dist(stage.engine.walkers["Kim"].place_W, (-1.0, 0.0)) > 0.5
+
+
+def test_a_person_speaks_once_at_the_end_of_the_route_when_a_robot_is_near(hall):
+    far = PointRoute((PointStop((1.0, 0.0)), PointStop((1.0, 1.0))), says="hello")
+    stage = hall((-7.0, 0.0), (-5.0, 0.0), says="thank you", speed_m_s=2.0, others={"Robin": far})
+    stage.engine.advance(3.0)
+    ((time_s, name, words),) = stage.engine.words
+    assert (name, words) == ("Kim", "thank you") and 1.0 <= time_s < 1.2

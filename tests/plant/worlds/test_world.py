@@ -145,7 +145,9 @@ def test_a_person_walks_on_a_route_of_places_and_points(copy: Path) -> None:
     ("people", "says"),
     [
         ("people: [{name: Kim}]", "give 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'"),
-        ("people: [{name: Kim, route: {waypoints: []}}]", "route.waypoints"),
+        ("people: [{name: Kim, route: {waypoints: []}}]", "a route needs 'waypoints'"),
+        ("people: [{name: Kim, route: {wanders: true}}]", "Kim stands nowhere at first"),
+        ("people: [{name: Kim, route: {waypoints: [kitchen], follows: robot, loop: true}}]", "nor walks a loop"),
         ("people: [{name: Kim, route: {waypoints: [kitchn]}}]", "Kim cannot walk to 'kitchn'.*did you mean 'kitchen'"),
         ("people: [{name: Kim, route: {waypoints: [kitchen], speed: 9}}]", "route.speed"),
         ("people: [{name: coke, route: {waypoints: [kitchen]}}]", "'coke' names two objects or people"),

@@ -320,6 +320,12 @@ class SkillContext:
 
         return KeepOut(self.zone_map()).space(self.costmap, Footprint.of(self.robot.capabilities()), self.pose())
 
+    def silent_zone(self) -> str | None:
+        """Returns the name of the silent zone in which the robot stands, or None."""
+        if not any(zone.kind is ZoneKind.SILENT for zone in self.zones):
+            return None
+        return next(iter(self.zone_map().names_with_origin(ZoneKind.SILENT, self.pose())), None)
+
     def X_WB(self) -> RigidTransform:
         """Returns the body's estimated pose in the world."""
         return self.localiser.estimate().X_WO @ self.robot.odometry().X_OB

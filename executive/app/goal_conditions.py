@@ -192,6 +192,9 @@ def _speech(tree: CompiledTree, result: RobotResult) -> Iterator[tuple[bool, str
         expected = text.text if isinstance(text, Template) else str(text or "")
         shown = (expected if found is None else found.text)[:SHOWN_CHARS]
         end = "" if shown.endswith((".", "!", "?")) else "."
+        if found is not None and found.silent:
+            yield True, f'It showed "{shown}" in the silent zone {found.silent}.'
+            continue
         yield found is not None, f'It {"said" if found is not None else "did not say"} "{shown}"{end}'
 
 

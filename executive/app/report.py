@@ -168,6 +168,8 @@ class RunReport(Ending):
         for name in ("scenario", "notes", "robots"):
             if not getattr(self, name):
                 without[name] = True
+        if not any(one.silent for one in self.said):
+            without["said"] = {"__all__": {"silent"}}
         plain = replace(self, work=dict(self.work), robots=dict(self.robots))
         values: dict[str, Any] = _adapter().dump_python(plain, mode="json", exclude=without)
         return values

@@ -55,6 +55,8 @@ def voice_for(aloud: bool) -> Iterator[Voice]:
 class SpeechOutput(RunVisitor):
     """Output of a robot's speech: by a voice that does not block, and on the console unless `quiet`.
 
+    What a robot says in a silent zone is only shown.
+
     The console shows it at the end of the tick, behind the skills that ended before it.
     """
 
@@ -69,7 +71,8 @@ class SpeechOutput(RunVisitor):
             robot, text = (str(message.get(name, "")) for name in ("robot", "text"))
             if not self.quiet:
                 self._said.append(printable(f"{robot}: {text}"))
-            self.voice.say(text)
+            if not message.get("silent"):
+                self.voice.say(text)
         return message
 
     def tick(self, progress: Progress) -> None:

@@ -302,7 +302,7 @@ def _ticks(data: Mapping[str, Any]) -> str:
 _TEXTS: Final[Mapping[str, Callable[[Mapping[str, Any]], str]]] = {
     RUN: _run,
     OUTCOME: _outcome,
-    SPEECH: lambda data: f'{data.get("robot")} says: "{data.get("text")}"',
+    SPEECH: lambda data: f'{data.get("robot")} {"shows" if data.get("silent") else "says"}: "{data.get("text")}"',
     MISSIONS: lambda data: "; ".join(
         f"{each.get('id')} ({each.get('robot') or 'nobody'}): {each.get('outcome')}"
         for each in data.get("missions", ())

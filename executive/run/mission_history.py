@@ -195,7 +195,8 @@ class Findings:
                 self._board.put(self._keys.findings, (*self.findings, finding))
         elif topic == SPEECH:
             now_s = round(self._clock.now(), 6)
-            said = Said(now_s, str(message.get("text", "")), bool(message.get("asked", False)))
+            asked, silent = bool(message.get("asked", False)), str(message.get("silent", ""))
+            said = Said(now_s, str(message.get("text", "")), asked, silent)
             self._board.put(self._keys.said, (*self.said, said))
         return message
 

@@ -38,11 +38,15 @@ class Finding:
 
 @dataclass(frozen=True)
 class Said:
-    """Sentence that the robot began to say, or `asked`, at `t_s` (s on the robot's clock)."""
+    """Sentence that the robot began to say, or `asked`, at `t_s` (s on the robot's clock).
+
+    In the zone `silent` it was shown and not spoken.
+    """
 
     t_s: float
     text: str
     asked: bool = False
+    silent: str = ""
 
 
 @dataclass(frozen=True)

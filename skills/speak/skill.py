@@ -30,7 +30,8 @@ class SpeakOptions:
 class Speak(Skill[SpeakInputs]):
     """Says a text once, and waits as long as saying it takes. Moves nothing.
 
-    The text is published under the topic `speech` when it begins; a viewer of the run says it aloud or in writing.
+    The text is published under the topic `speech` when it begins; a viewer of the run says it aloud or in writing, and
+    in a silent zone, which the message names, in writing only.
     """
 
     name: ClassVar[str] = "speak"
@@ -48,8 +49,10 @@ class Speak(Skill[SpeakInputs]):
         self._refusal = _refusal(self._text)
         self._begun_s = self.context.clock.now()
         self._lasts_s = max(self.options.at_least_s, self.options.word_s * len(self._text.split()))
+        self._silent: str | None = None
         if self._refusal is None:
-            say(self.context, self._text)
+            self._silent = say(self.context, self._text)
+            self._lasts_s = self.options.at_least_s if self._silent else self._lasts_s
 
     def step(self) -> Step:
         """Waits until the text is said."""
@@ -58,7 +61,9 @@ class Speak(Skill[SpeakInputs]):
         assert self._begun_s is not None
         passed_s = self.context.clock.now() - self._begun_s
         if passed_s < self._lasts_s:
-            return Running(f'says "{self._text}"', passed_s / self._lasts_s)
+            return Running(f'{"shows" if self._silent else "says"} "{self._text}"', passed_s / self._lasts_s)
+        if self._silent:
+            return Succeeded(f'showed "{self._text}" without a sound: {self._silent} is a silent zone')
         return Succeeded(f'said "{self._text}"')
 
     def resume(self, inputs: SpeakInputs) -> None:
@@ -67,10 +72,13 @@ class Speak(Skill[SpeakInputs]):
             self.begin(inputs)
 
 
-def say(context: SkillContext, text: str) -> None:
-    """Says a text, without waiting until it is said."""
+def say(context: SkillContext, text: str) -> str | None:
+    """Says a text, without waiting until it is said; in a silent zone only shows it, and returns the zone's name."""
     message = {"robot": context.robot.name, "text": text, "t": round(context.clock.now(), 6)}
+    if silent := context.silent_zone():
+        message["silent"] = silent
     context.publish(SPEECH_TOPIC, message)
+    return silent
 
 
 def _refusal(text: str) -> Failed | None:

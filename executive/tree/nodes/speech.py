@@ -30,7 +30,7 @@ _FILLERS: Final = re.compile(
 
 
 class AskPeople(ExplainedLeaf):
-    """Leaf that asks a question, aloud and on the page, and writes the answer under `key`.
+    """Leaf that asks a question, aloud and on the page (in a silent zone only there), and writes the answer to `key`.
 
     | case | status |
     |---|---|
@@ -115,6 +115,8 @@ class AskPeople(ExplainedLeaf):
         default = "" if self.default is None else _as_text(self.default)
         self._asked = self.context.ask(Question(self.path_id, text, self.options, default, left_s))
         message = {"t": round(now_s, 6), "robot": self.context.robot.name, "text": text, "asked": True}
+        if silent := self.context.silent_zone():
+            message["silent"] = silent
         self.context.publish(SPEECH_TOPIC, message)
         self.message = f"asks: {text}"
 

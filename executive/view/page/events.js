@@ -9,7 +9,7 @@
     object_to_detect: (data) => ["look for", data.class_name.join(", ")],
     object_destination: (data) => ["found", data.class_name],
     missions: (data) => ["missions", data.missions.map((each) => `${each.id} ${each.robot || "no robot"}: ${each.outcome}`).join(", ")],
-    speech: (data) => [`${data.robot} says`, `“${data.text}”`],
+    speech: (data) => [`${data.robot} ${data.silent ? "shows" : "says"}`, `“${data.text}”`],
     errors: (data) => ["defect", (data.traceback || "").trim().split("\n").pop()],
     control: (data) => [data.what || "control", data.message || ""],
     question: (data) => ["question", data.text || data.message || ""],

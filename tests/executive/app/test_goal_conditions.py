@@ -234,6 +234,15 @@ def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, ru
     assert verdict.success is not asked
 
 
+def test_a_text_shown_in_a_silent_zone_counts_and_the_verdict_says_so(knowledge, registry, run_tree):
+    mission = Mission(name="tell", robot="Alice", steps=(HELLO,))
+    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
+    result = run_tree(tree).worst
+    shown = dataclasses.replace(result, said=tuple(dataclasses.replace(one, silent="bedroom") for one in result.said))
+    verdict = verdict_of(tree, shown, lambda given: RefereeReport(None, "", 0, 0))
+    assert (verdict.success, verdict.why) == (True, 'It showed "Hello" in the silent zone bedroom.')
+
+
 def test_one_sentence_counts_for_one_step(knowledge, registry, run_tree):
     anything = Speak(speak="{n}")
     mission = Mission(name="tell", robot="Alice", steps=(HELLO, anything), variables={"n": 1})

@@ -38,6 +38,14 @@ def test_speech_is_printed_unless_quiet_and_said_by_the_voice(quiet, shown):
     assert (told.getvalue(), voice.texts) == (shown, ["[bold]Hello"])
 
 
+def test_the_voice_keeps_silent_in_a_silent_zone():
+    told, voice = io.StringIO(), Heard()
+    SpeechOutput(Console(file=told, width=80), voice, False).message(
+        "speech", {"robot": "Alice", "text": "Hello", "silent": "bedroom"}
+    )
+    assert voice.texts == []
+
+
 def test_without_the_option_nothing_is_said_aloud():
     with voice_for(False) as voice:
         assert voice is SILENCE

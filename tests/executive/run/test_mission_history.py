@@ -49,7 +49,8 @@ def test_any_node_adds_a_finding_by_publishing_an_answer(findings, answer):
 def test_speech_is_stored(findings, clock):
     clock.advance(2.0)
     findings.message("speech", {"robot": "Alice", "text": "Hello", "t": 2.0})
-    assert findings.said == (Said(2.0, "Hello"),)
+    findings.message("speech", {"robot": "Alice", "text": "Good night", "t": 2.0, "silent": "bedroom"})
+    assert findings.said == (Said(2.0, "Hello"), Said(2.0, "Good night", silent="bedroom"))
 
 
 def test_a_number_that_json_does_not_know_becomes_text(findings):

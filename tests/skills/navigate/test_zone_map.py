@@ -210,6 +210,13 @@ def test_a_grey_mask_in_scale_mode_has_shares_of_darkness(tmp_path):
     assert zones.speed_m_s(FOOTPRINT, pose_array([Pose2D(3.0, 4.0, 0.0)]), np.zeros(1)) == pytest.approx(0.4)
 
 
+def test_the_robot_knows_the_silent_zone_in_which_it_stands():
+    hush = Zone("corridor", ZoneKind.SILENT, CORRIDOR)
+    places = (START, Pose2D(1.5, 2.0, 0.0))
+    contexts = [dataclasses.replace(Bench(place).context(), zones=(hush,)) for place in places]
+    assert [context.silent_zone() for context in contexts] == ["corridor", None]
+
+
 def test_the_sentence_names_all_zones():
     assert zones_sentence(["hall"], "keep-out zone") == "The hall is a keep-out zone."
     assert (

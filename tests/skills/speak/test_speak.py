@@ -19,7 +19,8 @@ def said():
 def skill(said):
     clock, robot = VirtualClock(), SimpleNamespace(name="Alice")
     publish = lambda topic, message: said.append((topic, message))  # noqa: E731
-    return Speak(SimpleNamespace(robot=robot, clock=clock, publish=publish, stack=default_stack()))
+    loud = {"silent_zone": lambda: None, "stack": default_stack()}
+    return Speak(SimpleNamespace(robot=robot, clock=clock, publish=publish, **loud))
 
 
 def time_taken(skill, text):
@@ -71,3 +72,11 @@ def test_the_longest_text_is_said(skill, said):
 def test_a_stack_sets_how_fast_it_speaks(skill):
     slow = Speak(skill.context, SpeakOptions(word_s=2.0))
     assert time_taken(slow, "one two")[0] == pytest.approx(4.0, abs=0.06)
+
+
+def test_in_a_silent_zone_the_text_is_shown_and_not_spoken(skill, said):
+    skill.context.silent_zone = lambda: "bedroom"
+    seconds, step = time_taken(skill, "Dinner is ready and the table is set.")
+    assert said[0][1]["silent"] == "bedroom"
+    assert seconds < 0.6
+    assert step.message == 'showed "Dinner is ready and the table is set." without a sound: bedroom is a silent zone'

@@ -7,6 +7,7 @@ that it is legible on any ground. All lengths in metres, all poses in the world 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -26,7 +27,17 @@ from pydrake.math import RigidTransform, RotationMatrix
 from plant.rendering import lights
 from plant.sensors.camera_spec import FAR_M, NEAR_M, colour_render_camera, depth_render_camera
 from plant.worlds.world import Point, World
-from skills.files.map_drawing import INK, PLATE, Colour, Names, label, text_size, with_legend
+from skills.files.map_drawing import (
+    INK,
+    PLATE,
+    ZONE_COLOURS,
+    Colour,
+    Names,
+    draw_zone,
+    label,
+    text_size,
+    with_legend,
+)
 from skills.robot import FloatArray, Intrinsics, Picture, Pose2D
 
 Bounds = tuple[float, float, float, float]
@@ -308,11 +319,12 @@ def draw_world(
     *,
     labels: Mapping[str, Point],
     doors: Iterable[Door],
+    zones: Iterable[Mapping[str, Any]] = (),
 ) -> Picture:
     """Draws the plan of a world over a grid's grey values (rows from the south).
 
     Rooms are tinted, surfaces outlined, doors are circles of their width, and the start is an arrow. `labels` are
-    written at their points.
+    written at their points. `zones` have a `kind`, `outlines` and perhaps `direction_rad`.
     """
     rows, columns = cells.shape
     scale = WIDTH_PX / max(columns, rows)
@@ -323,6 +335,9 @@ def draw_world(
     for index, polygon in enumerate(world.rooms.values()):
         cv2.fillPoly(ground, [_pixels(view, polygon)], _TINTS[index % len(_TINTS)])
     picture = np.asarray(np.minimum(view.picture, ground), np.uint8)
+    for zone in zones:
+        outlines = [_pixels(view, outline) for outline in zone["outlines"]]
+        draw_zone(picture, outlines, zone["kind"], ZONE_COLOURS[zone["kind"]], zone.get("direction_rad"))
     for surface in world.surfaces.values():
         cv2.polylines(picture, [_pixels(view, surface.polygon_W)], True, _SURFACE, 3, cv2.LINE_AA)
     for at, width in doors:

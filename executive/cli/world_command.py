@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
@@ -383,22 +384,32 @@ def show(
 ) -> None:
     """Draws the plan of a world: rooms, doors, walls, surfaces and the start."""
     from plant.scene_pictures import draw_world, save_png
+    from skills.navigate.zones import zone_messages
 
     drawn = open_world(folder)
     facts = knowledge_of(drawn)
     grid = load_grid_map(drawn.surveyed.keepout_map_path)
+    rooms = {name: (place.pose.x, place.pose.y) for name, place in facts.places.items()}
+    zones = zone_messages(facts.known_zones())
     picture = draw_world(
         drawn,
         grid.grey(free=255, unknown=150, occupied=0),
         grid.origin_m,
         grid.resolution_m,
-        labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
+        labels={**rooms, **{each["rule"]: _middle(each["outlines"][0]) for each in zones}},
         doors=[(door.at, door.width) for door in facts.doors],
+        zones=zones,
     )
     with writing(out):
         save_png(out, picture)
-    counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"))
+    counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone"))
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
+
+
+def _middle(outline: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Mean of the corners of an outline."""
+    xs, ys = zip(*outline, strict=True)
+    return fmean(xs), fmean(ys)
 
 
 def _cylinders(path: Path) -> _Cylinders:

@@ -21,7 +21,7 @@ import numpy as np
 from mcap.writer import Writer
 from pydantic_core import to_jsonable_python
 
-from executive.record.other_tools import grid_of, joints_message, scan_message, transform_of
+from executive.record.other_tools import grid_of, joints_message, scan_message, scene_of, transform_of
 from executive.record.schemas import (
     BOXES,
     DETECTIONS,
@@ -34,7 +34,9 @@ from executive.record.schemas import (
     SCAN,
     TOPIC,
     TRANSFORM,
+    TREE,
     WALL,
+    ZONES,
     Schema,
     schema_of,
     stamp,
@@ -218,6 +220,8 @@ def viewer_messages(topic: str, message: Message, now_s: float) -> Iterator[tupl
         yield TRANSFORM, transform_of(message)
     elif topic == MAP and "data" in message:
         yield GRID, grid_of(message, now_s)
+    elif topic == TREE and message.get("zones"):
+        yield ZONES, scene_of(message["zones"], now_s)
 
 
 def _foxglove_form(topic: str, message: Message, now_s: float) -> Message:

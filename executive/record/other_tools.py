@@ -6,7 +6,7 @@ Scans and joint states are measured; transforms and the grid follow from the mes
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import cv2
@@ -14,9 +14,14 @@ import numpy as np
 
 from executive.record.schemas import stamp
 from executive.words.slug import slug
+from skills.files.map_drawing import ZONE_COLOURS
 from skills.robot import Joints, Scan
 
 _UINT8: Final = 1
+_LINE_LOOP: Final = 1
+_ALL: Final = 1
+_ABOVE_FLOOR_M: Final = 0.02
+_OTHER_SHAPES: Final = ("arrows", "cubes", "spheres", "cylinders", "triangles", "models")
 _STEP: Final = 2
 """Only one of so many beams of a scan is logged."""
 
@@ -94,6 +99,26 @@ def grid_of(data: Message, now_s: float) -> Message:
         "fields": [{"name": "occupancy", "offset": 0, "type": _UINT8}],
         "data": base64.b64encode(cells.tobytes()).decode(),
     }
+
+
+def scene_of(zones: Sequence[Message], now_s: float) -> Message:
+    """Zones as outlines on the floor with their rules; it replaces all zones before."""
+    when = stamp(now_s)
+    level = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
+    entities = []
+    for zone in zones:
+        colour = {**dict(zip("rgb", (part / 255.0 for part in ZONE_COLOURS[zone["kind"]]), strict=True)), "a": 1.0}
+        line = {"type": _LINE_LOOP, "pose": level, "thickness": 0.05, "scale_invariant": False, "color": colour}
+        outlines = [[{"x": x, "y": y, "z": _ABOVE_FLOOR_M} for x, y in outline] for outline in zone["outlines"]]
+        middle = {axis: sum(each[axis] for each in outlines[0]) / len(outlines[0]) for axis in "xyz"}
+        text = {"pose": {**level, "position": middle}, "billboard": True, "font_size": 0.3, "scale_invariant": False}
+        shapes = {
+            "lines": [{**line, "points": points, "colors": [], "indices": []} for points in outlines],
+            "texts": [{**text, "color": colour, "text": zone["rule"]}],
+        }
+        head = {"timestamp": when, "frame_id": "world", "id": zone["rule"], "lifetime": stamp(0.0), "metadata": []}
+        entities.append({**head, "frame_locked": False, **{name: [] for name in _OTHER_SHAPES}, **shapes})
+    return {"deletions": [{"timestamp": when, "type": _ALL, "id": ""}], "entities": entities}
 
 
 def grey_map(data: Message) -> np.ndarray[Any, np.dtype[np.uint8]]:

@@ -43,7 +43,8 @@ SCAN: Final = "scan"
 JOINTS: Final = "joints"
 TRANSFORM: Final = "transform"
 GRID: Final = "map/grid"
-DERIVED: Final = frozenset({BOXES, TRANSFORM, GRID})
+ZONES: Final = "map/zones"
+DERIVED: Final = frozenset({BOXES, TRANSFORM, GRID, ZONES})
 """Topics whose messages repeat others in a form that viewers draw."""
 _PICTURE: Final = "picture"
 _OTHERS: Final = "any"

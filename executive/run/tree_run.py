@@ -23,6 +23,7 @@ from executive.tree.nodes.skill_leaf import SkillLeaf
 from executive.tree.nodes.wait import WaitFor
 from executive.words.goal import GoalKind
 from skills.api import Cause
+from skills.navigate.zones import zone_messages
 
 POSE_NOTE_PERIOD_S = 1.0
 
@@ -86,7 +87,9 @@ class TreeRun:
     def show(self) -> None:
         """Logs the tree."""
         structure = node_view(self.tree.root, self.states).structure()
-        self.context.publish(TREE, {"robot": self.tree.robot_name, "root": structure})
+        zones = zone_messages(self.tree.all_zones)
+        message = {"robot": self.tree.robot_name, "root": structure}
+        self.context.publish(TREE, {**message, "zones": zones} if zones else message)
 
     def tick(self, breakpoints: frozenset[str]) -> bool:
         """Ticks once and logs the changes; returns whether anything changed."""

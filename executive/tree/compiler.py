@@ -72,6 +72,12 @@ class CompiledTree:
         return tuple(dict.fromkeys(button for node in self.root.walk() for button in buttons_of(node)))
 
     @property
+    def all_zones(self) -> tuple[Zone, ...]:
+        """Zones of the whole mission, and of its groups."""
+        groups = (node.options["zones"] for node in self.root.walk() if node.kind == InZones.kind)
+        return tuple(dict.fromkeys((*self.zones, *(zone for zones in groups for zone in zones))))
+
+    @property
     def path_ids(self) -> tuple[str, ...]:
         """All path ids, parents first."""
         return tuple(node.path_id for node in self.root.walk())

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from executive.record.history import Event
-from executive.record.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH
+from executive.record.schemas import DOORS, MAP, NAVIGATION, PATH, POSE, RESERVED_PATH, TREE
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from skills.files.errors import InputError
-from skills.files.map_drawing import Names, with_legend
+from skills.files.map_drawing import ZONE_COLOURS, Names, draw_zone, with_legend
 
 WIDTH_PX: Final = 1400
 FOOTPRINT_M: Final = (1.1, 0.5)
@@ -64,7 +64,8 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     """Draws the map (height, width, 3; blue, green, red) at a time on the robot's clock.
 
     It shows the trajectory, the planned and the reserved path, the particles of the localiser, the cells of the
-    obstacle layer, the footprint, and the dock, with a legend and a scale below. Several robots have a colour each.
+    obstacle layer, the footprint, the dock, and the zones, with a legend and a scale below. Several robots have a
+    colour each.
     Raises InputError if the log has no map.
     """
     known = [event for event in events if event.stamp_s <= at_s]
@@ -72,6 +73,10 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     if not maps:
         raise InputError("the log has no map", hint="give the log.mcap of a run with a world that has one")
     picture, frame = _ground(maps[-1])
+    zones = _zones([event.data for event in known if event.topic == TREE])
+    for zone in zones:
+        outlines = [frame.pixels(outline) for outline in zone["outlines"]]
+        draw_zone(picture, outlines, zone["kind"], _colour_of(zone), zone.get("direction_rad"))
     robots = sorted({event.data["robot"] for event in known if event.topic == POSE})
     colours = {name: rgb_of(ROBOT_COLOURS[n % len(ROBOT_COLOURS)])[::-1] for n, name in enumerate(robots)}
     one = len(robots) < 2
@@ -79,16 +84,32 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
         own = [event for event in known if event.data.get("robot") == robot]
         _draw_robot(picture, frame, own, None if one else colours[robot])
     doors = _draw_doors(picture, frame, [event.data["doors"] for event in known if event.topic == DOORS])
-    _write_names(picture, frame, maps[-1], [event.data for event in known if event.topic == POSE])
+    _write_names(picture, frame, maps[-1], [event.data for event in known if event.topic == POSE], zones)
     entries = list(_LEGEND) if one else [*((f"path of {name}", colours[name]) for name in robots), *_LEGEND[2:]]
     entries += [(text, colour) for state, (colour, text) in _DOORS.items() if state in doors]
+    entries += [(zone["rule"], _colour_of(zone)) for zone in zones]
     return with_legend(picture, frame.pixels_per_m, entries)
 
 
+def _zones(trees: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Zones of the last mission of each robot, each once."""
+    last = {tree["robot"]: tree.get("zones", ()) for tree in trees}
+    return list({zone["rule"]: zone for zones in last.values() for zone in zones}.values())
+
+
+def _colour_of(zone: Mapping[str, Any]) -> Colour:
+    red, green, blue = ZONE_COLOURS[zone["kind"]]
+    return blue, green, red
+
+
 def _write_names(
-    picture: NDArray[np.uint8], frame: _Frame, data: Mapping[str, Any], poses: Sequence[Mapping[str, Any]]
+    picture: NDArray[np.uint8],
+    frame: _Frame,
+    data: Mapping[str, Any],
+    poses: Sequence[Mapping[str, Any]],
+    zones: Sequence[Mapping[str, Any]],
 ) -> None:
-    """Draws the dock, and the names of robots, dock and places above all else."""
+    """Draws the dock, and the names of robots, dock, places and other zones above all else."""
     driven: dict[str, list[tuple[float, float]]] = {}
     for pose in poses:
         driven.setdefault(pose["robot"], []).append(_position(pose))
@@ -105,8 +126,11 @@ def _write_names(
         names.write("dock", pixel.tolist())
     for name, line in lines.items():
         names.write(name, line[-1].tolist())
-    for place in data.get("places", ()):
-        names.write(place["name"], frame.pixels([(place["x"], place["y"])])[0].tolist())
+    written = {place["name"]: (place["x"], place["y"]) for place in data.get("places", ())}
+    for zone in zones:
+        written.setdefault(zone["name"], np.mean(zone["outlines"][0], axis=0).tolist())
+    for name, middle in written.items():
+        names.write(name, frame.pixels([middle])[0].tolist())
 
 
 def _position(pose: Mapping[str, Any]) -> tuple[float, float]:

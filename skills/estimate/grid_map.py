@@ -154,9 +154,19 @@ class FilterMask:
     def corners_W(self) -> FloatArray:
         """World (x, y) of its four corners, (4, 2)."""
         rows, columns = self.percent.shape
+        return self._points_W(np.array([(0, 0), (columns, 0), (columns, rows), (0, rows)]))
+
+    def outlines_W(self, least: int) -> list[FloatArray]:
+        """World (x, y) of the outlines, (N, 2) each, of the cells with values of `least` and more."""
+        found, _ = cv2.findContours((self.percent >= least).astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_SIMPLE)
+        simple = (cv2.approxPolyDP(each, 1.0, closed=True)[:, 0] for each in found)
+        return [self._points_W(each + 0.5) for each in simple if len(each) > 2]
+
+    def _points_W(self, cells: NDArray[Any]) -> FloatArray:
+        """World (x, y) of points in columns and rows."""
         x, y, yaw = self.origin
-        ends = np.array([(0, 0), (columns, 0), (columns, rows), (0, rows)]) * self.resolution_m
-        return np.asarray(ends @ [[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]] + (x, y))
+        turn = [[math.cos(yaw), math.sin(yaw)], [-math.sin(yaw), math.cos(yaw)]]
+        return np.asarray(cells * self.resolution_m @ turn + (x, y))
 
     def at(self, points_W: FloatArray) -> NDArray[np.int16]:
         """Values at points (N, 2); -1 off the mask."""

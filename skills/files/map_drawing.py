@@ -4,8 +4,9 @@ Pictures are (H, W, 3) uint8 arrays; colours have the order of the picture's cha
 """
 
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
+from types import MappingProxyType
 from typing import Final
 
 import cv2
@@ -17,6 +18,18 @@ from skills.robot import FloatArray, Picture
 Colour = tuple[int, int, int]
 INK: Final[Colour] = (25, 25, 25)
 PLATE: Final[Colour] = (255, 255, 255)
+ZONE_COLOURS: Final[Mapping[str, Colour]] = MappingProxyType(
+    {
+        "keep_out": (200, 30, 40),
+        "speed_limit": (214, 140, 0),
+        "one_way": (0, 114, 178),
+        "preferred": (0, 140, 100),
+        "silent": (125, 91, 166),
+    }
+)
+"""Colours of zones by kind: red, green, blue."""
+_ZONE_SHARE: Final = 0.22
+_HATCH_PX: Final = 14
 _FONT: Final = cv2.FONT_HERSHEY_SIMPLEX
 _PAD_PX: Final = 5
 _STEP_PX: Final = 4.0
@@ -90,6 +103,24 @@ def with_legend(picture: Picture, pixels_per_m: float, entries: Sequence[tuple[s
         cv2.rectangle(strip, (left, y - 4), (left + gap, y + 4), INK, 1)
         _text(strip, text, (left + 2 * gap, y), picture)
     return np.asarray(np.vstack([picture, strip]), np.uint8)
+
+
+def draw_zone(
+    picture: Picture, outlines: Sequence[NDArray[np.int32]], kind: str, colour: Colour, ahead: float | None
+) -> None:
+    """Tints a zone with these outlines (pixels, N x 2 each); hatches a keep-out zone, and draws `ahead` (rad)."""
+    inside = cv2.fillPoly(np.zeros(picture.shape[:2], np.uint8), list(outlines), 1).astype(bool)
+    share = np.full(picture.shape[:2], _ZONE_SHARE)
+    if kind == "keep_out":
+        share[np.add(*np.indices(share.shape)) % _HATCH_PX < 2] = 0.8
+    tinted = picture + share[..., None] * (np.array(colour) - picture)
+    picture[inside] = tinted.astype(np.uint8)[inside]
+    cv2.polylines(picture, list(outlines), True, colour, 2, cv2.LINE_AA)
+    for outline in outlines if ahead is not None else ():
+        middle = outline.mean(axis=0)
+        step = 0.2 * np.ptp(outline, axis=0).max() * np.array([np.cos(ahead or 0.0), -np.sin(ahead or 0.0)])
+        start, end = (np.round(middle + sign * step).astype(int).tolist() for sign in (-1, 1))
+        cv2.arrowedLine(picture, start, end, colour, 3, cv2.LINE_AA, tipLength=0.25)
 
 
 def _text(strip: Picture, text: str, left_middle: tuple[int, int], like: Picture) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
 from skills.quantities import Angle, Coordinate, Share, Speed
 
@@ -64,6 +65,25 @@ class Zone:
             f"{self.speed_m_s:g} m/s" if self.speed_m_s is not None else f"{100 * (self.share or 1):g} % of full speed"
         )
         return f"{_WORDS[self.kind].format(speed=speed if self.mask is None else 'the speed of its mask')}: {self.name}"
+
+
+def zone_messages(zones: Iterable[Zone]) -> list[dict[str, Any]]:
+    """Encodes the zones that have an outline: name, kind, rule in words, outlines (world frame, m), one-way direction.
+
+    The outlines of a mask are those of its keep-out cells or of its limits. Raises InputError for an unreadable mask.
+    """
+    found = []
+    for zone in zones:
+        outlines: list[Any] = [zone.corners_W]
+        if zone.mask is not None:
+            from skills.estimate.grid_map import load_filter_mask
+
+            least = 100 if zone.kind is ZoneKind.KEEP_OUT else 1
+            outlines = [each.round(3).tolist() for each in load_filter_mask(Path(zone.mask.file)).outlines_W(least)]
+        ahead = {"direction_rad": zone.direction_rad} if zone.kind is ZoneKind.ONE_WAY else {}
+        message = {"name": zone.name, "kind": zone.kind.value, "rule": zone.words, "outlines": outlines, **ahead}
+        found += [message] if outlines else []
+    return found
 
 
 _WORDS: Final = {

@@ -113,6 +113,7 @@
       brush.fillRect(0, 0, width, height);
       const frame = this.frame(width, height), names = (this.names = new Names(brush, width, height - FOOT_PX));
       this.drawGrid(brush, frame);
+      for (const zone of this.zones()) this.drawZone(brush, frame, zone);
       for (const [name, robot] of this.view.robots) {
         const style = this.styleOf(name);
         if (robot.reserved) this.drawReserved(brush, frame, robot.reserved, style);
@@ -179,6 +180,7 @@
         ...(this.view.destinations.length || any((each) => each.held) ? [["--object", "object found"]] : []),
         ...(this.map && this.map.dock ? [["--dock", "dock"]] : []),
         ...this.explainDoors(),
+        ...this.zones().map(({ kind, rule }) => [`--zone-${kind}`, rule]),
       ];
       const key = JSON.stringify(rows);
       if (key === this.explained) return;
@@ -210,6 +212,46 @@
         if (!known || (door.seen_s ?? -1) > (known.seen_s ?? -1)) latest.set(key, door);
       }
       return [...latest.values()];
+    }
+
+    // The zones of the newest mission of each robot, each once.
+    zones() {
+      const newest = new Map(this.view.trees.map((tree) => [tree.robot, tree.zones || []]));
+      return [...new Map([...newest.values()].flat().map((zone) => [zone.rule, zone])).values()];
+    }
+
+    // A zone is tinted; a keep-out zone is hatched, and a one-way zone has an arrow.
+    drawZone(brush, { at }, { name, kind, outlines, direction_rad: ahead }) {
+      const shape = new Path2D(), colour = css(`--zone-${kind}`), points = outlines.flat().map(([x, y]) => at(x, y));
+      for (const outline of outlines) {
+        outline.forEach(([x, y], n) => shape[n ? "lineTo" : "moveTo"](...at(x, y)));
+        shape.closePath();
+      }
+      const us = points.map((p) => p[0]), vs = points.map((p) => p[1]), low = [Math.min(...us), Math.min(...vs)], high = [Math.max(...us), Math.max(...vs)];
+      const [u, v] = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2], size = Math.max(high[0] - low[0], high[1] - low[1]);
+      const stroke = (...lines) => {
+        brush.beginPath();
+        for (const [from, ...to] of lines) { brush.moveTo(...from); for (const point of to) brush.lineTo(...point); }
+        brush.stroke();
+      };
+      brush.save();
+      brush.fillStyle = brush.strokeStyle = colour;
+      brush.lineWidth = 1.5;
+      brush.stroke(shape);
+      brush.globalAlpha = 0.2;
+      brush.fill(shape, "evenodd");
+      brush.clip(shape, "evenodd");
+      brush.globalAlpha = 0.7;
+      if (kind === "keep_out") for (let d = 0; d < 2 * size; d += 9) stroke([[low[0] + d, low[1]], [low[0] + d - size, low[1] + size]]);
+      brush.restore();
+      if (ahead !== undefined) {
+        const dir = (turn, length) => [length * Math.cos(ahead + turn), -length * Math.sin(ahead + turn)], [x, y] = dir(0, 0.2 * size);
+        const head = [2.6, -2.6].map((turn) => { const [dx, dy] = dir(turn, 9); return [u + x + dx, v + y + dy]; });
+        brush.strokeStyle = colour;
+        brush.lineWidth = 2.5;
+        stroke([[u - x, v - y], [u + x, v + y]], [head[0], [u + x, v + y], head[1]]);
+      }
+      if (!this.map || !this.map.places.some((place) => place.name === name)) this.names.add(name, u, v, css("--text"), `11px ${css("--font")}`);
     }
 
     line(brush, { at }, points, colour, dashes, thick = 2) {

@@ -12,6 +12,7 @@ from executive.record.announce import map_message
 from executive.record.event_log import EventLog, box_annotations, compress_picture, viewer_messages
 from executive.record.history import read_events
 from skills.estimate.grid_map import GridMap
+from skills.navigate.zones import Zone, ZoneKind, zone_messages
 
 SEEN = {"class_name": "coke", "score": 0.9, "box": [10, 20, 30, 40]}
 
@@ -60,6 +61,17 @@ def test_a_map_comes_back_the_right_way_up(knowledge, tmp_path, clock):
     assert (picture[3, 0], picture[0, 0]) == (0, 255)
     cells = np.frombuffer(base64.b64decode(grid.data["data"]), np.uint8).reshape(4, 6)
     assert (grid.topic, grid.data["column_count"], cells[0, 0], cells[1, 1]) == ("map/grid", 6, 100, 0)
+
+
+def test_zones_become_outlines_on_the_floor_with_their_rules():
+    zone = Zone("den", ZoneKind.KEEP_OUT, ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0)))
+    tree, (topic, scene) = viewer_messages("tree", {"robot": "Alice", "zones": zone_messages([zone])}, 1.5)
+    (entity,) = scene["entities"]
+    assert (tree[0], topic, entity["frame_id"]) == ("tree", "map/zones", "world")
+    assert [(p["x"], p["y"]) for p in entity["lines"][0]["points"]] == [(0, 0), (2, 0), (2, 2)]
+    assert entity["texts"][0]["text"] == "keep out of: den"
+    assert len(scene["deletions"]) == 1
+    assert len([*viewer_messages("tree", {"robot": "Alice"}, 1.5)]) == 1
 
 
 def test_every_topic_of_a_mission_has_a_schema_of_its_own(tmp_path, compiled, run_tree, make, clock):

@@ -11,6 +11,8 @@ from executive.record.history import Event
 from executive.view.map_picture import WIDTH_PX, map_picture
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from skills.files.errors import InputError
+from skills.files.map_drawing import ZONE_COLOURS, draw_zone
+from skills.navigate.zones import Zone, ZoneKind, zone_messages
 
 SCALE = WIDTH_PX / 7.0
 """Pixels per metre of the map below, 7 m x 3.5 m from (-1, -1)."""
@@ -67,6 +69,31 @@ def test_a_door_is_drawn_in_the_state_in_which_it_was_last_seen():
     events = (*EVENTS, doors(0.0, "unknown", None), doors(1.0, "closed", 1.0), doors(3.0, "open", 3.0))
     drawn = [colour_at(map_picture(events, at_s), 3.0, 1.0) for at_s in (0.5, 1.5, 3.5)]
     assert drawn == [UNKNOWN, CLOSED, TRAIL]
+
+
+def tree(stamp_s, *zones):
+    return Event("tree", stamp_s, {"robot": "Alice", "zones": zone_messages(zones)})
+
+
+def test_the_zones_of_the_newest_mission_are_drawn():
+    zone = Zone("den", ZoneKind.SILENT, ((1.0, -0.9), (3.0, -0.9), (3.0, -0.5), (1.0, -0.5)))
+    events = (*EVENTS, tree(1.0, zone), tree(3.0))
+    drawn = [colour_at(map_picture(events, at_s), 1.2, -0.9) for at_s in (0.5, 2.0, 3.5)]
+    assert drawn == [(255, 255, 255), ZONE_COLOURS["silent"][::-1], (255, 255, 255)]
+
+
+def test_a_keep_out_zone_is_hatched_and_a_one_way_zone_has_an_arrow():
+    outline = np.array([[10, 10], [190, 10], [190, 90], [10, 90]], np.int32)
+    pictures = {}
+    for kind, ahead in (("silent", None), ("keep_out", None), ("one_way", 0.0)):
+        pictures[kind] = np.full((100, 200, 3), 255, np.uint8)
+        draw_zone(pictures[kind], [outline], kind, ZONE_COLOURS[kind], ahead)
+    colours = {
+        kind: len(np.unique(picture[14:86, 14:186].reshape(-1, 3), axis=0)) for kind, picture in pictures.items()
+    }
+    assert (colours["silent"], colours["keep_out"]) == (1, 2)
+    assert tuple(pictures["one_way"][50, 100]) == ZONE_COLOURS["one_way"]
+    assert (pictures["silent"][5, 5] == 255).all()
 
 
 def test_the_footprint_is_where_the_robot_was_at_that_time():

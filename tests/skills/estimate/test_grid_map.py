@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 
-from skills.estimate.grid_map import GridMap, load_grid_map
+from skills.estimate.grid_map import FilterMask, GridMap, load_grid_map
 from skills.files.errors import InputError
 
 YAML = """image: room.pgm
@@ -310,3 +310,12 @@ def test_unknown_ground_that_counts_as_free_is_noted(tmp_path):
     (note,) = load_grid_map(path).notes
     assert "free_thresh is 0.25" in note
     assert load_grid_map(write_map(tmp_path)).notes == ()
+
+
+def test_the_outlines_of_a_turned_mask_lie_about_its_cells():
+    percent = np.zeros((20, 20), dtype=np.int16)
+    percent[5:10, 4:12] = 100
+    percent[15, 15] = 40
+    (outline,) = FilterMask(percent, 0.1, (2.0, 1.0, np.pi / 2)).outlines_W(100)
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    assert np.allclose((low, high), [(2.0 - 0.95, 1.45), (2.0 - 0.55, 2.15)])

@@ -42,6 +42,17 @@ def test_a_zone_of_a_mission_replaces_no_zone_of_the_world(knowledge, registry):
     assert [zone.words for zone in tree.zones] == ["keep out of: hall", "silent in: hall (mission)"]
 
 
+def test_the_log_of_the_tree_has_the_zones(run_tree, published, knowledge, registry):
+    group = Group(steps=(KITCHEN,), zones={"corner": CLOSED})
+    mission = Mission(name="round", robot="Alice", zones={"hall": QUIET}, steps=(HALL, group))
+    run_tree(compile_mission(mission, knowledge=knowledge, registry=registry))
+    (logged,) = (message for topic, message in published if topic == "tree")
+    assert [(zone["name"], zone["rule"]) for zone in logged["zones"]] == [
+        ("hall", "silent in: hall"),
+        ("corner", "keep out of: corner"),
+    ]
+
+
 def test_the_tree_names_the_zones_of_a_group(knowledge, registry):
     group = Group(steps=(KITCHEN,), zones={"corner": CLOSED, "hall": QUIET})
     tree = compile_mission(Mission(name="round", steps=(HALL, group)), knowledge=knowledge, registry=registry)

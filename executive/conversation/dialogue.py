@@ -160,8 +160,12 @@ class Conversation(RunVisitor):
     def _answer_mission(self, text: str, now_s: float) -> Reply | None:
         """Answers a question that the mission asks."""
         said = text.strip(" .,!?").lower()
+        begun = said.replace(",", " ").split()[:1]  # "yes, I am" begins with the answer
         for each in self._control.state.questions:
-            option = next((o for n, o in enumerate(each.options, 1) if said in (o.lower(), str(n))), None)
+            plain = begun[0] if begun and {o.lower() for o in each.options} == {"yes", "no"} else said
+            option = next(
+                (o for n, o in enumerate(each.options, 1) if o.lower() in (said, plain) or said == str(n)), None
+            )
             chosen = option or (text if not each.options else None)
             if chosen is not None:
                 return self._tried(partial(self._control.answer, each.id, chosen), f"{chosen}, then")

@@ -25,7 +25,7 @@ __all__ = ["Estimate", "Estimates", "Route", "RoutePlanner", "estimate_tree", "e
 
 _Mark = tuple[Pose2D, Mapping[str, Pose2D], float]
 Positive = Annotated[float, Field(gt=0.0)]
-NAVIGATE: Final = "navigate"
+_DRIVES: Final = frozenset({"navigate", "guide_person"})
 CHARGE: Final = "charge"
 DAY_S: Final = 86400.0
 USUALLY_FOUND: Final = 3
@@ -255,7 +255,7 @@ def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
 
 def _goal(node: NodeSpec, walk: _Walk) -> Pose2D | None:
     """Goal of a drive, as far as it is known before the run."""
-    binding = node.options["inputs"].get("goal") if node.name == NAVIGATE else None
+    binding = node.options["inputs"].get("goal") if node.name in _DRIVES else None
     if isinstance(binding, FromBoard):
         return walk.noted.get(binding.key)
     return binding.value if isinstance(binding, Constant) and isinstance(binding.value, Pose2D) else None

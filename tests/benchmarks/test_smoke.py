@@ -148,6 +148,11 @@ def test_the_speed_of_a_mission_is_measured():
 
 
 @pytest.mark.nightly
+def test_a_person_at_a_random_place_is_met():
+    assert result_of("people_missions", "--only", 9764, "--json")["missions"] == 1
+
+
+@pytest.mark.nightly
 def test_somebody_crosses_the_way():
     assert result_of("people_crossing", "--what", "crosses", "--count", 1, "--json")
 

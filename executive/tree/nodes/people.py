@@ -38,9 +38,6 @@ ANSWER_WITHIN_S: Final = 12.0
 STILL_NEAR_M: Final = 3.5
 STILL_NEAR_S: Final = 120.0
 """Distance and time within which a person whom an earlier step has met is still the same one."""
-_YES: Final = ("yes", "yeah", "yep", "yes i am", "i am", "that is me", "that's me", "yes that's me", "yes that is me")
-_NO: Final = ("no", "nope", "no i am not", "no i'm not", "i am not", "i'm not", "not me")
-_MEANING: Final = MappingProxyType({**dict.fromkeys(_YES, "yes"), **dict.fromkeys(_NO, "no")})
 
 
 class OnlyIfNear(OnlyIfKnown):
@@ -330,7 +327,7 @@ def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], 
         text=Template(f"Are you {person}?"),
         keys=MappingProxyType({}),
         options=("yes", "no"),
-        names=_MEANING,
+        names=MappingProxyType({"yes": "yes", "no": "no"}),
         gives=str,
         limit_s=ANSWER_WITHIN_S,
         default=None,

@@ -10,10 +10,10 @@ from skills.api import Cause, Failed, Succeeded
 
 NAMES = (
     "beer_else_coke", "charge_then_go", "check_hammer", "clear_table", "count_drinks", "deliver", "fetch_drink",
-    "find_hammer", "go_living_room", "go_to_pose", "guarded_delivery", "guarded_round", "hammer_to_kitchen",
-    "look_and_approach", "patrol", "patrol_and_report", "retry_elsewhere", "speak_while_driving",
-    "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table", "timed_visit", "two_drinks", "two_robots",
-    "visit_room", "wait_for_button", "watch_the_door", "welcome",
+    "find_hammer", "go_living_room", "go_to_pose", "greet_and_ask", "guarded_delivery", "guarded_round",
+    "guide_robin", "hammer_to_kitchen", "look_and_approach", "patrol", "patrol_and_report", "retry_elsewhere",
+    "speak_while_driving", "take_beer_to_bedroom", "tea_or_coffee", "tidy_cube", "tidy_table", "timed_visit",
+    "two_drinks", "two_robots", "visit_room", "wait_for_button", "watch_the_door", "welcome",
 )  # fmt: skip
 SURFACES_WITH_THINGS = ("kitchen counter", "kitchen table", "workbench", "tool trolley")
 
@@ -44,7 +44,9 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
         return Succeeded("charged")
 
     def somebody(skill):
-        return Succeeded("seen", {"observation": make.COKE, "observations": (make.COKE,)})
+        found = skill.inputs.avoid == ()
+        seen = {"observation": make.COKE, "observations": (make.COKE,)}
+        return Succeeded("seen", seen) if found else Failed(Cause.POSTCONDITION, "nobody else is there")
 
     def scripted(name, skill):
         made = make.scripted_skill(script, name, skill.Inputs, skill.outputs)
@@ -53,6 +55,7 @@ def run_mission(parser, flat, skills, run_tree, script, missions, make):
 
     script.seen_on = SURFACES_WITH_THINGS
     script.ends |= {"place": put_down, "grasp": hold, "detect": look, "charge": charge, "find_people": somebody}
+    script.ends["meet_person"] = lambda skill: Succeeded("beside them", {"person": make.COKE})
     script.ends["check_door"] = lambda skill: Succeeded("open", {"open": True, "free_m": 0.9})
     registry = {name: scripted(name, skill) for name, skill in skills.items()}
 

@@ -25,9 +25,9 @@ LINES = {
     "executive/conversation": 593,
     "executive/view": 1594,
     "executive/testing": 818,
-    "executive/app": 8208,
+    "executive/app": 8218,
     "executive/cli": 5018,
-    "skills": 28915,
+    "skills": 28922,
     "plant": 21826,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 506, 96, 13

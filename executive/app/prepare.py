@@ -23,7 +23,7 @@ from executive.mission.load import (
 )
 from executive.mission.request import Request
 from executive.mission.resolve import mission_from_file
-from executive.tree.compiler import compile_mission
+from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.registry import installed_skills
 from executive.words.knowledge import Knowledge, Pose, with_own_objects
 from executive.words.mission import DEFAULT_WORLD, Mission, MissionPart, QuestionPolicy
@@ -175,6 +175,7 @@ class Setting:
             except WorldError as error:
                 raise InputError(str(error), hint="take --people out") from error
         tree = compile_mission(mission, knowledge=self.knowledge, registry=installed_skills())
+        _check_masks(tree)
         request = replace(request, world_name=world.name, robot=mission.robot_name)
         name, robots = mission.robot_name, self.robots
         if not robots:
@@ -197,6 +198,15 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
             raise loaded.error(("world",), error.message, error.hint) from error
     knowledge = knowledge_of(world)
     return request, loaded, world if request.map is None else with_map(world, request.map), knowledge
+
+
+def _check_masks(tree: CompiledTree) -> None:
+    """Reads the filter masks of a tree's zones. Raises InputError for a mask that cannot be read."""
+    if files := [zone.mask.file for zone in tree.zones if zone.mask is not None]:
+        from skills.navigate.zone_map import read_mask  # most worlds have no masks, and need no pictures
+
+        for file in files:
+            read_mask(file)
 
 
 def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:

@@ -111,7 +111,7 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
     def _go_beside(self, place_W: tuple[float, float], name: str) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
         poses = facing_poses(place_W, self.context.pose(), self.options.apart_m)
-        footprint, costmap = ArmFootprint(self.context).now(), self.context.costmap
+        footprint, costmap = ArmFootprint(self.context).now(), self.context.free_space()
         free = [pose for pose in poses if footprint_clear(costmap, footprint, pose) and self._sees(pose, place_W)]
         if not free:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand beside {name}")

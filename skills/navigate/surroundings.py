@@ -274,8 +274,9 @@ class Surroundings:
         pace = self._pace.pace(self._context.clock.now(), here, ahead, self.persons(), most_m_s, goal)
         if self._zones is None:
             return pace
-        poses = np.vstack([pose_array([here]), follower.ahead(self._zones.braking_m(most_m_s))])
-        ahead_m = np.concatenate([[0.0], progress_m(poses[1:])])
+        on_path = follower.ahead(self._zones.braking_m(most_m_s))
+        poses = np.vstack([pose_array([here]), on_path[::2]])
+        ahead_m = np.concatenate([[0.0], progress_m(on_path)[::2]])
         return replace(pace, most_m_s=min(pace.most_m_s, self._zones.speed_m_s(self.footprint, poses, ahead_m)))
 
     def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:

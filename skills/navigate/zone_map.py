@@ -54,7 +54,8 @@ def zone_map(zones: tuple[Zone, ...], full_m_s: float) -> ZoneMap:
 
 
 @lru_cache(maxsize=16)
-def _mask(file: str) -> FilterMask:
+def read_mask(file: str) -> FilterMask:
+    """Reads a filter mask once. Raises InputError."""
     return load_filter_mask(Path(file))
 
 
@@ -63,7 +64,7 @@ class ZoneMap:
 
     def __init__(self, zones: Sequence[Zone], full_m_s: float) -> None:
         self._zones, self._full_m_s = tuple(zones), full_m_s
-        corners = [_mask(z.mask.file).corners_W if z.mask else np.array(z.corners_W) for z in zones]
+        corners = [read_mask(z.mask.file).corners_W if z.mask else np.array(z.corners_W) for z in zones]
         points = np.vstack([np.empty((0, 2)), *corners])
         low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.zeros(2))
         self.origin_m = low - _AROUND_M
@@ -89,7 +90,7 @@ class ZoneMap:
         """Values of a zone's mask in all cells, NaN where it says nothing: base + multiplier * percent."""
         assert zone.mask is not None
         x, y = np.meshgrid(*self.axes)
-        percent = _mask(zone.mask.file).at(np.column_stack([x.ravel(), y.ravel()])).reshape(self._shape)
+        percent = read_mask(zone.mask.file).at(np.column_stack([x.ravel(), y.ravel()])).reshape(self._shape)
         return np.where(percent < 0, np.nan, zone.mask.base + zone.mask.multiplier * percent)
 
     def ground(self, zone: Zone) -> BoolGrid:
@@ -296,7 +297,12 @@ def _row(pose: Pose2D) -> FloatArray:
 
 def _body_points(footprint: Footprint, grown_m: float = 0.0) -> FloatArray:
     """Points (N, 2) that cover the footprint, grown by a margin, in the body frame."""
-    discs = footprint.discs
+    return _points_of(footprint.discs.tobytes(), grown_m)
+
+
+@lru_cache(maxsize=16)
+def _points_of(buffer: bytes, grown_m: float) -> FloatArray:
+    discs = np.frombuffer(buffer).reshape(-1, 3)
     reach = discs[:, 2:] + grown_m
     low, high = np.min(discs[:, :2] - reach, axis=0), np.max(discs[:, :2] + reach, axis=0)
     axes = (np.linspace(a, b, 1 + math.ceil((b - a) / _SAMPLE_M)) for a, b in zip(low, high, strict=True))

@@ -213,3 +213,15 @@ def test_a_start_or_stack_for_one_robot_is_refused(own):
 def test_the_parts_of_different_files_have_different_prints(asked_file):
     texts = (PARTS, PARTS.replace("[{to: office}]", "[{to: office}, {dock: }]"))
     assert len({asked_file(text).request.fingerprint for text in texts}) == 2
+
+
+def test_a_mask_that_cannot_be_read_is_refused_before_the_run(tmp_path):
+    zones = "knowledge: {zones: {wet: {kind: keep_out, mask: mask.yaml}}}"
+    (tmp_path / "go.yaml").write_text(f"name: go\n{zones}\nsteps: [{{say: go to the kitchen}}]\n", encoding="utf-8")
+    (tmp_path / "mask.yaml").write_text(
+        "image: gone.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.25\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError) as caught:
+        prepare(Request(file=tmp_path / "go.yaml"), ask=None)
+    assert (caught.value.file, caught.value.line) == (tmp_path / "mask.yaml", 1)

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 8203,
     "executive/speech": 1582,
     "executive/mission": 1635,
-    "executive/tree": 8282,
+    "executive/tree": 8314,
     "executive/run": 3213,
     "executive/record": 1408,
     "executive/store": 1666,

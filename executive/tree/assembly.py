@@ -50,7 +50,8 @@ class Flow:
 
     `names` has the values that are certain to exist, `kinds` the types of all values that any step may have given, by
     their blackboard keys; `declared` are the names that always have a value. `held` is the object in the gripper;
-    `opening` is set while it is still the object from the beginning of the mission.
+    `opening` is set while it is still the object from the beginning of the mission. The people in `met`
+    stand where an earlier step has met them.
     """
 
     names: dict[str, Named] = field(default_factory=dict)
@@ -58,6 +59,7 @@ class Flow:
     declared: frozenset[str] = frozenset()
     held: InGripper | None = None
     opening: bool = True
+    met: frozenset[str] = frozenset()
 
     def copy(self) -> Flow:
         """Returns a copy, for a branch."""
@@ -75,11 +77,13 @@ class Flow:
         same = all(branch.held == first.held for branch in others)
         self.held = first.held if same else held_after_either(*(each.held for each in branches))
         self.opening = all(branch.opening for branch in branches)
+        self.met = frozenset.intersection(*(branch.met for branch in branches))
 
     def may_lack(self, before: Flow) -> None:
         """Merges with the flow before the last step, which may be skipped, so that its values may be missing."""
         after = {name: named for name, named in self.names.items() if named.is_same(before.names.get(name))}
         changed = {name for name, named in after.items() if before.names[name] != named}
+        self.met &= before.met
         self.names = after | {name: replace(after[name], quantity=None) for name in changed}
 
     def keys_of(self, *each: Expression | Template) -> Mapping[str, str]:

@@ -91,7 +91,8 @@ class PlanBuilder:
     `avoided`: objects there are at their goal. With `in_gripper`, an earlier step has grasped the object; `carried` is
     the object that an earlier step has grasped, whether this step uses it or not. A dropped object is picked up again
     at most `pick_ups` times; at most `move_aside` objects that block a grasp are moved aside. `following` is the next
-    command. `last_known` is where another robot last knew the object of the mission to be.
+    command. `last_known` is where another robot last knew the object of the mission to be. An earlier step has met the
+    people in `met`.
     """
 
     knowledge: Knowledge
@@ -108,6 +109,7 @@ class PlanBuilder:
     move_aside: int = 0
     following: Command | None = None
     last_known: LastKnown | None = None
+    met: frozenset[str] = frozenset()
 
     def at(self, *parts: str) -> PlanBuilder:
         """Returns the builder of a subtree below."""
@@ -116,6 +118,10 @@ class PlanBuilder:
     def key(self, name: str) -> str:
         """Returns a blackboard key of this subtree, for the node that writes it and the nodes that read it."""
         return f"{self.path_id}/{name}"
+
+    def met_key(self, person: str, of: str = "") -> str:
+        """Returns the blackboard key of a person as they were met last, the same in all steps of a mission."""
+        return f"{self.start_key.rpartition('/')[0]}/met-{slug(person)}{of}"
 
     def node(self, kind: str, name: str, *children: NodeSpec, part: str = "", **options: Any) -> NodeSpec:
         """Builds a node at this path id, or at the `part` below it."""

@@ -45,7 +45,9 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
         return _hand_over_plan(builder, item, FromBoard(builder.start_key), _person_at_start(builder))
     person = builder.knowledge.person(goal)
     if person is not None:
-        return _hand_over_plan(builder, item, person_pose(builder, person, command.goal_at), person)
+        met = person in builder.met and command.goal_at is None
+        pose = FromBoard(builder.met_key(person, "-beside")) if met else person_pose(builder, person, command.goal_at)
+        return _hand_over_plan(builder, item, pose, person)
     place = builder.place(goal)
     put, guards = put_down_plan(builder, item, place)
     skills = tuple(guard.children[0] for guard in guards if guard.children[0].kind == "skill")
@@ -54,7 +56,7 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
 
 def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
     """Carries the item to a person and holds it out; the gripper opens when the person takes it."""
-    to = "the start" if isinstance(pose, FromBoard) else person
+    to = "the start" if builder.command.goal == START else person
     ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
     hand_over = builder.skill("hand_over", ports, _released(builder, "hand_over"))

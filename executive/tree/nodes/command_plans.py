@@ -12,7 +12,7 @@ from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_w
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
-from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan
+from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan, met_after
 from executive.tree.nodes.pick_up import held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
     find_plan,
@@ -62,11 +62,12 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
         avoided=frozenset() if goal_of_next is None else frozenset(knowledge.surfaces_in(goal_of_next)),
         in_gripper=is_same(held, command.object, knowledge),
         carried=None if held is None else held.kind,
+        met=flow.met,
     )
     refuse_several(builder)
     refuse_everything(builder)
     node = _giving(assembler, step, _BY_TASK[command.task](builder), builder)
-    flow.held = held_after(command, held, knowledge)
+    flow.held, flow.met = held_after(command, held, knowledge), met_after(command, flow.met, knowledge)
     lets_go = command.item is not None or command.task is Task.PLACE
     flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not lets_go
     goal = command_goal(command, knowledge, _elsewhere(builder))

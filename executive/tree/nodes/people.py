@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import field
 from types import MappingProxyType
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
@@ -22,11 +22,10 @@ from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.recovery import OnlyIfKnown
 from executive.tree.nodes.speech import AskPeople
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.command import SPEAKER, START
-from executive.words.expression import Template
-from executive.words.knowledge import ANYBODY, Place
+from executive.words.command import SPEAKER, START, Command, Task
+from executive.words.expression import Template, Value
+from executive.words.knowledge import ANYBODY, Knowledge, Place
 from executive.words.outlines import inside
-from executive.words.slug import slug
 from skills.api import Cause, Failed, ObjectObservation
 from skills.quantities import Coordinate
 from skills.robot import Pose2D
@@ -70,16 +69,21 @@ class AskWhoItIs(AskPeople):
     | nobody answers within `limit_s` | FAILURE with TIMEOUT |
     | halted | INVALID with CANCELLED; the question is withdrawn |
 
-    After a success the observation of the person stands under `met`.
+    After a success the observation of the person stands under `met`, and the robot's pose beside them under `beside`.
     """
 
     kind = "who is it"
-    output_types: ClassVar = {"met": ObjectObservation}
     person: str
     seen: str
     observations: str
     met: str
+    beside: str
     always: bool
+
+    @classmethod
+    def writes(cls, options: Mapping[str, Any]) -> Mapping[str, Any]:
+        """Returns the keys of the answer, of the person and of the robot's pose, with their types."""
+        return {**super().writes(options), options["met"]: ObjectObservation, options["beside"]: Pose2D}
 
     def initialise(self) -> None:
         """Asks, if there is any doubt."""
@@ -104,12 +108,16 @@ class AskWhoItIs(AskPeople):
             return self.fail(Failed(Cause.POSTCONDITION, f"{where} is not {self.person}"))
         return self._met(f"{where} is {self.person}")
 
+    def report(self, answer: Value) -> None:
+        """Leaves the answer out of the findings, since the claim tells who was met."""
+
     def _here(self) -> ObjectObservation:
         here: ObjectObservation = self.context.board.get(self.seen)
         return here
 
     def _met(self, message: str) -> Status:
         self.context.board.put(self.met, self._here())
+        self.context.board.put(self.beside, self.context.pose())
         return self.say(message)
 
 
@@ -149,9 +157,11 @@ class EachInTurn(MemoryComposite):
     did: str = ""
     where: str = "here"
     met: str = ""
+    beside: str = ""
     whom: str = ""
     expected: bool = False
     limit: int = MOST_PEOPLE
+    context: RunContext
     board: Board
     _whys: tuple[str, ...] = field(default=(), init=False)
     _silent: tuple[ObjectObservation, ...] = field(default=(), init=False)
@@ -189,7 +199,7 @@ class EachInTurn(MemoryComposite):
     def _action_ended(self, action: Behaviour) -> None:
         """Notes the person, and ends or begins the next look."""
         seen = self.board.get(self.found)
-        self.board.put(self.over, (*self._over(), seen))
+        self.board.put(self.over, (*(each for each in self._over() if each != seen), seen))
         if action.status == Status.SUCCESS:
             if self.first:
                 self._end(None, message_of(action))
@@ -211,6 +221,7 @@ class EachInTurn(MemoryComposite):
             self._end(Cause.POSTCONDITION, nobody)
         elif self.first and self.expected and people == len(self._silent) == 1:
             self.board.put(self.met, self._silent[0])
+            self.board.put(self.beside, self.context.pose())
             self._end(None, f"{describe_seen(self._silent[0])}, taken for {self.whom}, which nobody confirmed")
         elif self._whys:
             more = f"; and {len(self._whys) - 4} more" if len(self._whys) > 4 else ""
@@ -252,9 +263,12 @@ class NextRoom(ExplainedLeaf):
         return self.say(f"the next room is the {room}")
 
 
-def met_key(builder: PlanBuilder, person: str) -> str:
-    """Blackboard key of the person as they were met last, the same in all steps of a mission."""
-    return f"{builder.start_key.rpartition('/')[0]}/met-{slug(person)}"
+def met_after(command: Command, met: frozenset[str], knowledge: Knowledge) -> frozenset[str]:
+    """Returns the people who stand where the robot has met them, after a command that succeeded."""
+    if command.task in (Task.FOLLOW, Task.GUIDE) and command.object is not None:
+        return met - {knowledge.person(command.object.name) or ""}
+    goes = command.task is None and command.item is None and command.goal is not None
+    return met | set(filter(None, (knowledge.person(command.goal or ""),))) if goes else met
 
 
 def person_text(person: str) -> str:
@@ -277,7 +291,7 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
 
     That is `place`, where the person is said to be, or else their usual room, then all other rooms, the nearest first.
     """
-    knowledge, met = builder.knowledge, met_key(builder, person)
+    knowledge, met = builder.knowledge, builder.met_key(person)
     usual = knowledge.room(builder.place(knowledge.people[person].at))
     said = usual if place is None else knowledge.room(place)
     others = tuple(dict.fromkeys(room for room in (usual, *knowledge.places) if room != said))
@@ -319,7 +333,7 @@ def _ports_of(builder: PlanBuilder, room: str) -> dict[str, object]:
 
 def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], *, expected: bool = True) -> NodeSpec:
     """Goes beside one person after the other, until one of them is the one who is meant."""
-    seen, observations, met = builder.key("seen"), builder.key("all"), met_key(builder, person)
+    seen, observations, met = builder.key("seen"), builder.key("all"), builder.met_key(person)
     who = builder.node(
         "who is it",
         f"is it {person}?",
@@ -336,10 +350,11 @@ def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], 
         seen=seen,
         observations=observations,
         met=met,
+        beside=builder.met_key(person, "-beside"),
         always=len(builder.knowledge.people) > 1 or not expected,
     )
     visit = builder.sequence(f"meet {person}", _go_beside(builder, person, seen, ports["place"]), who, part="visit")
-    options = {"met": met, "whom": person, "expected": expected, "first": True}
+    options = {"whom": person, "expected": expected, "first": True, "met": met, "beside": who.options["beside"]}
     return _each_person(builder, f"is {person} here?", person, ports, visit, **options)
 
 
@@ -411,7 +426,7 @@ def _with_person(builder: PlanBuilder, person: str, title: str, skill: str, port
     if person in (SPEAKER, ANYBODY):
         return builder.sequence(title, builder.skill(skill, ports))
     find = meet_plan(builder.at("meet"), person)
-    return builder.sequence(title, find, builder.skill(skill, {**ports, "place_W": PlaceOf(met_key(builder, person))}))
+    return builder.sequence(title, find, builder.skill(skill, {**ports, "place_W": PlaceOf(builder.met_key(person))}))
 
 
 def greet_plan(builder: PlanBuilder) -> NodeSpec:

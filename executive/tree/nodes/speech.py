@@ -92,11 +92,15 @@ class AskPeople(ExplainedLeaf):
         if answer is not None:
             self.context.board.put(self.key, answer)
             self.cause, self.message = None, f"{self._text}: {answer}"
-            note = {"node": self.path_id, "question": self._text, "answer": answer, "message": self.message}
-            self.context.publish(ANSWER_TOPIC, note)
+            self.report(answer)
             return Status.SUCCESS
         self._put(f"I did not understand '{said[:60]}'. {self._text}")
         return Status.RUNNING
+
+    def report(self, answer: Value) -> None:
+        """Publishes the answer as a finding of the mission."""
+        note = {"node": self.path_id, "question": self._text, "answer": answer, "message": self.message}
+        self.context.publish(ANSWER_TOPIC, note)
 
     def terminate(self, new_status: Status) -> None:
         """Withdraws an open question when the node is stopped from outside."""

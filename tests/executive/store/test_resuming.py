@@ -233,6 +233,33 @@ def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, s
         assert result.worst.message.startswith("moved two cokes"), told
 
 
+def test_after_a_kill_in_any_tick_each_person_has_been_greeted(live, store, script, make):
+    places = ((0.5, 0.0, 0.8), (-0.5, 1.0, 0.8))
+
+    def person(place):
+        return dataclasses.replace(make.COKE, kind=ObjectKind("person"), position_W=place)
+
+    def look(skill):
+        left = [place for place in places if all(one.position_W != place for one in skill.inputs.avoid)]
+        seen = tuple(map(person, left))
+        found = {"observation": seen[0], "observations": seen} if seen else {}
+        return Succeeded("seen", found) if seen else Failed(Cause.POSTCONDITION, "nobody else is there")
+
+    script.steps = 2
+    script.ends["find_people"] = look
+    script.ends["meet_person"] = lambda skill: Succeeded("beside", {"person": person((*skill.inputs.place_W, 0.8))})
+    greet = ("Take [Nothing] to [hall] and do [greet] to [some person]",)
+    _, ticks, _ = live(greet)
+    for moment in range(1, ticks):
+        store.remove(store.missions()[0].id)
+        assert live(greet, kill_after=moment)[0] is None
+        greeted = script.begun.count("speak")
+        result, _, recollection = live(greet)
+        told = (moment, result.worst.message, recollection.log)
+        assert (result.outcome, result.worst.message) == (Outcome.SUCCESS, "greeted 2 people in the hall"), told
+        assert 2 <= greeted + script.begun.count("speak") <= 3, told
+
+
 def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot, world, script, make):
     script.ends["approach"] = lambda skill: Succeeded("near", {"observation": skill.inputs.observation})
     cube, allowed = dataclasses.replace(make.COKE, kind=ObjectKind("cube")), Policy(move_aside=1)

@@ -97,9 +97,7 @@ def test_robot_asks_each_person_in_the_usual_room_until_one_is_meant(result_of, 
 def test_the_claim_says_where_the_person_is(result_of, there):
     there["Robin"] = (4.0, 1.0, "kitchen")
     result = result_of(TO_ROBIN)
-    states = [state.message for state in result.states.values()]
-    assert "somebody at (4.00, 1.00) in the kitchen is Robin" in states
-    assert result.outcome is Outcome.SUCCESS
+    assert (result.outcome, result.message) == (Outcome.SUCCESS, "somebody at (4.00, 1.00) in the kitchen is Robin")
 
 
 def test_a_person_who_is_not_in_the_usual_room_is_looked_for_in_the_nearest_others_first(result_of, there, script):
@@ -126,7 +124,7 @@ def test_the_claim_says_that_nobody_confirmed_who_it_is(result_of, there):
     there["mute"] = (1.0, 0.0, "hall")
     result = result_of(TO_ROBIN)
     assert result.outcome is Outcome.SUCCESS
-    assert "taken for Robin, which nobody confirmed" in "".join(state.message for state in result.states.values())
+    assert result.message == "somebody at (1.00, 0.00) in the hall, taken for Robin, which nobody confirmed"
 
 
 def test_somebody_who_does_not_answer_elsewhere_is_not_taken_for_the_person(result_of, there):
@@ -162,6 +160,22 @@ def test_a_person_who_left_is_looked_for_again(result_of, there, script):
     guide = "Take [Nothing] to [kitchen] and do [guide] to [Robin]"
     assert result_of(guide, TO_ROBIN).outcome is Outcome.SUCCESS
     assert script.begun.count("find_people") == 3
+
+
+def test_a_drink_is_brought_to_where_the_person_was_met(result_of, there, script, robot):
+    there["Robin"] = (4.0, 1.0, "kitchen")
+    given = []
+
+    def give(skill):
+        given.append((robot.standing.x_m, robot.standing.y_m))
+        skill.context.robot._robot.holding = False
+        return Succeeded("given", {"released_W": (0.0, 0.0, 0.9)})
+
+    script.ends["hand_over"] = give
+    get = "Take [Nothing] to [kitchen] and do [grasp] to [drink]"
+    result = result_of(TO_ROBIN, get, "Take [drink] to [Robin] and do [Nothing] to [Nothing]")
+    assert result.outcome is Outcome.SUCCESS, result.message
+    assert given == [(3.0, 1.0)]
 
 
 def test_each_person_in_the_room_is_greeted_once(result_of, there, script):

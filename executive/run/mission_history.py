@@ -2,8 +2,9 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Final
 
 from py_trees.behaviour import Behaviour
@@ -65,7 +66,7 @@ class Executions:
         self._keys = history_keys(tree.robot_name, tree.mission_name)
         parts = {part.node or part.path_id for part in tree.parts}
         self._parts = frozenset(n.path_id for n in tree.root.walk() if n.path_id in parts or is_speech(n))
-        self._below: Mapping[str, frozenset[str]] = dict(_below(tree.root, self._parts))
+        self._below: Mapping[str, frozenset[str]] = _below(tree.root, self._parts)
         self._base = frozenset(
             n.path_id for n in tree.root.walk() if n.kind == "skill" and Part.BASE in n.options["skill"].uses
         )
@@ -160,13 +161,11 @@ def _executions_key(path_id: str) -> str:
     return f"{path_id}/executions"
 
 
-def _below(node: NodeSpec, parts: frozenset[str]) -> Iterator[tuple[str, frozenset[str]]]:
-    """Iterates over the nodes that are parts or have parts below them, each with these parts."""
-    found = frozenset(below.path_id for below in node.walk()) & parts
-    if found:
-        yield node.path_id, found
-        for child in node.children:
-            yield from _below(child, parts)
+def _below(node: NodeSpec, parts: frozenset[str]) -> Mapping[str, frozenset[str]]:
+    """Returns the nodes that are parts or have parts below them, parents first, each with these parts."""
+    below = [_below(child, parts) for child in node.children]
+    own = (parts & {node.path_id}).union(*(next(iter(each.values()), ()) for each in below))
+    return {node.path_id: own, **dict(chain.from_iterable(each.items() for each in below))} if own else {}
 
 
 class Findings:

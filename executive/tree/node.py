@@ -37,9 +37,11 @@ class NodeSpec:
 
     def walk(self) -> Iterator[NodeSpec]:
         """Iterates over the node and all its descendants, parents first."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        left = [self]
+        while left:
+            node = left.pop()
+            yield node
+            left += reversed(node.children)
 
     def with_options(self, **options: Any) -> NodeSpec:
         """Returns a copy of the node with some options changed."""

@@ -185,8 +185,13 @@ def outline(root: NodeView) -> NodeView:
     """Returns the mission as its author wrote it: each step is one row with its policy, and so is each chain of nodes
     with a single child. A row has the path id and state of its first node, and the name of its step.
     """
-    authored = {row.path_id for _, row in root.walk() if any(below.step for _, below in row.walk())}
-    return _outline_row(root, authored)
+    return _outline_row(root, _authored(root))
+
+
+def _authored(node: NodeView) -> set[str]:
+    """Path ids of the steps, and of the nodes with steps below them."""
+    below = set[str]().union(*map(_authored, node.children))
+    return below | {node.path_id} if below or node.step else below
 
 
 def _outline_row(node: NodeView, authored: set[str]) -> NodeView:

@@ -25,7 +25,7 @@ def kill_in(leaf: str, after_s: float, process: subprocess.Popen, out: Path) -> 
     while begun_s is None or clock_s(out) < begun_s + after_s:
         assert process.poll() is None, "it ended before it was killed"
         begun_s = begun_s or began_s(leaf, out)
-        time.sleep(0.05)
+        time.sleep(0.3)
     process.send_signal(signal.SIGKILL)
     process.wait()
 

@@ -242,9 +242,11 @@ class Summary(ExplainedDecorator):
     def update(self) -> Status:
         """Returns the child's status, with the skipped steps."""
         status = self.pass_on()
+        if status != Status.SUCCESS:
+            return status
         nodes = [node for node in self.iterate() if isinstance(node, Skip) and node.status == Status.SUCCESS]
         skipped = {node.path_id: f"{node.step} ({node.skipped})" for node in nodes if node.skipped is not None}
-        if status != Status.SUCCESS or not skipped:
+        if not skipped:
             return status
         steps = "; ".join(skipped.values())
         if skipped.keys() >= set(self.steps):

@@ -324,7 +324,7 @@ class SkillContext:
         """Returns the name of the silent zone in which the robot stands, or None."""
         if not any(zone.kind is ZoneKind.SILENT for zone in self.zones):
             return None
-        return next(iter(self.zone_map().names_with_origin(ZoneKind.SILENT, self.pose())), None)
+        return next(iter(self.zone_map().names_at(ZoneKind.SILENT, self.pose())), None)
 
     def X_WB(self) -> RigidTransform:
         """Returns the body's estimated pose in the world."""

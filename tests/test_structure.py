@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3286,
+    "executive/words": 3275,
     "executive/language": 8203,
     "executive/speech": 1582,
     "executive/mission": 1635,
@@ -25,9 +25,9 @@ LINES = {
     "executive/conversation": 593,
     "executive/view": 1594,
     "executive/testing": 818,
-    "executive/app": 8218,
+    "executive/app": 8219,
     "executive/cli": 5018,
-    "skills": 28922,
+    "skills": 28883,
     "plant": 21826,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 506, 96, 13

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from executive.app.mission_files import mission_file
@@ -203,10 +204,10 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
 def _check_masks(tree: CompiledTree) -> None:
     """Reads the filter masks of a tree's zones. Raises InputError for a mask that cannot be read."""
     if files := [zone.mask.file for zone in tree.zones if zone.mask is not None]:
-        from skills.navigate.zone_map import read_mask  # most worlds have no masks, and need no pictures
+        from skills.estimate.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
 
         for file in files:
-            read_mask(file)
+            load_filter_mask(Path(file))
 
 
 def _named_robots(loaded: Mission | None, world: World, knowledge: Knowledge) -> tuple[RobotConfig, ...]:

@@ -53,31 +53,17 @@ class ZoneFacts(_Frozen):
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> ZoneFacts:
-        limited, one_way = self.kind is ZoneKind.SPEED_LIMIT, self.kind is ZoneKind.ONE_WAY
-        grounds = sum(each is not None for each in (self.place, self.polygon, self.mask))
-        limits = sum(each is not None for each in (self.speed, self.share))
-        faults = (
-            (grounds != 1, "give one of 'place', 'polygon' and 'mask'"),
-            (self.info is not None and self.mask is None, "'info' belongs to a 'mask'"),
-            (
-                self.mask is not None and self.kind not in (ZoneKind.KEEP_OUT, ZoneKind.SPEED_LIMIT),
-                "a zone with a 'mask' is of kind 'keep_out' or 'speed_limit'",
-            ),
-            (limits > 0 and not limited, f"'speed' and 'share' belong to the kind 'speed_limit', not '{self.kind}'"),
-            (
-                limits > 0 and self.mask is not None,
-                "the values of the 'mask' are its limits: remove 'speed' and 'share'",
-            ),
-            (limits != 1 and limited and self.mask is None, "a 'speed_limit' has one of 'speed' and 'share'"),
-            (one_way and self.direction is None, "a 'one_way' zone has a 'direction'"),
-            (
-                not one_way and self.direction is not None,
-                f"'direction' belongs to the kind 'one_way', not '{self.kind}'",
-            ),
-        )
-        wrong = next((message for bad, message in faults if bad), None)
-        if wrong is not None:
-            raise ValueError(wrong)
+        given = {name for name in type(self).model_fields if name != "kind" and getattr(self, name) is not None}
+        if len(given & _GROUNDS) != 1:
+            raise ValueError("give one of 'place', 'polygon' and 'mask'")
+        masked = "mask" in given
+        if masked and self.kind not in _PLAIN_INFO:
+            raise ValueError("a zone with a 'mask' is of kind 'keep_out' or 'speed_limit'")
+        wanted = () if masked else _KEYS.get(self.kind, ())
+        extra = given - _GROUNDS - ({"info"} if masked else set())
+        if len(extra) != bool(wanted) or not extra <= {*wanted}:
+            where, what = " with a mask" if masked else "", " or ".join(map(repr, wanted)) or "no other key"
+            raise ValueError(f"a zone of kind '{self.kind}'{where} has {what} beside its ground")
         return self
 
     def zone(self, name: str, rooms: Mapping[str, Polygon]) -> Zone:
@@ -118,6 +104,9 @@ ZONES: Final = (
     f"rooms, as in `{_EXAMPLE}`."
 )
 
+_GROUNDS: Final = {"place", "polygon", "mask"}
+_KEYS: Final = {ZoneKind.SPEED_LIMIT: ("speed", "share"), ZoneKind.ONE_WAY: ("direction",)}
+"""Keys of which a zone has one, by its kind."""
 _PLAIN_INFO: Final = {
     ZoneKind.KEEP_OUT: FilterInfo(type=FilterType.KEEP_OUT),
     ZoneKind.SPEED_LIMIT: FilterInfo(type=FilterType.SPEED_SHARE, base=100.0, multiplier=-1.0),

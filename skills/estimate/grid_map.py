@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Annotated, Any, Final, Literal
 
@@ -178,8 +179,9 @@ class FilterMask:
         return np.where(inside, self.percent[row.clip(0, rows - 1), column.clip(0, columns - 1)], np.int16(-1))
 
 
+@lru_cache(maxsize=16)
 def load_filter_mask(path: Path) -> FilterMask:
-    """Reads a filter mask of Nav2, in the map_server form. Raises InputError as `load_grid_map`."""
+    """Reads a filter mask of Nav2, in the map_server form, once. Raises InputError as `load_grid_map`."""
     _, file, picture, _ = _read(path)
     occupied, unknown = _classify(picture, file)
     percent = np.where(occupied, 100, 0).astype(np.int16)

@@ -57,7 +57,7 @@ class DoorWatch:
 
     def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
         self._context, self._begun_s = context, context.clock.now()
-        self._options = options or DoorOptions()
+        self.options = options or DoorOptions()
         self._doubted: frozenset[Doorway] = frozenset()
         sides = [y for _, y in context.robot.capabilities().footprint_m]
         self._width_m = max(sides) - min(sides)
@@ -71,14 +71,14 @@ class DoorWatch:
         seen = self._context.door_memory.last_seen(door)
         if seen.state is not DoorState.CLOSED or seen.seen_s >= self._begun_s:
             return seen.state is DoorState.CLOSED
-        return door not in self._doubted and self._context.clock.now() <= seen.seen_s + self._options.trust_s
+        return door not in self._doubted and self._context.clock.now() <= seen.seen_s + self.options.trust_s
 
     def look(self) -> None:
         """Judges the doors in view by the newest scan."""
         scan, estimate = self._context.robot.scan(), self._context.localiser.estimate()
         if not self._context.doors or scan is None or not estimate.localised:
             return
-        X_WL, options, memory = estimate.X_WO @ scan.X_OB @ scan.X_BL, self._options, self._context.door_memory
+        X_WL, options, memory = estimate.X_WO @ scan.X_OB @ scan.X_BL, self.options, self._context.door_memory
         place = float(X_WL.translation()[0]), float(X_WL.translation()[1])
         for door in self._context.doors:
             if door.distance_m(place) > options.reach_m or door.view_angle_rad(place) > options.flattest_rad:
@@ -127,22 +127,14 @@ class DoorWatch:
         return bool(costmap.clear_obstacles(np.array(discs)))
 
     def regions(
-        self,
-        footprint: Footprint,
-        here: Pose2D,
-        goals: Sequence[Pose2D],
-        people_W: Sequence[tuple[float, float]] = (),
-        costmap: FreeSpace | None = None,
+        self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> Regions:
-        """The regions in which a disc as wide as the robot can move, without people and with all other doors open.
-
-        `costmap` replaces that of the context.
-        """
+        """The regions in which a disc as wide as the robot can move, without people and with all other doors open."""
         closed = self.closed
         axes = [door.axis(_THROUGH_M, 0.5 * _CELL_M) for door in self._context.doors if door not in closed]
         discs = [np.array(place) + _PERSON_M for place in people_W]
         return Regions(
-            self.costmap(costmap or self._context.costmap),
+            self.costmap(self._context.free_space()),
             footprint,
             here,
             goals,
@@ -150,17 +142,12 @@ class DoorWatch:
         )
 
     def blocking_doors(
-        self,
-        footprint: Footprint,
-        here: Pose2D,
-        goals: Sequence[Pose2D],
-        people_W: Sequence[tuple[float, float]] = (),
-        costmap: FreeSpace | None = None,
+        self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D], people_W: Sequence[tuple[float, float]] = ()
     ) -> tuple[Doorway, ...]:
         """The closed doors that block every path to the goals; none where a goal is reachable."""
         if not self.closed:
             return ()
-        regions = self.regions(footprint, here, goals, people_W, costmap)
+        regions = self.regions(footprint, here, goals, people_W)
         return regions.doors_between(self.closed) if regions.cut_off else ()
 
 

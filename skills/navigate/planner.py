@@ -171,7 +171,7 @@ def _solve_with_zones(problem: Problem, zones: ZoneMap) -> Path:
     try:
         return solve(replace(problem, zones=costs()))
     except NoPathError as error:
-        if zones.names_with_origin(ZoneKind.ONE_WAY, start):
+        if zones.names_at(ZoneKind.ONE_WAY, start):
             return solve(replace(problem, zones=costs(leave=start)))
         against = zones.against(solve(problem).poses)
         if not against:

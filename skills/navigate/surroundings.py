@@ -15,7 +15,7 @@ from skills.navigate.giving_way import Avoided, GivingWay, GivingWayOptions
 from skills.navigate.path import progress_m
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, ScanHealthOptions, WatchOptions
 from skills.navigate.zone_map import KeepOut, ZoneMap
-from skills.navigate.zones import ZoneKind
+from skills.navigate.zones import Zone, ZoneKind
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
@@ -246,18 +246,20 @@ class Surroundings:
 
     def forbidding_zones(self, goal: Pose2D) -> tuple[str, ...]:
         """Names of the keep-out zones into which the body reaches at a goal."""
-        return () if self._zones is None else self._zones.names_at(ZoneKind.KEEP_OUT, self.footprint, goal)
+        return () if self._zones is None else self._zones.names_at(ZoneKind.KEEP_OUT, goal, self.footprint)
 
     def zones_between(self, goals: Sequence[Pose2D]) -> tuple[str, ...]:
-        """Names of the keep-out zones that leave no path to any of the goals."""
-        if self._zones is None or not self.cut_off(goals):
-            return ()
-        return self._zones.names_between(lambda zones: self._cut_off_by(zones, goals))
+        """Names of the keep-out zones that cut all goals off: one that does alone, else all of them."""
+        zones = [zone for zone in self._context.zones if zone.kind is ZoneKind.KEEP_OUT]
 
-    def _cut_off_by(self, zones: ZoneMap, goals: Sequence[Pose2D]) -> bool:
-        here, costmap = self._context.pose(), self._context.costmap
-        space = KeepOut(zones).space(costmap, self.footprint, here)
-        return self.doors.regions(self.footprint, here, goals, costmap=space).cut_off
+        def opens(left_out: Sequence[Zone]) -> bool:
+            rest = tuple(zone for zone in zones if zone not in left_out)
+            doors = DoorWatch(replace(self._context, zones=rest), self.doors.options)
+            return not doors.regions(self.footprint, self._context.pose(), goals).cut_off
+
+        if not zones or opens(()) or not opens(zones):
+            return ()
+        return next(((zone.name,) for zone in zones if opens([zone])), tuple(zone.name for zone in zones))
 
     def costmap(self, here: Pose2D, goal: Pose2D, avoided: Avoided = Avoided.BODIES) -> FreeSpace:
         """The costmap with zones, closed doors, robots, and people as far from them as `here` and the goal allow."""
@@ -282,11 +284,11 @@ class Surroundings:
     def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
         """The closed doors that leave no path to any of the goals."""
         people_W = [one.place_W for one in self.persons()]
-        return self.doors.blocking_doors(self.footprint, self._context.pose(), goals, people_W, self.free_space())
+        return self.doors.blocking_doors(self.footprint, self._context.pose(), goals, people_W)
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
         """Returns whether all goals are certainly out of reach."""
-        return self.doors.regions(self.footprint, self._context.pose(), goals, costmap=self.free_space()).cut_off
+        return self.doors.regions(self.footprint, self._context.pose(), goals).cut_off
 
     def clear_obstacles(self) -> bool:
         """Clears the obstacle layer of the costmap; returns whether a cell was cleared."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.estimate.compiled import distances
-from skills.estimate.grid_map import BoolGrid, FilterMask, load_filter_mask, signed_distance
+from skills.estimate.grid_map import BoolGrid, load_filter_mask, signed_distance
 from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, WithObstacles, clearance_on_grid, disc_centres
 from skills.navigate.motion_cost import ZoneCosts
 from skills.navigate.zones import FilterType, Zone, ZoneKind
@@ -53,18 +53,12 @@ def zone_map(zones: tuple[Zone, ...], full_m_s: float) -> ZoneMap:
     return ZoneMap(zones, full_m_s)
 
 
-@lru_cache(maxsize=16)
-def read_mask(file: str) -> FilterMask:
-    """Reads a filter mask once. Raises InputError."""
-    return load_filter_mask(Path(file))
-
-
 class ZoneMap:
     """Zones on a grid; off it there are none. It never changes, so that a plan may use it in a thread."""
 
     def __init__(self, zones: Sequence[Zone], full_m_s: float) -> None:
         self._zones, self._full_m_s = tuple(zones), full_m_s
-        corners = [read_mask(z.mask.file).corners_W if z.mask else np.array(z.corners_W) for z in zones]
+        corners = [load_filter_mask(Path(z.mask.file)).corners_W if z.mask else np.array(z.corners_W) for z in zones]
         points = np.vstack([np.empty((0, 2)), *corners])
         low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.zeros(2))
         self.origin_m = low - _AROUND_M
@@ -90,7 +84,9 @@ class ZoneMap:
         """Values of a zone's mask in all cells, NaN where it says nothing: base + multiplier * percent."""
         assert zone.mask is not None
         x, y = np.meshgrid(*self.axes)
-        percent = read_mask(zone.mask.file).at(np.column_stack([x.ravel(), y.ravel()])).reshape(self._shape)
+        percent = (
+            load_filter_mask(Path(zone.mask.file)).at(np.column_stack([x.ravel(), y.ravel()])).reshape(self._shape)
+        )
         return np.where(percent < 0, np.nan, zone.mask.base + zone.mask.multiplier * percent)
 
     def ground(self, zone: Zone) -> BoolGrid:
@@ -138,24 +134,11 @@ class ZoneMap:
         """Distance (m) ahead in which limits count at a speed."""
         return _EARLY_M + speed_m_s**2 / (2.0 * _BRAKING_M_S2)
 
-    def names_at(self, kind: ZoneKind, footprint: Footprint, pose: Pose2D) -> tuple[str, ...]:
-        """Names of the zones of a kind that the body touches at a pose, or comes nearer to than a safe margin."""
-        points = disc_centres(_body_points(footprint, SAFE_MARGIN_M), _row(pose))[0]
-        row, column, _ = self.cells(points)
+    def names_at(self, kind: ZoneKind, pose: Pose2D, footprint: Footprint | None = None) -> tuple[str, ...]:
+        """Names of the zones of a kind in which the body's origin is, or that a footprint at a pose comes near to."""
+        points = np.zeros((1, 2)) if footprint is None else _body_points(footprint, SAFE_MARGIN_M)
+        row, column, _ = self.cells(disc_centres(points, _row(pose))[0])
         return tuple(zone.name for zone in self._of(kind) if self.ground(zone)[row, column].any())
-
-    def names_between(self, cut_off: Callable[[ZoneMap], bool]) -> tuple[str, ...]:
-        """Names of the keep-out zones that cut a goal off: one that does alone, else all; none if it is cut off anyway.
-
-        `cut_off` returns whether the zones of a map cut the goal off.
-        """
-        names = [zone.name for zone in self._of(ZoneKind.KEEP_OUT)]
-        if cut_off(self._without(*names)):
-            return ()
-        return tuple(name for name in names if not cut_off(self._without(name)))[:1] or tuple(names)
-
-    def _without(self, *names: str) -> ZoneMap:
-        return zone_map(tuple(zone for zone in self._zones if zone.name not in names), self._full_m_s)
 
     @cached_property
     def _factors(self) -> Floats:
@@ -173,10 +156,9 @@ class ZoneMap:
 
     def has_costs(self, start: Pose2D) -> bool:
         """Returns whether some motions from a start cost more than others."""
-        row, column, _ = self.cells(_row(start))
-        kinds = (ZoneKind.PREFERRED, ZoneKind.ONE_WAY, ZoneKind.SPEED_LIMIT)
-        masks = any(zone.mask is not None for zone in self._zones)
-        return masks or bool(self._of(*kinds)) or bool(self.keep_out[row, column].any())
+        costly = (ZoneKind.PREFERRED, ZoneKind.ONE_WAY, ZoneKind.SPEED_LIMIT)
+        masked = any(zone.mask is not None for zone in self._zones)
+        return masked or bool(self._of(*costly)) or bool(self.names_at(ZoneKind.KEEP_OUT, start))
 
     def costs(self, xs: FloatArray, ys: FloatArray, forward_m_s: float, leave: Pose2D | None = None) -> ZoneCosts:
         """Costs at the points of a grid with these x and y; `forward_m_s` is the speed without a limit.
@@ -188,7 +170,7 @@ class ZoneMap:
         row, column, on = self.cells(np.stack(np.meshgrid(xs, ys), axis=-1).reshape(-1, 2))
         slower = forward_m_s / np.minimum(self._limits_m_s[row, column], forward_m_s)
         factor.reshape(-1)[on] = self._factors[row, column] * slower
-        left = () if leave is None else self.names_with_origin(ZoneKind.ONE_WAY, leave)
+        left = () if leave is None else self.names_at(ZoneKind.ONE_WAY, leave)
         for zone in self._of(ZoneKind.ONE_WAY):
             cells = np.zeros(factor.shape, dtype=np.bool_)
             cells.reshape(-1)[on] = self.ground(zone)[row, column]
@@ -197,11 +179,6 @@ class ZoneMap:
             else:
                 course[cells] = zone.direction_rad
         return ZoneCosts(factor, course, cv2.erode(factor, np.ones((13, 13), np.uint8)).astype(np.float32))
-
-    def names_with_origin(self, kind: ZoneKind, pose: Pose2D) -> tuple[str, ...]:
-        """Names of the zones of a kind in which the body's origin is."""
-        row, column, _ = self.cells(_row(pose))
-        return tuple(zone.name for zone in self._of(kind) if self.ground(zone)[row, column].any())
 
     def against(self, poses: FloatArray) -> tuple[str, ...]:
         """Names of the one-way zones in which a path (N, 3) goes against the direction."""
@@ -240,7 +217,9 @@ class KeepOut:
             self.reset()
             return WithObstacles(costmap, self._distance_m(self._whole))
         self._steps = _steps_out(self._zones, costmap, footprint) if self._steps is None else self._steps
-        level = self._level_at(pose)
+        (i,), (j,) = self._zones.cells(_row(pose))[:2]
+        around = self._steps[max(0, i - _BESIDE) : i + _BESIDE + 1, max(0, j - _BESIDE) : j + _BESIDE + 1]
+        level = int(around.min()) if keep_out[i, j] else 0
         if level == _NEVER:
             return WithObstacles(costmap, self._distance_m(self._whole))
         body = self._steps[row, column]
@@ -249,15 +228,6 @@ class KeepOut:
         if self._deeper is None or self._deeper[0] != most:
             self._deeper = most, signed_distance(keep_out & (self._steps > most), _CELL_M)
         return WithObstacles(costmap, self._distance_m(self._deeper[1]))
-
-    def _level_at(self, pose: Pose2D) -> int:
-        """Steps from the body's origin to the outside, 0 where it is outside."""
-        assert self._steps is not None
-        row, column, _ = self._zones.cells(_row(pose))
-        if not self._zones.keep_out[row, column].any():
-            return 0
-        (i,), (j,) = row, column
-        return int(self._steps[max(0, i - _BESIDE) : i + _BESIDE + 1, max(0, j - _BESIDE) : j + _BESIDE + 1].min())
 
     def _distance_m(self, field: Floats) -> Callable[[FloatArray], FloatArray]:
         """Distance of points from the cells of a field; infinite off the grid, which is wider than the zones."""

@@ -82,8 +82,8 @@ SCHEMA_PAGES = (
         "Scenario files",
         "A scenario: `errand run --scenario FILE`, also `evaluate`. Times are those "
         "of the robot's clock, in seconds from the beginning of the run. A door waits for who is in the doorway; a "
-        "person passes through a closed one. What a gripper holds is not moved. The robot learns of none of it but by "
-        "its sensors. [Faults by name](faults.md) lists the faults.",
+        "person waits before a closed one, or takes another path. What a gripper holds is not moved. The robot learns "
+        "of none of it but by its sensors. [Faults by name](faults.md) lists the faults.",
         ScenarioFile,
         "missions/scenarios/busy_flat.yaml",
     ),

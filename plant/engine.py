@@ -52,7 +52,7 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self.robots = {name: body.kind.drive(body, sensors) for name, body in world.robots.items()}
         self.words: list[tuple[float, str, str]] = []
         """Words of people to a robot near them: the time (s), the person's name and the words."""
-        self.walkers = Walkers(world, self.context, lambda name, text: self.words.append((self.now(), name, text)))
+        self.walkers = Walkers(world, self.context, self._record_words)
         self._sleepers = Sleepers(world, self.root_context)
         plant = world.plant
         loose = [plant.get_body(index) for model in world.models.values() for index in plant.GetBodyIndices(model)]
@@ -171,6 +171,10 @@ class Engine(Stateful, saved=("_steps", "walkers", "receivers", "doors")):
         self._command_robots()
         self._simulator.Initialize()
 
+    def _record_words(self, person: str, words: str) -> None:
+        self.words.append((round(self.now(), 6), person, words))
+        self.record_event(f'{person} says "{words}"')
+
     def record_event(self, sentence: str) -> None:
         """Records a sentence about an event that happens now."""
         self.events.append((round(self.now(), 6), sentence))
@@ -207,6 +211,11 @@ class Pipeline:
         self.robots = {name: PipelinedRobot(robot, self) for name, robot in engine.robots.items()}
         self._now_s: float | None = None
         self._under_way: Future[None] | None = None
+
+    @property
+    def words(self) -> Sequence[tuple[float, str, str]]:
+        """Words of people to a robot near them until now: the time (s), the person's name and the words."""
+        return [each for each in self._engine.words if each[0] <= self.now() + _EXACT_S]
 
     @property
     def events(self) -> Sequence[tuple[float, str]]:

@@ -12,6 +12,7 @@ from executive.words.variation import NO_VARIATION, Variation, parse_light
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.events import Moves
+from plant.people.listeners import Listeners
 from plant.recording import LiveScene, Recorder, View, save_html
 from plant.referee.referee import Referee
 from plant.rendering import render_parameters
@@ -79,6 +80,7 @@ class Simulation:
         )
         self.referee.observe(self.engine.context, 0.0)
         self.engine.observe(self._referee_observes, every=REFEREE_PERIOD_STEPS)
+        self.listeners = Listeners(self.engine, people, seed=seed)
         self.recorder = Recorder(built, self.engine.context) if record else None
         if self.recorder is not None:
             self.engine.observe(self.recorder)

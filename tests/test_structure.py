@@ -14,10 +14,10 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3275,
+    "executive/words": 3280,
     "executive/language": 8203,
     "executive/speech": 1582,
-    "executive/mission": 1635,
+    "executive/mission": 1646,
     "executive/tree": 8323,
     "executive/run": 3212,
     "executive/record": 1408,
@@ -25,12 +25,12 @@ LINES = {
     "executive/conversation": 593,
     "executive/view": 1594,
     "executive/testing": 818,
-    "executive/app": 8219,
+    "executive/app": 8306,
     "executive/cli": 5018,
     "skills": 28883,
-    "plant": 21826,
+    "plant": 21945,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 506, 96, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 508, 96, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 
 from executive.app.artifacts import Artifacts
 from executive.record.work import Profile
+from executive.run.control import Control
 from executive.run.outcome import RobotResult
-from executive.run.visitor import RunEntry
+from executive.run.visitor import RunEntry, RunVisitor
 from executive.store.journal import StoreJournal
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
@@ -76,6 +77,9 @@ class Backend(Protocol):
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns the scenario's events so far, as times (s) and sentences; empty for a real robot."""
+
+    def visitors(self, control: Control) -> Sequence[RunVisitor]:
+        """Returns the backend's own visitors of a run with this control; empty for a real robot."""
 
     @property
     def notes(self) -> Sequence[str]:

@@ -101,7 +101,7 @@ def run_request(
             watching.append(DisturbanceLog(log, entries[0].robot, backend.happened))
         if profile is not None:
             watching.append(RunProfile(profile, backend, (artifacts, log), journals))
-        control = control or Control(pace=None)
+        watching += backend.visitors(control := control or Control(pace=None))
         with ended_by_signals(control.cancel), closing(worker or LockStepWorker(clock)) as jobs:
             result = run(
                 entries, clock=clock, worker=jobs, visitors=watching, settings=settings, control=control, spare=spare

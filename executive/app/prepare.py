@@ -167,7 +167,7 @@ class Setting:
             from executive.app.scenarios import with_events, with_scenario
 
             request = with_scenario(request, world, self.knowledge)
-            world = with_events(world, request.scenario)
+            world = with_events(world, request.scenario, request.seed)
         if request.variation.people:
             from plant.worlds.seeding import add_passers_by
 

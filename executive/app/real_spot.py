@@ -20,8 +20,9 @@ from executive.app.prepared import Prepared
 from executive.app.signals import ended_by_signals
 from executive.app.simulated import compile_first, run_entry
 from executive.record.work import Profile
+from executive.run.control import Control
 from executive.run.outcome import RobotResult
-from executive.run.visitor import RunEntry
+from executive.run.visitor import RunEntry, RunVisitor
 from executive.run.worker import ThreadWorker
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
@@ -98,6 +99,10 @@ class ApiBackend:
 
     def happened(self) -> Sequence[tuple[float, str]]:
         """Returns nothing: nobody knows what happens around a real robot."""
+        return ()
+
+    def visitors(self, control: Control) -> Sequence[RunVisitor]:
+        """Returns no visitors: people talk to the robot by themselves."""
         return ()
 
     @property

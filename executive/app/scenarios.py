@@ -10,21 +10,22 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from executive.mission.request import Request
 from executive.mission.scenario import RandomFaults, Scenario
 from executive.words.knowledge import Knowledge
-from executive.words.mission import Route, Stop
+from executive.words.mission import Manner, Route, Stop
 from executive.words.outlines import Corner
 from plant.robots.spot.kind import spot_capabilities
+from plant.worlds.seeding import add_answers, add_crowd
 from plant.worlds.world import DoorRule, MoveRule, World, WorldError
 from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.faults.faulty_robot import parse_fault, random_faults
 from skills.files.errors import InputError, Problems, suggestion, with_article
 from skills.files.schema import Name, Text, validate
 from skills.files.yaml_source import KeyPath, YamlSource, read_yaml
-from skills.quantities import Coordinate, Delay, Height, Speed
+from skills.quantities import Coordinate, Delay, Height, Quantity
 from skills.robot import FloatArray
 
 DIRECTIONS: Final = 36
@@ -54,10 +55,11 @@ def with_scenario(request: Request, world: World, knowledge: Knowledge) -> Reque
     return replace(request, scenario=scenario.with_drawn(drawn), scenario_files=())
 
 
-def with_events(world: World, scenario: Scenario) -> World:
-    """Adds a scenario's events to the world. Raises InputError if they do not fit the world."""
+def with_events(world: World, scenario: Scenario, seed: int = 0) -> World:
+    """Adds a scenario's events to the world; the seed places its crowd. Raises InputError if they do not fit."""
     try:
         walking = world.with_walks({name: Route.model_validate(each) for name, each in scenario.people.items()})
+        walking = add_crowd(add_answers(walking, scenario.answers), scenario.crowd, seed)
     except WorldError as error:
         raise InputError(str(error), hint="change the scenario's events") from error
     doors = [DoorRule.model_validate(door) for door in scenario.doors]
@@ -111,12 +113,14 @@ def _occupied(grid: GridMap, points_W: FloatArray) -> Any:
 
 _KINDS: Final = ("person", "door", "object")
 _KEYS: Final[Mapping[str, tuple[str, ...]]] = {
-    "person": ("at", "to", "from", "speed", "loop", "yields"),
+    "person": ("at", "to", "from", *Manner.model_fields),
     "door": ("closes", "opens"),
     "object": ("at", "to"),
 }
 
 
+Crowd = Annotated[int, Quantity(ge=0, le=10)]
+"""Number of people who wander about."""
 Spot = tuple[Coordinate, Coordinate, Height]
 Stops = Annotated[tuple[Corner | Name | Stop, ...], Field(min_length=1)]
 
@@ -125,7 +129,7 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True, defer_build=True)
 
 
-class EventFile(_Strict):
+class EventFile(Manner):
     """Event of exactly one person, door or object."""
 
     person: Name | None = Field(None, description="A person who walks: one of the world, or a new one.")
@@ -138,9 +142,6 @@ class EventFile(_Strict):
         "point [x, y, z] in metres, with z the height of the surface.",
     )
     from_: Corner | Name | None = Field(None, alias="from", description="The place where a new person stands at first.")
-    speed: Speed = Field(1.2, description="Walking speed of the person, in m/s.")
-    loop: StrictBool = Field(False, description="Whether the person goes on from the first place after the last.")
-    yields: StrictBool = Field(True, description="Whether the person stops for a robot that is close ahead.")
     closes: Delay | None = Field(None, description="Time when the door begins to close.")
     opens: Delay | None = Field(
         None, description="Time when the door begins to open; without `closes` it is closed at first."
@@ -158,7 +159,8 @@ class EventFile(_Strict):
             raise ValueError(f"{with_article(named[0])} has no key '{strange[0]}'; its keys are {keys}")
         if named[0] == "door" and self.closes is None and self.opens is None:
             raise ValueError("a door needs 'closes' or 'opens'")
-        if named[0] != "door" and (self.at is None or self.to is None):
+        stays = named[0] == "person" and (self.wanders or self.follows is not None)
+        if named[0] != "door" and not stays and (self.at is None or self.to is None):
             raise ValueError(f"{with_article(named[0])} needs 'at' and 'to'")
         spot = isinstance(self.to, tuple) and len(self.to) == 3 and isinstance(self.to[0], float)
         if named[0] == "person" and spot:
@@ -174,6 +176,12 @@ class ScenarioFile(_Strict):
     faults: tuple[Text, ...] = Field(default=(), description="Faults in words.")
     random: RandomFaults = Field(0, description="Number of further faults that the run's seed draws.")
     events: tuple[EventFile, ...] = Field(default=(), description="Events in the world.")
+    crowd: Crowd = Field(0, description="Number of people who wander about between free points that the seed draws.")
+    answers: dict[Name, dict[Text, Text]] = Field(
+        default={},
+        description="Answers of people to a robot within 3 m and in sight, by a part of the question; of the options "
+        'of another question they choose by the seed. "Are you Robin?" everybody answers by the name.',
+    )
 
 
 def _check_fault(words: str, cameras: tuple[str, ...], refusal: Callable[[str, str], InputError]) -> None:
@@ -210,8 +218,14 @@ def read_scenario(
     for number, event in enumerate(file.events):
         with problems:
             reader.add(event, ("events", number))
+    answers = {knowledge.person(said) or said: each for said, each in file.answers.items()}
+    for name in answers.keys() - {*people, *reader.people}:
+        with problems:
+            hint = suggestion(name, [*people, *reader.people], "add an event of this person")
+            raise source.error(("answers", name), f"there is no {name} in the world", hint)
     problems.raise_any()
-    return Scenario(file.faults, file.random, reader.people, tuple(reader.doors), tuple(reader.moves))
+    moved = (reader.people, tuple(reader.doors), tuple(reader.moves))
+    return Scenario(file.faults, file.random, *moved, answers=answers, crowd=file.crowd)
 
 
 class _EventReader:
@@ -247,8 +261,10 @@ class _EventReader:
             raise self._source.error((*path, "person"), f"there is no {said} in the world", hint)
         if name in self._known_people and event.from_ is not None:
             raise self._source.error((*path, "from"), f"{name} stands in the world already", "take 'from' out")
-        stops = _stops(event.to) if event.from_ is None else [Stop(at=event.from_, pause=0.0), *_stops(event.to)]
-        route = {"start": event.at, "speed": event.speed, "loop": event.loop, "yields": event.yields}
+        stops = [] if event.to is None else _stops(event.to)
+        stops = stops if event.from_ is None else [Stop(at=event.from_, pause=0.0), *stops]
+        route = {"start": event.at or 0.0, "speed": event.speed, "loop": event.loop, "yields": event.yields}
+        route |= event.model_dump(include={*Manner.model_fields} - {*route}, exclude_defaults=True, mode="json")
         points = [{"at": self._point(stop.at, (*path, "to")), "pause": stop.pause} for stop in stops]
         self.people[name] = {**route, "waypoints": points}
 

@@ -10,11 +10,13 @@ from typing import Final
 
 from executive.app.artifacts import Artifacts, draw_artifacts
 from executive.app.backend import Durable, Scene
+from executive.app.bystanders import Bystanders
 from executive.app.goal_conditions import Share, verdict_of
 from executive.app.placed_robots import robot_stack, shared_detector
 from executive.record.work import Profile
+from executive.run.control import Control
 from executive.run.outcome import RobotResult
-from executive.run.visitor import RunEntry
+from executive.run.visitor import RunEntry, RunVisitor
 from executive.run.worker import WorkThread
 from executive.tree.compiler import CompiledTree
 from executive.words.goal import RefereeReport
@@ -112,6 +114,10 @@ class SimulatedBackend:
     def happened(self) -> Sequence[tuple[float, str]]:
         """Events of doors, people and moved objects, as times (s) and sentences."""
         return self._pipeline.events
+
+    def visitors(self, control: Control) -> Sequence[RunVisitor]:
+        """Returns the people of the plant, who hear the robots and answer them."""
+        return (Bystanders(self._simulation, self._pipeline, control),)
 
     notes: Sequence[str] = ()
 

@@ -19,8 +19,9 @@ RandomFaults = Annotated[int, Quantity(ge=0, le=100)]
 class Scenario:
     """Scenario of a run: faults in their text form, the number of random faults, and events as plain data.
 
-    `people` are routes by name, `doors` doorways with the times at which they close and open, `moves` objects with the
-    time and destination of their move; all points are in the world frame, in metres.
+    `people` are routes by name, `answers` those of people to the robot's questions, and `crowd` is the number of people
+    who wander about. `doors` are doorways with the times at which they close and open, `moves` objects with the time
+    and destination of their move. All points are in the world frame, in metres.
     """
 
     faults: Annotated[
@@ -38,6 +39,8 @@ class Scenario:
     people: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     doors: tuple[Mapping[str, Any], ...] = ()
     moves: tuple[Mapping[str, Any], ...] = ()
+    answers: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    crowd: int = 0
 
     def __bool__(self) -> bool:
         return self != NO_SCENARIO
@@ -55,6 +58,8 @@ class Scenario:
             {**self.people, **other.people},
             (*self.doors, *other.doors),
             (*self.moves, *other.moves),
+            {**self.answers, **other.answers},
+            self.crowd + other.crowd,
         )
 
     def with_drawn(self, faults: tuple[str, ...]) -> Scenario:
@@ -63,7 +68,8 @@ class Scenario:
 
     def lines(self) -> tuple[str, ...]:
         """One line for each fault and event."""
-        people = (f"{name} sets off at {route['start']:g} s" for name, route in self.people.items())
+        people = [f"{name} {_verb(route)} at {route['start']:g} s" for name, route in self.people.items()]
+        people += [f"a crowd of {self.crowd} wanders about"] if self.crowd else []
         doors = []
         for door in self.doors:
             times = sorted((door[verb], verb) for verb in ("closes", "opens") if door[verb] is not None)
@@ -73,6 +79,11 @@ class Scenario:
             to = f"the {move['to']}" if isinstance(move["to"], str) else "({:g}, {:g}, {:g})".format(*move["to"])
             moves.append(f"somebody moves {definite(move['name'])} to {to} at {move['at']:g} s")
         return (*(f"fault: {words}" for words in self.faults), *people, *doors, *moves)
+
+
+def _verb(route: Mapping[str, Any]) -> str:
+    """Verb of a person's walk."""
+    return "is ready to follow" if route.get("follows") else "wanders off" if route.get("wanders") else "sets off"
 
 
 NO_SCENARIO: Final = Scenario()

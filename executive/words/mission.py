@@ -54,17 +54,13 @@ class Distraction(Strict):
 ANY_ROBOT: Final = "robot"
 
 
-class Route(Strict):
-    """Route of a walking person around walls, furniture and closed doors."""
+class Manner(Strict):
+    """Manner in which a person walks."""
 
-    waypoints: tuple[Corner | Name | Stop, ...] = Field(
-        default=(), description="Points (x, y) in metres or names of places, in order; the person begins at the first."
-    )
     speed: Speed = Field(default=1.2, description="Speed of the person, in m/s.")
     loop: StrictBool = Field(
         default=False, description="Whether the first waypoint follows the last; by default, once."
     )
-    start: Delay = Field(default=0.0, description="Time at which the person sets off, in seconds from the beginning.")
     yields: StrictBool = Field(default=True, description="Whether the person stops for a robot that is close ahead.")
     apart: StrictBool = Field(
         default=False, description="Whether the person keeps apart from other people; who follows or wanders does."
@@ -86,6 +82,15 @@ class Route(Strict):
     says: Text | None = Field(
         default=None, description="Words to the nearest robot within 3 m, once, at the end of the route."
     )
+
+
+class Route(Manner):
+    """Route of a walking person around walls, furniture and closed doors."""
+
+    waypoints: tuple[Corner | Name | Stop, ...] = Field(
+        default=(), description="Points (x, y) in metres or names of places, in order; the person begins at the first."
+    )
+    start: Delay = Field(default=0.0, description="Time at which the person sets off, in seconds from the beginning.")
 
     @model_validator(mode="after")
     def _leads_somewhere(self) -> Self:

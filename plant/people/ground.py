@@ -41,9 +41,14 @@ class Ground:
         self._block(outlines_W)
 
     @staticmethod
-    def from_plant(plant: MultibodyPlant, inspector: SceneGraphInspector, points_W: Iterable[Point]) -> Ground:
-        """Builds the ground of a finalized plant, with the shapes that are fixed to the world as obstacles."""
-        return Ground([*_outlines_W(plant, inspector)], points_W)
+    def from_plant(
+        plant: MultibodyPlant,
+        inspector: SceneGraphInspector,
+        points_W: Iterable[Point],
+        band_m: tuple[float, float] = BAND_M,
+    ) -> Ground:
+        """Builds the ground of a finalized plant; the shapes fixed to the world in a band of heights are obstacles."""
+        return Ground([*_outlines_W(plant, inspector, band_m)], points_W)
 
     def with_obstacles(self, outlines_W: Iterable[FloatArray]) -> Ground:
         """Returns the same ground with more obstacles."""
@@ -156,7 +161,9 @@ class Ground:
         return cells[..., ::-1]
 
 
-def _outlines_W(plant: MultibodyPlant, inspector: SceneGraphInspector) -> Iterable[FloatArray]:
+def _outlines_W(
+    plant: MultibodyPlant, inspector: SceneGraphInspector, band_m: tuple[float, float]
+) -> Iterable[FloatArray]:
     """Outlines (K, 2) from above of the shapes that are fixed to the world and reach into the band."""
     context = plant.CreateDefaultContext()
     for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
@@ -166,7 +173,7 @@ def _outlines_W(plant: MultibodyPlant, inspector: SceneGraphInspector) -> Iterab
         for geometry in plant.GetCollisionGeometriesForBody(body):
             kind, half_m, X_BG = shape_row(inspector, geometry)
             corners_W = (X_WB @ X_BG).multiply((_unit_corners(kind) * half_m).T).T
-            if corners_W[:, 2].max() > BAND_M[0] and corners_W[:, 2].min() < BAND_M[1]:
+            if corners_W[:, 2].max() > band_m[0] and corners_W[:, 2].min() < band_m[1]:
                 yield cv2.convexHull(corners_W[:, :2].astype(np.float32)).reshape(-1, 2).astype(np.float64)
 
 

@@ -224,7 +224,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         """Returns whether a person must wait for a robot, a person or a door."""
         route = self._routes[name]
         path = walk.ahead_W(DOOR_M) if self._barriers else ()
-        if any(_cross(part, door) for part in itertools.pairwise(path) for door in self._barriers):
+        if any(segments_cross(part, door) for part in itertools.pairwise(path) for door in self._barriers):
             return True
         if route.apart and any(self._people_near(name, walk)):
             return True
@@ -288,7 +288,7 @@ def _is_ahead(walk: Walk, point_W: Sequence[float] | FloatArray) -> bool:
     return abs(math.remainder(bearing_rad - walk.heading_rad, math.tau)) < AHEAD_RAD
 
 
-def _cross(a: tuple[Point, Point], b: tuple[Point, Point]) -> bool:
+def segments_cross(a: tuple[Point, Point], b: tuple[Point, Point]) -> bool:
     """Returns whether two segments cross."""
 
     def side(line: tuple[Point, Point], p: Point) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -122,7 +122,7 @@ class Placement:
     """A model in the world: X_WO is its pose at the start.
 
     A loose object rests on `surface`. A person is welded to the world unless there is a `route`, and takes offered
-    objects as `receiving` says.
+    objects as `receiving` says. `answers` are the person's, by a part of the question.
     """
 
     name: str
@@ -132,6 +132,7 @@ class Placement:
     surface: str | None = None
     route: PointRoute | None = None
     receiving: Receiving | None = None
+    answers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def model_path(self) -> Path:
@@ -229,7 +230,7 @@ def _place_person(world: World, rule: PersonRule, form: ModelForm, seed: int, in
         (x, y), yaw = route.stops[0].at_W, route.first_yaw_rad
     X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([x, y, form.rest_height_m], dtype=np.float64))
     receiving = Receiving(rule.pull_n, rule.reaction_s) if rule.receives else None
-    return Placement(rule.name, rule.model, form, X_WO, route=route, receiving=receiving)
+    return Placement(rule.name, rule.model, form, X_WO, route=route, receiving=receiving, answers=rule.answers)
 
 
 def _before_start(
@@ -284,7 +285,8 @@ def polygon_distance(a: FloatArray, b: FloatArray) -> float:
 
 
 PAUSE_S = 4.0
-_CLUTTER_STREAM, _PASSING_STREAM = 11, 12
+_CROWD_APART_M, _CROWD_M_S = 1.2, (0.7, 1.3)
+_CLUTTER_STREAM, _PASSING_STREAM, _CROWD_STREAM = 11, 12, 15
 _NEVER = frozenset({"person", "extinguisher"})
 """Classes that are never clutter: people, and objects that are too large for most surfaces."""
 _STOPS = 4
@@ -331,3 +333,30 @@ def add_passers_by(world: World, count: int, seed: int) -> World:
         stops = tuple(Stop(at=places[int(each)], pause=PAUSE_S) for each in chosen)
         walks[f"passer-by {index + 1}"] = Route(waypoints=stops, loop=True, start=float(rng.uniform(0.0, 10.0)))
     return world.with_walks(walks) if walks else world
+
+
+def add_crowd(world: World, count: int, seed: int) -> World:
+    """Adds `count` people who wander about; the seed chooses where they stand at first, far from the robot's start.
+
+    Raises WorldError when the world has too few places.
+    """
+    rng, start_W = np.random.default_rng([seed, _CROWD_STREAM]), (world.start.x_m, world.start.y_m)
+    starts_W = list[Point]()
+    for place_W in rng.permutation(sorted({*world.standing.values()})) if count else ():
+        if all(math.dist(place_W, other_W) > _CROWD_APART_M for other_W in (start_W, *starts_W)):
+            starts_W.append((float(place_W[0]), float(place_W[1])))
+    if len(starts_W) < count:
+        raise WorldError(f"{world.name} has room for a crowd of {len(starts_W)} at its places, not {count}")
+    walks = {
+        f"wanderer {number + 1}": Route(waypoints=(at_W,), wanders=True, speed=float(rng.uniform(*_CROWD_M_S)))
+        for number, at_W in enumerate(starts_W[:count])
+    }
+    return world.with_walks(walks) if walks else world
+
+
+def add_answers(world: World, answers: Mapping[str, Mapping[str, str]]) -> World:
+    """Adds the answers of people, by name, to the robot's questions."""
+    rules = world.seed_rules
+    given = {name: {"answers": {**each}} for name, each in answers.items()}
+    people = tuple(rule.model_copy(update=given.get(rule.name)) for rule in rules.people)
+    return replace(world, seed_rules=rules.model_copy(update={"people": people}))

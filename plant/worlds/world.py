@@ -83,6 +83,7 @@ class PersonRule(_Strict):
     turned_rad: Angles | None = Field(default=None, description="least and greatest turn away from facing the robot")
     route: Route | None = Field(default=None, description="where the person walks")
     receives: bool = Field(default=True, description="whether the person takes offered objects")
+    answers: dict[str, str] = Field(default={}, description="answers to the robot's questions by a part of their text")
     pull_n: Pull = Field(default=15.0, description="the person's pull at an offered object, N")
     reaction_s: Reaction = Field(default=1.0, description="how long an offered object must be still before, s")
 
@@ -100,7 +101,7 @@ class PersonRule(_Strict):
         return self.distance_m, self.bearing_rad, self.turned_rad
 
 
-_MANNERS: Final = ("receives", "pull_n", "reaction_s")
+_MANNERS: Final = ("receives", "pull_n", "reaction_s", "answers")
 
 
 class DoorRule(_Strict):

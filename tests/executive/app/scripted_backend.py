@@ -32,6 +32,9 @@ class ScriptedBackend:
     def happened(self):
         return ()
 
+    def visitors(self, control):
+        return ()
+
     def work(self):
         return {"calls": len(self.robot.calls)}
 

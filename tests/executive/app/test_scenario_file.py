@@ -5,6 +5,7 @@ import pytest
 from executive.app.scenarios import read_scenario
 from executive.mission.request import Request
 from executive.words.knowledge import Door, Knowledge, ObjectFacts, Person, Place, Pose, SurfaceFacts
+from executive.words.mission import Distraction, Route
 from skills.files.errors import InputError
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
@@ -64,6 +65,27 @@ def test_a_new_person_walks_along_several_places(read):
     assert stops == [((5.0, 2.0), 0.0), ((1.0, 2.0), 0.0), ((3.0, 2.0), 4.0)]
 
 
+def test_a_new_person_follows_a_robot_and_is_distracted(read):
+    scenario = read(event("{person: Sam, from: hall, follows: robot, distractions: [{after: 4, back: 2}], pace: 0.2}"))
+    route = scenario.people["Sam"]
+    assert [stop["at"] for stop in route["waypoints"]] == [(5.0, 2.0)]
+    assert Route.model_validate(route).distractions == (Distraction(after=4.0, back=2.0),)
+    assert scenario.lines() == ("Sam is ready to follow at 0 s",)
+
+
+def test_a_person_of_the_world_wanders_from_where_they_stand(read):
+    route = read(event("{person: Robin, wanders: true}")).people["Robin"]
+    assert (route["waypoints"], route["wanders"]) == ([], True)
+
+
+def test_a_crowd_and_the_answers_of_people(read):
+    scenario = read("crowd: 4\nanswers: {the boss: {drink: 'yes'}}\n")
+    assert (scenario.crowd, scenario.answers) == (4, {"Robin": {"drink": "yes"}})
+    assert scenario.lines() == ("a crowd of 4 wanders about",)
+    back = Request.from_json(Request(scenario=scenario).to_json()).scenario
+    assert (back.crowd, back.answers) == (scenario.crowd, scenario.answers)
+
+
 def test_a_door_is_named_by_its_rooms_in_any_order(read):
     (door,) = read(event("{door: [hall, kitchen], closes: 10 s, opens: 40 s}")).doors
     wanted = ("door between kitchen and hall", (3.0, 2.0), 0.9, 10.0, 40.0)
@@ -110,6 +132,10 @@ def test_a_scenario_comes_back_from_the_json_of_its_request(read):
         (event("{at: 3, to: hall}"), "exactly one of 'person', 'door' and 'object'"),
         (event("{person: Robin, door: [hall, kitchen], at: 3, to: hall}"), "exactly one"),
         (event("{person: Robin, at: 3}"), "a person needs 'at' and 'to'"),
+        (event("{person: Sam, wanders: true}"), "there is no Sam in the world; add 'from'"),
+        (event("{person: Robin, wanders: true, distractions: 50}"), ":2: events.0.distractions"),
+        ("crowd: 11\n", ":1: crowd: should be"),
+        ("answers: {Robni: {drink: tea}}\n", ":1: there is no Robni in the world; did you mean 'Robin'"),
         (event("{person: Robin, at: soon, to: hall}"), ":2: events.0.at"),
         (event("{person: Robin, at: 3, to: hal}"), ":2: unknown place 'hal'; did you mean 'hall'"),
         (event("{person: Robni, at: 3, to: hall}"), "there is no Robni in the world; did you mean 'Robin'"),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
 
 from plant.worlds.seeding import (
+    add_crowd,
     add_passers_by,
     outline_of,
     place_clutter,
@@ -15,7 +17,7 @@ from plant.worlds.seeding import (
     place_people,
     polygon_distance,
 )
-from plant.worlds.world import World, load_world
+from plant.worlds.world import World, WorldError, load_world
 
 SEEDS = (1, 2)
 
@@ -63,3 +65,13 @@ def test_passers_by_walk_between_places_of_the_world(world: World) -> None:
 
 def test_without_passers_by_the_world_stays_as_it_is(world: World) -> None:
     assert add_passers_by(world, 0, 5) is world
+
+
+def test_a_crowd_stands_apart_at_places_that_the_seed_chooses() -> None:
+    world = load_world("flat")
+    crowds = [place_people(add_crowd(world, 8, seed), seed)[1:] for seed in (5, 5, 6)]
+    places = [[tuple(each.X_WO.translation()[:2]) for each in crowd] for crowd in crowds]
+    assert places[0] == places[1] != places[2]
+    assert min(math.dist(*pair) for pair in itertools.combinations(places[0], 2)) > 1.0
+    with pytest.raises(WorldError, match="room for a crowd"):
+        add_crowd(world, 40, 5)

@@ -1,0 +1,71 @@
+"""People who hear robots near them and in sight, and answer their questions; they know the true state."""
+
+import math
+import re
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from plant.engine import Engine
+from plant.people.ground import Ground
+from plant.people.walkers import HEARS_M, segments_cross
+from plant.worlds.seeding import Placement
+from plant.worlds.world import Point
+
+EYES_M: Final = (1.2, 1.8)
+"""Shapes between these heights hide people from robots that speak."""
+BESIDE_M: Final = 0.4
+_WHO: Final = re.compile(r"\bare you (?P<name>[^?,.]+)\?", re.IGNORECASE)
+_STREAM: Final = 14
+
+
+class Listeners:
+    """The people of one plant as listeners."""
+
+    def __init__(self, engine: Engine, people: Iterable[Placement], *, seed: int) -> None:
+        """`people` are the people of the plant; `seed` draws answers that nobody has given them."""
+        self._engine, self._seed = engine, seed
+        self._answers = {each.name: each.answers for each in people}
+        plant, models = engine.world.plant, engine.world.models
+        self._bodies = {name: plant.get_body(plant.GetBodyIndices(models[name])[0]) for name in self._answers}
+        self._walls: Ground | None = None
+
+    def hearer(self, robot: str) -> str | None:
+        """Returns the nearest person who hears a robot speak now; None when nobody does."""
+        robot_W = self._place_W(self._engine.world.robots[robot].body)
+        away_m = {name: math.dist(self._place_W(body), robot_W) for name, body in self._bodies.items()}
+        near = sorted((each for each in away_m if away_m[each] <= HEARS_M), key=lambda name: away_m[name])
+        return next((name for name in near if self._in_sight(robot_W, self._place_W(self._bodies[name]))), None)
+
+    def answer(self, person: str, question: str, options: Sequence[str] = ()) -> str | None:
+        """Returns a person's answer to a question; None when the person has none.
+
+        "Are you Robin?" is answered by the name, other questions by the first of the person's `answers` whose text
+        stands in the question. Of the options of another question, a person who has answers chooses by the seed.
+        """
+        answers: Mapping[str, str] = self._answers[person]
+        who = _WHO.search(question)
+        if who is not None:
+            return "yes" if who["name"].strip().casefold() == person.casefold() else "no"
+        given = next((said for part, said in answers.items() if part.casefold() in question.casefold()), None)
+        if given is not None or not answers or not options:
+            return given
+        rng = np.random.default_rng([self._seed, _STREAM, zlib.crc32(f"{person}: {question}".encode())])
+        return options[int(rng.integers(len(options)))]
+
+    def _in_sight(self, from_W: Point, to_W: Point) -> bool:
+        """Returns whether neither wall nor closed door stands between a robot and a person."""
+        world = self._engine.world
+        if self._walls is None:
+            inspector, corners = world.scene_graph.model_inspector(), (from_W, to_W)
+            self._walls = Ground.from_plant(world.plant, inspector, corners, EYES_M)
+        share = max(0.0, 1.0 - BESIDE_M / max(math.dist(from_W, to_W), BESIDE_M))
+        beside_W = (from_W[0] + share * (to_W[0] - from_W[0]), from_W[1] + share * (to_W[1] - from_W[1]))
+        door = any(segments_cross((from_W, to_W), each) for each in self._engine.doors.barriers)
+        return not door and self._walls.sees(from_W, beside_W)
+
+    def _place_W(self, body: object) -> Point:
+        x, y, _ = self._engine.world.plant.EvalBodyPoseInWorld(self._engine.context, body).translation()
+        return float(x), float(y)

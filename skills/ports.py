@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from skills.api import Cause, ObjectObservation, Part, Skill, Surface
 from skills.perception.class_forms import PERSON
-from skills.quantities import Angle, Coordinate, Cosine, Height, Length, Speed, Tries, Turn
+from skills.quantities import Angle, Coordinate, Cosine, Duration, Height, Length, Speed, Tries, Turn
 from skills.robot import Pose2D
 from skills.world_model import IN_THE_WAY
 
@@ -224,6 +224,39 @@ class GuidePersonPorts(Skill[GuidePersonInputs]):
         Cause.POSTCONDITION: "the person is lost, does not come along, or ends it on the way",
     }
     default_timeout_s = 600.0
+    max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
+
+
+@dataclass(frozen=True)
+class FollowPersonInputs:
+    """The person's name, and `place_W` (x, y), where they were seen last; None takes the nearest person ahead.
+
+    With the corners `until_W` of the place `until`, the skill ends once the person has stood there for 5 s. It ends
+    when somebody tells it to, and after `time_limit_s` at the latest.
+    """
+
+    person: str = PERSON
+    place_W: tuple[Coordinate, Coordinate] | None = None
+    until_W: tuple[tuple[Coordinate, Coordinate], ...] | None = None
+    until: str = ""
+    time_limit_s: Duration = 600.0
+    max_speed_m_s: Speed = 1.2
+
+
+class FollowPersonPorts(Skill[FollowPersonInputs]):
+    """Keeps behind a walking person by LiDAR and body cameras; searches for a person whom it has lost, and asks."""
+
+    done_by: ClassVar[str] = "skills.follow_person.skill:FollowPerson"
+    name = "follow_person"
+    Inputs = FollowPersonInputs
+    uses: ClassVar[frozenset[Part]] = frozenset({Part.BASE, Part.VOICE})
+    causes: ClassVar[Mapping[Cause, str]] = {
+        Cause.PRECONDITION: "nobody is seen, localisation is lost, or the robot refuses to drive",
+        Cause.PLANNING: "no path leads to the person",
+        Cause.EXECUTION: "the person is lost, or the robot loses localisation or its LiDAR, or refuses to drive on",
+        Cause.TIMEOUT: "the person has not stood still in the place within the time limit",
+    }
+    default_timeout_s: ClassVar[float] = 1800.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"odometry": 0.5}
 
 

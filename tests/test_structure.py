@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8306,
     "executive/cli": 5018,
-    "skills": 28883,
+    "skills": 29403,
     "plant": 21945,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 508, 96, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 511, 96, 13
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -200,28 +200,38 @@ class GivingWay:
 
         Leaves out positions beside the `tried` poses.
         """
-        options = self._options
-        n = int(2.0 * options.reach_m / _CELL_M) + 1
-        axis = np.linspace(-options.reach_m, options.reach_m, n)
-        xs, ys = here.x_m + axis, here.y_m + axis
-        x, y = np.meshgrid(xs, ys)
-        everything = self.costmap(costmap, Avoided.BODIES)
-        free = clearance_on_grid(everything, xs, ys) > footprint.inscribed_m + SAFE_MARGIN_M
         paths = with_outlines(NoObstacles(), [(one.discs, _thinned(one)) for one in self.robots_with_priority()])
-        aside = clearance_on_grid(paths, xs, ys) > footprint.inscribed_m + options.aside_m
-        for other in tried:
-            aside &= np.hypot(x - other.x_m, y - other.y_m) > _BESIDE_TRIED_M
-        yaws = here.yaw_rad + np.arange(_YAWS) * (2.0 * math.pi / _YAWS)
+        return pose_aside(self.costmap(costmap, Avoided.BODIES), paths, footprint, here, self._options, tried)
 
-        def suits(places: FloatArray) -> Pose2D | None:
-            poses = np.column_stack([np.repeat(places, _YAWS, axis=0), np.tile(yaws, len(places))])
-            clear = footprint_clearance_m(everything, footprint, poses) > SAFE_MARGIN_M + _SLACK_M
-            good = np.flatnonzero(clear & (footprint_clearance_m(paths, footprint, poses) > options.aside_m))
-            return Pose2D(*poses[good[0]].tolist()) if len(good) else None
 
-        cells = [cell for cell in reachable_cells(free, (n // 2, n // 2)) if aside[cell] and sum(cell) % 2 == 0]
-        rows, columns = np.array(cells, dtype=np.int64).reshape(-1, 2).T
-        return first_suitable_pose(np.column_stack([x[rows, columns], y[rows, columns]]), suits)
+def pose_aside(
+    costmap: FreeSpace,
+    paths: FreeSpace,
+    footprint: Footprint,
+    here: Pose2D,
+    options: GivingWayOptions,
+    tried: Sequence[Pose2D] = (),
+) -> Pose2D | None:
+    """The nearest reachable pose that leaves some paths free, None when there is none; see `GivingWay.waiting_pose`."""
+    n = int(2.0 * options.reach_m / _CELL_M) + 1
+    axis = np.linspace(-options.reach_m, options.reach_m, n)
+    xs, ys = here.x_m + axis, here.y_m + axis
+    x, y = np.meshgrid(xs, ys)
+    free = clearance_on_grid(costmap, xs, ys) > footprint.inscribed_m + SAFE_MARGIN_M
+    aside = clearance_on_grid(paths, xs, ys) > footprint.inscribed_m + options.aside_m
+    for other in tried:
+        aside &= np.hypot(x - other.x_m, y - other.y_m) > _BESIDE_TRIED_M
+    yaws = here.yaw_rad + np.arange(_YAWS) * (2.0 * math.pi / _YAWS)
+
+    def suits(places: FloatArray) -> Pose2D | None:
+        poses = np.column_stack([np.repeat(places, _YAWS, axis=0), np.tile(yaws, len(places))])
+        clear = footprint_clearance_m(costmap, footprint, poses) > SAFE_MARGIN_M + _SLACK_M
+        good = np.flatnonzero(clear & (footprint_clearance_m(paths, footprint, poses) > options.aside_m))
+        return Pose2D(*poses[good[0]].tolist()) if len(good) else None
+
+    cells = [cell for cell in reachable_cells(free, (n // 2, n // 2)) if aside[cell] and sum(cell) % 2 == 0]
+    rows, columns = np.array(cells, dtype=np.int64).reshape(-1, 2).T
+    return first_suitable_pose(np.column_stack([x[rows, columns], y[rows, columns]]), suits)
 
 
 def reachable_cells(free: NDArray[np.bool_], begin: tuple[int, int]) -> list[tuple[int, int]]:

@@ -17,7 +17,7 @@ from skills.navigate.follower import Drive
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
-from skills.navigate.surroundings import NavigateOptions, Surroundings
+from skills.navigate.surroundings import Company, NavigateOptions, Surroundings
 from skills.navigate.trip_planning import TripPlanning, place_text
 from skills.ports import NavigateInputs, NavigatePorts
 from skills.robot import Pose2D
@@ -72,19 +72,22 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
     Options: ClassVar[type] = NavigateOptions
     options: NavigateOptions
 
-    def __init__(self, context: SkillContext, options: NavigateOptions | None = None) -> None:
+    def __init__(
+        self, context: SkillContext, options: NavigateOptions | None = None, company: Company | None = None
+    ) -> None:
+        """With `company` the robot goes with a person, for whom it does not wait."""
         super().__init__(context, options)
-        self._base = Base(context)
+        self._base, self._company = Base(context), company
 
     def begin(self, inputs: NavigateInputs) -> None:
         """Starts a new attempt to reach the goal of `inputs`."""
         super().begin(inputs)
         context, options, clock = self.context, self.options, self.context.clock
         self._base, self._inputs = Base(context), inputs
-        self._around = Surroundings(context, options)
+        self._around = Surroundings(context, options, self._company)
         self._around.robots.begin()
         self._planning = TripPlanning(context, options, inputs, self._around)
-        self._progress = _Progress(clock.now())
+        self._progress, self._drives = _Progress(clock.now()), False
         self._blind = Patience(clock, options.blind_patience_s)
         self._lost, self._placed = Patience(clock, options.localising_patience_s), False
         self._blocked = Patience(clock, options.blocked_patience_s)
@@ -95,6 +98,14 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         self._base.stop()
         self.context.traffic.release()
         super().end()
+
+    def retarget(self, inputs: NavigateInputs) -> bool:
+        """Changes the goal while the robot drives along its path; returns False while a plan is under way."""
+        if self._planning.under_way:
+            return False
+        self._inputs = inputs
+        self._planning.retarget(inputs, self._pose_then() if self._drives else None)
+        return True
 
     def suspend(self) -> None:
         """Ends the attempt, so that others may pass meanwhile."""
@@ -216,6 +227,7 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         """Starts to follow a path."""
         controller, speed = self.context.stack.controller, self._inputs.max_speed_m_s
         self._follower: LocalController = controller.build(path, self._around.footprint, max_speed_m_s=speed)
+        self._drives = True
         self._progress.whole_m = self._progress.whole_m or max(self._follower.length_m, 1e-3)
         self._progress.restart(self._now())
         self._blocked.reset()
@@ -257,8 +269,9 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
         yield from self._tick("planning a path")
         return self._plan
 
-    def _settle(self) -> Routine[Succeeded]:
+    def _settle(self) -> Routine[_Stage | Succeeded]:
         """Stops, then checks that the robot stands at the goal. Raises SkillFailure when it does not."""
+        goal = self._inputs.goal
         until_s, still = self._now() + self.options.settle_s, False
         while not still and self._now() < until_s:
             yield Running("stopping at the goal", 1.0)
@@ -266,6 +279,8 @@ class Navigate(NavigatePorts, RoutineSkill[NavigateInputs]):
             vx, vy, wz = self.context.robot.odometry().velocity
             still = math.hypot(vx, vy) < self.options.still_m_s and abs(wz) < self.options.still_rad_s
         self._base.stop()
+        if self._inputs.goal != goal:
+            return self._plan
         off = relative_pose(self._inputs.goal, self.context.pose())
         sentence = f"{math.hypot(off.x_m, off.y_m):.2f} m and {abs(off.yaw_rad):.2f} rad off the goal"
         if not still:

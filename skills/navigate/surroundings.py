@@ -177,6 +177,27 @@ class NavigateOptions:
 
 
 _OUTLINE_PERIOD_S = 0.5
+_WALKED_M = 0.5
+"""Way of a track from which on it is a person, and no object."""
+
+
+@dataclass
+class Company:
+    """The person with whom the robot goes: no person to keep away from or to wait for.
+
+    Somebody else steps the `watch`. `track` is the person's number (0: nobody), `most_m_s` the speed limit that keeps
+    the distance.
+    """
+
+    watch: PeopleWatch
+    track: int = 0
+    most_m_s: float = math.inf
+
+    def others(self) -> tuple[SeenPerson, ...]:
+        """All other people: those in pictures, and those who walk."""
+        sure = {one.track for one in self.watch.people()}
+        tracks = (one for one in self.watch.tracks() if one.track in sure or one.moved_m > _WALKED_M)
+        return tuple(one for one in tracks if one.track != self.track)
 
 
 class Surroundings:
@@ -185,8 +206,8 @@ class Surroundings:
     Plans and checks use `footprint`; plans keep `room_m` from people.
     """
 
-    def __init__(self, context: SkillContext, options: NavigateOptions) -> None:
-        self._context, self._space = context, options.space
+    def __init__(self, context: SkillContext, options: NavigateOptions, company: Company | None = None) -> None:
+        self._context, self._space, self._company = context, options.space, company
         self._outline = ArmFootprint(context)
         self._zones = context.zone_map() if context.zones else None
         self._keep_out = None if self._zones is None else KeepOut(self._zones)
@@ -197,14 +218,15 @@ class Surroundings:
         self.doors = DoorWatch(context, options.doors)
         self.robots = GivingWay(context, options.giving_way)
         self._low = LowObstacleWatch(context, options.low_obstacles)
-        self._people = PeopleWatch(context, options.people)
+        self._people = PeopleWatch(context, options.people) if company is None else company.watch
         self._pace = PaceManager(self.footprint, options.space)
         self._guard = CollisionGuard(context, self.footprint, options.guard)
 
     def look(self, velocity: FloatArray) -> None:
         """Takes pictures for low obstacles and people; results arrive later. `velocity` (3,) is the last command."""
         self._low.step()
-        self._people.step(velocity)
+        if self._company is None:
+            self._people.step(velocity)
 
     def refresh(self) -> None:
         """Updates footprint and doors before a plan; restores `room_m` once nobody is near."""
@@ -224,8 +246,9 @@ class Surroundings:
         return self._outline.outgrows(self.footprint)
 
     def persons(self) -> tuple[SeenPerson, ...]:
-        """The people near, without detections at the poses that other robots report."""
-        return tuple(one for one in self._people.people() if not self.robots.is_robot(one.place_W))
+        """The people near, without the robot's company and without detections where other robots report to be."""
+        people = self._people.people() if self._company is None else self._company.others()
+        return tuple(one for one in people if not self.robots.is_robot(one.place_W))
 
     def reduce_distance_to_people(self) -> bool:
         """Lets plans pass people more closely from now on; False when nobody is near, or they do already."""
@@ -274,6 +297,8 @@ class Surroundings:
         """The speed that people near the path and zones allow, at most `most_m_s`."""
         ahead, here = follower.ahead(self._space.look_ahead_m), self._context.pose()
         pace = self._pace.pace(self._context.clock.now(), here, ahead, self.persons(), most_m_s, goal)
+        if self._company is not None:
+            pace = replace(pace, most_m_s=min(pace.most_m_s, self._company.most_m_s))
         if self._zones is None:
             return pace
         on_path = follower.ahead(self._zones.braking_m(most_m_s))

@@ -91,6 +91,13 @@ class TripPlanning:
         )
         self._job = context.worker.submit(plan, latency_s=self._options.planning_latency_s, name="plan a path")
 
+    def retarget(self, inputs: NavigateInputs, start: Pose2D | None) -> None:
+        """Plans to another goal, unless the robot waits aside, and forgets what failed before."""
+        self._inputs, self._replans, self._map_leads, self.wait_until_s = inputs, 0, False, -math.inf
+        if self.aside is None:
+            self.avoided = Avoided.PATHS
+            self.ask(start)
+
     def _check_zones(self) -> None:
         """Raises SkillFailure when the body would reach into a keep-out zone at the goal."""
         zones = self._around.forbidding_zones(self._inputs.goal)

@@ -58,6 +58,7 @@ NIGHTLY = {
     "detect": {**HANDS, FREEZES: Cause.EXECUTION},
     "grasp": {**HANDS, FREEZES: Cause.EXECUTION, "gripper loses": Cause.POSTCONDITION},
     "place": {**HANDS, **LOST, "odometry jumps": Cause.POSTCONDITION},  # nothing corrects it here: it looks beside it
+    "follow_person": {DIES: Cause.PRECONDITION},
     "find_people": {DIES: Cause.ERROR, LEASE: Cause.EXECUTION},
     "hand_over": {**HANDS, **LOST, "arm never ends": Cause.TIMEOUT},  # the person pulls before it is held out
 }

@@ -1,0 +1,1 @@
+"""The follow_person skill: keeps behind a walking person."""

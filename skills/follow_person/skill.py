@@ -1,0 +1,326 @@
+"""The follow_person skill: keeps behind a walking person, searches for a person whom it has lost, and asks."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+import shapely
+
+from skills.api import Cause, Failed, Running, SkillContext, Succeeded
+from skills.follow_person.target import Target, TargetOptions
+from skills.geometry import wrap
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
+from skills.navigate.giving_way import GivingWayOptions, pose_aside
+from skills.navigate.skill import Navigate
+from skills.navigate.surroundings import Company
+from skills.perception.class_forms import PERSON
+from skills.perception.people import SeenPerson
+from skills.perception.people_tracking import PeopleOptions, PeopleWatch
+from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
+from skills.quantities import Delay, Duration, Factor, Length, Tries, Turn
+from skills.robot import FloatArray, Pose2D
+from skills.routine import Routine, RoutineSkill, SkillFailure
+from skills.speak.skill import say
+
+_SAME_PLACE_M = 1.5
+"""Distance from the place where the person was seen last at which somebody is that person."""
+_WALKS_M_S = 0.25
+_PERSON_M, _ASIDE_M = 0.3, 4.0
+"""Radius of a person on a path, and reach of the search for a pose aside from it."""
+
+
+@dataclass(frozen=True)
+class FollowPersonOptions:
+    """Distances (m) between the middles of robot and person, and patience (s).
+
+    The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
+    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`. For a person
+    who comes towards it within `meeting_m`, it goes aside for `aside_s` at most. A person who stays hidden for `lost_s`
+    is lost: the robot says so and searches through `doors` doors, then asks and listens for `asking_s`. At the
+    beginning it looks for the person for `finding_s`.
+    """
+
+    behind_m: Length = 1.6
+    close_m: Length = 1.35
+    near_m: Length = 2.0
+    meeting_m: Length = 2.5
+    aside_s: Delay = 5.0
+    ahead_s: Duration = 0.8
+    replan_s: Duration = 0.5
+    gain: Factor = 1.0
+    lost_s: Delay = 6.0
+    finding_s: Delay = 8.0
+    asking_s: Delay = 12.0
+    search_s: Delay = 20.0
+    doors: Tries = 2
+    tries: Tries = 8
+    ahead_rad: Turn = 1.2
+    ahead_m: Length = 4.0
+    target: TargetOptions = field(default_factory=TargetOptions)
+    people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
+
+
+class _Told(Exception):  # noqa: N818 - no program error
+    """Somebody told the robot to end."""
+
+
+class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
+    """Implementation of `FollowPersonPorts`; the navigate skill drives."""
+
+    Options: ClassVar[type] = FollowPersonOptions
+    options: FollowPersonOptions
+
+    def __init__(self, context: SkillContext, options: FollowPersonOptions | None = None) -> None:
+        super().__init__(context, options)
+        self._target: Target | None = None
+        self._company = Company(PeopleWatch(context, self.options.people))
+        self._navigate = Navigate(context, None, self._company)
+        self._goal: Pose2D | None = None
+        self._remark = context.listen()
+
+    def begin(self, inputs: FollowPersonInputs) -> None:
+        """Starts to look for the person."""
+        super().begin(inputs)
+        self._inputs, self._limit_s = inputs, self.context.clock.now() + inputs.time_limit_s
+        self._outline, self._tries = ArmFootprint(self.context).now(), 0
+        self._planned_s = self._aside_until_s = -math.inf
+        self._aside: Pose2D | None = None
+        self._remark.withdraw()
+        self._remark = self.context.listen()
+        self._company.watch = PeopleWatch(self.context, self.options.people)
+
+    def end(self) -> None:
+        """Stops the base, and listens no longer."""
+        self._halt()
+        self._remark.withdraw()
+        super().end()
+
+    def suspend(self) -> None:
+        """Stops the base; the person may walk on."""
+        self._halt()
+        super().suspend()
+        self._remark.withdraw()
+
+    def resume(self, inputs: FollowPersonInputs) -> None:
+        """Looks for the person again, first where they were seen last."""
+        last_W = inputs.place_W if self._target is None else self._target.place_W(self.context.clock.now())
+        self.begin(replace(inputs, place_W=last_W))
+
+    def run(self, inputs: FollowPersonInputs) -> Routine[Succeeded]:
+        """Finds the person and keeps behind them to the end. Raises SkillFailure."""
+        try:
+            self._target = yield from self._find(inputs)
+            while not (yield from self._keep_behind(self._target)):
+                yield from self._search(self._target)
+        except _Told as told:
+            return Succeeded(f'stopped following {self._who} when told "{told}"')
+        self._halt()
+        yield from self.pause(0.5, "coming to rest")
+        return Succeeded(f"followed {self._who} to the {inputs.until or 'place'}")
+
+    @property
+    def _who(self) -> str:
+        return "the person" if self._inputs.person == PERSON else self._inputs.person
+
+    def _now(self) -> float:
+        return self.context.clock.now()
+
+    def _tick(self, message: str) -> Routine[None]:
+        """Waits for the next tick; looks for people and listens. Raises SkillFailure at the time limit, and _Told."""
+        yield Running(message)
+        company = self._company
+        company.watch.step(np.zeros(3))
+        if self._target is not None:
+            self._target.update(company.watch.tracks(), self._now())
+            company.track = self._target.seen.track
+        if self._remark.done():
+            raise _Told(self._remark.result())
+        if self._now() > self._limit_s:
+            where = f" in the {self._inputs.until}" if self._inputs.until else ""
+            raise SkillFailure(Cause.TIMEOUT, f"followed {self._who} for {self._inputs.time_limit_s:.0f} s{where}")
+
+    def _find(self, inputs: FollowPersonInputs) -> Routine[Target]:
+        """Looks for the person to follow. Raises SkillFailure when nobody is seen."""
+        self._target, begun_s = None, self._now()
+        while self._now() < begun_s + self.options.finding_s:
+            waited = self._now() - begun_s > 0.25 * self.options.finding_s
+            if (first := self._first(inputs, waited)) is not None:
+                say(self.context, f"I follow you, {inputs.person}." if inputs.person != PERSON else "I follow you.")
+                return Target(first, self.context.pose(), self.options.target)
+            yield from self._tick(f"looking for {self._who}")
+        where = "ahead" if inputs.place_W is None else f"at ({inputs.place_W[0]:.2f}, {inputs.place_W[1]:.2f})"
+        raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._who} cannot be followed")
+
+    def _first(self, inputs: FollowPersonInputs, waited: bool) -> SeenPerson | None:
+        """The nearest person ahead, or at the place of the inputs; a standing one without a picture after a wait."""
+        here, options = self.context.pose(), self.options
+        tracks = self._company.watch.tracks()
+        if inputs.place_W is None:
+            centre_W, reach_m = (here.x_m, here.y_m), options.ahead_m
+            tracks = tuple(one for one in tracks if abs(_bearing(here, one.place_W)) < options.ahead_rad)
+        else:
+            centre_W, reach_m = inputs.place_W, _SAME_PLACE_M * (2.0 if waited else 1.0)
+        sure = {one.track for one in self._company.others()}
+        near = [one for one in tracks if math.dist(one.place_W, centre_W) < reach_m and (waited or one.track in sure)]
+        return min(near, key=lambda one: (one.track not in sure, math.dist(one.place_W, centre_W)), default=None)
+
+    def _keep_behind(self, target: Target) -> Routine[bool]:
+        """Follows until the person stands in the place (True), or is lost (False)."""
+        place = None if self._inputs.until_W is None else shapely.Polygon(self._inputs.until_W)
+        while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
+            here, seen_W = self.context.pose(), target.seen.place_W
+            near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
+            inside = near and place is not None and place.covers(shapely.Point(seen_W))
+            if inside and target.stands_still(self._now()):
+                return True
+            if self._now() >= self._planned_s + self.options.replan_s:
+                self._plan(self._next_pose(target, hidden_s))
+            self._company.most_m_s = math.inf if hidden_s else self._speed_m_s(target)
+            doing = f"following {self._who}" if not hidden_s else f"going to where {self._who} went"
+            yield from self._tick(self._drive(doing))
+        return False
+
+    def _search(self, target: Target) -> Routine[None]:
+        """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""
+        say(self.context, f"I have lost sight of {self._who}.")
+        self._company.most_m_s = math.inf
+        for goal in self._poses_beyond_doors(target):
+            self._plan(goal)
+            until_s = self._now() + self.options.search_s
+            while self._goal is not None and self._now() < until_s:
+                yield from self._tick(self._drive(f"searching {self._who}"))
+                if not target.hidden_s(self._now()):
+                    return
+        self._halt()
+        say(self.context, "I lost you. Where are you?")
+        until_s = self._now() + self.options.asking_s
+        while self._now() < until_s:
+            yield from self._tick(f"waiting for {self._who}")
+            if not target.hidden_s(self._now()):
+                return
+        (x, y), hidden_s = target.seen.place_W, target.hidden_s(self._now())
+        raise SkillFailure(
+            Cause.EXECUTION, f"{self._who} is lost, seen last at ({x:.2f}, {y:.2f}) {hidden_s:.0f} s ago"
+        )
+
+    def _plan(self, goal: Pose2D | None) -> None:
+        """Starts or changes the drive; None keeps the present goal."""
+        if goal is None or (self._goal is not None and _apart_m(goal, self._goal) < 0.1):
+            return
+        inputs = NavigateInputs(goal, 0.15, 0.35, self._inputs.max_speed_m_s)
+        if self._goal is None:
+            self._navigate.begin(inputs)
+        elif not self._navigate.retarget(inputs):
+            return
+        self._goal, self._planned_s = goal, self._now()
+
+    def _drive(self, doing: str) -> str:
+        """Drives on for one tick; returns the message. Raises SkillFailure when the robot cannot drive any longer."""
+        if self._goal is None:
+            return doing
+        step = self._navigate.step()
+        if isinstance(step, Running):
+            return f"{doing}: {step.message}"
+        self._halt()
+        self._tries = self._tries + 1 if isinstance(step, Failed) else 0
+        if isinstance(step, Failed):
+            self._planned_s = self._now() + self.options.replan_s
+            if step.cause not in (Cause.PLANNING, Cause.POSTCONDITION) or self._tries > self.options.tries:
+                raise SkillFailure(step.cause, step.message)
+        return doing
+
+    def _halt(self) -> None:
+        """Stops the drive."""
+        self._goal = None
+        self._navigate.end()
+
+    def _speed_m_s(self, target: Target) -> float:
+        """The speed at which the robot does not come too near to the person; unlimited on a path away from them."""
+        here, options, place_W = self.context.pose(), self.options, target.place_W(self._now())
+        distance_m = math.dist((here.x_m, here.y_m), place_W)
+        if self._goal is None or math.dist((self._goal.x_m, self._goal.y_m), place_W) > distance_m:
+            return math.inf
+        return max(0.0, target.away_m_s(here)) + options.gain * max(0.0, distance_m - options.close_m)
+
+    def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
+        """The pose to drive to: behind the person, or aside from the path of one who comes towards the robot."""
+        here, now_s, options = self.context.pose(), self._now(), self.options
+        near = math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
+        away_m_s = target.away_m_s(here)
+        if near and not hidden_s and away_m_s < -max(_WALKS_M_S, 0.6 * target.speed_m_s):
+            if now_s >= self._aside_until_s:
+                self._aside = self._pose_aside(target, here)
+            self._aside_until_s = now_s + options.aside_s
+        elif away_m_s > _WALKS_M_S:
+            self._aside_until_s = -math.inf
+        return self._aside if now_s < self._aside_until_s else self._pose_behind(target, hidden_s)
+
+    def _pose_aside(self, target: Target, here: Pose2D) -> Pose2D | None:
+        """The nearest pose off the path of a person who comes back."""
+        end_W = np.array(target.seen.place_W)
+        path = np.vstack([target.trail, np.linspace(end_W, (here.x_m, here.y_m), 10)])
+        paths = with_discs(NoObstacles(), np.column_stack([path, np.full(len(path), _PERSON_M)]))
+        return pose_aside(self.context.costmap, paths, self._outline, here, GivingWayOptions(reach_m=_ASIDE_M))
+
+    def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
+        """The nearest free pose behind the person on their trail; None to stay.
+
+        While the person is hidden, it is where they were seen last.
+        """
+        here, options, walks = self.context.pose(), self.options, target.speed_m_s > _WALKS_M_S
+        end_W = np.array(target.place_W(self._now() + (options.ahead_s if walks and not hidden_s else 0.0)))
+        distance_m = math.dist((here.x_m, here.y_m), end_W)
+        if not hidden_s and not walks and options.close_m - 0.1 < distance_m < options.near_m:
+            return None
+        trail = target.trail if hidden_s else np.vstack([target.trail, end_W])
+        behind_m = 0.0 if hidden_s else options.behind_m
+        poses = np.array(list(_poses_behind(trail, behind_m))).reshape(-1, 3)
+        return self._free(poses)
+
+    def _free(self, poses: FloatArray) -> Pose2D | None:
+        """The first of some poses (N, 3) with clearance."""
+        clear = footprint_clearance_m(self.context.costmap, self._outline, poses) > SAFE_MARGIN_M
+        return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
+
+    def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:
+        """Poses behind the doors where the person may have gone, the likeliest first."""
+        seen_W, heading = np.array(target.seen.place_W), np.array(target.seen.velocity_W)
+        heading = heading / max(float(np.linalg.norm(heading)), 1e-3)
+
+        def unlikely(middle_W: tuple[float, float]) -> float:
+            off = np.array(middle_W) - seen_W
+            return float(np.linalg.norm(off) - 1.5 * off @ heading / max(float(np.linalg.norm(off)), 1e-3))
+
+        for door in sorted(self.context.doors, key=lambda door: unlikely(door.middle_W))[: self.options.doors]:
+            through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
+            here = self.context.pose()
+            through *= math.copysign(1.0, float((np.array(door.middle_W) - (here.x_m, here.y_m)) @ through))
+            yaw = math.atan2(through[1], through[0])
+            beyond = [(*(np.array(door.middle_W) + far_m * through), yaw) for far_m in (1.0, 1.4, 0.7)]
+            if (pose := self._free(np.array(beyond))) is not None:
+                yield pose
+
+
+def _poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:
+    """Poses on a trail at least so far behind its end, the nearest to the end first: along it, and facing its end."""
+    end = trail[-1]
+    for n in range(len(trail) - 1, 0, -1):
+        length = float(np.linalg.norm(trail[n] - trail[n - 1]))
+        along = math.atan2(*(trail[n] - trail[n - 1])[::-1])
+        for point in np.linspace(trail[n], trail[n - 1], max(1, math.ceil(length / 0.15)), endpoint=False):
+            if np.linalg.norm(end - point) >= behind_m:
+                for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
+                    yield float(point[0]), float(point[1]), yaw
+
+
+def _bearing(here: Pose2D, place_W: tuple[float, float]) -> float:
+    """Direction of a point from the robot's heading (rad)."""
+    return wrap(math.atan2(place_W[1] - here.y_m, place_W[0] - here.x_m) - here.yaw_rad)
+
+
+def _apart_m(a: Pose2D, b: Pose2D) -> float:
+    """Distance of two poses (m), a radian counting half a metre."""
+    return math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) + 0.5 * abs(wrap(a.yaw_rad - b.yaw_rad))

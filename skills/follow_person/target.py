@@ -1,0 +1,103 @@
+"""The person whom the robot follows: the track of one person through crossings and gaps, and the trail behind them."""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from skills.perception.people import SeenPerson
+from skills.perception.people_tracking import predicted_place_W
+from skills.quantities import Delay, Length, Speed
+from skills.robot import FloatArray, Pose2D
+
+_TRAIL_STEP_M = 0.1
+_TRAIL_POINTS = 100
+_LOOP_M, _LOOP_POINTS = 0.4, 8
+"""Distance from a point of the trail, so many points back, at which the person has come back to it."""
+
+
+@dataclass(frozen=True)
+class TargetOptions:
+    """Conditions for another track to be the person again after a gap.
+
+    The person is hidden once no scan has shown them for `hidden_s`. A track that begins later continues theirs within
+    `again_m` of the prediction, and farther by `again_m_s` for each second, up to `farthest_m`. A person stands still
+    while all positions of `still_s` lie within `still_m`.
+    """
+
+    hidden_s: Delay = 0.6
+    again_m: Length = 0.8
+    again_m_s: Speed = 1.0
+    farthest_m: Length = 5.0
+    still_s: Delay = 5.0
+    still_m: Length = 0.5
+
+
+class Target:
+    """The followed person. `seen` is the last view."""
+
+    def __init__(self, first: SeenPerson, here: Pose2D, options: TargetOptions) -> None:
+        self.seen, self._options = first, options
+        self._trail = [(here.x_m, here.y_m), first.place_W]
+        self._others: set[int] = set()
+        self._places: deque[tuple[float, tuple[float, float]]] = deque([(first.stamp_s, first.place_W)])
+
+    @property
+    def speed_m_s(self) -> float:
+        """Speed of the person at the last view."""
+        return math.hypot(*self.seen.velocity_W)
+
+    @property
+    def trail(self) -> FloatArray:
+        """Points (N, 2) of the person's path to the last view, which begins at the robot; without loops."""
+        return np.array(self._trail)
+
+    def hidden_s(self, now_s: float) -> float:
+        """Time since the last view, 0 while the person is in view."""
+        age_s = now_s - self.seen.stamp_s
+        return age_s if age_s > self._options.hidden_s else 0.0
+
+    def place_W(self, now_s: float) -> tuple[float, float]:
+        """Position (x, y) of the person now."""
+        return predicted_place_W(self.seen, now_s)
+
+    def stands_still(self, now_s: float) -> bool:
+        """Returns whether the person has stood still for so long."""
+        long_enough = now_s - self._places[0][0] >= self._options.still_s - 0.2
+        last_W = self.seen.place_W
+        return long_enough and all(math.dist(place, last_W) < self._options.still_m for _, place in self._places)
+
+    def away_m_s(self, here: Pose2D) -> float:
+        """Speed at which the person goes away from the robot, negative towards it."""
+        off = np.array(self.seen.place_W) - (here.x_m, here.y_m)
+        return float(off @ self.seen.velocity_W) / max(float(np.linalg.norm(off)), 1e-3)
+
+    def update(self, people: Sequence[SeenPerson], now_s: float) -> None:
+        """Takes in the tracks of now."""
+        one = next((one for one in people if one.track == self.seen.track), None)
+        if one is None or now_s - one.stamp_s > self._options.hidden_s:
+            one = self._again(people, now_s) or one
+        if one is not None and one.stamp_s > self.seen.stamp_s:
+            self.seen = one
+            self._note(one)
+            self._others |= {each.track for each in people if each.track != one.track}
+
+    def _note(self, one: SeenPerson) -> None:
+        """Lengthens the trail to the person; cuts off a loop."""
+        if math.dist(self._trail[-1], one.place_W) >= _TRAIL_STEP_M:
+            old = self._trail[:-_LOOP_POINTS]
+            back = next((n for n, point in enumerate(old) if math.dist(point, one.place_W) < _LOOP_M), None)
+            self._trail = [*(self._trail if back is None else self._trail[: back + 1]), one.place_W][-_TRAIL_POINTS:]
+        self._places.append((one.stamp_s, one.place_W))
+        while self._places[0][0] < one.stamp_s - self._options.still_s:
+            self._places.popleft()
+
+    def _again(self, people: Sequence[SeenPerson], now_s: float) -> SeenPerson | None:
+        """The track that continues the person's after a gap: the nearest to the prediction that is nobody else's."""
+        options, expected_W = self._options, self.place_W(now_s)
+        reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), options.farthest_m)
+        new = [each for each in people if each.track not in self._others and each.stamp_s > self.seen.stamp_s]
+        near = [each for each in new if math.dist(each.place_W, expected_W) <= reach_m]
+        return min(near, key=lambda each: math.dist(each.place_W, expected_W), default=None)

@@ -1,0 +1,156 @@
+"""Drives behind a person who walks along a corridor, seen by the LiDAR alone."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from planar_people import PeopleDetector, person_at
+from planar_robot import Bench
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.follow_person.skill import FollowPerson, FollowPersonOptions
+from skills.ports import FollowPersonInputs
+from skills.robot import Pose2D
+
+START, LANE_M = Pose2D(1.5, 5.4, 0.0), 5.4
+END = ((5.0, 4.5), (8.0, 4.5), (8.0, 6.5), (5.0, 6.5))
+QUICK = FollowPersonOptions(lost_s=2.0, finding_s=2.0, asking_s=2.0, search_s=4.0)
+
+
+class Remark:
+    """What a person says to the robot at a time."""
+
+    def __init__(self, bench, at_s):
+        self.bench, self.at_s = bench, at_s
+        self.withdrawn = False
+
+    def done(self):
+        return self.bench.clock.now() >= self.at_s
+
+    def result(self):
+        return "thank you"
+
+    def withdraw(self):
+        self.withdrawn = True
+
+
+class Walk:
+    """One run behind a person who walks from x = 3.2 m to `to_m` at a speed, and is gone after `gone_s`."""
+
+    def __init__(
+        self, to_m=6.5, *, speed_m_s=0.6, gone_s=math.inf, told_s=math.inf, others=(), cameras=False, **inputs
+    ):
+        self.bench = Bench(START, unmapped=[person_at(3.2, LANE_M), *others], cameras=cameras)
+        self.to_m, self.speed_m_s, self.gone_s, self.x_m = to_m, speed_m_s, gone_s, 3.2
+        for _ in range(10):
+            self.bench.tick()
+        self.remark = Remark(self.bench, told_s)
+        self.detector = PeopleDetector(self.bench, [])
+        context = replace(self.bench.context(), listen=lambda: self.remark, detector=self.detector)
+        self.skill, self.distances_m, self.messages = FollowPerson(context, QUICK), [], []
+        self.inputs = FollowPersonInputs("Robin", **inputs)
+        self.skill.begin(self.inputs)
+
+    def tick(self):
+        """One tick of everybody; returns the skill's step."""
+        now_s, boxes = self.bench.clock.now(), self.bench.robot.boxes
+        boxes[:] = [box for box in boxes if box != person_at(self.x_m, LANE_M)]
+        self.x_m = min(self.to_m, self.x_m + (0.05 * self.speed_m_s if now_s > 3.0 else 0.0))
+        if now_s < self.gone_s:
+            boxes.append(person_at(self.x_m, LANE_M))
+        self.bench.tick()
+        here = self.bench.robot.pose
+        self.distances_m.append(math.dist((here.x_m, here.y_m), (self.x_m, LANE_M)))
+        step = self.skill.step()
+        self.messages.append(step.message)
+        return step
+
+    def run(self, most_s=40.0):
+        """Runs to the end; returns the last step."""
+        step = self.tick()
+        while isinstance(step, Running) and self.bench.clock.now() < most_s:
+            step = self.tick()
+        self.skill.end()
+        return step
+
+    def said(self):
+        return [message["text"] for topic, message in self.bench.published if topic == "speech"]
+
+
+def test_robot_keeps_behind_a_person_until_they_stand_in_the_place():
+    walk = Walk(until_W=END, until="kitchen")
+    step = walk.run()
+    assert step == Succeeded("followed Robin to the kitchen")
+    assert 1.2 <= walk.distances_m[-1] <= 2.1
+    assert min(walk.distances_m) > 1.1 and max(walk.distances_m) < 2.9
+    assert not walk.bench.robot.driving
+
+
+def test_without_anybody_ahead_the_skill_fails():
+    step = Walk(gone_s=0.0).run()
+    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION
+    assert "nobody is seen ahead" in step.message
+
+
+def test_a_person_is_found_at_the_place_where_they_were_seen():
+    other = person_at(3.0, 4.6)
+    walk = Walk(others=[other], place_W=(3.2, LANE_M), until_W=END)
+    assert isinstance(walk.run(), Succeeded)
+    assert walk.distances_m[-1] < 2.2
+
+
+def test_a_remark_ends_the_skill_with_success():
+    walk = Walk(told_s=6.0)
+    assert walk.run() == Succeeded('stopped following Robin when told "thank you"')
+    assert walk.remark.withdrawn and not walk.bench.robot.driving
+
+
+def test_a_lost_person_is_searched_and_asked_for_before_the_skill_fails():
+    walk = Walk(gone_s=6.0)
+    step = walk.run()
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
+    assert "Robin is lost, seen last at" in step.message
+    assert walk.said() == ["I follow you, Robin.", "I have lost sight of Robin.", "I lost you. Where are you?"]
+    assert any("going to where Robin went" in message for message in walk.messages)
+
+
+def test_the_time_limit_ends_the_skill():
+    step = Walk(time_limit_s=5.0, until_W=END, until="kitchen").run()
+    assert isinstance(step, Failed) and step.cause is Cause.TIMEOUT
+
+
+@pytest.mark.parametrize("at_s", [0.6, 4.0, 9.5])
+def test_a_cancel_in_any_phase_stops_the_base_and_the_listening(at_s):
+    walk = Walk(gone_s=6.5)
+    while walk.bench.clock.now() < at_s:
+        walk.tick()
+    walk.skill.end()
+    assert not walk.bench.robot.driving and walk.remark.withdrawn
+
+
+def test_after_a_pause_the_robot_looks_for_the_person_again_and_follows():
+    walk = Walk(until_W=END)
+    while walk.bench.clock.now() < 5.0:
+        walk.tick()
+    walk.skill.suspend()
+    assert not walk.bench.robot.driving
+    for _ in range(20):
+        walk.bench.tick()
+    walk.skill.resume(walk.inputs)
+    assert isinstance(walk.run(), Succeeded)
+
+
+def test_a_blind_lidar_ends_the_skill_with_its_sentence():
+    walk = Walk()
+    while walk.bench.clock.now() < 5.0:
+        walk.tick()
+    walk.bench.robot.scan = lambda: None
+    step = walk.run()
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
+
+
+def test_pictures_are_bounded():
+    walk = Walk(cameras=True)
+    while walk.bench.clock.now() < 6.0:
+        walk.tick()
+    assert 4 <= len(walk.detector.pictures) <= 8

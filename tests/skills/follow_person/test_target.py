@@ -1,0 +1,59 @@
+"""The followed person among the tracks of all people."""
+
+import numpy as np
+import pytest
+
+from skills.follow_person.target import Target, TargetOptions
+from skills.perception.people import SeenPerson
+from skills.robot import Pose2D
+
+HERE = Pose2D(0.0, 0.0, 0.0)
+
+
+def track(number, x, stamp_s, y=0.0, speed_m_s=1.0):
+    return SeenPerson((x, y), np.eye(2) * 0.01, 1.0, stamp_s, HERE, track=number, velocity_W=(speed_m_s, 0.0), scans=9)
+
+
+def walked(seconds=2.0, others=()):
+    target = Target(track(1, 2.0, 0.0), HERE, TargetOptions())
+    for stamp_s in np.arange(0.1, seconds + 0.05, 0.1):
+        target.update([track(1, 2.0 + stamp_s, stamp_s), *others], stamp_s)
+    return target
+
+
+def test_the_trail_leads_from_the_robot_to_the_person():
+    trail = walked().trail
+    assert trail[0] == pytest.approx((0.0, 0.0)) and trail[-1] == pytest.approx((4.0, 0.0), abs=0.11)
+
+
+def test_a_person_who_comes_back_takes_the_loop_off_the_trail():
+    target = walked()
+    for n in range(1, 16):
+        target.update([track(1, 4.0 - 0.1 * n, 2.0 + 0.1 * n, speed_m_s=-1.0)], 2.0 + 0.1 * n)
+    assert target.trail[:, 0].max() < 3.3
+
+
+def test_a_new_track_near_the_prediction_is_the_person_again():
+    target = walked()
+    target.update([track(7, 5.4, 3.4)], 3.4)
+    assert (target.seen.track, target.hidden_s(3.4)) == (7, 0.0)
+
+
+def test_nobody_is_taken_for_the_person_who_was_seen_beside_them():
+    other = track(2, 4.5, 2.0, y=0.8)
+    target = walked(others=[other])
+    target.update([track(2, 4.6, 3.4, y=0.2)], 3.4)
+    assert target.seen.track == 1 and target.hidden_s(3.4) > 1.0
+
+
+def test_a_track_too_far_away_is_somebody_else():
+    target = walked()
+    target.update([track(7, 9.0, 3.0)], 3.0)
+    assert target.seen.track == 1
+
+
+def test_a_person_stands_still_after_five_seconds_in_one_place():
+    target = walked()
+    for n in range(1, 52):
+        target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], 2.0 + 0.1 * n)
+        assert target.stands_still(2.0 + 0.1 * n) == (n >= 46)

@@ -28,9 +28,10 @@ from tests.executive.language.notation import as_noted, noted
 __all__ = ["TABLES", "Score", "in_full", "measured"]
 
 TABLES: Final = tuple(
-    Path(__file__).with_name(f"structured_sentences{name}.yaml") for name in ("", "_later", "_last", "_forms")
+    Path(__file__).with_name(f"structured_sentences{name}.yaml")
+    for name in ("", "_later", "_last", "_forms", "_people")
 )
-_SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge)\(([^()]*)\)")
+_SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge|follow|guide|greet)\(([^()]*)\)")
 _FORMS: Final = {
     "fetch": "Take [Nothing] to [{1}] and do [grasp] to [{0}] then Take [{0}] to [start] and do [Nothing] to [Nothing]",
     "carry": "Take [Nothing] to [{1}] and do [grasp] to [{0}] then Take [{0}] to [{2}] and do [Nothing] to [Nothing]",
@@ -39,6 +40,9 @@ _FORMS: Final = {
     "give": "Take [{0}] to [{1}] and do [Nothing] to [Nothing]",
     "go": "Take [Nothing] to [{0}] and do [Nothing] to [Nothing]",
     "find": "Take [Nothing] to [{1}] and do [find] to [{0}]",
+    "follow": "Take [Nothing] to [{1}] and do [follow] to [{0}]",
+    "guide": "Take [Nothing] to [{1}] and do [guide] to [{0}]",
+    "greet": "Take [Nothing] to [{1}] and do [greet] to [{0}]",
     "charge": "Take [Nothing] to [Nothing] and do [charge] to [Nothing]",
 }
 
@@ -89,7 +93,7 @@ def _wrongly_accepted(expected: list[str] | str, answer: Understanding) -> bool:
 
 
 def in_full(text: str) -> str:
-    return _SHORT.sub(lambda match: _FORMS[match[1]].format(*re.split(r", ", match[2])), text)
+    return _SHORT.sub(lambda match: _FORMS[match[1]].format(*re.split(r", ", match[2]), "Nothing"), text)
 
 
 def _line(text: str, answer: Understanding) -> str:

@@ -16,6 +16,7 @@ from executive.words.knowledge import ANYBODY, Knowledge
 from skills.api import ObjectKind
 from skills.files.errors import listing
 
+_PEOPLE: Final = Patterns("structures.yaml", "people")
 _TASKS: Final = {"follow": Task.FOLLOW, "guide": Task.GUIDE, "greet": Task.GREET, "meet": None, "find": None}
 
 
@@ -72,14 +73,17 @@ def parse_people(text: str, knowledge: Knowledge) -> PeopleRequest | None:
     raise RefusalError(f"{what}; {hint}", [text])
 
 
-_ENDS: Final = re.compile(r"[,\s]+(?:please|thanks|thank you|now|then)$", re.IGNORECASE)
+_ENDS: Final = re.compile(r",\s*(?:thanks|thank you)$|[,\s]+(?:please|now|then)$", re.IGNORECASE)
+
+
+def refers_to_somebody(text: str) -> bool:
+    """Returns whether a clause has "him", "her" or "them"."""
+    return _PEOPLE.refers.search(text) is not None
 
 
 @lru_cache(maxsize=16)
 def _of_world(people: tuple[str, ...], places: tuple[str, ...]) -> Patterns:
-    return Patterns("structures.yaml", "people").with_words(
-        names=any_of(people) or "(?!)", around=any_of(places) or "(?!)"
-    )
+    return _PEOPLE.with_words(names=any_of(people) or "(?!)", around=any_of(places) or "(?!)")
 
 
 def commands_on_people(
@@ -144,7 +148,7 @@ def _place(text: str, state: State, reader: PlainReader) -> str | None:
     """Own name of a place in words; None for "home". Raises RefusalError when it is no place."""
     if text.lower() == "home" and reader.knowledge.place(text) is None:
         return None
-    if text.lower() == "here":
+    if text.lower() in ("here", "back"):
         return START
     first, *more = reader.go_to(text, state).commands
     if more or first.goal is None or reader.knowledge.place(first.goal) is None:

@@ -17,7 +17,7 @@ from executive.language.reference import Memory
 from executive.language.roles import Location
 from executive.language.structure.conditions import parse_condition, parse_opening
 from executive.language.structure.decisions import DecisionBuilder
-from executive.language.structure.people import commands_on_people, parse_people
+from executive.language.structure.people import commands_on_people, parse_people, refers_to_somebody
 from executive.language.structure.plain import (
     ATTACHED,
     LastCheck,
@@ -139,7 +139,7 @@ class SentenceBuilder(DecisionBuilder):
             return None
         if request.form == "find":
             then = clauses[at + 1] if at + 1 < len(clauses) else None
-            follows = then is not None and then.kind is None and parse_people(then.text, self.reader.knowledge)
+            follows = then is not None and then.kind is None and refers_to_somebody(then.text)
             if not follows and not (self.special and request.refers):
                 return None
         if found is not None and decides:

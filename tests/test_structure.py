@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8306,
     "executive/cli": 5018,
-    "skills": 29403,
+    "skills": 29405,
     "plant": 21945,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 511, 96, 13

@@ -23,7 +23,8 @@ from skills.navigate.zones import FilterType, Zone, ZoneKind
 from skills.robot import FloatArray, Pose2D
 from skills.world_model import FreeSpace
 
-_CELL_M = 0.05
+_CELL_M, _MOST_CELLS = 0.05, 4_000_000
+"""Size of a cell, larger where the zones would fill more cells."""
 _AROUND_M = 1.0
 """Ground about the zones that belongs to the grid."""
 _SUBPIXEL_BITS: Final = 6
@@ -61,8 +62,9 @@ class ZoneMap:
         corners = [load_filter_mask(Path(z.mask.file)).corners_W if z.mask else np.array(z.corners_W) for z in zones]
         points = np.vstack([np.empty((0, 2)), *corners])
         low, high = (points.min(axis=0), points.max(axis=0)) if len(points) else (np.zeros(2), np.zeros(2))
-        self.origin_m = low - _AROUND_M
-        columns, rows = np.ceil((high - low + 2.0 * _AROUND_M) / _CELL_M).astype(int).tolist()
+        self.origin_m, size_m = low - _AROUND_M, high - low + 2.0 * _AROUND_M
+        self.cell_m = max(_CELL_M, math.sqrt(float(size_m.prod()) / _MOST_CELLS))
+        columns, rows = np.ceil(size_m / self.cell_m).astype(int).tolist()
         self._shape = rows, columns
 
     def _of(self, *kinds: ZoneKind) -> tuple[Zone, ...]:
@@ -71,12 +73,12 @@ class ZoneMap:
     @property
     def axes(self) -> tuple[FloatArray, FloatArray]:
         """The x and y of the cells' centres."""
-        x, y = ((self.origin_m[n] + (np.arange(self._shape[1 - n]) + 0.5) * _CELL_M) for n in (0, 1))
+        x, y = ((self.origin_m[n] + (np.arange(self._shape[1 - n]) + 0.5) * self.cell_m) for n in (0, 1))
         return x, y
 
     def cells(self, points_W: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64], BoolGrid]:
         """Row and column of the cell of each point (N, 2), and whether it is on the grid."""
-        column, row = np.floor((points_W[:, :2] - self.origin_m) / _CELL_M).astype(np.int64).T
+        column, row = np.floor((points_W[:, :2] - self.origin_m) / self.cell_m).astype(np.int64).T
         on = (row >= 0) & (row < self._shape[0]) & (column >= 0) & (column < self._shape[1])
         return row[on], column[on], on
 
@@ -95,7 +97,7 @@ class ZoneMap:
             values = self._values(zone)
             return values >= _MOST_PERCENT if zone.kind is ZoneKind.KEEP_OUT else np.isfinite(values)
         cells = np.zeros(self._shape, dtype=np.uint8)
-        corners = ((np.array(zone.corners_W) - self.origin_m) / _CELL_M - 0.5) * 2**_SUBPIXEL_BITS
+        corners = ((np.array(zone.corners_W) - self.origin_m) / self.cell_m - 0.5) * 2**_SUBPIXEL_BITS
         cv2.fillPoly(cells, [np.round(corners).astype(np.int32)], 1, shift=_SUBPIXEL_BITS)
         return cells.astype(np.bool_)
 
@@ -199,7 +201,7 @@ class KeepOut:
 
     def __init__(self, zones: ZoneMap) -> None:
         self._zones = zones
-        self._whole = signed_distance(zones.keep_out, _CELL_M)
+        self._whole = signed_distance(zones.keep_out, zones.cell_m)
         self.reset()
 
     def reset(self) -> None:
@@ -223,10 +225,10 @@ class KeepOut:
         if level == _NEVER:
             return WithObstacles(costmap, self._distance_m(self._whole))
         body = self._steps[row, column]
-        turning = math.ceil(footprint.circumscribed_m / _CELL_M) if level > 0 else 0
+        turning = math.ceil(footprint.circumscribed_m / self._zones.cell_m) if level > 0 else 0
         most = max(int(body[body < _NEVER].max(initial=0)), level + turning) + 1
         if self._deeper is None or self._deeper[0] != most:
-            self._deeper = most, signed_distance(keep_out & (self._steps > most), _CELL_M)
+            self._deeper = most, signed_distance(keep_out & (self._steps > most), self._zones.cell_m)
         return WithObstacles(costmap, self._distance_m(self._deeper[1]))
 
     def _distance_m(self, field: Floats) -> Callable[[FloatArray], FloatArray]:
@@ -235,7 +237,7 @@ class KeepOut:
 
         def distance_m(points_W: FloatArray) -> FloatArray:
             points = np.ascontiguousarray(points_W)
-            found = distances(field, _CELL_M, x0_m, y0_m, points)
+            found = distances(field, self._zones.cell_m, x0_m, y0_m, points)
             return np.where(self._zones.cells(points)[2], found, np.inf)
 
         return distance_m
@@ -247,14 +249,14 @@ def _steps_out(zones: ZoneMap, costmap: FreeSpace, footprint: Footprint) -> NDAr
     0 outside, _NEVER where no path leads out.
     """
     clear_m = clearance_on_grid(costmap, *zones.axes)
-    free = clear_m > footprint.inscribed_m - 2.0 * _CELL_M
+    free = clear_m > footprint.inscribed_m - 2.0 * zones.cell_m
     steps = np.full(free.shape, _NEVER, dtype=np.int32)
     square, front, count = np.ones((3, 3), np.uint8), free & ~zones.keep_out, 0
     while front.any():
         steps[front] = count
         count += 1
         front = cv2.dilate(front.astype(np.uint8), square).astype(np.bool_) & free & (steps == _NEVER)
-    for _ in range(math.ceil(footprint.inscribed_m / _CELL_M)):
+    for _ in range(math.ceil(footprint.inscribed_m / zones.cell_m)):
         nearest = cv2.erode(steps.astype(np.float32), square)
         beside = (clear_m > 0.0) & (steps == _NEVER) & (nearest < _NEVER)
         steps[beside] = nearest[beside].astype(np.int32) + 1

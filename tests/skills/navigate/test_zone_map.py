@@ -168,6 +168,12 @@ def test_zones_without_costs_change_no_plan_and_expand_as_many_states():
     assert not zone_map((Zone("hush", ZoneKind.SILENT, CORRIDOR),), FULL_M_S).has_costs(START)
 
 
+def test_a_zone_of_square_kilometres_is_drawn_on_larger_cells():
+    zones = zone_map((Zone("land", ZoneKind.KEEP_OUT, box(-9000.0, -9000.0, 9000.0, -100.0)),), FULL_M_S)
+    assert zones.keep_out.size < 5_000_000
+    assert zones.names_at(ZoneKind.KEEP_OUT, Pose2D(0.0, -200.0, 0.0)) == ("land",)
+
+
 def mask_zone(folder, values, kind, info, mode="raw"):
     cv2.imwrite(str(folder / "mask.pgm"), np.flipud(values).astype(np.uint8))
     text = f"image: mask.pgm\nmode: {mode}\nresolution: 0.5\norigin: [1.0, 2.0, 0.0]\nnegate: 0\n"

@@ -322,9 +322,8 @@ class SkillContext:
 
     def silent_zone(self) -> str | None:
         """Returns the name of the silent zone in which the robot stands, or None."""
-        if not any(zone.kind is ZoneKind.SILENT for zone in self.zones):
-            return None
-        return next(iter(self.zone_map().names_at(ZoneKind.SILENT, self.pose())), None)
+        is_any = any(zone.kind is ZoneKind.SILENT for zone in self.zones)
+        return next(iter(self.zone_map().names_at(ZoneKind.SILENT, self.pose()) if is_any else ()), None)
 
     def X_WB(self) -> RigidTransform:
         """Returns the body's estimated pose in the world."""

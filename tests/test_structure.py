@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 8207,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8323,
+    "executive/tree": 8324,
     "executive/run": 3212,
     "executive/record": 1408,
     "executive/store": 1666,
@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8306,
     "executive/cli": 5018,
-    "skills": 29405,
+    "skills": 29409,
     "plant": 21945,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 511, 96, 13

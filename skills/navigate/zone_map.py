@@ -122,6 +122,11 @@ class ZoneMap:
             limits = np.minimum(limits, each.astype(np.float32))
         return limits
 
+    @cached_property
+    def slowdown(self) -> float:
+        """Factor, 1 or more, by which speed limits may lengthen a drive."""
+        return max(1.0, self._full_m_s / float(self._limits_m_s.min()))
+
     def speed_m_s(self, footprint: Footprint, poses: FloatArray, ahead_m: FloatArray) -> float:
         """The speed limit of a robot that reaches `poses` (N, 3) after `ahead_m` (N,), with time to brake."""
         if not self._of(ZoneKind.SPEED_LIMIT):

@@ -50,7 +50,7 @@ class SkillLeaf(ExplainedLeaf):
     | `Succeeded` in time, outputs of the declared types, data fresh | SUCCESS |
     | `Succeeded` in time, on data older than it declares | FAILURE with POSTCONDITION |
     | `Failed` | FAILURE with its cause |
-    | `Running` or `Succeeded` after `limit_s` of the robot's clock | FAILURE with TIMEOUT |
+    | `Running` or `Succeeded` after `limit_s`, longer by speed limits | FAILURE with TIMEOUT |
     | an exception, no `Step`, or outputs that are missing or of a wrong type | FAILURE with ERROR |
     | suspended | RUNNING; the next tick calls `Skill.resume`, and the time between does not count |
     | halted | INVALID with CANCELLED |
@@ -207,9 +207,10 @@ class SkillLeaf(ExplainedLeaf):
 
     def _judged(self, step: Step) -> Step:
         """Turns a step after the time limit, and a success on old data, into a failure."""
-        late = self._time.elapsed_s() > self.limit_s
-        if late and not isinstance(step, Failed):
-            return Failed(Cause.TIMEOUT, f"{self.name} took longer than {self.limit_s:g} s ({step.message})")
+        drives = Part.BASE in self.skill.uses and bool(self.context.zones)
+        limit_s = self.limit_s * (self.context.zone_map().slowdown if drives else 1.0)
+        if self._time.elapsed_s() > limit_s and not isinstance(step, Failed):
+            return Failed(Cause.TIMEOUT, f"{self.name} took longer than {limit_s:g} s ({step.message})")
         if isinstance(step, Succeeded):
             success = step
             return self._guarded(lambda: refuse_stale(self.skill, success, self.context))

@@ -1,5 +1,6 @@
 """SkillLeaf: statuses, time, defects, ports, and that the skill is ended on every way out."""
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -9,7 +10,7 @@ from py_trees.common import Status
 from executive.tree.board import Constant, FromBoard
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Cause, Failed, Part, Running, Skill, Succeeded
+from skills.api import Cause, Failed, Part, Running, Skill, Succeeded, Zone, ZoneKind
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,16 @@ def test_time_over_is_a_timeout_even_for_a_late_success(context, clock, late):
     assert leaf.cause is Cause.TIMEOUT
     assert "1.5 s" in leaf.message
     assert log[-1] == "end"
+
+
+def test_speed_limits_lengthen_the_time_of_a_drive(context, clock, robot, monkeypatch):
+    monkeypatch.setattr(robot, "capabilities", spot_capabilities, raising=False)
+    corners = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
+    hall = Zone("hall", ZoneKind.SPEED_LIMIT, corners, share=0.5)
+    leaf, _ = leaf_of(
+        dataclasses.replace(context, zones=(hall,)), [Running("a"), Running("b"), Succeeded("there")], limit_s=1.5
+    )
+    assert tick(leaf, clock, 3)[-1] is Status.SUCCESS
 
 
 def test_a_late_failure_keeps_its_own_cause(context, clock):

@@ -17,7 +17,14 @@ from skills.api import ObjectKind
 from skills.files.errors import listing
 
 _PEOPLE: Final = Patterns("structures.yaml", "people")
-_TASKS: Final = {"follow": Task.FOLLOW, "guide": Task.GUIDE, "greet": Task.GREET, "meet": None, "find": None}
+_TASKS: Final = {
+    "follow": Task.FOLLOW,
+    "guide": Task.GUIDE,
+    "greet": Task.GREET,
+    "meet": None,
+    "find": None,
+    "stated": None,
+}
 
 
 @dataclass(frozen=True)
@@ -91,7 +98,9 @@ def commands_on_people(
 ) -> tuple[tuple[Command, ...], State, tuple[str, ...]]:
     """Builds the commands of a request, with the state after them and notes. Raises RefusalError."""
     person, notes = _person(request, state, reader), tuple[str, ...]()
-    at = None if request.at is None else _place(request.at, state, reader)
+    found = person == ANYBODY and request.refers and state.memory.person is None and state.memory.place is not None
+    where = "there" if found and request.at is None else request.at
+    at = None if where is None else _place(where, state, reader)
     goal = None if request.to is None else _place(request.to, state, reader)
     if request.to is not None and request.to.lower() == "home":
         goal, notes = _home(request, person, reader)
@@ -139,7 +148,7 @@ def _person(request: PeopleRequest, state: State, reader: PlainReader) -> str:
         return SPEAKER
     if who in _PRONOUNS and before is not None and request.form != "greet":
         return reader.knowledge.person(before.name) or before.name
-    if who in _PRONOUNS - _ONE:
+    if who in _PRONOUNS - _ONE and not state.somebody:
         raise RefusalError(f"who is meant by '{request.who}' in '{request.said}'?", [request.who], question=True)
     return reader.knowledge.person(request.who) or ANYBODY
 

@@ -36,7 +36,8 @@ class State:
     """State of the mission where a part of the sentence begins.
 
     `memory` has the referents, `held` the object in the gripper, `goal` the robot's last destination, `at` its room
-    (None: unknown), `door` the last door, `recipient` the person who receives objects where nobody is named.
+    (None: unknown), `door` the last door, `recipient` the person who receives objects where nobody is named. `somebody`
+    says that a condition has found anybody in the place of the memory.
     """
 
     memory: Memory = field(default_factory=Memory)
@@ -45,6 +46,7 @@ class State:
     at: str | None = None
     door: DoorOpen | None = None
     recipient: Location | None = None
+    somebody: bool = False
 
 
 @dataclass(frozen=True)
@@ -248,7 +250,7 @@ class PlainReader:
             known = sought is not None and self.knowledge.person(sought.name) is not None
             person = Location(target) if known else state.memory.person
             met = replace(memory, objects=state.memory.objects, where=state.memory.where, person=person)
-            return replace(state, memory=replace(met, place=where or memory.place))
+            return replace(state, memory=replace(met, place=where or memory.place), somebody=not known)
         memory = replace(memory, objects=(target,), where=where, place=where or memory.place, locations=locations)
         return replace(state, memory=memory)
 

@@ -145,7 +145,7 @@ def parse_speech(text: str, reader: PlainReader) -> SpeechRequest | None:
     if (match := forms.greet.fullmatch(text)) is not None:
         return SpeechRequest("hello", _listener(match))
     if (match := forms.introduce.fullmatch(text)) is not None:
-        return SpeechRequest(_INTRODUCTION, _listener(match))
+        return SpeechRequest(_INTRODUCTION, _listener(match) if match["who"] else None)
     if (match := forms.announce_to.fullmatch(text)) is not None:
         return SpeechRequest(_told(match["text"]), _listener(match))
     if (match := ACTS.announce.fullmatch(text)) is not None:
@@ -165,7 +165,7 @@ def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser
         raise RefusalError(f"I tell it to one person at a time, not '{text}'", [text])
     if said is None or re.fullmatch(r"so|it|that|about it|about that", said, re.IGNORECASE):
         return SpeechRequest(None, to)
-    states = not (to.speaker or ACTS.question.match(said)) and _clause(said, parser)
+    states = not (to.speaker or ACTS.question.match(said)) and is_clause(said, parser)
     if CLAUSES.greetings.fullmatch(said) or states:
         return SpeechRequest(_told(said), to)
     raise RefusalError(f"I do not understand what to tell in '{text}'; say 'tell ... that ...'", [text])
@@ -178,7 +178,7 @@ def make_speech(who: str, text: str, knowledge: Knowledge) -> SpeechRequest:
     return SpeechRequest(_told(text), _listener(match))
 
 
-def _clause(text: str, parser: DependencyParser) -> bool:
+def is_clause(text: str, parser: DependencyParser) -> bool:
     """Returns whether a text is a statement: a finite verb with its subject before it."""
     tokens = parser.parse(text)
     finite = {t.index for t in tokens if t.tag in ("VBZ", "VBP", "VBD", "MD")}
@@ -188,7 +188,7 @@ def _clause(text: str, parser: DependencyParser) -> bool:
 
 def _words(text: str, parser: DependencyParser) -> str:
     """Words to say. Raises RefusalError when they describe the text, or name an unknown person."""
-    clause = _clause(text, parser)
+    clause = is_clause(text, parser)
     whom = re.search(r" to (?:the|a|an|my|our|all|every|each|some|any|somebody|someone)\b.*$", text, re.IGNORECASE)
     if whom is not None and (not clause or re.search(r"\b(?:person|guest|visitor)\b", whom[0], re.IGNORECASE)):
         raise RefusalError(f"I do not know to whom to say it: '{whom[0].strip()}'", [whom[0].strip()])

@@ -36,6 +36,7 @@ from executive.language.structure.requests import (
     Listener,
     QuestionRequest,
     escape_braces,
+    is_clause,
     make_speech,
     parse_charging,
     parse_question,
@@ -137,19 +138,33 @@ class SentenceBuilder(DecisionBuilder):
         request = parse_people(found.before if found is not None and decides else text, self.reader.knowledge)
         if request is None:
             return None
-        if request.form == "find":
-            then = clauses[at + 1] if at + 1 < len(clauses) else None
-            follows = then is not None and then.kind is None and refers_to_somebody(then.text)
-            if not follows and not (self.special and request.refers):
-                return None
+        then = clauses[at + 1].text if at + 1 < len(clauses) and clauses[at + 1].kind is None else ""
+        if request.form == "find" and not (refers_to_somebody(then) or (self.special and request.refers)):
+            return None
+        if request.form == "stated" and not (refers_to_somebody(then) and parse_people(then, self.reader.knowledge)):
+            return None
         if found is not None and decides:
             self.modify(row, clauses[at], found)
             return at + 1
-        self.flush(row)
+        self._flush_reasons(row)
         commands, state, notes = commands_on_people(request, row.state, self.reader)
         self.put_done(row, (steps_of_commands(commands), state, notes))
         self.special = True
         return at + 1
+
+    def _flush_reasons(self, row: StepRow) -> None:
+        """Understands the pending clauses; those that only state a reason ("Robin is lost") ask for nothing."""
+        reasons = " ".join(clause.text for clause in row.plain)
+        try:
+            self.flush(row)
+        except RefusalError as refusal:
+            if refusal.kind is not RefusalKind.NOTHING_TO_DO or not is_clause(reasons, self.reader.pipeline.parser):
+                raise
+            row.plain = []
+            named = [name for name in self.reader.knowledge.people if re.search(rf"\b{re.escape(name)}\b", reasons)]
+            if len(named) == 1:
+                person = Location(phrase_of_name(named[0], NounKind.PERSON), "to")
+                row.state = replace(row.state, memory=replace(row.state.memory, person=person))
 
     def _answered(self, row: StepRow) -> bool:
         """Returns whether the robot answers the last look anyway."""

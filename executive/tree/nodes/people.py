@@ -4,7 +4,7 @@ The robot knows nobody by face. Where several people may be meant, it asks each 
 """
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import field
 from types import MappingProxyType
 from typing import Any, ClassVar, Final
@@ -12,11 +12,12 @@ from typing import Any, ClassVar, Final
 from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
-from executive.tree.behaviour import ExplainedLeaf, MemoryComposite, cause_of, message_of
-from executive.tree.board import Board, FromBoard, FromBoardOr, PlaceOf
+from executive.tree.behaviour import ExplainedLeaf, cause_of, message_of
+from executive.tree.board import FromBoard, FromBoardOr, PlaceOf
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import goal_in_words, goal_pose
+from executive.tree.nodes.clearing import ForEachFound
 from executive.tree.nodes.pick_up import go_near_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.recovery import OnlyIfKnown
@@ -30,7 +31,6 @@ from skills.api import Cause, Failed, ObjectObservation
 from skills.quantities import Coordinate
 from skills.robot import Pose2D
 
-Seen = tuple[ObjectObservation, ...]
 MOST_PEOPLE: Final = 12
 ANSWER_WITHIN_S: Final = 12.0
 """Time for the answer to "Are you Robin?"."""
@@ -127,111 +127,66 @@ def describe_seen(seen: ObjectObservation) -> str:
     return f"somebody at ({seen.position_W[0]:.2f}, {seen.position_W[1]:.2f}){place}"
 
 
-class EachInTurn(MemoryComposite):
-    """Composite of a look for one more person or room (first child) and an action there; rounds of both.
+class EachInTurn(ForEachFound):
+    """Composite like `ForEachFound`, for people and rooms: a look finds the next one under `key`, an action goes there.
 
-    What the look finds stands under `found`, all whose turn is over under `over`. With `first`, one success is enough.
+    All whose turn is over stand under `done`. Status as there, except:
 
     | look | action | status |
     |---|---|---|
-    | RUNNING | idle | RUNNING |
-    | SUCCESS | ticked in the same tick | as below |
-    | SUCCESS after `limit` rounds | idle | FAILURE with POSTCONDITION |
-    | FAILURE with POSTCONDITION, all had success | idle | SUCCESS |
     | FAILURE with POSTCONDITION, nobody found, or some without success | idle | FAILURE with POSTCONDITION |
-    | FAILURE with another cause | idle | FAILURE with its cause |
-    | SUCCESS | RUNNING | RUNNING |
-    | SUCCESS | SUCCESS | with `first` SUCCESS, else RUNNING; the next tick looks again |
-    | SUCCESS | FAILURE | RUNNING; the next tick looks again |
-    | SUCCESS | FAILURE with ERROR or CANCELLED | FAILURE with its cause |
-    | halted | halted | INVALID with CANCELLED |
+    | SUCCESS | SUCCESS, with `first` | SUCCESS |
+    | SUCCESS | FAILURE other than ERROR or CANCELLED | RUNNING; the next tick looks again |
 
     With `first` and `expected`, a single person who gave no answer counts at the end; the message says so.
     """
 
     kind = "each in turn"
-    output_types: ClassVar = {"over": Seen}
-    found: str
-    over: str
     first: bool
-    did: str = ""
-    where: str = "here"
     met: str = ""
     beside: str = ""
     whom: str = ""
     expected: bool = False
-    limit: int = MOST_PEOPLE
     context: RunContext
-    board: Board
     _whys: tuple[str, ...] = field(default=(), init=False)
     _silent: tuple[ObjectObservation, ...] = field(default=(), init=False)
-
-    def tick(self) -> Iterator[Behaviour]:
-        """Looks again in each round; until then the results of the round before stay visible."""
-        if self._index == 0 and self.children[0].status != Status.RUNNING:
-            self._reset_children()
-        yield from super().tick()
-
-    def _following(self, child: Behaviour) -> int | None:
-        found = child.status == Status.SUCCESS and len(self._over()) < self.limit
-        return 1 if self._index == 0 and found else None
 
     def _restart(self) -> None:
         super()._restart()
         self._whys, self._silent = (), ()
 
-    def _forget(self) -> None:
-        self.board.forget((self.over,))
-
-    def _take_over(self, child: Behaviour) -> None:
-        look, action = self.children
-        if child.status == Status.RUNNING:
-            self._go_on(message_of(child))
-        elif child is action:
-            self._action_ended(action)
-        elif look.status == Status.SUCCESS:
-            self._end(Cause.POSTCONDITION, f"there are more than {self.limit} {self.where}")
-        elif cause_of(look) is Cause.POSTCONDITION:
-            self._nobody_left(message_of(look))
-        else:
-            self._end(cause_of(look), message_of(look))
-
     def _action_ended(self, action: Behaviour) -> None:
-        """Notes the person, and ends or begins the next look."""
-        seen = self.board.get(self.found)
-        self.board.put(self.over, (*(each for each in self._over() if each != seen), seen))
-        if action.status == Status.SUCCESS:
-            if self.first:
-                self._end(None, message_of(action))
-                return
+        seen = self.board.get(self.key)
+        self.board.put(self.done, (*(each for each in self._noted(self.done) if each != seen), seen))
+        cause, why = cause_of(action), message_of(action)
+        if action.status == Status.SUCCESS and self.first:
+            self._end(None, why)
+        elif action.status == Status.FAILURE and cause in FINAL_CAUSES:
+            self._end(cause, why)
         else:
-            cause, why = cause_of(action), message_of(action)
-            if cause in FINAL_CAUSES:
-                self._end(cause, why)
-                return
-            self._whys = (*self._whys, why)
-            self._silent = (*self._silent, seen) if cause is Cause.TIMEOUT else self._silent
-        self._index = 0
-        self._go_on("looks on")
+            failed = action.status == Status.FAILURE
+            self._whys += (why,) * failed
+            self._silent += (seen,) * (failed and cause is Cause.TIMEOUT)
+            self._index = 0
+            self._go_on("looks on")
 
-    def _nobody_left(self, nobody: str) -> None:
-        """Ends after a look that found nobody else."""
-        people = len(self._over())
+    def _nothing_left(self) -> None:
+        people, silent = len(self._noted(self.done)), self._silent
         if not people:
-            self._end(Cause.POSTCONDITION, nobody)
-        elif self.first and self.expected and people == len(self._silent) == 1:
-            self.board.put(self.met, self._silent[0])
+            self._end(Cause.POSTCONDITION, message_of(self.children[0]))
+        elif self.first and self.expected and people == len(silent) == 1:
+            self.board.put(self.met, silent[0])
             self.board.put(self.beside, self.context.pose())
-            self._end(None, f"{describe_seen(self._silent[0])}, taken for {self.whom}, which nobody confirmed")
+            self._end(None, f"{describe_seen(silent[0])}, taken for {self.whom}, which nobody confirmed")
         elif self._whys:
             more = f"; and {len(self._whys) - 4} more" if len(self._whys) > 4 else ""
             self._end(Cause.POSTCONDITION, "; ".join(self._whys[:4]) + more)
         else:
-            self._end(None, f"{self.did} {people} {'person' if people == 1 else 'people'} {self.where}")
+            self._end(None, self._report())
 
-    def _over(self) -> Seen:
-        over: Seen = self.board.get(self.over) if self.over in self.board else ()
-        return over
+    def _report(self) -> str:
+        people = len(self._noted(self.done))
+        return f"{self.did[0]} {people} {'person' if people == 1 else 'people'} {self.where}"
 
 
 class NextRoom(ExplainedLeaf):
@@ -323,7 +278,7 @@ def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -
         "look there", drive, _meet_one_plan(builder.at("there"), person, ports, expected=False), part="visit"
     )
     title = f"look for {person} in all other rooms"
-    return builder.node("each in turn", title, following, visit, found=room, over=over, first=True, limit=len(rooms))
+    return _each_in_turn(builder, title, following, visit, room, over, limit=len(rooms) + 1, first=True)
 
 
 def _ports_of(builder: PlanBuilder, room: str) -> dict[str, object]:
@@ -365,14 +320,22 @@ def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
 
 
 def _each_person(
-    builder: PlanBuilder, title: str, person: str, ports: dict[str, object], visit: NodeSpec, **options: object
+    builder: PlanBuilder, title: str, person: str, ports: dict[str, object], visit: NodeSpec, **options: Any
 ) -> NodeSpec:
     """Builds rounds of a look for one more person and a visit."""
     seen, over = builder.key("seen"), builder.key("over")
     avoid = {"avoid": FromBoardOr(over, ())} if builder.has_ports("find_people", ("avoid",)) else {}
     outputs = {"observation": seen, "observations": builder.key("all")}
     look = builder.skill("find_people", {**ports, "person": person, "count": 1, **avoid}, outputs)
-    return builder.node("each in turn", title, look, visit, part="each", found=seen, over=over, **options)
+    return _each_in_turn(builder.at("each"), title, look, visit, seen, over, limit=MOST_PEOPLE, **options)
+
+
+def _each_in_turn(
+    builder: PlanBuilder, title: str, look: NodeSpec, visit: NodeSpec, key: str, over: str, **options: Any
+) -> NodeSpec:
+    keys = {"key": key, "done": over, "missed": over, "forgets": (over,)}
+    texts = {"did": ("greeted", ""), "where": "here", "misses": MOST_PEOPLE}
+    return builder.node("each in turn", title, look, visit, **{**keys, **texts, **options})
 
 
 def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "") -> NodeSpec:
@@ -445,6 +408,6 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
     visit = builder.sequence(
         "greet somebody", _go_beside(builder, ANYBODY, builder.key("seen"), room), greet, part="visit"
     )
-    options = {"first": False, "did": "greeted", "where": f"in the {room}"}
+    options = {"first": False, "where": f"in the {room}"}
     each = _each_person(builder, "greet each person here", ANYBODY, _ports_of(builder, room), visit, **options)
     return _in_room(builder, room, each)

@@ -12,6 +12,7 @@ from skills.geometry import facing_poses, wrap
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
+from skills.navigate.trip_planning import place_text
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import MeetPersonInputs, MeetPersonPorts, NavigateInputs
@@ -29,15 +30,15 @@ _MOST_POSES = 4
 
 @dataclass(frozen=True)
 class MeetPersonOptions:
-    """Positions of the robot beside a person: `apart_m` from the person's axis, turned to them within `facing_rad`.
+    """Positions of the robot beside a person: at the first free of the distances `apart_m`, turned to the person.
 
-    A robot that is nearer than `near_m` and faces the person stays. A person seen within `same_m` of the expected place
-    is the one; within `reach_m` of the robot they are looked for during `look_s`. When the person has walked on, the
-    robot goes after them, in `tries` drives at most.
+    A robot that is nearer than `near_m` and faces the person within `facing_rad` stays. A person seen within `same_m`
+    of the expected place is the one; within `reach_m` of the robot they are looked for during `look_s`. When the person
+    has walked on, the robot goes after them, in `tries` drives at most.
     """
 
-    apart_m: Length = 1.3
-    near_m: Length = 1.7
+    apart_m: tuple[Length, ...] = (1.3, 1.6)
+    near_m: Length = 1.85
     facing_rad: Turn = 0.6
     same_m: Length = 1.2
     ahead_m: Length = 3.0
@@ -54,24 +55,18 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def run(self, inputs: MeetPersonInputs) -> Routine[Succeeded]:
         """Drives beside the person, again if they have moved meanwhile."""
-        place_W, person = inputs.place_W, None
-        if place_W is None:
-            person = yield from self._look(inputs.person, None)
-            place_W = person.place_W if person else None
-        for _ in range(self.options.tries):
-            if place_W is None:
-                raise SkillFailure(Cause.POSTCONDITION, f"nobody stands within {self.options.ahead_m:g} m ahead")
-            if person is not None and self._is_beside(person):
-                return self._met(inputs, person)
+        place_W = inputs.place_W
+        for drives in range(self.options.tries + 1):
+            if drives or place_W is None or self._away_m(place_W) <= self.options.near_m:
+                person = yield from self._look(inputs.person, place_W)
+                if person is None:
+                    nobody = f"nobody is seen within {self.options.ahead_m:g} m"
+                    why = nobody if place_W is None else f"{inputs.person} is not seen at {place_text(place_W)}"
+                    raise SkillFailure(Cause.POSTCONDITION, why)
+                place_W = person.place_W
+                if self._is_beside(person):
+                    return self._met(inputs, person)
             yield from self._go_beside(place_W, inputs.person)
-            person = yield from self._look(inputs.person, place_W)
-            if person is None:
-                x, y = place_W
-                why = f"{inputs.person} is no longer at ({x:.2f}, {y:.2f})"
-                raise SkillFailure(Cause.POSTCONDITION, why)
-            place_W = person.place_W
-        if person is not None and self._is_beside(person):
-            return self._met(inputs, person)
         raise SkillFailure(Cause.POSTCONDITION, f"{inputs.person} does not stay where the robot goes")
 
     def _look(self, name: str, place_W: tuple[float, float] | None) -> Routine[SeenPerson | None]:
@@ -105,12 +100,16 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         here = self.context.pose()
         return wrap(math.atan2(one.place_W[1] - here.y_m, one.place_W[0] - here.x_m) - here.yaw_rad)
 
+    def _away_m(self, place_W: tuple[float, float]) -> float:
+        here = self.context.pose()
+        return math.dist(place_W, (here.x_m, here.y_m))
+
     def _is_beside(self, person: SeenPerson) -> bool:
         return person.distance_m <= self.options.near_m and abs(self._bearing_rad(person)) <= self.options.facing_rad
 
     def _go_beside(self, place_W: tuple[float, float], name: str) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
-        poses = facing_poses(place_W, self.context.pose(), self.options.apart_m)
+        poses = [pose for m in self.options.apart_m for pose in facing_poses(place_W, self.context.pose(), m)]
         footprint, costmap = ArmFootprint(self.context).now(), self.context.free_space()
         free = [pose for pose in poses if footprint_clear(costmap, footprint, pose) and self._sees(pose, place_W)]
         if not free:
@@ -119,7 +118,7 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def _sees(self, pose: Pose2D, place_W: tuple[float, float]) -> bool:
         """Returns whether no wall or table is between a pose and a person."""
-        from_m = np.arange(_ARM_M, self.options.apart_m, _STEP_M)[:, None]
+        from_m = np.arange(_ARM_M, math.dist(place_W, (pose.x_m, pose.y_m)), _STEP_M)[:, None]
         direction = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
         return bool(np.all(self.context.costmap.clearance_m(np.array(place_W) - from_m * direction) > 0.0))
 

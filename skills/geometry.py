@@ -35,6 +35,11 @@ def relative_pose(X_WA: Pose2D, X_WB: Pose2D) -> Pose2D:
     return compose(inverse(X_WA), X_WB)
 
 
+def bearing_rad(here: Pose2D, place_W: tuple[float, float]) -> float:
+    """Direction of a point (x, y) from the heading of a pose."""
+    return wrap(math.atan2(place_W[1] - here.y_m, place_W[0] - here.x_m) - here.yaw_rad)
+
+
 def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float, count: int = 24) -> list[Pose2D]:
     """Returns poses at a distance from a point that face it, the nearest first."""
     poses = []

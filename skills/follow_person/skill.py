@@ -10,7 +10,7 @@ import shapely
 
 from skills.api import Cause, Failed, Running, SkillContext, Succeeded
 from skills.follow_person.target import Target, TargetOptions
-from skills.geometry import wrap
+from skills.geometry import bearing_rad, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
@@ -160,7 +160,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         tracks = self._company.watch.tracks()
         if inputs.place_W is None:
             centre_W, reach_m = (here.x_m, here.y_m), options.ahead_m
-            tracks = tuple(one for one in tracks if abs(_bearing(here, one.place_W)) < options.ahead_rad)
+            tracks = tuple(one for one in tracks if abs(bearing_rad(here, one.place_W)) < options.ahead_rad)
         else:
             centre_W, reach_m = inputs.place_W, _SAME_PLACE_M * (2.0 if waited else 1.0)
         sure = {one.track for one in self._company.others()}
@@ -314,11 +314,6 @@ def _poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, f
             if np.linalg.norm(end - point) >= behind_m:
                 for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
                     yield float(point[0]), float(point[1]), yaw
-
-
-def _bearing(here: Pose2D, place_W: tuple[float, float]) -> float:
-    """Direction of a point from the robot's heading (rad)."""
-    return wrap(math.atan2(place_W[1] - here.y_m, place_W[0] - here.x_m) - here.yaw_rad)
 
 
 def _apart_m(a: Pose2D, b: Pose2D) -> float:

@@ -1,31 +1,36 @@
 """The guide_person skill: goes ahead of a person at their pace, waits for them, and goes back for them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
 import shapely
 
-from skills.api import Cause, Job, Running, SkillContext, Step, Succeeded
+from skills.api import Cause, Job, Running, Step, Succeeded
+from skills.follow_person.target import Target, TargetOptions
+from skills.geometry import bearing_rad, grid_inside
 from skills.meet_person.skill import MeetPerson
+from skills.navigate.arm_footprint import ArmFootprint
+from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import Navigate
+from skills.navigate.surroundings import Company
 from skills.perception.people import SeenPerson
-from skills.perception.people_tracking import PeopleOptions, PeopleWatch, predicted_place_W
+from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import GuidePersonInputs, GuidePersonPorts, MeetPersonInputs, NavigateInputs
 from skills.quantities import Delay, Length, Speed, Tries
+from skills.robot import Pose2D
 from skills.routine import ENDED_EARLY, Patience, Routine, RoutineSkill, SkillFailure
 from skills.speak.skill import say
 
-_TRACKING: Final = PeopleOptions(track_m=6.0, hidden_s=8.0)
+_TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
 _SLOWEST_M_S = 0.25
-_GROWTH_M_S, _GROWTH_M = 0.4, 1.5
-"""Growth of the distance within which a hidden person is found again, and its most."""
-_LOOK_S = 1.0
-_ASK_AFTER_S = 2.0
-_WALKS_M_S = 0.3
-_ON_M = 2.0
-"""Distance along their last direction at which a person is looked for who is not where they were seen last."""
+_AHEAD_M, _AHEAD_RAD = 3.0, 1.2
+_STEPS_IN, _STANDS_S, _BEHIND_M = 3, 2.0, 1.7
+"""Drives into the room, time for which the person stands before its door, and how far behind the robot they stand."""
+_ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
+"""Wait before the robot asks the person to come; how far along their last direction it looks for one who walked."""
 
 
 @dataclass(frozen=True)
@@ -47,56 +52,14 @@ class GuidePersonOptions:
     same_m: Length = 1.2
 
 
-class Companion:
-    """The person whom the robot guides: their track, or else somebody who is where they should be."""
-
-    def __init__(self, context: SkillContext, options: GuidePersonOptions, place_W: tuple[float, float] | None) -> None:
-        self._context, self._options = context, options
-        self._watch = PeopleWatch(context, _TRACKING)
-        self._expected_W = place_W
-        self.seen: SeenPerson | None = None
-
-    def expect_at(self, place_W: tuple[float, float]) -> None:
-        """Takes the person nearest to a place for them from now on."""
-        self._expected_W, self.seen = place_W, None
-
-    def look(self) -> None:
-        """Takes in new scans and pictures."""
-        self._watch.step(np.zeros(3))
-        tracks, now_s = self._watch.tracks(), self._context.clock.now()
-        same = next((one for one in tracks if self.seen is not None and one.track == self.seen.track), None)
-        expected_W = self._expected_W if self.seen is None else predicted_place_W(self.seen, now_s)
-        if same is None and expected_W is not None:
-            hidden_s = 0.0 if self.seen is None else now_s - self.seen.stamp_s
-            same_m = self._options.same_m + min(_GROWTH_M, _GROWTH_M_S * hidden_s)
-            away = {math.dist(one.place_W, expected_W): one for one in tracks if now_s - one.stamp_s < _LOOK_S}
-            same = next((one for distance_m, one in sorted(away.items()) if distance_m <= same_m), None)
-        self.seen = same or self.seen
-
-    @property
-    def place_W(self) -> tuple[float, float] | None:
-        """Place (x, y) at which the person was seen last, or is expected."""
-        return self._expected_W if self.seen is None else self.seen.place_W
-
-    def gap_m(self) -> float:
-        """Distance from the robot to the person, in metres; infinite while they are hidden."""
-        if self.seen is None or self._context.clock.now() - self.seen.stamp_s > self._options.hidden_s:
-            return math.inf
-        here = self._context.pose()
-        return math.dist(self.seen.place_W, (here.x_m, here.y_m))
-
-
 class Leading(Navigate):
-    """Drive of a robot that leads: at most at `most_m_s`, and standing for the person at 0, which is no trouble."""
-
-    most_m_s = math.inf
-    message = ""
+    """Drive of a robot that leads, and stands where it waits for its company; that is no trouble."""
 
     def _give_way(self) -> tuple[float, str | None]:
         most_m_s, waits = super()._give_way()
-        if waits is None and self.most_m_s <= 0.0:
-            waits = self._waits(self.message)
-        return min(most_m_s, self.most_m_s), waits
+        if waits is None and self._company is not None and self._company.most_m_s <= 0.0:
+            waits = self._waits("waiting for the person")
+        return most_m_s, waits
 
 
 class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
@@ -109,15 +72,42 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
     def begin(self, inputs: GuidePersonInputs) -> None:
         """Starts with the person at the place of the inputs."""
         super().begin(inputs)
-        self._inputs, self._companion = inputs, Companion(self.context, self.options, inputs.place_W)
+        self._inputs, self._place_W = inputs, inputs.place_W
+        self._company = Company(PeopleWatch(self.context, _TRACKING))
+        self._target: Target | None = None
         self._behind = Patience(self.context.clock, self.options.behind_s)
         self._waiting, self._asked = Patience(self.context.clock, _ASK_AFTER_S), False
         self._remark = self.context.listen()
 
     def step(self) -> Step:
         """Looks for the person; then as `RoutineSkill.step`."""
-        self._companion.look()
+        watch, now_s = self._company.watch, self.context.clock.now()
+        watch.step(np.zeros(3))
+        if self._target is None:
+            if (first := self._first(watch.tracks())) is not None:
+                self._target = Target(first, self.context.pose(), TargetOptions())
+        else:
+            self._target.update(watch.tracks(), now_s)
+        self._company.track = 0 if self._target is None else self._target.seen.track
         return super().step()
+
+    def _first(self, tracks: Sequence[SeenPerson]) -> SeenPerson | None:
+        """The person nearest to where they should be; without such a place, the nearest one ahead."""
+        here = self.context.pose()
+        if self._place_W is not None:
+            centre_W, reach_m = self._place_W, self.options.same_m
+        else:
+            centre_W, reach_m = (here.x_m, here.y_m), _AHEAD_M
+            tracks = [one for one in tracks if abs(bearing_rad(here, one.place_W)) < _AHEAD_RAD]
+        near = [one for one in tracks if math.dist(one.place_W, centre_W) <= reach_m]
+        return min(near, key=lambda one: math.dist(one.place_W, centre_W), default=None)
+
+    def _gap_m(self) -> float:
+        """Distance from the robot to the person, in metres; infinite while they are hidden."""
+        if self._target is None or self._target.hidden_s(self.context.clock.now()) > self.options.hidden_s:
+            return math.inf
+        here = self.context.pose()
+        return math.dist(self._target.seen.place_W, (here.x_m, here.y_m))
 
     def suspend(self) -> None:
         """Stands, and hears no remark meanwhile."""
@@ -155,36 +145,64 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
             say(self.context, f"Please follow me to {inputs.place}.")
             if (yield from self._lead()):
                 say(self.context, f"Here we are: {inputs.place}.")
-                apart_m = self._companion.gap_m()
+                apart_m = self._gap_m()
                 return Succeeded(f"{inputs.person} came along to {inputs.place}, {apart_m:.1f} m from the robot")
             yield from self._fetch()
         raise SkillFailure(Cause.POSTCONDITION, f"{inputs.person} does not come along to {inputs.place}")
 
     def _lead(self) -> Routine[bool]:
         """Drives to the goal; returns whether both are there, or False once the person is too far behind."""
-        inputs, leading = self._inputs, Leading(self.context)
-        leading.message = f"waiting for {inputs.person}"
-        self._behind.reset()
-
-        def enough() -> bool:
-            leading.most_m_s = self._pace_m_s()
-            return self._is_behind() or self._is_told()
-
-        goal = NavigateInputs(inputs.goal, 0.25, 0.4, self.options.most_m_s)
-        if (yield from self.perform(leading, goal, enough)) is not ENDED_EARLY:
+        inputs, goal = self._inputs, self._inputs.goal
+        for _ in range(_STEPS_IN):
+            drive = NavigateInputs(goal, 0.25, 0.4, self.options.most_m_s)
+            leading = Leading(self.context, None, self._company)
+            if (yield from self.perform(leading, drive, self._must_stop)) is ENDED_EARLY:
+                break
             end_s = self.context.clock.now() + self.options.arrive_s
-            while not self._are_there() and self.context.clock.now() < end_s:
+            while not (self._are_there() or self._waits_outside(end_s)) and self.context.clock.now() < end_s:
                 yield Running(f"waiting for {inputs.person} at {inputs.place}")
+            further = None if self._are_there() else self._pose_further_in()
+            if further is None:
+                break
+            say(self.context, "Please come in.")
+            goal = further
         return self._are_there()
+
+    def _must_stop(self) -> bool:
+        """Sets the pace; returns whether the drive has to end, since the person fell behind or has ended it."""
+        self._company.most_m_s = self._pace_m_s()
+        return self._is_behind() or self._is_told()
+
+    def _waits_outside(self, end_s: float) -> bool:
+        """Returns whether the person has stood near the robot for a while, but not at the goal."""
+        return self._is_close() and self.context.clock.now() > end_s - self.options.arrive_s + _STANDS_S
+
+    def _pose_further_in(self) -> Pose2D | None:
+        """The nearest free pose in the room that leaves room for the person behind the robot; None without one."""
+        here, area = self.context.pose(), self._inputs.area_W
+        if self._target is None or not area or not self._is_close():
+            return None
+        footprint, costmap = ArmFootprint(self.context).now(), self.context.free_space()
+        x, y = self._target.seen.place_W
+        for at in sorted(
+            grid_inside(area, 0.25, first_m=0.3, margin_m=-0.4), key=lambda at: math.dist(at, (here.x_m, here.y_m))
+        ):
+            away = np.array([x, y]) - at
+            behind_W = at + away * min(1.0, _BEHIND_M / max(float(np.linalg.norm(away)), 1e-6))
+            pose = Pose2D(float(at[0]), float(at[1]), math.atan2(-away[1], -away[0]))
+            if _inside(area, behind_W) and footprint_clear(costmap, footprint, pose):
+                return pose
+        return None
 
     def _fetch(self) -> Routine[None]:
         """Goes back to where the person was seen last, or was going. Raises SkillFailure when nobody is there."""
         if self._is_close():
             return
-        last, inputs, failures = self._companion.seen, self._inputs, list[SkillFailure]()
+        inputs, failures = self._inputs, list[SkillFailure]()
+        last = None if self._target is None else self._target.seen
         if last is not None:
             say(self.context, f"I come back for you, {inputs.person}.")
-        for place_W in (self._companion.place_W, *(() if last is None else _further_on(last))):
+        for place_W in (self._place_W,) if last is None else (last.place_W, *_further_on(last)):
             try:
                 goal = MeetPersonInputs(inputs.person, place_W)
                 met = yield from self.perform(MeetPerson(self.context), goal, self._is_close)
@@ -193,17 +211,15 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
                     raise
                 failures.append(failure)
                 continue
-            if met is not ENDED_EARLY:
-                x, y, _ = met.outputs["person"].position_W
-                self._companion.expect_at((x, y))
+            if met is not ENDED_EARLY and not self._is_close():
+                self._place_W, self._target = met.outputs["person"].position_W[:2], None
             return
-        raise SkillFailure(
-            failures[0].cause, f"lost {inputs.person} on the way to {inputs.place}: {failures[0].message}"
-        )
+        why = f"lost {inputs.person} on the way to {inputs.place}: {failures[0].message}"
+        raise SkillFailure(failures[0].cause, why)
 
     def _pace_m_s(self) -> float:
         """Speed that the distance of the person allows; 0 to wait."""
-        options, gap_m = self.options, self._companion.gap_m()
+        options, gap_m = self.options, self._gap_m()
         if gap_m > options.wait_m:
             return 0.0
         share = min(1.0, (options.wait_m - gap_m) / (options.wait_m - options.close_m))
@@ -211,7 +227,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
 
     def _is_behind(self) -> bool:
         """Returns whether the person has been too far away for too long; asks them once to come."""
-        if self._companion.gap_m() <= self.options.wait_m:
+        if self._gap_m() <= self.options.wait_m:
             self._behind.reset()
             self._waiting.reset()
             self._asked = False
@@ -222,19 +238,21 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         return not self._behind.is_left()
 
     def _is_close(self) -> bool:
-        return self._companion.gap_m() <= self.options.close_m
+        return self._gap_m() <= self.options.close_m
 
     def _is_told(self) -> bool:
         return self._remark is not None and self._remark.done()
 
     def _are_there(self) -> bool:
         """Returns whether the person is seen near the robot, and both are at the goal."""
-        area, here, seen = shapely.Polygon(self._inputs.area_W), self.context.pose(), self._companion.seen
-        if seen is None or self._companion.gap_m() > self.options.wait_m:
+        area, here = self._inputs.area_W, self.context.pose()
+        if self._target is None or self._gap_m() > self.options.wait_m:
             return False
-        return area.is_empty or bool(
-            np.all(shapely.contains_xy(area, *np.transpose([seen.place_W, (here.x_m, here.y_m)])))
-        )
+        return not area or (_inside(area, self._target.seen.place_W) and _inside(area, (here.x_m, here.y_m)))
+
+
+def _inside(area_W: Sequence[tuple[float, float]], point_W: Sequence[float]) -> bool:
+    return bool(shapely.Polygon(area_W).covers(shapely.Point(point_W)))
 
 
 def _further_on(one: SeenPerson) -> list[tuple[float, float]]:

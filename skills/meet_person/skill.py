@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
-from skills.geometry import facing_poses, wrap
+from skills.geometry import bearing_rad, facing_poses
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
@@ -90,22 +90,22 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def _candidates(self, people: Sequence[SeenPerson], place_W: tuple[float, float] | None) -> list[SeenPerson]:
         """People who may be the one, the likeliest first."""
+        here = self.context.pose()
         if place_W is None:
             near = [one for one in people if one.distance_m <= self.options.ahead_m]
-            return sorted(near, key=lambda one: (abs(self._bearing_rad(one)) > math.pi / 3, one.distance_m))
+            return sorted(near, key=lambda one: (abs(bearing_rad(here, one.place_W)) > math.pi / 3, one.distance_m))
         near = [one for one in people if math.dist(one.place_W, place_W) <= self.options.same_m]
         return sorted(near, key=lambda one: math.dist(one.place_W, place_W))
-
-    def _bearing_rad(self, one: SeenPerson) -> float:
-        here = self.context.pose()
-        return wrap(math.atan2(one.place_W[1] - here.y_m, one.place_W[0] - here.x_m) - here.yaw_rad)
 
     def _away_m(self, place_W: tuple[float, float]) -> float:
         here = self.context.pose()
         return math.dist(place_W, (here.x_m, here.y_m))
 
     def _is_beside(self, person: SeenPerson) -> bool:
-        return person.distance_m <= self.options.near_m and abs(self._bearing_rad(person)) <= self.options.facing_rad
+        return (
+            person.distance_m <= self.options.near_m
+            and abs(bearing_rad(self.context.pose(), person.place_W)) <= self.options.facing_rad
+        )
 
     def _go_beside(self, place_W: tuple[float, float], name: str) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""

@@ -126,6 +126,14 @@ def test_the_person_must_be_in_the_area_at_the_goal():
     assert isinstance(guided.go(elsewhere), Failed)
 
 
+def test_robot_makes_room_for_a_person_who_waits_before_the_door():
+    guided = Guided()
+    step = guided.go(replace(INPUTS, goal=Pose2D(2.45, 3.2, -1.57)))
+    assert isinstance(step, Succeeded), step
+    assert "Please come in." in guided.said
+    assert guided.at[1] < 4.0
+
+
 def test_a_remark_before_both_are_there_ends_it_and_is_no_success():
     guided = Guided()
     step = guided.go(at_s={6.0: lambda: guided.control.tell("stop")})

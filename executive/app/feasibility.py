@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from executive.app.placed_robots import DEFAULT_KIND, robot_stack, shared_detector
 from executive.app.prepared import Prepared
@@ -18,6 +18,7 @@ from executive.tree.estimate import Route, RoutePlanner, load_estimates
 from plant.models.catalogue import load_catalogue
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
+from skills.api import Zone
 from skills.files.errors import Problems
 from skills.manipulation.arm.kinematics import arm_model
 from skills.perception.class_forms import class_forms, known_attributes, shipped_forms
@@ -29,7 +30,7 @@ class _RoutesOnMap(RoutePlanner):
     """Planner of routes on the robot's map of a world, for the robot's footprint.
 
     It reads the map at the first route. The costmap and the planner of the robot's stack plan; of the default stack
-    only these two are loaded.
+    only these two are loaded, and the controller where there are zones.
     """
 
     def __init__(self, world: World, robot: PlacedRobot) -> None:
@@ -42,15 +43,21 @@ class _RoutesOnMap(RoutePlanner):
         from skills.navigate.footprint import Footprint
 
         keepout_map = load_grid_map(self._world.keepout_map_path)
-        costmap, planner = (
-            default_component(slot) if self._stack is None else getattr(self._stack, slot)
-            for slot in ("costmap", "planner")
-        )
-        return PlannedRoutes(costmap.build(keepout_map), Footprint.of(self._robot.capabilities), planner)
+        costmap, planner = self._component("costmap"), self._component("planner")
+        footprint = Footprint.of(self._robot.capabilities)
+        return PlannedRoutes(costmap.build(keepout_map), footprint, planner, self._full_m_s)
 
-    def route(self, start: Pose2D, goal: Pose2D) -> Route:
+    def _component(self, slot: str) -> Any:
+        return default_component(slot) if self._stack is None else getattr(self._stack, slot)
+
+    def _full_m_s(self) -> float:
+        """Full speed of the robot with its controller."""
+        most_m_s = self._robot.capabilities.max_speed_m_s
+        return min(most_m_s, getattr(self._component("controller"), "max_speed_m_s", most_m_s))
+
+    def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
         """Plans a route. Raises ValueError with one sentence if there is none, InputError if the map is broken."""
-        return self._routes.route(start, goal)
+        return self._routes.route(start, goal, zones)
 
 
 def route_planner_of(world: World, robot: PlacedRobot, *, cached: bool = True) -> RoutePlanner:
@@ -180,13 +187,19 @@ class RouteCache(RoutePlanner):
             return routes
         return {}
 
-    def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """Returns a route, planned if the file lacks it. Raises ValueError with one sentence if there is none."""
-        name = f"{start} {goal}"
+    def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
+        """Returns a route, planned if the file lacks it; a mask's file may change, so that its routes are planned.
+
+        Raises ValueError with one sentence if there is none.
+        """
+        if any(zone.mask is not None for zone in zones):
+            return self._planned.route(start, goal, zones)
+        name = f"{start} {goal}{f' {zones}' if zones else ''}"
         if name not in self._routes:
             try:
-                route = self._planned.route(start, goal)
-                self._routes[name] = [route.length_m, route.progress_m]
+                route = self._planned.route(start, goal, zones)
+                parts = [number for part in route.limited for number in part]
+                self._routes[name] = [route.length_m, route.progress_m, *parts]
             except ValueError as error:
                 self._routes[name] = str(error)
             with suppress(OSError):
@@ -197,7 +210,8 @@ class RouteCache(RoutePlanner):
         known = self._routes[name]
         if isinstance(known, str):
             raise ValueError(known)
-        return Route(*known)
+        length_m, progress_m, *parts = known
+        return Route(length_m, progress_m, tuple(zip(parts[::2], parts[1::2], strict=True)))
 
 
 def route_cache_of(world: World, planned: RoutePlanner, *robot_files: Path) -> RouteCache:

@@ -33,7 +33,7 @@ from executive.words.mission import Mission
 from executive.words.step import Step
 from plant.robots.robot_kind import PlacedRobot, robot_kind
 from plant.worlds.world import World
-from skills.api import Surface
+from skills.api import Surface, Zone
 from skills.files.errors import InputError
 from skills.geometry import wrap
 from skills.manipulation.place.free_spots import spots
@@ -201,14 +201,15 @@ def _out_of_reach(prepared: Prepared, pose: Pose2D, planner: RoutePlanner) -> It
         usual = knowledge.usual_surfaces(command.object.name) if place is None else (place,)
         surfaces = [name for spot in usual for name in knowledge.surfaces_in(spot)]
         views = [view for name in surfaces for view in knowledge.surfaces[name].viewpoints]
-        if surfaces and not any(is_reachable(planner, pose, Pose2D(each.x, each.y, each.yaw)) for each in views):
+        poses, zones = (Pose2D(each.x, each.y, each.yaw) for each in views), prepared.tree.zones
+        if surfaces and not any(is_reachable(planner, pose, view, zones) for view in poses):
             yield f"no path leads to the {place or surfaces[0]}, where it must take the {command.object}"
 
 
-def is_reachable(planner: RoutePlanner, start: Pose2D, goal: Pose2D) -> bool:
-    """Returns whether a route leads from one pose to another."""
+def is_reachable(planner: RoutePlanner, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> bool:
+    """Returns whether a route that minds the zones leads from one pose to another."""
     try:
-        planner.route(start, goal)
+        planner.route(start, goal, zones)
     except ValueError:
         return False
     return True

@@ -238,6 +238,7 @@ def _judge(
         log=str(log.path),
         scenario=(*prepared.request.scenario.lines(), *prepared.request.variation.lines()),
         notes=tuple(backend.notes),
+        zones=tuple(dict.fromkeys(zone.words for each in result.every for zone in each.tree.all_zones)),
         robots=robots if prepared.request.robots else {},
     )
     return FinishedRun(report, views[worst]), [

@@ -137,7 +137,8 @@ class RunReport(Ending):
 
     Times are in seconds. `log` is the path of the event log, and `work` has the work counters by name. `answers` and
     `said` are in the order of time, `seen_objects` are the confirmed objects, and `scenario` lists the faults and
-    events of the run's scenario. `notes` say how a real robot sensed.
+    events of the run's scenario. `notes` say how a real robot sensed. `zones` are the rules of the zones that the
+    missions minded.
     """
 
     world: str
@@ -153,6 +154,7 @@ class RunReport(Ending):
     seen_objects: tuple[ReportedObject, ...] = ()
     scenario: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    zones: tuple[str, ...] = ()
     robots: Mapping[str, RobotReport] = field(default_factory=dict)
 
     @property
@@ -165,7 +167,7 @@ class RunReport(Ending):
         """Returns the report as JSON values, without the referee's sentences."""
         no_events = {"referee": {"events"}}
         without: dict[str, Any] = {**no_events, "robots": {"__all__": no_events}}
-        for name in ("scenario", "notes", "robots"):
+        for name in ("scenario", "notes", "zones", "robots"):
             if not getattr(self, name):
                 without[name] = True
         if not any(one.silent for one in self.said):
@@ -196,11 +198,12 @@ class RunReport(Ending):
         if self.robots:
             for name, robot in self.robots.items():
                 yield from (line for verdict in robot.verdicts(name=name, counts=True) for line in verdict.lines())
+            yield from (escape(f"  {zone}") for zone in self.zones)
             yield figures
             return
         yield from (line for verdict in self.verdicts() for line in verdict.lines())
         yield figures if self.referee is None else f"{counts_text(self.referee)}; {figures}"
-        yield from (escape(f"  {event}") for event in (*self.notes, *self.seen.events))
+        yield from (escape(f"  {event}") for event in (*self.zones, *self.notes, *self.seen.events))
 
 
 _LONG_TEXT: Final = 100

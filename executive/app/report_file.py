@@ -243,6 +243,7 @@ def _facts(report: RunReport, robot_name: str) -> tuple[tuple[str, str], ...]:
     facts = (
         ("world", f"{report.world}, seed {report.seed}"),
         ("duration", report.duration_text),
+        *((("zones", "; ".join(report.zones)),) if report.zones else ()),
         *(("sensors", note) for note in report.notes),
     )
     if not robot_name:
@@ -282,10 +283,9 @@ def with_findings(
     report: RunReport, knowledge: Knowledge, result: RunResult, artifacts: Artifacts, events: Sequence[Event]
 ) -> RunReport:
     """Adds the answers and the speech of all missions, in the order of time, and the seen objects to a report."""
-    results = [each for robot in result.robots for each in (*robot.preempting, robot)]
     parts = [part for tree in result.trees.values() for part in tree.parts]
-    findings = sorted((one for each in results for one in each.findings), key=lambda one: one.t_s)
-    said = sorted((one for each in results for one in each.said), key=lambda one: one.t_s)
+    findings = sorted((one for each in result.every for one in each.findings), key=lambda one: one.t_s)
+    said = sorted((one for each in result.every for one in each.said), key=lambda one: one.t_s)
     return replace(
         report,
         answers=tuple(_answer(one, parts, artifacts) for one in findings),

@@ -133,6 +133,11 @@ class RunResult:
     work: Mapping[str, int] = field(default_factory=dict)
 
     @property
+    def every(self) -> tuple[RobotResult, ...]:
+        """Results of all missions, those that came in between before the one that they interrupted."""
+        return tuple(each for robot in self.robots for each in (*robot.preempting, robot))
+
+    @property
     def trees(self) -> Mapping[str, CompiledTree]:
         """Trees of the missions by the robot's name."""
         return {each.robot_name: each.tree for each in self.robots}

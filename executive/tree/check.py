@@ -1,8 +1,13 @@
 """Check of a mission before it runs: errors that make it impossible, warnings, and its estimate."""
 
+from __future__ import annotations
+
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from executive.mission.gripper import InGripper, grasp_objection, objection
 from executive.tree.compiler import CompiledTree
@@ -11,12 +16,16 @@ from executive.tree.plan import StepPart
 from executive.words.command import START, Command, Task
 from executive.words.knowledge import Knowledge
 from executive.words.outlines import area_m2
-from skills.api import FreeSpace, PlanningError
+from skills.api import FreeSpace, PlanningError, Zone, ZoneKind
 from skills.files.errors import InputError, listing, suggestion
 from skills.navigate.footprint import Footprint
-from skills.navigate.path import path_length
+from skills.navigate.path import Path, path_length
+from skills.navigate.zones import zones_sentence
 from skills.robot import Pose2D
 from skills.stack import GlobalPlanner
+
+if TYPE_CHECKING:
+    from skills.navigate.zone_map import ZoneMap
 
 __all__ = ["Abilities", "Checked", "PlannedRoutes", "check_tree"]
 
@@ -60,24 +69,88 @@ class Checked:
 
 
 class PlannedRoutes(RoutePlanner):
-    """Planner of routes on the map with the global planner of `navigate`; each route is planned once."""
+    """Planner of routes on the map with the global planner of `navigate`; each route is planned once.
 
-    def __init__(self, costmap: FreeSpace, footprint: Footprint, planner: GlobalPlanner) -> None:
-        self._costmap, self._footprint, self._planner = costmap, footprint, planner
-        self._routes: dict[tuple[Pose2D, Pose2D], Route | PlanningError] = {}
+    `full_m_s` returns the robot's full speed, of which a zone may allow a share.
+    """
 
-    def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """Plans the route from start to goal. Raises ValueError with one sentence when there is none."""
-        if (start, goal) not in self._routes:
+    def __init__(
+        self,
+        costmap: FreeSpace,
+        footprint: Footprint,
+        planner: GlobalPlanner,
+        full_m_s: Callable[[], float] = lambda: math.inf,
+    ) -> None:
+        self._costmap, self._footprint, self._planner, self._full_m_s = costmap, footprint, planner, full_m_s
+        self._routes: dict[tuple[Pose2D, Pose2D, tuple[Zone, ...]], Route | PlanningError] = {}
+
+    def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
+        """Plans the route from start to goal that minds the zones.
+
+        Raises ValueError with one sentence if none does, InputError for a mask that cannot be read.
+        """
+        if (start, goal, zones) not in self._routes:
             try:
-                path = self._planner.problem(self._costmap, self._footprint, start, goal, max_speed_m_s=math.inf)()
-                self._routes[start, goal] = Route(path_length(path), float(path.progress_m()[-1]))
+                self._routes[start, goal, zones] = self._planned(start, goal, zones)
             except PlanningError as error:
-                self._routes[start, goal] = error
-        route = self._routes[start, goal]
+                self._routes[start, goal, zones] = error
+        route = self._routes[start, goal, zones]
         if isinstance(route, PlanningError):
             raise ValueError(str(route)) from route
         return route
+
+    def _planned(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...]) -> Route:
+        """Plans a route. Raises PlanningError, which names the zones that forbid the goal or every path."""
+        if not zones:
+            path = self._path(self._costmap, start, goal)
+            return Route(path_length(path), float(path.progress_m()[-1]))
+        from skills.navigate.zone_map import zone_map
+
+        ground, place = zone_map(zones, self._full_m_s()), f"({goal.x_m:.2f}, {goal.y_m:.2f})"
+        if names := ground.names_at(ZoneKind.KEEP_OUT, goal, self._footprint):
+            raise PlanningError(f"{zones_sentence(names, 'keep-out zone')} The robot does not stand at {place}.")
+        costs = {"zones": ground} if ground.has_costs(start) else {}
+        try:
+            path = self._path(self._space(zones, start), start, goal, **costs)
+        except PlanningError:
+            names = self._between(zones, start, goal)
+            if not names:
+                raise
+            raise PlanningError(f"{zones_sentence(names, 'keep-out zone')} No path leads to {place}.") from None
+        return Route(path_length(path), float(path.progress_m()[-1]), self._limited(ground, path))
+
+    def _path(self, space: FreeSpace, start: Pose2D, goal: Pose2D, **costs: Any) -> Path:
+        return self._planner.problem(space, self._footprint, start, goal, max_speed_m_s=math.inf, **costs)()
+
+    def _space(self, zones: tuple[Zone, ...], start: Pose2D) -> FreeSpace:
+        from skills.navigate.zone_map import KeepOut, zone_map
+
+        return KeepOut(zone_map(zones, self._full_m_s())).space(self._costmap, self._footprint, start)
+
+    def _between(self, zones: tuple[Zone, ...], start: Pose2D, goal: Pose2D) -> tuple[str, ...]:
+        """Names of the keep-out zones that cut the goal off: one that does alone, else all; none if walls do."""
+        keep_out = tuple(zone for zone in zones if zone.kind is ZoneKind.KEEP_OUT)
+
+        def leads(without: Sequence[Zone]) -> bool:
+            try:
+                self._path(self._space(tuple(each for each in keep_out if each not in without), start), start, goal)
+            except PlanningError:
+                return False
+            return True
+
+        if not keep_out or not leads(keep_out):
+            return ()
+        return next(((zone.name,) for zone in keep_out if leads([zone])), tuple(zone.name for zone in keep_out))
+
+    def _limited(self, ground: ZoneMap, path: Path) -> tuple[tuple[float, float], ...]:
+        """Parts of a path under a speed limit: the progress of each (m), and the limit (m/s)."""
+        parts, now = dict[float, float](), np.zeros(1)
+        steps = zip(path.poses[1:], np.diff(path.progress_m()).tolist(), strict=True)
+        for pose, step_m in steps:
+            limit_m_s = ground.speed_m_s(self._footprint, pose[None], now)
+            if math.isfinite(limit_m_s):
+                parts[limit_m_s] = parts.get(limit_m_s, 0.0) + step_m
+        return tuple((part_m, limit_m_s) for limit_m_s, part_m in parts.items())
 
 
 def check_tree(
@@ -107,7 +180,9 @@ def check_tree(
     needs = ((part, _objection(part, before, knowledge, abilities)) for part, before in starts)
     grasps = errors((part, each) for part, each in needs if each is not None)
     full = errors(_full_surfaces(tree, knowledge, abilities))
-    estimate, unreachable, warnings = estimate_tree(tree.root, start=start, planner=planner, estimates=estimates)
+    estimate, unreachable, warnings = estimate_tree(
+        tree.root, start=start, planner=planner, estimates=estimates, zones=tree.zones
+    )
     return Checked((*impossible, *grasps, *unreachable), estimate, (*full, *warnings))
 
 

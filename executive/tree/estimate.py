@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from executive.tree.board import Constant, FromBoard
 from executive.tree.node import NodeSpec
+from skills.api import Zone
 from skills.files.errors import InputError
 from skills.files.schema import validate
 from skills.files.yaml_source import read_yaml
@@ -62,17 +63,21 @@ class Estimates(_Data):
 
 @dataclass(frozen=True)
 class Route:
-    """Route between two poses: its length (m), and its progress (m), in which turns count as well."""
+    """Route between two poses: its length (m), and its progress (m), in which turns count as well.
+
+    `limited` are its parts under a speed limit: the progress of each (m), and the limit (m/s).
+    """
 
     length_m: float
     progress_m: float
+    limited: tuple[tuple[float, float], ...] = ()
 
 
 class RoutePlanner(Protocol):
     """Planner of routes on the map."""
 
-    def route(self, start: Pose2D, goal: Pose2D) -> Route:
-        """Plans the route from start to goal. Raises ValueError with one sentence when there is none."""
+    def route(self, start: Pose2D, goal: Pose2D, zones: tuple[Zone, ...] = ()) -> Route:
+        """Plans the route from start to goal that minds the zones. Raises ValueError with one sentence if none does."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +128,7 @@ class _Walk:
     planner: RoutePlanner
     estimates: Estimates
     pose: Pose2D
+    zones: tuple[Zone, ...] = ()
     noted: dict[str, Pose2D] = field(default_factory=dict)
     written: set[str] = field(default_factory=set)
     errors: list[InputError] = field(default_factory=list)
@@ -148,10 +154,13 @@ class _Walk:
 
 
 def estimate_tree(
-    root: NodeSpec, *, start: Pose2D, planner: RoutePlanner, estimates: Estimates
+    root: NodeSpec, *, start: Pose2D, planner: RoutePlanner, estimates: Estimates, zones: tuple[Zone, ...] = ()
 ) -> tuple[Estimate, tuple[InputError, ...], tuple[InputError, ...]]:
-    """Estimates a tree from `start` on; returns also errors for unreachable places, and warnings, with their lines."""
-    walk = _Walk(planner, estimates, start)
+    """Estimates a tree from `start` on, in which the robot minds `zones`.
+
+    Returns also errors for unreachable places, and warnings, with their lines.
+    """
+    walk = _Walk(planner, estimates, start, zones)
     return _followed(root, walk, first=False), tuple(walk.errors), tuple(walk.warnings)
 
 
@@ -242,13 +251,14 @@ def _skill(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
         duration_s = walk.estimates.skills.get(node.name, walk.estimates.other_skill_s)
         return walk.draw(node, Estimate(duration_s, 0.0, duration_s * walk.estimates.battery.standing_per_s))
     try:
-        route = walk.planner.route(walk.pose, goal)
+        route = walk.planner.route(walk.pose, goal, walk.zones)
     except ValueError as error:
-        hint = "name another place or pose, or correct the world's map"
+        hint = f"name another place or pose, or correct the world's map{' or the zones' if walk.zones else ''}"
         raise _CannotError(InputError.at(node.source, str(error).rstrip("."), hint=hint)) from error
     walk.pose = goal
     drive = walk.estimates.drive
-    duration_s = drive.overhead_s + drive.per_metre_s * route.progress_m
+    slower_s = sum(max(0.0, part_m / limit_m_s - drive.per_metre_s * part_m) for part_m, limit_m_s in route.limited)
+    duration_s = drive.overhead_s + drive.per_metre_s * route.progress_m + slower_s
     charge = duration_s * walk.estimates.battery.driving_per_s
     return walk.draw(node, Estimate(duration_s, route.length_m, charge))
 
@@ -321,6 +331,15 @@ def _repeated(node: NodeSpec, walk: _Walk, first: bool, begun: Estimate, times: 
     return rounds + Estimate(pauses_s, 0.0, pauses_s * walk.estimates.battery.standing_per_s)
 
 
+def _in_zones(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
+    """Estimates the child, which minds further zones."""
+    outer, walk.zones = walk.zones, tuple(dict.fromkeys((*walk.zones, *node.options["zones"])))
+    try:
+        return _all_of(node, walk, first)
+    finally:
+        walk.zones = outer
+
+
 def _in_time(node: NodeSpec, walk: _Walk, first: bool) -> Estimate:
     """Limits the estimate to a timeout."""
     taken, limit_s = _all_of(node, walk, first), node.options["limit_s"]
@@ -342,6 +361,7 @@ _VISITS: Final[Mapping[str, Callable[[NodeSpec, _Walk, bool], Estimate]]] = {
     "wait until": lambda node, walk, first: Estimate().up_to(DAY_S, f"until {node.options['words']}"),
     "wait for": lambda node, *walk: _all_of(node, *walk).up_to(math.inf, f"until {node.options['words']}"),
     "timeout": _in_time,
+    "zones": _in_zones,
 }
 
 

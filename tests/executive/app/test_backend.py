@@ -14,6 +14,8 @@ from executive.record.history import read_events
 from executive.record.work import Profile
 from executive.run.outcome import Outcome
 from executive.run.worker import ThreadWorker
+from executive.words.zone import ZoneFacts
+from skills.api import ZoneKind
 from tests.executive.app.scripted_backend import ScriptedBackend
 
 
@@ -51,6 +53,16 @@ def test_a_run_uses_the_worker_that_it_is_given_and_closes_it(prepared):
     worker = Counting()
     assert run_request(prepared, ScriptedBackend(), worker=worker).report.outcome == "success"
     assert (worker.jobs > 0, worker.closed) == (True, True)
+
+
+def test_the_report_names_the_zones_that_the_robot_minds(prepared):
+    quiet = {"hall": ZoneFacts(kind=ZoneKind.SILENT, place="hall")}
+    zoned = prepared.with_mission(prepared.mission.model_copy(update={"zones": quiet}))
+    report = run_request(zoned, ScriptedBackend()).report
+    assert report.to_json()["zones"] == ["silent in: hall"]
+    assert "  silent in: hall" in report.lines()
+    assert "silent in: hall" in (zoned.request.out / "report.html").read_text(encoding="utf-8")
+    assert "zones" not in run_request(prepared, ScriptedBackend()).report.to_json()
 
 
 def test_the_report_of_a_run_without_a_referee_says_so(prepared):

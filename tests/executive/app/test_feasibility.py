@@ -72,7 +72,7 @@ class Planner:
     def __init__(self):
         self.asked = 0
 
-    def route(self, start, goal):
+    def route(self, start, goal, zones=()):
         self.asked += 1
         if goal == NOWHERE:
             raise ValueError("There is no way.")

@@ -25,7 +25,7 @@ class Routes:
     def __init__(self, *, closed=False):
         self.closed = closed
 
-    def route(self, start, goal):
+    def route(self, start, goal, zones=()):
         if self.closed and goal.y_m > KITCHEN_Y_M:
             raise ValueError("there is no way")
         return Route(10.0, 10.0)
@@ -94,7 +94,7 @@ class EastOf:
     def __init__(self, x_m):
         self.x_m = x_m
 
-    def route(self, start, goal):
+    def route(self, start, goal, zones=()):
         if goal.x_m < self.x_m:
             raise ValueError("there is no way")
 

@@ -239,6 +239,8 @@ def test_zones_are_added_listed_and_removed_and_comments_stay(own):
     zones = load_knowledge(file).zones
     assert (zones["slow"].polygon, zones["private"].place) == (((3.0, 0.0), (5.0, 0.0), (5.0, 2.0)), "room 2")
     assert file.read_text().startswith("# mine\n")
+    (error,) = executive.check("go to room 2", world=str(own)).errors
+    assert error.message.startswith("The private is a keep-out zone.")
     for name in ("slow", "private"):
         assert zone("remove", own, name).exit_code == 0
     assert file.read_text().rstrip() == before.rstrip()

@@ -47,6 +47,7 @@ TO_BEDROOM = ["bedroom"]
             "don't drive faster than 40 centimetres per second in the hall, and go to the bedroom",
             [("speed_limit", "hall", 0.4)],
         ),
+        ("tell me whether anybody is in the bedroom but keep out of the kitchen", [KEPT_OUT]),
         ("be quiet in the living room and go to the bedroom", [("silent", "living room")]),
         (
             "keep out of the kitchen, drive slowly in the hall and go to the bedroom",
@@ -96,6 +97,7 @@ def test_a_rule_holds_around_conditions_as_well(meant):
         ("go to the hall and do not go into the kitchen tomorrow", ""),
         ("do not go into the kitchen unless Robin is there, and go to the hall", ""),
         ("do not keep out of the kitchen and go to the hall", ""),
+        ("do not stay out of the kitchen and go to the hall", ""),
         ("do not go into the attic and go to the hall", ""),
         ("avoid the kitchen if you can and go to the hall", ""),
         ("do not leave the kitchen and find a coke", ""),

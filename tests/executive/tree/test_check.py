@@ -15,12 +15,14 @@ from executive.words.leaf_steps import Awaited, CallSkill, Do, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Policy
 from executive.words.step import Place
-from executive.words.steps import Loop, Repeat, Together
+from executive.words.steps import Group, Loop, Repeat, Together
+from executive.words.zone import ZoneFacts
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap
 from skills.files.yaml_source import YamlSource
 from skills.navigate.footprint import Footprint
 from skills.navigate.planner import LatticePlanner
+from skills.navigate.zones import Zone, ZoneKind
 from skills.robot import Pose2D
 
 START = Pose2D(0.0, 0.0, 0.0)
@@ -38,7 +40,7 @@ class StraightRoutes:
     def __init__(self, far_m=99.0, stretched=1.0):
         self.far_m, self.stretched, self.asked = far_m, stretched, []
 
-    def route(self, start, goal):
+    def route(self, start, goal, zones=()):
         self.asked.append((start, goal))
         if goal.x_m > self.far_m:
             raise ValueError(f"There is no way to ({goal.x_m:.2f}, {goal.y_m:.2f}).")
@@ -208,6 +210,62 @@ def test_routes_are_planned_on_the_map_for_the_whole_body(walled):
             routes.route(here, Pose2D(1.0, 1.0, 0.0))
     with pytest.raises(ValueError, match="blocked"):
         routes.route(here, Pose2D(-1.9, 1.0, 0.0))
+
+
+BODY = Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)])
+SOUTH, NORTH = Pose2D(-1.0, -1.2, 1.57), Pose2D(-1.0, 1.2, 1.57)
+STRIP = ((-2.0, -0.3), (0.05, -0.3), (0.05, 0.3), (-2.0, 0.3))
+
+
+def zone(kind, corners=STRIP, **more):
+    return Zone("strip", ZoneKind(kind), corners, **more)
+
+
+@pytest.mark.parametrize(
+    ("zones", "goal", "why"),
+    [
+        ((zone("keep_out"),), NORTH, r"^The strip is a keep-out zone\. No path leads to \(-1\.00, 1\.20\)\."),
+        ((zone("keep_out"),), Pose2D(-1.0, 0.4, 0.0), r"^The strip is a keep-out zone\. The robot does not stand at"),
+        ((zone("one_way", direction_rad=-1.57),), NORTH, "The strip is a one-way zone"),
+        ((zone("keep_out"),), Pose2D(1.0, 1.0, 0.0), "no path"),
+    ],
+)
+def test_a_goal_that_zones_forbid_is_refused_with_their_names(walled, zones, goal, why):
+    with pytest.raises(ValueError, match=why):
+        PlannedRoutes(walled, BODY, LatticePlanner()).route(SOUTH, goal, zones)
+
+
+def test_a_robot_that_starts_in_a_keep_out_zone_leaves_it(walled):
+    routes = PlannedRoutes(walled, BODY, LatticePlanner())
+    assert routes.route(Pose2D(-1.0, 0.0, 1.57), NORTH, (zone("keep_out"),)).length_m == pytest.approx(1.2, abs=0.2)
+
+
+def test_a_route_has_the_parts_under_a_speed_limit(walled):
+    routes = PlannedRoutes(walled, BODY, LatticePlanner(), lambda: 0.8)
+    free, slow = (routes.route(SOUTH, NORTH, zones) for zones in ((), (zone("speed_limit", share=0.25),)))
+    assert free.limited == ()
+    ((part_m, limit_m_s),) = slow.limited
+    assert (part_m, limit_m_s) == (pytest.approx(1.3, abs=0.2), pytest.approx(0.2))
+
+
+class SlowRoutes(StraightRoutes):
+    """Routes of which all is under the limit of each zone."""
+
+    def route(self, start, goal, zones=()):
+        route = super().route(start, goal)
+        return replace(route, limited=tuple((route.length_m, each.speed_m_s) for each in zones))
+
+
+def test_a_speed_limit_of_a_group_counts_in_the_time_of_its_steps(check):
+    drive = load_estimates().drive
+    slow = ZoneFacts(kind=ZoneKind.SPEED_LIMIT, place="kitchen", speed=0.1)
+    steps = [Do.from_command(parse_command(GO.format(place))) for place in ("kitchen", "hall")]
+    whole = (Group(steps=(steps[0],), zones={"kitchen": slow}), steps[1])
+    free, limited = (check(*each, routes=SlowRoutes()).estimate for each in (steps, whole))
+    assert free.distance_m == limited.distance_m
+    first_m = check(steps[0], routes=SlowRoutes()).estimate.distance_m
+    slower_s = first_m / 0.1 - drive.per_metre_s * first_m
+    assert limited.duration_s - free.duration_s == pytest.approx(slower_s)
 
 
 BRING = "Take [{}] to [{}] and do [Nothing] to [Nothing]"

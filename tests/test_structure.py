@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8325,
     "executive/cli": 5018,
-    "skills": 29426,
+    "skills": 29432,
     "plant": 21945,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 511, 93, 13

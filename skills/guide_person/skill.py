@@ -11,7 +11,7 @@ import shapely
 from skills.api import Cause, Job, Running, Step, Succeeded
 from skills.follow_person.target import Target, TargetOptions
 from skills.geometry import bearing_rad, grid_inside
-from skills.meet_person.skill import MeetPerson
+from skills.meet_person.skill import MeetPerson, person_text
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.skill import Navigate
@@ -72,7 +72,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
     def begin(self, inputs: GuidePersonInputs) -> None:
         """Starts with the person at the place of the inputs."""
         super().begin(inputs)
-        self._inputs, self._place_W = inputs, inputs.place_W
+        self._inputs, self._place_W, self._who = inputs, inputs.place_W, person_text(inputs.person)
         self._company = Company(PeopleWatch(self.context, _TRACKING))
         self._target: Target | None = None
         self._behind = Patience(self.context.clock, self.options.behind_s)
@@ -136,7 +136,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         if self._remark is None or not self._is_told() or self._are_there():
             return None
         inputs, said = self._inputs, self._remark.result()
-        return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {inputs.person} was at {inputs.place}")
+        return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {self._who} was at {inputs.place}")
 
     def run(self, inputs: GuidePersonInputs) -> Routine[Succeeded]:
         """Leads the person, and goes back for them as often as needed."""
@@ -146,9 +146,9 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
             if (yield from self._lead()):
                 say(self.context, f"Here we are: {inputs.place}.")
                 apart_m = self._gap_m()
-                return Succeeded(f"{inputs.person} came along to {inputs.place}, {apart_m:.1f} m from the robot")
+                return Succeeded(f"{self._who} came along to {inputs.place}, {apart_m:.1f} m from the robot")
             yield from self._fetch()
-        raise SkillFailure(Cause.POSTCONDITION, f"{inputs.person} does not come along to {inputs.place}")
+        raise SkillFailure(Cause.POSTCONDITION, f"{self._who} does not come along to {inputs.place}")
 
     def _lead(self) -> Routine[bool]:
         """Drives to the goal; returns whether both are there, or False once the person is too far behind."""
@@ -160,7 +160,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
                 break
             end_s = self.context.clock.now() + self.options.arrive_s
             while not (self._are_there() or self._waits_outside(end_s)) and self.context.clock.now() < end_s:
-                yield Running(f"waiting for {inputs.person} at {inputs.place}")
+                yield Running(f"waiting for {self._who} at {inputs.place}")
             further = None if self._are_there() else self._pose_further_in()
             if further is None:
                 break
@@ -201,7 +201,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         inputs, failures = self._inputs, list[SkillFailure]()
         last = None if self._target is None else self._target.seen
         if last is not None:
-            say(self.context, f"I come back for you, {inputs.person}.")
+            say(self.context, "I come back for you.")
         for place_W in (self._place_W,) if last is None else (last.place_W, *_further_on(last)):
             try:
                 goal = MeetPersonInputs(inputs.person, place_W)
@@ -214,7 +214,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
             if met is not ENDED_EARLY and not self._is_close():
                 self._place_W, self._target = met.outputs["person"].position_W[:2], None
             return
-        why = f"lost {inputs.person} on the way to {inputs.place}: {failures[0].message}"
+        why = f"lost {self._who} on the way to {inputs.place}: {failures[0].message}"
         raise SkillFailure(failures[0].cause, why)
 
     def _pace_m_s(self) -> float:

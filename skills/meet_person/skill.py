@@ -13,6 +13,7 @@ from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
 from skills.navigate.trip_planning import place_text
+from skills.perception.class_forms import PERSON
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import MeetPersonInputs, MeetPersonPorts, NavigateInputs
@@ -26,6 +27,11 @@ _ARM_M = 0.5
 """Distance from a person's axis up to which their own body is in the costmap."""
 _STEP_M = 0.1
 _MOST_POSES = 4
+
+
+def person_text(name: str) -> str:
+    """Name of a person in a sentence."""
+    return "the person" if name == PERSON else name
 
 
 @dataclass(frozen=True)
@@ -55,19 +61,19 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def run(self, inputs: MeetPersonInputs) -> Routine[Succeeded]:
         """Drives beside the person, again if they have moved meanwhile."""
-        place_W = inputs.place_W
+        place_W, who = inputs.place_W, person_text(inputs.person)
         for drives in range(self.options.tries + 1):
             if drives or place_W is None or self._away_m(place_W) <= self.options.near_m:
-                person = yield from self._look(inputs.person, place_W)
+                person = yield from self._look(who, place_W)
                 if person is None:
                     nobody = f"nobody is seen within {self.options.ahead_m:g} m"
-                    why = nobody if place_W is None else f"{inputs.person} is not seen at {place_text(place_W)}"
+                    why = nobody if place_W is None else f"{who} is not seen at {place_text(place_W)}"
                     raise SkillFailure(Cause.POSTCONDITION, why)
                 place_W = person.place_W
                 if self._is_beside(person):
                     return self._met(inputs, person)
-            yield from self._go_beside(place_W, inputs.person)
-        raise SkillFailure(Cause.POSTCONDITION, f"{inputs.person} does not stay where the robot goes")
+            yield from self._go_beside(place_W, who)
+        raise SkillFailure(Cause.POSTCONDITION, f"{who} does not stay where the robot goes")
 
     def _look(self, name: str, place_W: tuple[float, float] | None) -> Routine[SeenPerson | None]:
         """Looks for the person nearest to a place (None: nearest ahead); None when nobody is there."""
@@ -128,4 +134,4 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         found = ObjectObservation(
             person.stamp_s, kind, middle_W, PERSON_SIZE_M, 0.0, person.score, inputs.place or None
         )
-        return Succeeded(f"beside {inputs.person} at ({x:.2f}, {y:.2f})", {"person": found})
+        return Succeeded(f"beside {person_text(inputs.person)} at ({x:.2f}, {y:.2f})", {"person": found})

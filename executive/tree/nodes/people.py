@@ -340,7 +340,7 @@ def _each_in_turn(
 
 def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "") -> NodeSpec:
     """Goes beside the person who was seen under a key, in a room called `place`; notes there where they are now."""
-    ports = {"person": person_text(person), "place_W": PlaceOf(key), "place": place}
+    ports = {"person": person, "place_W": PlaceOf(key), "place": place}
     return builder.skill("meet_person", ports, {"person": key})
 
 
@@ -356,7 +356,7 @@ def go_to_goal_plan(builder: PlanBuilder, goal: str) -> NodeSpec:
 def follow_plan(builder: PlanBuilder) -> NodeSpec:
     """Follows a person, after finding them; the speaker, or anybody, is the person before the robot."""
     person, goal = person_of(builder), builder.command.goal
-    ports: dict[str, object] = {"person": person_text(person)}
+    ports: dict[str, object] = {"person": ANYBODY if person == SPEAKER else person}
     if goal is not None:
         room = builder.knowledge.room(builder.place(goal))
         ports |= {"until": room, "until_W": builder.knowledge.places[room].polygon}
@@ -370,7 +370,7 @@ def guide_plan(builder: PlanBuilder) -> NodeSpec:
     if goal is None:
         raise builder.error(f"it is not said where to guide {person_text(person)}", "name a place")
     to = goal_in_words(builder, goal)
-    ports = {"person": person_text(person), "goal": goal_pose(builder, goal), "place": to}
+    ports = {"person": ANYBODY if person == SPEAKER else person, "goal": goal_pose(builder, goal), "place": to}
     area = {"area_W": _guided_area(builder, goal)}
     return _with_person(builder, person, f"guide {person_text(person)} to {to}", "guide_person", {**ports, **area})
 

@@ -180,11 +180,13 @@ SMALL = (
     ),
     Construct(
         "open",
-        "Has a door opened: the robot looks at it, and where it is closed asks aloud for it and waits before it, for "
-        "`within` at most (two minutes by default).",
+        "Has a door opened: the robot looks at it. A closed door is opened by its "
+        "[plug-in](../how-to/doors.md), or else asked for aloud. "
+        "The robot waits before it, for `within` at most (two minutes by default).",
         """- open: {door: [hall, kitchen], within: 1 min}
 """,
-        "SUCCESS when the door is open. FAILURE with TIMEOUT when it is not opened in time.",
+        "SUCCESS when the door is open. FAILURE with TIMEOUT when it is not opened in time, and with the cause of "
+        "its plug-in.",
         "timeout",
     ),
     Construct(

@@ -93,12 +93,14 @@ def slide(
 class _Panel(Stateful):
     """Panel of a door: the closed share of the doorway (0 to 1), and whether the panel `closes` now.
 
-    The history has the time (s) of each change and the new state: 0 (open), 1 (closed) or 0.5 (moving).
+    A door that is `called` opens, and stays open. The history has the time (s) of each change and the new state: 0
+    (open), 1 (closed) or 0.5 (moving).
     """
 
     share: float
     closes: bool
     history: list[tuple[float, float]]
+    called: bool = False
 
     def move_to(self, share: float, now_s: float) -> None:
         """Closes the door to a `share` (0 to 1), and records when it becomes open, closed or moving."""
@@ -141,10 +143,16 @@ class Doors(Stateful, saved=("_panels",)):
         ajar = (door for name, door in self._doors.items() if self._panels[name].share > AJAR)
         return [_doorway(door) for door in ajar]
 
+    def call(self, at_W: tuple[float, float]) -> None:
+        """Opens the door at a position (x, y) from the next step on, as its drive would; from any thread."""
+        name = next(name for name, door in self._doors.items() if door.at == at_W)
+        self._panels[name].called = True
+
     def before_step(self, now_s: float, dt_s: float) -> None:
         """Sets the pose of each panel, and the velocity that brings it to its next pose within dt_s."""
         for name, door in self._doors.items():
-            panel, closes = self._panels[name], _closed_at(door, now_s)
+            panel = self._panels[name]
+            closes = _closed_at(door, now_s) and not panel.called
             if closes != panel.closes:
                 panel.closes = closes
                 self._tell(f"the {name} {'closes' if closes else 'opens'}")

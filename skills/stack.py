@@ -40,11 +40,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "DEFAULT_FILE",
+    "DOORS",
     "SLOTS",
     "RobotStack",
     "StackError",
     "default_component",
     "default_stack",
+    "door_opener",
     "stack_data",
     "stack_of",
     "stack_schema",
@@ -64,6 +66,9 @@ SLOTS: Final[Mapping[str, str]] = {
 SKILLS: Final = "skills"
 SKILL_GROUP: Final = "errand.skills"
 USE: Final = "use"
+DOORS: Final = "errand.doors"
+"""Entry-point group of the plug-ins that open doors (`skills.perception.doorway.DoorOpener`)."""
+PLUGIN: Final = "plugin"
 DEFAULT_FILE: Final = Path(__file__).with_name("default_stack.yaml")
 
 
@@ -240,6 +245,16 @@ def _component(slot: str, given: Any) -> tuple[str, Any]:
 def components(slot: str) -> Mapping[str, type]:
     """Returns the installed components of a slot by name, the default one first. Raises StackError."""
     return MappingProxyType({name: _loaded(slot, name, SLOTS[slot]) for name in _names(slot)})
+
+
+def door_opener(given: Mapping[str, Any]) -> Any:
+    """Returns the plug-in that opens a door, from its name under `plugin` and its options. Raises StackError."""
+    known = sorted({entry.name for entry in installed_plugins(DOORS)})
+    name = given.get(PLUGIN)
+    if name not in known:
+        raise StackError((PLUGIN,), f"no plug-in {display_text(name)} opens doors", suggestion(str(name), known))
+    options = {key: value for key, value in given.items() if key != PLUGIN}
+    return _typed((), _loaded(PLUGIN, str(name), DOORS), options)
 
 
 def _names(slot: str) -> list[str]:

@@ -14,11 +14,11 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3280,
+    "executive/words": 3283,
     "executive/language": 8233,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8382,
+    "executive/tree": 8400,
     "executive/run": 3217,
     "executive/record": 1408,
     "executive/store": 1666,
@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8325,
     "executive/cli": 5018,
-    "skills": 29432,
-    "plant": 21945,
+    "skills": 29631,
+    "plant": 21953,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 511, 93, 13
+MODULES, ONE_IMPORTER, SAME_NAME = 515, 94, 14
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -27,7 +27,7 @@ from skills.files.plugins import CLASSES, LIMIT_S, OURS, PluginDefect, distribut
 from skills.files.yaml_source import yaml_of
 from skills.perception.class_forms import class_forms
 from skills.quantities import Duration
-from skills.stack import SLOTS, stack_data
+from skills.stack import DOORS, SLOTS, stack_data
 
 _WORKERS: Final = 4
 _MORE_S: Final = 30.0
@@ -70,7 +70,7 @@ def plugins(
 
 def groups() -> Sequence[str]:
     """Returns the entry-point groups that Errand reads."""
-    return (registry.GROUP, *SLOTS.values(), kinds.GROUP, trigger_source.GROUP, CLASSES, COMMANDS_GROUP)
+    return (registry.GROUP, *SLOTS.values(), DOORS, kinds.GROUP, trigger_source.GROUP, CLASSES, COMMANDS_GROUP)
 
 
 def _of_others() -> Sequence[EntryPoint]:

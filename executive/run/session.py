@@ -407,7 +407,7 @@ class Session(RunRobot):
         self._doors.look()
         doors, memory = self.context.doors, self.context.door_memory
         seen = [memory.last_seen(door) for door in doors]
-        known = tuple((one.state.value, one.seen_s // DOORS_PERIOD_S) for one in seen)
+        known = tuple((one.state.value, max(one.seen_s, 0.0) // DOORS_PERIOD_S) for one in seen)
         if known != self._known_doors:
             self._known_doors = known
             self.context.publish(DOORS, {"robot": self.name, "doors": list(map(_door_message, doors, seen))})

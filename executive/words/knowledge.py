@@ -81,6 +81,9 @@ class Door(_Facts):
     between: tuple[str, str] = Field(description="the rooms on its two sides")
     at: Corner = Field(description="its middle (x, y)")
     width: Opening = Field(description="clear width, m")
+    opens: dict[str, str | float | bool] | None = Field(
+        default=None, description="the plug-in that opens it and its options, as `{plugin: http, url: ..}`"
+    )
 
 
 class SurfaceFacts(_Facts):

@@ -19,6 +19,8 @@ from skills.robot import FloatArray, Pose2D
 _CELL_M = 0.05
 _AROUND_M = 8.0
 """Margin of the ground that is examined about robot and goals."""
+_DOOR_M = 2.0
+"""Margin of the ground that is examined about the doors, through which a detour may lead."""
 _NEAR_M = 0.3
 """Radius within which a blocked robot looks for its region."""
 _BESIDE_M = (0.4, 0.55, 0.7, 0.9)
@@ -40,36 +42,39 @@ class DoorOptions:
 
     A scan shows a door from `reach_m` at most, and from `flattest_rad` at most off the direct view. The door is closed
     while all its gaps are narrower than `closed_m`. Where closed doors leave no path, the robot looks again every
-    `look_s`, for `patience_s`. Plans avoid a door that was seen closed up to `trust_s` before the trip where they can;
-    where they cannot, the robot goes there and looks.
+    `look_s`, for `patience_s`. Plans avoid a door that was seen closed up to `trust_s` before the trip; where none
+    does, and it was seen more than `sure_s` before, the robot goes there and looks. A door with a plug-in opens within
+    `opens_s` of its call, or not.
     """
 
     reach_m: Length = 4.0
-    flattest_rad: Turn = 1.1
+    flattest_rad: Turn = 1.25
     closed_m: Margin = 0.1
     patience_s: Delay = 3.0
     look_s: Delay = 1.0
     trust_s: Delay = 120.0
+    sure_s: Delay = 60.0
+    opens_s: Delay = 15.0
 
 
 class DoorWatch:
     """The doors in view, and those of the robot's memory that count as closed on one trip."""
 
     def __init__(self, context: SkillContext, options: DoorOptions | None = None) -> None:
-        self._context, self._begun_s = context, context.clock.now()
-        self.options = options or DoorOptions()
+        self._context, self.options = context, options or DoorOptions()
+        self._sure_since_s = context.clock.now() - self.options.sure_s
         self._doubted: frozenset[Doorway] = frozenset()
         sides = [y for _, y in context.robot.capabilities().footprint_m]
         self._width_m = max(sides) - min(sides)
 
     @property
     def closed(self) -> tuple[Doorway, ...]:
-        """The doors that the robot saw closed on this trip, or not long before, unless it doubts that."""
+        """The doors that the robot saw closed on this trip or not long before, unless it doubts that."""
         return tuple(door for door in self._context.doors if self._counts_as_closed(door))
 
     def _counts_as_closed(self, door: Doorway) -> bool:
         seen = self._context.door_memory.last_seen(door)
-        if seen.state is not DoorState.CLOSED or seen.seen_s >= self._begun_s:
+        if seen.state is not DoorState.CLOSED or seen.seen_s >= self._sure_since_s:
             return seen.state is DoorState.CLOSED
         return door not in self._doubted and self._context.clock.now() <= seen.seen_s + self.options.trust_s
 
@@ -92,12 +97,12 @@ class DoorWatch:
                 memory.note(door, DoorState.UNKNOWN, scan.stamp_s)
 
     def doubt(self, doors: Sequence[Doorway]) -> bool:
-        """Lets plans lead to those `doors` that the robot has not seen on this trip, so that it looks at them again.
+        """Lets plans lead to those `doors` that the robot has not seen lately, so that it looks at them again.
 
         Returns whether there are any.
         """
         memory = self._context.door_memory
-        old = [door for door in doors if memory.last_seen(door).seen_s < self._begun_s]
+        old = [door for door in doors if memory.last_seen(door).seen_s < self._sure_since_s]
         self._doubted |= frozenset(old)
         self._clear(old)
         return bool(old)
@@ -119,6 +124,13 @@ class DoorWatch:
         far = [door for door in self._context.doors if door.distance_m(place) > _JUDGED_M and door not in closed]
         return bool(closed) and self._clear(far)
 
+    def detour_margin_m(self, start: Pose2D, goal: Pose2D) -> float:
+        """Margin about start and goal within which all doors lie (m), for a plan that leads through others."""
+        places = np.array([[start.x_m, start.y_m], [goal.x_m, goal.y_m]])
+        doors_W = np.array([door.middle_W for door in self._context.doors])
+        out_m = np.maximum(places.min(axis=0) - doors_W, doors_W - places.max(axis=0))
+        return max(_AROUND_M, float(out_m.max()) + _DOOR_M)
+
     def _clear(self, doors: Sequence[Doorway]) -> bool:
         """Clears the costmap in doorways; returns whether a cell was cleared."""
         costmap, discs = self._context.costmap, [[*door.middle_W, 0.5 * door.width_m + _JAMB_M] for door in doors]
@@ -139,6 +151,7 @@ class DoorWatch:
             here,
             goals,
             np.concatenate([np.empty((0, 2)), *axes, *discs]),
+            np.array([door.middle_W for door in self._context.doors]).reshape(-1, 2),
         )
 
     def blocking_doors(
@@ -155,7 +168,7 @@ class Regions:
     """The connected regions of the ground in which a disc as wide as the robot can move.
 
     A goal outside the robot's region is certainly out of reach; one inside may still be, since the robot is longer. The
-    points `free_W` (N, 2) count as free in any case.
+    points `free_W` (N, 2) count as free in any case. The ground about the doors at `doors_W` (N, 2) belongs to it.
     """
 
     def __init__(
@@ -165,11 +178,14 @@ class Regions:
         here: Pose2D,
         goals: Sequence[Pose2D],
         free_W: FloatArray,
+        doors_W: FloatArray,
     ) -> None:
         self._here, self._goals = here, goals
         places = np.array([[pose.x_m, pose.y_m] for pose in (here, *goals)])
-        self._corner = places.min(axis=0) - _AROUND_M
-        columns, rows = np.ceil((places.max(axis=0) + _AROUND_M - self._corner) / _CELL_M).astype(int).tolist()
+        low = np.vstack([places - _AROUND_M, doors_W - _DOOR_M]).min(axis=0)
+        high = np.vstack([places + _AROUND_M, doors_W + _DOOR_M]).max(axis=0)
+        self._corner = low
+        columns, rows = np.ceil((high - low) / _CELL_M).astype(int).tolist()
         xs, ys = (self._corner[axis] + _CELL_M * np.arange(n) for axis, n in ((0, columns), (1, rows)))
         free = clearance_on_grid(costmap, xs, ys) > footprint.inscribed_m - _CELL_M
         cells = self._cell(free_W)

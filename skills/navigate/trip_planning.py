@@ -2,15 +2,17 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from skills.api import Cause, ClearableCostmap, Job, SkillContext
 from skills.geometry import compose
 from skills.navigate.cut_off import closed_doors_sentence
 from skills.navigate.giving_way import Avoided
 from skills.navigate.path import Path
+from skills.navigate.planner import LatticePlanner
 from skills.navigate.surroundings import NavigateOptions, Surroundings
 from skills.navigate.zones import zones_sentence
+from skills.open_door.calls import DoorCalls
 from skills.ports import NavigateInputs
 from skills.robot import Pose2D
 from skills.routine import Patience, SkillFailure
@@ -49,10 +51,11 @@ class TripPlanning:
     ) -> None:
         self._context, self._options, self._inputs, self._around = context, options, inputs, around
         self._job: Job[Path] | None = None
-        self._map_alone = self._map_leads = self._looked_again = self._waited = False
+        self._map_alone = self._map_leads = self._looked_again = self._waited = self._detours = False
         self._replans = 0
         self._people, self._robots = _Presence(options.after_person_s), _Presence(options.after_person_s)
         self._closed = Patience(context.clock, options.doors.patience_s)
+        self._calls = DoorCalls(context, options.doors.opens_s)
         self._tried: tuple[Pose2D, ...] = ()
         self._asked_due_s = -math.inf
         self.aside: Pose2D | None = None
@@ -80,7 +83,10 @@ class TripPlanning:
         self._check_zones()
         begin, self._map_alone = start or context.pose(), map_alone
         avoided = self.avoided if self.aside is None else Avoided.BODIES
-        plan = context.stack.planner.problem(
+        planner = context.stack.planner
+        if self._detours and isinstance(planner, LatticePlanner):
+            planner = replace(planner, around_m=around.doors.detour_margin_m(begin, self.goal))
+        plan = planner.problem(
             around.free_space() if map_alone else around.costmap(begin, self.goal, avoided),
             around.footprint,
             begin,
@@ -197,7 +203,7 @@ class TripPlanning:
         """Waits for people, robots or doors, or looks again. Raises SkillFailure at the limits of the options."""
         robot = self._robot_may_go()
         may_go = robot or self._people_may_go()
-        if not robot and self._waits_for_doors():
+        if not robot and (self._waits_for_doors() or self._plans_detour()):
             return
         self._replans += not may_go
         if self._replans < self._options.replans and self._around.doors.forget_distant(self._context.pose()):
@@ -219,7 +225,7 @@ class TripPlanning:
             self.ask(map_alone=True)
 
     def _waits_for_doors(self) -> bool:
-        """Returns whether to go to closed doors that leave no path, or to wait for them.
+        """Returns whether to go to closed doors that leave no path, or to wait for them; calls their plug-ins.
 
         Raises SkillFailure once patience is over.
         """
@@ -229,10 +235,19 @@ class TripPlanning:
         if self._around.doors.doubt(doors):
             self.ask()
             return True
-        if not self._closed.is_left():
-            raise SkillFailure(Cause.PLANNING, closed_doors_sentence(doors, self._inputs.goal), final=True)
+        if not self._calls.may_open(doors) and not self._closed.is_left():
+            sentence = f"{closed_doors_sentence(doors, self._inputs.goal)} {self._calls.reasons(doors)}".strip()
+            raise SkillFailure(Cause.PLANNING, sentence, final=True)
         self.obstacle_W = doors[0].middle_W
         self.wait_until_s = self._now() + options.look_s
+        return True
+
+    def _plans_detour(self) -> bool:
+        """Requests plans that lead far round closed doors from now on; False when there are none, or it did before."""
+        if self._detours or not self._around.doors.closed:
+            return False
+        self._detours = True
+        self.ask()
         return True
 
     def _looks_again(self) -> bool:

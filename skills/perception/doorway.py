@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,17 +28,25 @@ Bools = NDArray[np.bool_]
 Counts = NDArray[np.int64]
 
 
+class DoorOpener(Protocol):
+    """Plug-in that opens a door which moves by itself; a frozen dataclass whose fields are its options."""
+
+    def open(self, door_name: str, between: tuple[str, str]) -> None:
+        """Asks the door to open; may block for some seconds. Raises an exception whose text says why it does not."""
+
+
 @dataclass(frozen=True)
 class Doorway:
     """A doorway: its middle (x, y) in the world (m), its clear width (m), and the direction through it (rad).
 
-    The direction may lead either way. `between` names the two rooms that it joins.
+    The direction may lead either way. `between` names the two rooms that it joins, `opener` the plug-in that opens it.
     """
 
     middle_W: tuple[float, float]
     width_m: float
     through_rad: float
     between: tuple[str, str] = ("", "")
+    opener: DoorOpener | None = field(default=None, compare=False)
 
     def distance_m(self, place_W: tuple[float, float]) -> float:
         """Distance of its middle from a point (m)."""

@@ -56,6 +56,15 @@ def test_a_door_closes_and_opens_at_its_times_and_the_lidar_sees_it():
     assert [begun_s for begun_s, _ in changes] == pytest.approx([0.0, 1.0, 2.5, 5.0, 6.5], abs=0.05)
 
 
+def test_a_door_that_is_called_opens_and_stays_open():
+    simulation = simulated(doors=(DOOR.model_copy(update={"closes": None, "opens": 900.0}),))
+    simulation.clock.advance(0.2)
+    simulation.engine.doors.call(AT)
+    simulation.clock.advance(2.0)
+    assert panel_W(simulation) == pytest.approx((AT[0] - 0.9, AT[1]))
+    assert [share for _, share in simulation.engine.doors.history()[AT]] == [1.0, 0.5, 0.0]
+
+
 @pytest.mark.parametrize(
     ("times", "shut"),
     [({"closes": 0.0}, True), ({"opens": 9.0}, True), ({"closes": 9.0}, False), ({"opens": 2.0, "closes": 9.0}, True)],

@@ -4,7 +4,7 @@ A closed door may bar the path to its viewpoint, so the robot also looks from th
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import product
 from types import MappingProxyType
 from typing import ClassVar, Final
@@ -25,6 +25,7 @@ from skills.api import Cause
 from skills.files.errors import InputError
 from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
+from skills.stack import StackError, door_opener
 
 CHECK_DOOR: Final = "check_door"
 _FROM_EITHER: Final = "look from one side, or else from the other"
@@ -108,7 +109,7 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
     The room with more doors comes first, since the robot can reach it more easily when this door is closed.
     """
     knowledge, name = builder.knowledge, _name(door)
-    ports = {"middle_W": door.at, "width_m": door.width, "through_rad": _through_rad(knowledge, door), "door": name}
+    ports = _ports(knowledge, door)
     sides = sorted(door.between, key=lambda room: -sum(room in other.between for other in knowledge.doors))
     views = [(room, view) for room in sides if (view := view_of(knowledge, door, room)) is not None]
     views = views or [(room, pose_2d(knowledge.places[room].pose)) for room in sides]
@@ -125,18 +126,20 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
 
 
 def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled:
-    """Looks at a door; where it is closed, asks the people there to open it, and waits before it."""
+    """Looks at a door; where it is closed, calls its plug-in or asks the people there, and waits before it."""
     door, key, wanted = _door(builder, block.door.between), builder.key("open"), block.door
     look, again = builder.at("look"), builder.at("again")
     first = look.node("selector", _FROM_EITHER, *_looks(look, door, key), part="look")
     first = _known_or(look, door, first, key, wanted.max_age_s)
-    ask = builder.at("ask").skill("speak", {"text": f"Please open the {_name(door)}."})
+    ask, ports = builder.at("ask"), _ports(builder.knowledge, door)
+    please = {"text": f"Please open the {_name(door)}."}
+    opens = ask.skill("speak", please) if door.opens is None else ask.skill("open_door", ports)
     looks = again.node("selector", _FROM_EITHER, *_looks(again, door, key), part="look")
     patient = again.node("retry", "look until it can tell", looks, attempts=_LOOKS, causes=_CANNOT_TELL)
     wait = builder.node(
         "wait for", f"wait until {wanted}", patient, part="wait", key=key, words=str(wanted), every_s=2.0
     )
-    work = builder.sequence("ask, and wait", ask, wait, part="ask-and-wait")
+    work = builder.sequence("ask, and wait", opens, wait, part="ask-and-wait")
     opened = builder.node("choose", f"{wanted}?", first, work, part="choose", branches=_IF_CLOSED, key=key)
     late = f"the {_name(door)} was not opened"
     node = builder.node("timeout", wanted.words, opened, limit_s=wanted.within_s, late=late)
@@ -153,6 +156,16 @@ def _door(builder: PlanBuilder, between: tuple[str, str]) -> Door:
         what = f"there is no door between {between[0]} and {between[1]}"
         raise InputError.at(builder.source, what, hint="add it under 'doors' in the knowledge file")
     return door
+
+
+def _ports(knowledge: Knowledge, door: Door) -> Mapping[str, object]:
+    """Inputs of the skills that look at a door, or open it."""
+    return {
+        "middle_W": door.at,
+        "width_m": door.width,
+        "through_rad": _through_rad(knowledge, door),
+        "door": _name(door),
+    }
 
 
 def _name(door: Door) -> str:
@@ -182,8 +195,13 @@ def _before(door: Door, into_rad: float) -> Iterator[Pose2D]:
 
 
 def doorway(knowledge: Knowledge, door: Door) -> Doorway:
-    """Converts a door of the knowledge file to the doorway of the skills."""
-    return Doorway(door.at, door.width, _through_rad(knowledge, door), door.between)
+    """Converts a door of the knowledge file to the doorway of the skills. Raises InputError for a wrong plug-in."""
+    try:
+        opener = None if door.opens is None else door_opener(door.opens)
+    except StackError as error:
+        what = f"'opens' of the {_name(door)} in the knowledge file: {error}"
+        raise InputError(what, hint=error.hint) from error
+    return Doorway(door.at, door.width, _through_rad(knowledge, door), door.between, opener)
 
 
 def _through_rad(knowledge: Knowledge, door: Door) -> float:

@@ -87,11 +87,19 @@ def test_a_door_seen_closed_long_ago_is_no_obstacle():
     assert DoorWatch(context).closed == ()
 
 
+def test_drive_to_a_door_that_was_just_seen_closed_is_given_up_at_once():
+    bench = Bench(Pose2D(4.0, 5.4, 3.14), unmapped=[RIGHT_PANEL])
+    context = context_of(bench)
+    context.door_memory.note(RIGHT, DoorState.CLOSED, bench.clock.now() - 20.0)
+    step = go(bench, KITCHEN, context=context)
+    assert step.message.startswith("The door between the corridor and the kitchen is closed")
+    assert (step.final, bench.robot.pose.x_m) == (True, pytest.approx(4.0, abs=0.05))
+
+
 def test_robot_goes_and_looks_at_the_only_door_though_it_remembers_it_closed():
     bench = Bench(BEFORE_RIGHT)
     context = context_of(bench)
-    context.door_memory.note(RIGHT, DoorState.CLOSED, bench.clock.now())
-    bench.clock.advance(1.0)
+    context.door_memory.note(RIGHT, DoorState.CLOSED, bench.clock.now() - DoorOptions().sure_s - 1.0)
     assert isinstance(go(bench, KITCHEN, context=context), Succeeded)
     assert context.door_memory.last_seen(RIGHT).state is DoorState.OPEN
 

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from executive.tree.nodes.door_check import BeforeDoor, KnownDoor, door_plan, doorway, view_of
+from executive.tree.nodes.door_check import PLANS, BeforeDoor, KnownDoor, door_plan, doorway, view_of
 from executive.tree.plan import PlanBuilder
+from executive.words import leaf_steps as model
 from executive.words.command import Command
 from executive.words.knowledge import Door, Knowledge
 from skills.back_off.skill import BackOff
@@ -13,6 +14,8 @@ from skills.check_door.skill import CheckDoor
 from skills.clear_costmap.skill import ClearCostmap
 from skills.files.errors import InputError
 from skills.navigate.skill import Navigate
+from skills.open_door.http_door import HttpDoor
+from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import DoorState, Doorway
 from skills.robot import Pose2D
 from tests.executive.tree.scripted import Leaf
@@ -75,6 +78,34 @@ def test_the_side_from_which_there_are_more_ways_comes_first():
     told["doors"] = (*told["doors"], {"between": ["cellar", "hall"], "at": (6.05, 6.0), "width": 0.9})
     (looks,) = plan(Knowledge.model_validate(told)).children
     assert [side.name for side in looks.children[1:]] == ["look from the hall", "look from the kitchen"]
+
+
+def test_a_door_with_a_plug_in_is_opened_by_it():
+    told = world().model_dump()
+    told["doors"][0]["opens"] = {"plugin": "http", "url": "http://door/open"}
+    knowledge = Knowledge.model_validate(told)
+    assert doorway(knowledge, knowledge.doors[0]).opener == HttpDoor("http://door/open")
+    builder = PlanBuilder(knowledge, {**SKILLS, "open_door": OpenDoor}, "alice/m/1-open", "start", Command(), None)
+    step = model.OpenDoor(door=model.DoorToOpen(door=("kitchen", "hall")))
+    (tree,) = PLANS[model.OpenDoor](None, step, builder).nodes
+    names = [leaf.name for leaf in tree.walk() if leaf.kind == "skill" and leaf.name not in SKILLS]
+    assert names == ["open_door"]
+
+
+@pytest.mark.parametrize(
+    ("opens", "message"),
+    [
+        ({"plugin": "htp", "url": "http://door"}, "plugin: no plug-in 'htp' opens doors"),
+        ({"plugin": "http", "url": "ftp://door"}, "url: should"),
+        ({"plugin": "http"}, "url: is missing"),
+    ],
+)
+def test_a_wrong_plug_in_is_refused_with_its_door(opens, message):
+    told = world().model_dump()
+    told["doors"][0]["opens"] = opens
+    knowledge = Knowledge.model_validate(told)
+    with pytest.raises(InputError, match=f"'opens' of the door between kitchen and hall .*: {message}"):
+        doorway(knowledge, knowledge.doors[0])
 
 
 def test_path_ids_are_unique():

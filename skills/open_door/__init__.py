@@ -1,0 +1,1 @@
+"""The open_door skill, and plug-ins that open doors."""

@@ -1,0 +1,140 @@
+"""Doors that a plug-in opens: the call, the wait for the door, and failures by name."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import socket
+import threading
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
+
+import pytest
+from planar_robot import Bench, Box
+
+from skills.api import Cause, Failed, Running, Succeeded
+from skills.check_door.skill import CheckDoorInputs
+from skills.navigate.skill import Navigate, NavigateInputs
+from skills.open_door.http_door import HttpDoor
+from skills.open_door.skill import OpenDoor
+from skills.perception.doorway import Doorway
+from skills.robot import Pose2D
+from skills.stack import StackError, door_opener
+
+PANEL = Box(7.0, 4.03, 7.9, 4.07, 0.0, 2.0)
+INPUTS = CheckDoorInputs((7.45, 4.05), 0.9, math.pi / 2, "door between corridor and kitchen")
+BEFORE, KITCHEN = Pose2D(6.8, 5.4, 0.0), Pose2D(8.5, 2.0, -1.57)
+
+
+@contextmanager
+def served(status=200, opens=lambda: None, waits_s=0.0):
+    """A door's server on this machine, which answers with a status after a while; yields address and calls."""
+    calls, done = [], threading.Event()
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_POST(self):
+            calls.append((self.command, self.path))
+            done.wait(waits_s)
+            opens()
+            self.send_response(status)
+            self.end_headers()
+
+        def log_message(self, *_):
+            pass
+
+    server = HTTPServer(("127.0.0.1", 0), Handler)
+    thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.02}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/open", calls
+    finally:
+        done.set()
+        server.shutdown()
+        server.server_close()
+        thread.join()
+
+
+def unused_address():
+    with socket.socket() as bound:
+        bound.bind(("127.0.0.1", 0))
+        return f"http://127.0.0.1:{bound.getsockname()[1]}/open"
+
+
+def run(skill_class, inputs, opener, bench=None):
+    """Runs a skill before the closed door; returns bench and last step."""
+    bench = bench or Bench(BEFORE, unmapped=[PANEL])
+    door = Doorway(INPUTS.middle_W, INPUTS.width_m, INPUTS.through_rad, ("corridor", "kitchen"), opener)
+    skill = skill_class(dataclasses.replace(bench.context(), doors=(door,)))
+    for _ in range(10):
+        bench.tick()
+    skill.begin(inputs)
+    while isinstance(step := skill.step(), Running) and bench.clock.now() < 60.0:
+        bench.tick()
+    skill.end()
+    return bench, step
+
+
+@pytest.mark.parametrize(("skill", "inputs"), [(OpenDoor, INPUTS), (Navigate, NavigateInputs(KITCHEN))])
+def test_a_door_that_opens_after_its_call_is_passed(skill, inputs):
+    bench = Bench(BEFORE, unmapped=[PANEL])
+    with served(opens=lambda: bench.robot.boxes.remove(PANEL)) as (address, calls):
+        _, step = run(skill, inputs, HttpDoor(address), bench)
+    assert isinstance(step, Succeeded), step
+    assert calls == [("POST", "/open")]
+
+
+def test_a_door_that_does_not_move_after_its_call_is_named():
+    with served() as (address, calls):
+        bench, step = run(OpenDoor, INPUTS, HttpDoor(address))
+    assert (type(step), step.cause, len(calls)) == (Failed, Cause.EXECUTION, 1)
+    assert step.message == "The door between corridor and kitchen was called, and did not open within 15 s."
+    assert 15.0 < bench.clock.now() < 18.0
+
+
+# Server and time limit of the call -> end of the sentence.
+@pytest.mark.parametrize(
+    ("server", "why"),
+    [({"status": 404}, "answered 404 Not Found."), ({"waits_s": 5.0}, "did not answer within 0.2 s.")],
+)
+def test_a_call_that_fails_is_the_cause(server, why):
+    with served(**server) as (address, _):
+        _, step = run(OpenDoor, INPUTS, HttpDoor(address, timeout_s=0.2))
+    assert step.cause is Cause.EXECUTION
+    assert step.message == f"The call of the door between corridor and kitchen failed: {address} {why}"
+
+
+def test_a_drive_names_the_closed_door_and_its_failed_call():
+    address = unused_address()
+    bench, step = run(Navigate, NavigateInputs(KITCHEN), HttpDoor(address))
+    assert (step.cause, step.final) == (Cause.PLANNING, True)
+    assert step.message.startswith("The door between the corridor and the kitchen is closed, so no path leads to")
+    assert f"failed: {address} cannot be reached: [Errno 111] Connection refused." in step.message
+    assert bench.clock.now() < 15.0
+
+
+def test_a_door_without_plug_in_is_not_called():
+    _, step = run(OpenDoor, INPUTS, None)
+    assert (step.cause, step.message) == (
+        Cause.PRECONDITION,
+        "nothing opens the door between corridor and kitchen but people",
+    )
+
+
+def test_the_plug_in_is_made_of_its_options():
+    assert door_opener({"plugin": "http", "url": "http://door/open"}) == HttpDoor("http://door/open")
+
+
+@pytest.mark.parametrize(
+    ("given", "path", "message"),
+    [
+        ({"plugin": "htp", "url": "http://door"}, ("plugin",), "no plug-in 'htp' opens doors"),
+        ({"plugin": "http"}, ("url",), "missing"),
+        ({"plugin": "http", "url": "file:///etc/passwd"}, ("url",), "should"),
+        ({"plugin": "http", "url": "http://door", "methd": "PUT"}, ("methd",), "unknown key 'methd'"),
+    ],
+)
+def test_wrong_options_are_refused_at_their_place(given, path, message):
+    with pytest.raises(StackError) as refused:
+        door_opener(given)
+    assert refused.value.path == path
+    assert message in refused.value.message

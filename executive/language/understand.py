@@ -183,13 +183,13 @@ def _under(rules: RoomRules, meant: Understanding) -> Understanding:
 def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = None) -> Understanding:
     """Understands a text for one robot, given as an empty trace, and perhaps its clauses."""
     trace = pipeline.run(said)
-    people = trace.refusal is not None and _PEOPLE.search(said.text) is not None
-    if pipeline.knowledge is not None and (people or _MENTIONED.search(said.text) is not None):
+    mentioned = _MENTIONED.search(said.text) is not None
+    if pipeline.knowledge is not None and (mentioned or trace.refusal is not None):
         from executive.language.structure.sentence import read_structure
 
         found = read_structure(trace, clauses, pipeline, said.memory)
-        kept = people and found.refusal is not None and found.refusal.kind is not RefusalKind.ABOUT_PEOPLE
-        trace = trace if kept and _MENTIONED.search(said.text) is None else found
+        of_people = found.refusal is None or found.refusal.kind is RefusalKind.ABOUT_PEOPLE
+        trace = found if mentioned or of_people else trace
     refusal = trace.refusal
     if refusal is None:
         ok = Understanding(said.text, Status.OK, trace.commands, notes=trace.notes, memory=trace.memory, trace=trace)
@@ -223,9 +223,3 @@ _MENTIONED: Final = re.compile(
     re.IGNORECASE,
 )
 """Words without which a sentence has only plain commands, so that the rest of the language is not loaded."""
-_PEOPLE: Final = re.compile(
-    r"\b(?:me|us|follow\w*|behind|along|after|guid(?:e|ing)|lead\w*|escort\w*|accompan\w*|usher|take|bring|walk|show|home"
-    r"|meet|contact|welcome|salute|introduce|him|her|them|you|with)\b",
-    re.IGNORECASE,
-)
-"""Words of requests about people, which are never plain commands."""

@@ -56,7 +56,7 @@ def parse_people(text: str, knowledge: Knowledge) -> PeopleRequest | None:
 
     Raises RefusalError when such a clause does not say clearly whom it means.
     """
-    text = _ENDS.sub("", text)
+    text = _AROUND.sub("", text)
     forms = _of_world(tuple(knowledge.spellings(knowledge.people)), tuple(knowledge.spellings(knowledge.place_names())))
     if forms.begins.match(text) is None:
         return None
@@ -80,7 +80,10 @@ def parse_people(text: str, knowledge: Knowledge) -> PeopleRequest | None:
     raise RefusalError(f"{what}; {hint}", [text])
 
 
-_ENDS: Final = re.compile(r",\s*(?:thanks|thank you)$|[,\s]+(?:please|now|then)$", re.IGNORECASE)
+_AROUND: Final = re.compile(
+    r"^(?:just|simply|kindly|now|then|also)\s+|,\s*(?:thanks|thank you)$|[,\s]+(?:please|now|then|too|also|as well)$",
+    re.IGNORECASE,
+)
 
 
 def refers_to_somebody(text: str) -> bool:
@@ -133,7 +136,11 @@ def commands_on_people(
 
 
 _ONE: Final = frozenset(
-    {"somebody", "someone", "a person", "a guest", "a visitor", "the person", "the guest", "the visitor"}
+    {
+        "somebody",
+        "someone",
+        *(f"{word} {kind}" for word in ("a", "the", "this", "that") for kind in ("person", "guest", "visitor")),
+    }
 )
 _SPEAKERS: Final = frozenset({"me", "us"})
 _PRONOUNS: Final = frozenset({"him", "her", "them", "he", "she", "they", "this person", "that person", "the person"})

@@ -229,13 +229,13 @@ class GuidePersonPorts(Skill[GuidePersonInputs]):
 
 @dataclass(frozen=True)
 class FollowPersonInputs:
-    """The person's name, and `place_W` (x, y), where they were seen last; None takes the nearest person ahead.
+    """The person's name for messages, and `place_W` (x, y), where they were seen last; None: the nearest one ahead.
 
     With the corners `until_W` of the place `until`, the skill ends once the person has stood there for 5 s. It ends
     when somebody tells it to, and after `time_limit_s` at the latest.
     """
 
-    person: str = PERSON
+    person: str = "the person"
     place_W: tuple[Coordinate, Coordinate] | None = None
     until_W: tuple[tuple[Coordinate, Coordinate], ...] | None = None
     until: str = ""

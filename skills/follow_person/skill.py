@@ -16,7 +16,6 @@ from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clea
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company
-from skills.perception.class_forms import PERSON
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
@@ -116,14 +115,10 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             while not (yield from self._keep_behind(self._target)):
                 yield from self._search(self._target)
         except _Told as told:
-            return Succeeded(f'stopped following {self._who} when told "{told}"')
+            return Succeeded(f'stopped following {self._inputs.person} when told "{told}"')
         self._halt()
         yield from self.pause(0.5, "coming to rest")
-        return Succeeded(f"followed {self._who} to the {inputs.until or 'place'}")
-
-    @property
-    def _who(self) -> str:
-        return "the person" if self._inputs.person == PERSON else self._inputs.person
+        return Succeeded(f"followed {self._inputs.person} to the {inputs.until or 'place'}")
 
     def _now(self) -> float:
         return self.context.clock.now()
@@ -140,7 +135,9 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             raise _Told(self._remark.result())
         if self._now() > self._limit_s:
             where = f" in the {self._inputs.until}" if self._inputs.until else ""
-            raise SkillFailure(Cause.TIMEOUT, f"followed {self._who} for {self._inputs.time_limit_s:.0f} s{where}")
+            raise SkillFailure(
+                Cause.TIMEOUT, f"followed {self._inputs.person} for {self._inputs.time_limit_s:.0f} s{where}"
+            )
 
     def _find(self, inputs: FollowPersonInputs) -> Routine[Target]:
         """Looks for the person to follow. Raises SkillFailure when nobody is seen."""
@@ -148,11 +145,11 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         while self._now() < begun_s + self.options.finding_s:
             waited = self._now() - begun_s > 0.25 * self.options.finding_s
             if (first := self._first(inputs, waited)) is not None:
-                say(self.context, f"I follow you, {inputs.person}." if inputs.person != PERSON else "I follow you.")
+                say(self.context, "I follow you.")
                 return Target(first, self.context.pose(), self.options.target)
-            yield from self._tick(f"looking for {self._who}")
+            yield from self._tick(f"looking for {self._inputs.person}")
         where = "ahead" if inputs.place_W is None else f"at ({inputs.place_W[0]:.2f}, {inputs.place_W[1]:.2f})"
-        raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._who} cannot be followed")
+        raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._inputs.person} cannot be followed")
 
     def _first(self, inputs: FollowPersonInputs, waited: bool) -> SeenPerson | None:
         """The nearest person ahead, or at the place of the inputs; a standing one without a picture after a wait."""
@@ -179,31 +176,31 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             if self._now() >= self._planned_s + self.options.replan_s:
                 self._plan(self._next_pose(target, hidden_s))
             self._company.most_m_s = math.inf if hidden_s else self._speed_m_s(target)
-            doing = f"following {self._who}" if not hidden_s else f"going to where {self._who} went"
+            doing = f"following {self._inputs.person}" if not hidden_s else f"going to where {self._inputs.person} went"
             yield from self._tick(self._drive(doing))
         return False
 
     def _search(self, target: Target) -> Routine[None]:
         """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""
-        say(self.context, f"I have lost sight of {self._who}.")
+        say(self.context, "I have lost sight of you.")
         self._company.most_m_s = math.inf
         for goal in self._poses_beyond_doors(target):
             self._plan(goal)
             until_s = self._now() + self.options.search_s
             while self._goal is not None and self._now() < until_s:
-                yield from self._tick(self._drive(f"searching {self._who}"))
+                yield from self._tick(self._drive(f"searching {self._inputs.person}"))
                 if not target.hidden_s(self._now()):
                     return
         self._halt()
         say(self.context, "I lost you. Where are you?")
         until_s = self._now() + self.options.asking_s
         while self._now() < until_s:
-            yield from self._tick(f"waiting for {self._who}")
+            yield from self._tick(f"waiting for {self._inputs.person}")
             if not target.hidden_s(self._now()):
                 return
         (x, y), hidden_s = target.seen.place_W, target.hidden_s(self._now())
         raise SkillFailure(
-            Cause.EXECUTION, f"{self._who} is lost, seen last at ({x:.2f}, {y:.2f}) {hidden_s:.0f} s ago"
+            Cause.EXECUTION, f"{self._inputs.person} is lost, seen last at ({x:.2f}, {y:.2f}) {hidden_s:.0f} s ago"
         )
 
     def _plan(self, goal: Pose2D | None) -> None:

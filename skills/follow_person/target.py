@@ -13,6 +13,8 @@ from skills.quantities import Delay, Length, Speed
 from skills.robot import FloatArray, Pose2D
 
 _TRAIL_STEP_M = 0.1
+_ONE_BODY_M = 0.6
+"""Distance within which two tracks may be parts of one person."""
 _TRAIL_POINTS = 100
 _LOOP_M, _LOOP_POINTS = 0.4, 8
 """Distance from a point of the trail, so many points back, at which the person has come back to it."""
@@ -82,7 +84,8 @@ class Target:
         if one is not None and one.stamp_s > self.seen.stamp_s:
             self.seen = one
             self._note(one)
-            self._others |= {each.track for each in people if each.track != one.track}
+            apart = (each for each in people if math.dist(each.place_W, one.place_W) > _ONE_BODY_M)
+            self._others |= {each.track for each in apart if now_s - each.stamp_s < self._options.hidden_s}
 
     def _note(self, one: SeenPerson) -> None:
         """Lengthens the trail to the person; cuts off a loop."""

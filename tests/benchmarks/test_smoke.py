@@ -153,6 +153,12 @@ def test_a_person_at_a_random_place_is_met():
 
 
 @pytest.mark.nightly
+def test_people_are_tracked_in_scans():
+    result = result_of("people_tracking", "--count", 1, "--seconds", 8)
+    assert result["visible"] > 20 and result["precision"] > 0.9, result
+
+
+@pytest.mark.nightly
 def test_somebody_crosses_the_way():
     assert result_of("people_crossing", "--what", "crosses", "--count", 1, "--json")
 

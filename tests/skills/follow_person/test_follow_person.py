@@ -110,7 +110,7 @@ def test_a_lost_person_is_searched_and_asked_for_before_the_skill_fails():
     step = walk.run()
     assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
     assert "Robin is lost, seen last at" in step.message
-    assert walk.said() == ["I follow you, Robin.", "I have lost sight of Robin.", "I lost you. Where are you?"]
+    assert walk.said() == ["I follow you.", "I have lost sight of you.", "I lost you. Where are you?"]
     assert any("going to where Robin went" in message for message in walk.messages)
 
 

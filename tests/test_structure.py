@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8325,
     "executive/cli": 5018,
-    "skills": 29631,
+    "skills": 29674,
     "plant": 21953,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 515, 94, 14

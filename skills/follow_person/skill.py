@@ -3,12 +3,12 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import shapely
 
-from skills.api import Cause, Failed, Running, SkillContext, Succeeded
+from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
 from skills.follow_person.target import Target, TargetOptions
 from skills.geometry import bearing_rad, wrap
 from skills.navigate.arm_footprint import ArmFootprint
@@ -19,14 +19,18 @@ from skills.navigate.surroundings import Company
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
-from skills.quantities import Delay, Duration, Factor, Length, Tries, Turn
+from skills.quantities import Delay, Duration, Factor, Length, Speed, Tries, Turn
 from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, RoutineSkill, SkillFailure
 from skills.speak.skill import say
 
+_BACK_M = 3.0
+"""Length of the trail on which the robot looks for a free pose."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
 _WALKS_M_S = 0.25
+_CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
+"""Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
 _PERSON_M, _ASIDE_M = 0.3, 4.0
 """Radius of a person on a path, and reach of the search for a pose aside from it."""
 
@@ -38,8 +42,8 @@ class FollowPersonOptions:
     The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
     down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`. For a person
     who comes towards it within `meeting_m`, it goes aside for `aside_s` at most. A person who stays hidden for `lost_s`
-    is lost: the robot says so and searches through `doors` doors, then asks and listens for `asking_s`. At the
-    beginning it looks for the person for `finding_s`.
+    is lost, or for `gone_s` once the robot stands where they were seen last: the robot says so and searches through
+    `doors` doors, then asks and listens for `asking_s`. At the beginning it looks for the person for `finding_s`.
     """
 
     behind_m: Length = 1.6
@@ -51,15 +55,26 @@ class FollowPersonOptions:
     replan_s: Duration = 0.5
     gain: Factor = 1.0
     lost_s: Delay = 6.0
+    gone_s: Delay = 1.5
     finding_s: Delay = 8.0
     asking_s: Delay = 12.0
     search_s: Delay = 20.0
     doors: Tries = 2
     tries: Tries = 8
+    max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
     ahead_m: Length = 4.0
     target: TargetOptions = field(default_factory=TargetOptions)
     people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
+
+
+def _at_pace(context: SkillContext, max_speed_m_s: float) -> SkillContext:
+    """The context with a controller that drives as fast as people walk, if it has a speed limit of its own."""
+    controller: Any = context.stack.controller
+    if not hasattr(controller, "max_speed_m_s"):
+        return context
+    limit_m_s = min(max_speed_m_s, context.robot.capabilities().max_speed_m_s)
+    return replace(context, stack=replace(context.stack, controller=replace(controller, max_speed_m_s=limit_m_s)))
 
 
 class _Told(Exception):  # noqa: N818 - no program error
@@ -76,7 +91,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         super().__init__(context, options)
         self._target: Target | None = None
         self._company = Company(PeopleWatch(context, self.options.people))
-        self._navigate = Navigate(context, None, self._company)
+        self._navigate = Navigate(_at_pace(context, self.options.max_speed_m_s), None, self._company)
         self._goal: Pose2D | None = None
         self._remark = context.listen()
 
@@ -168,12 +183,16 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         """Follows until the person stands in the place (True), or is lost (False)."""
         place = None if self._inputs.until_W is None else shapely.Polygon(self._inputs.until_W)
         while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
+            if hidden_s > self.options.gone_s and self._goal is None:
+                return False
             here, seen_W = self.context.pose(), target.seen.place_W
             near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
             inside = near and place is not None and place.covers(shapely.Point(seen_W))
             if inside and target.stands_still(self._now()):
                 return True
             if self._now() >= self._planned_s + self.options.replan_s:
+                self._planned_s = self._now()
+                self._clear_trail(target, hidden_s)
                 self._plan(self._next_pose(target, hidden_s))
             self._company.most_m_s = math.inf if hidden_s else self._speed_m_s(target)
             doing = f"following {self._inputs.person}" if not hidden_s else f"going to where {self._inputs.person} went"
@@ -185,6 +204,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         say(self.context, "I have lost sight of you.")
         self._company.most_m_s = math.inf
         for goal in self._poses_beyond_doors(target):
+            self._halt()
             self._plan(goal)
             until_s = self._now() + self.options.search_s
             while self._goal is not None and self._now() < until_s:
@@ -205,14 +225,15 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
 
     def _plan(self, goal: Pose2D | None) -> None:
         """Starts or changes the drive; None keeps the present goal."""
-        if goal is None or (self._goal is not None and _apart_m(goal, self._goal) < 0.1):
+        now = self._goal or self.context.pose()
+        if goal is None or _apart_m(goal, now) < (0.1 if self._goal else 0.3):
             return
         inputs = NavigateInputs(goal, 0.15, 0.35, self._inputs.max_speed_m_s)
         if self._goal is None:
             self._navigate.begin(inputs)
         elif not self._navigate.retarget(inputs):
             return
-        self._goal, self._planned_s = goal, self._now()
+        self._goal = goal
 
     def _drive(self, doing: str) -> str:
         """Drives on for one tick; returns the message. Raises SkillFailure when the robot cannot drive any longer."""
@@ -274,8 +295,27 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             return None
         trail = target.trail if hidden_s else np.vstack([target.trail, end_W])
         behind_m = 0.0 if hidden_s else options.behind_m
+        straight = np.array([(here.x_m, here.y_m), end_W])
+        if not hidden_s and distance_m > behind_m and self._is_clear(straight):
+            trail = straight
         poses = np.array(list(_poses_behind(trail, behind_m))).reshape(-1, 3)
         return self._free(poses)
+
+    def _clear_trail(self, target: Target, hidden_s: float) -> None:
+        """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have gone."""
+        trail = target.trail[-_CLEARED:]
+        left = np.linalg.norm(trail - target.seen.place_W, axis=1) > (-1.0 if hidden_s else _LEFT_M)
+        if isinstance(self.context.costmap, ClearableCostmap) and left.any():
+            self.context.costmap.clear_obstacles(np.column_stack([trail[left], np.full(left.sum(), _CLEARED_M)]))
+
+    def _is_clear(self, straight: FloatArray) -> bool:
+        """Returns whether the robot can drive straight from a point towards another one (2, 2), as far as it may."""
+        length_m = float(np.linalg.norm(straight[1] - straight[0]))
+        share = max(0.0, 1.0 - self.options.close_m / max(length_m, 1e-3))
+        points = np.linspace(
+            straight[0], straight[0] + share * (straight[1] - straight[0]), 1 + math.ceil(length_m / 0.1)
+        )
+        return bool(self.context.costmap.clearance_m(points).min() > self._outline.inscribed_m + SAFE_MARGIN_M)
 
     def _free(self, poses: FloatArray) -> Pose2D | None:
         """The first of some poses (N, 3) with clearance."""
@@ -303,9 +343,12 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
 
 def _poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:
     """Poses on a trail at least so far behind its end, the nearest to the end first: along it, and facing its end."""
-    end = trail[-1]
+    end, back_m = trail[-1], 0.0
     for n in range(len(trail) - 1, 0, -1):
         length = float(np.linalg.norm(trail[n] - trail[n - 1]))
+        back_m += length
+        if back_m - length > behind_m + _BACK_M:
+            return
         along = math.atan2(*(trail[n] - trail[n - 1])[::-1])
         for point in np.linspace(trail[n], trail[n - 1], max(1, math.ceil(length / 0.15)), endpoint=False):
             if np.linalg.norm(end - point) >= behind_m:

@@ -31,8 +31,8 @@ class TargetOptions:
 
     hidden_s: Delay = 0.6
     again_m: Length = 0.8
-    again_m_s: Speed = 1.0
-    farthest_m: Length = 5.0
+    again_m_s: Speed = 0.7
+    farthest_m: Length = 3.0
     still_s: Delay = 5.0
     still_m: Length = 0.5
 

@@ -162,12 +162,17 @@ def draw_map(
     *,
     labels: Mapping[str, tuple[float, float]] | None = None,
     marks: Mapping[str, tuple[float, float]] | None = None,
+    zones: Sequence[Mapping[str, Any]] = (),
 ) -> Picture:
     """Draws paths (N, 2 or more columns: x, y), labels and marked points on a copy of a map, with a legend below it.
 
-    Each path has the text of its legend and a colour. No name covers another one or a mark.
+    Each path has the text of its legend and a colour. No name covers another one or a mark. The zones, as
+    `skills.navigate.zones.zone_messages` has them, are below all else.
     """
     picture = view.picture.copy()
+    for zone in zones:
+        outlines = [_pixels(view, outline) for outline in zone["outlines"]]
+        draw_zone(picture, outlines, zone["kind"], ZONE_COLOURS[zone["kind"]], zone.get("direction_rad"))
     paths = {text: (view.pixels(path), ink) for text, (path, ink) in paths_W.items() if len(path)}
     names = Names(picture, [pixels for pixels, _ in paths.values()])
     dots = {text: view.pixels(np.array([point]))[0] for text, point in (marks or {}).items()}
@@ -184,6 +189,7 @@ def draw_map(
         names.write(text, view.pixels(np.array([centre]))[0])
     entries = [(text, ink) for text, (_, ink) in paths.items()]
     entries += [("begin of a path", START_COLOUR)] if paths else []
+    entries += [(zone["rule"], ZONE_COLOURS[zone["kind"]]) for zone in zones]
     return with_legend(picture, view.pixels_per_m, entries)
 
 
@@ -319,12 +325,12 @@ def draw_world(
     *,
     labels: Mapping[str, Point],
     doors: Iterable[Door],
-    zones: Iterable[Mapping[str, Any]] = (),
+    zones: Sequence[Mapping[str, Any]] = (),
 ) -> Picture:
     """Draws the plan of a world over a grid's grey values (rows from the south).
 
     Rooms are tinted, surfaces outlined, doors are circles of their width, and the start is an arrow. `labels` are
-    written at their points. `zones` have a `kind`, `outlines` and perhaps `direction_rad`.
+    written at their points.
     """
     rows, columns = cells.shape
     scale = WIDTH_PX / max(columns, rows)
@@ -335,9 +341,6 @@ def draw_world(
     for index, polygon in enumerate(world.rooms.values()):
         cv2.fillPoly(ground, [_pixels(view, polygon)], _TINTS[index % len(_TINTS)])
     picture = np.asarray(np.minimum(view.picture, ground), np.uint8)
-    for zone in zones:
-        outlines = [_pixels(view, outline) for outline in zone["outlines"]]
-        draw_zone(picture, outlines, zone["kind"], ZONE_COLOURS[zone["kind"]], zone.get("direction_rad"))
     for surface in world.surfaces.values():
         cv2.polylines(picture, [_pixels(view, surface.polygon_W)], True, _SURFACE, 3, cv2.LINE_AA)
     for at, width in doors:
@@ -345,7 +348,7 @@ def draw_world(
         x, y = _pixels(view, [at])[0]
         cv2.circle(picture, (int(x), int(y)), radius, INK, 2, cv2.LINE_AA)
     start = {"start and its direction": (_arrow(world.start), PATH_COLOUR)}
-    return draw_map(MapView(picture, view.X_WC, view.intrinsics), start, labels=labels)
+    return draw_map(MapView(picture, view.X_WC, view.intrinsics), start, labels=labels, zones=zones)
 
 
 def _view(picture: Picture, origin_m: tuple[float, float], pixels_per_m: float) -> MapView:

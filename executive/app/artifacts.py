@@ -12,10 +12,11 @@ import cv2
 import numpy as np
 
 from executive.record.history import Event
-from executive.record.schemas import DESTINATION, TRANSITIONS
+from executive.record.schemas import DESTINATION, TRANSITIONS, TREE
 from executive.run.visitor import RunVisitor
 from executive.store.resuming import is_from_before
 from executive.tree.nodes.search import ANSWER_TOPIC
+from executive.view.map_picture import newest_zones
 from executive.view.styles import ROBOT_COLOURS, rgb_of
 from executive.words.slug import slug
 from plant.scene_pictures import PATH_COLOUR, best_view, draw_detection, draw_map, render_view, save_png, top_view
@@ -56,7 +57,7 @@ class Artifacts(RunVisitor):
     """Collector of each robot's detections and moments for pictures; it adds a picture to each answer in the log.
 
     `pictures` are small JPEG files of the answers, at most `MOST_BYTES` in all. `numbers` maps a node's path id and a
-    time (s) to the picture of the answer. `drawn` are the written files by name.
+    time (s) to the picture of the answer. `drawn` are the written files by name, `trees` the logged trees.
     """
 
     def __init__(self) -> None:
@@ -65,6 +66,7 @@ class Artifacts(RunVisitor):
         self.pictures: list[bytes] = []
         self.numbers: dict[tuple[str, float], int] = {}
         self.drawn: dict[str, Path] = {}
+        self.trees: list[Mapping[str, Any]] = []
 
     def of_robot(self, robot_name: str) -> RobotArtifacts:
         """Returns the detections and moments of a robot."""
@@ -73,6 +75,8 @@ class Artifacts(RunVisitor):
     def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
         """Takes a logged message; adds a picture to an answer."""
         own = self.of_robot(str(message.get("robot", "")))
+        if topic == TREE:
+            self.trees.append(message)
         if topic == DETECTIONS:
             own.looked.append(message)
             own.seen = message if message["detections"] else own.seen
@@ -134,7 +138,7 @@ def draw_artifacts(artifacts: Artifacts, simulation: Simulation, robots: Sequenc
 
     Leaves out what happened before a restart, because this process did not record it.
     """
-    pictures = {"map": _map(simulation, robots)}
+    pictures = {"map": _map(simulation, robots, newest_zones(artifacts.trees))}
     begun_s = simulation.recorder.frame_at(0.0).time_s if simulation.recorder is not None else 0.0
     for robot in robots:
         own = artifacts.of_robot(robot)
@@ -201,8 +205,8 @@ def detection_picture(message: Mapping[str, Any]) -> Picture:
     return picture
 
 
-def _map(simulation: Simulation, robots: Sequence[str]) -> Picture:
-    """Draws the world from above with the path of each robot; several robots have a colour each."""
+def _map(simulation: Simulation, robots: Sequence[str], zones: Sequence[Mapping[str, Any]]) -> Picture:
+    """Draws the world from above with zones, and the path of each robot; several robots have a colour each."""
     world, corners = simulation.world, np.array(simulation.world.corners)
     (x0, y0), (x1, y1) = corners.min(axis=0) - _MARGIN_M, corners.max(axis=0) + _MARGIN_M
     view = top_view(simulation.query_at(simulation.clock.now()), (float(x0), float(y0), float(x1), float(y1)))
@@ -215,7 +219,7 @@ def _map(simulation: Simulation, robots: Sequence[str]) -> Picture:
         f"path of {name}": (simulation.referee.path(name), colours[number % len(colours)])
         for number, name in enumerate(sorted(robots))
     }
-    return draw_map(view, paths, labels=centres, marks=marks)
+    return draw_map(view, paths, labels=centres, marks=marks, zones=zones)
 
 
 def _view(simulation: Simulation, robot_name: str, time_s: float, ahead_m: float) -> Picture:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
@@ -389,27 +388,19 @@ def show(
     drawn = open_world(folder)
     facts = knowledge_of(drawn)
     grid = load_grid_map(drawn.surveyed.keepout_map_path)
-    rooms = {name: (place.pose.x, place.pose.y) for name, place in facts.places.items()}
-    zones = zone_messages(facts.known_zones())
     picture = draw_world(
         drawn,
         grid.grey(free=255, unknown=150, occupied=0),
         grid.origin_m,
         grid.resolution_m,
-        labels={**rooms, **{each["rule"]: _middle(each["outlines"][0]) for each in zones}},
+        labels={name: (place.pose.x, place.pose.y) for name, place in facts.places.items()},
         doors=[(door.at, door.width) for door in facts.doors],
-        zones=zones,
+        zones=zone_messages(facts.known_zones()),
     )
     with writing(out):
         save_png(out, picture)
     counts = ((facts.places, "room"), (facts.doors, "door"), (facts.surfaces, "surface"), (facts.zones, "zone"))
     typer.echo(f"{out}: {', '.join(count_text(len(each), noun) for each, noun in counts)}")
-
-
-def _middle(outline: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Mean of the corners of an outline."""
-    xs, ys = zip(*outline, strict=True)
-    return fmean(xs), fmean(ys)
 
 
 def _cylinders(path: Path) -> _Cylinders:

@@ -42,6 +42,7 @@ from executive.tree.compiler import CompiledTree
 from executive.words.command import Command, Task
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.step import Step
+from executive.words.steps import Group
 from skills.api import ObjectKind
 from skills.files.errors import InputError
 
@@ -309,7 +310,8 @@ class Conversation(RunVisitor):
         give = {_When.FIRST: self._control.preempt, _When.AFTERWARDS: self._control.then}.get(when, instead)
         mode = state.robots.get(self._speech.robot_name, state).mode
         still = "; I stand still until you say 'go on'" if mode in (Mode.PAUSED, Mode.STOPPED) else ""
-        listed = "; ".join("; ".join(map(str, step.commands)) or step.words for step in whole)
+        shown = [inner for step in whole for inner in (step.steps if isinstance(step, Group) else (step,))]
+        listed = "; ".join("; ".join(map(str, step.commands)) or step.words for step in shown)
         text = "; ".join((*notes, f"{when.value}: {listed}{still}"))
         reply = self._tried(partial(give, tree), text, todo)
         if reply.kind is ReplyKind.DONE:

@@ -73,7 +73,7 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     if not maps:
         raise InputError("the log has no map", hint="give the log.mcap of a run with a world that has one")
     picture, frame = _ground(maps[-1])
-    zones = _zones([event.data for event in known if event.topic == TREE])
+    zones = newest_zones([event.data for event in known if event.topic == TREE])
     for zone in zones:
         outlines = [frame.pixels(outline) for outline in zone["outlines"]]
         draw_zone(picture, outlines, zone["kind"], _colour_of(zone), zone.get("direction_rad"))
@@ -91,8 +91,8 @@ def map_picture(events: Sequence[Event], at_s: float = math.inf) -> NDArray[np.u
     return with_legend(picture, frame.pixels_per_m, entries)
 
 
-def _zones(trees: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Zones of the last mission of each robot, each once."""
+def newest_zones(trees: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Zones of the newest of the logged trees of each robot, each once."""
     last = {tree["robot"]: tree.get("zones", ()) for tree in trees}
     return list({zone["rule"]: zone for zones in last.values() for zone in zones}.values())
 

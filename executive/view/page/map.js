@@ -112,6 +112,7 @@
       brush.fillStyle = css("--unknown");
       brush.fillRect(0, 0, width, height);
       const frame = this.frame(width, height), names = (this.names = new Names(brush, width, height - FOOT_PX));
+      this.outlines = [];
       this.drawGrid(brush, frame);
       for (const zone of this.zones()) this.drawZone(brush, frame, zone);
       for (const [name, robot] of this.view.robots) {
@@ -221,12 +222,13 @@
     }
 
     // A zone is tinted; a keep-out zone is hatched, and a one-way zone has an arrow.
-    drawZone(brush, { at }, { name, kind, outlines, direction_rad: ahead }) {
+    drawZone(brush, { at }, { name, kind, rule, outlines, direction_rad: ahead }) {
       const shape = new Path2D(), colour = css(`--zone-${kind}`), points = outlines.flat().map(([x, y]) => at(x, y));
       for (const outline of outlines) {
         outline.forEach(([x, y], n) => shape[n ? "lineTo" : "moveTo"](...at(x, y)));
         shape.closePath();
       }
+      this.outlines.push([rule, shape]);
       const us = points.map((p) => p[0]), vs = points.map((p) => p[1]), low = [Math.min(...us), Math.min(...vs)], high = [Math.max(...us), Math.max(...vs)];
       const [u, v] = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2], size = Math.max(high[0] - low[0], high[1] - low[1]);
       const stroke = (...lines) => {
@@ -331,8 +333,9 @@
       this.names.keepClear(u, v, 0.6 * length);
       this.names.add(held ? `${name}, holding ${held}` : name, u, v, css("--text"), `600 11px ${css("--font")}`);
       if (held) this.mark(brush, ...at(x + (LENGTH_M / 2) * Math.cos(yaw), y + (LENGTH_M / 2) * Math.sin(yaw)));
-      const degrees = Math.round((yaw * 180) / Math.PI);
-      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${held ? `, holding ${held}` : ""}${reserved ? `, its way to x ${reserved[reserved.length - 1][0].toFixed(2)} m, y ${reserved[reserved.length - 1][1].toFixed(2)} m reserved` : ""}`;
+      const degrees = Math.round((yaw * 180) / Math.PI), ratio = window.devicePixelRatio || 1;
+      const rules = this.outlines.filter(([, shape]) => brush.isPointInPath(shape, u * ratio, v * ratio, "evenodd")).map(([rule]) => `, ${rule}`).join("");
+      return `${name} at x ${x.toFixed(2)} m, y ${y.toFixed(2)} m, ${degrees}°${rules}${held ? `, holding ${held}` : ""}${reserved ? `, its way to x ${reserved[reserved.length - 1][0].toFixed(2)} m, y ${reserved[reserved.length - 1][1].toFixed(2)} m reserved` : ""}`;
     }
   }
 

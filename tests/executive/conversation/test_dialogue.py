@@ -89,6 +89,14 @@ def test_new_request_runs_first(talk, given):
     assert list(given()) == ["first"]
 
 
+def test_a_rule_for_a_room_comes_with_the_work_that_it_is_for(talk):
+    conversation = talk()
+    reply = conversation.hear("keep out of the kitchen and go to the bathroom")
+    going = "Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]"
+    assert (reply.kind, reply.text) == (ReplyKind.DONE, f"until it is done, keep out of: kitchen; first: {going}")
+    assert conversation.hear("keep out of the kitchen").kind is ReplyKind.REFUSED
+
+
 @pytest.mark.parametrize("text", ["no, the beer", "the beer too", "another one", "bring it to the bedroom"])
 def test_after_a_minute_of_the_robots_clock_it_is_forgotten(talk, given, text):
     reply = talk().hear(text, 60.1)

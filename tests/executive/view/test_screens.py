@@ -101,7 +101,7 @@ def several(nested, knowledge):
     known = knowledge.model_copy(update={"dock": Pose(x=0.5, y=0.5, yaw=0.0)})
     feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), known, world="test"))
     feed("run", 0.0, {"world": "t", "seed": 3, "commands": [], "versions": {}, "robots": dict.fromkeys(names, "spot")})
-    zones = zone_messages([Zone("den", ZoneKind.KEEP_OUT, ((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)))])
+    zones = zone_messages([Zone("den", ZoneKind.KEEP_OUT, ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)))])
     for name in names:
         feed("tree", 0.0, {"robot": name, "root": node_view(nested.root).structure(), "zones": zones})
         turn, position = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}, {"x": 0.4, "y": 0.4, "z": 0.0}
@@ -118,6 +118,7 @@ def several(nested, knowledge):
 def test_the_page_of_several_robots_fits_and_no_name_on_the_map_covers_another(page, several):
     page.goto(several)
     playwright_api.expect(page.locator("#legend li")).to_have_text(["object found", "dock", "keep out of: den"])
+    playwright_api.expect(page.locator("#where")).to_contain_text("Alice at x 0.40 m, y 0.40 m, 0°, keep out of: den")
     assert page.evaluate(OVERFLOWING) == []
     assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
     uncovered = """() => {

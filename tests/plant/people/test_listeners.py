@@ -26,7 +26,7 @@ def test_the_nearest_person_in_sight_hears_the_robot(simulation):
 
 @pytest.mark.parametrize(("robin", "hears"), [((11.5, 0.7), None), (BEFORE_DOOR, "Robin")])
 def test_behind_a_wall_or_too_far_away_nobody_hears(simulation, monkeypatch, robin, hears):
-    at = {"Robin": robin, "Kim": (10.6, 6.0), "Maya": BEYOND_DOOR}
+    at = {"Robin": robin, "Kim": (10.6, 6.0), "Maya": (5.8, 4.5)}
     bodies = {body: at[name] for name, body in simulation.listeners._bodies.items()}
     place_W = simulation.listeners._place_W
     monkeypatch.setattr(simulation.listeners, "_place_W", lambda body: bodies.get(body) or place_W(body))

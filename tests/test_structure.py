@@ -14,7 +14,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
-    "executive/words": 3283,
+    "executive/words": 3285,
     "executive/language": 8234,
     "executive/speech": 1582,
     "executive/mission": 1646,

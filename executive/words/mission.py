@@ -34,6 +34,8 @@ class QuestionPolicy(enum.Enum):
 
 Distractions = Annotated[int, Quantity(ge=0, le=10)]
 """Number of distractions that the seed draws."""
+Walked = Annotated[float, Quantity(ge=0.0, le=1_000.0, unit="m")]
+"""Length of a path that a person has walked."""
 
 
 class Stop(Strict):
@@ -46,7 +48,7 @@ class Stop(Strict):
 class Distraction(Strict):
     """Lapse of a walking person's attention: a stop, perhaps after some steps back."""
 
-    after: Margin = Field(description="Path that the person has walked by then, in metres.")
+    after: Walked = Field(description="Path that the person has walked by then, in metres.")
     stop: Delay = Field(default=3.0, description="Time for which the person stands, in seconds.")
     back: Margin = Field(default=0.0, description="Path that the person first walks back, in metres.")
 

@@ -164,6 +164,11 @@ def test_somebody_crosses_the_way():
 
 
 @pytest.mark.nightly
+def test_a_person_is_guided():
+    assert result_of("people_trials", "--what", "guide", "--count", 1)["guide"]["runs"] == 1
+
+
+@pytest.mark.nightly
 def test_a_drive_among_zones_is_judged():
     assert result_of("zone_drives", "--drives", 1)["entered_keep_out"] == 0
 

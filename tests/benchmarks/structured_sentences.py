@@ -29,7 +29,7 @@ __all__ = ["TABLES", "Score", "in_full", "measured"]
 
 TABLES: Final = tuple(
     Path(__file__).with_name(f"structured_sentences{name}.yaml")
-    for name in ("", "_later", "_last", "_forms", "_people", "_people_later")
+    for name in ("", "_later", "_last", "_forms", "_people", "_people_later", "_people_last")
 )
 _SHORT: Final = re.compile(r"\b(fetch|carry|put|take|give|go|find|charge|follow|guide|greet)\(([^()]*)\)")
 _FORMS: Final = {

@@ -113,26 +113,33 @@ def commands_on_people(
         if at is None and here is None:
             raise RefusalError(f"{request.said}: in which room?", question=True)
         several = person == ANYBODY and request.who.lower() not in _ONE
-        commands = [Command(goal=at or here, task=Task.GREET, object=ObjectKind(ANYBODY), object_count=not several)]
+        whom, count = ObjectKind(ANYBODY), 0 if several else 1
+        commands = [Command(goal=at or here, task=Task.GREET, object=whom, object_count=count, verb=verb)]
     elif request.task is None:
         if person == ANYBODY and (at or here) is None:
             raise RefusalError(f"{request.said}: in which room?", question=True)
-        named = Command(goal=person, goal_at=at or here, verb=verb)
-        commands = [named if person != ANYBODY else Command(goal=at or here, verb=verb)]
+        commands = _go_to(person, at or here, verb, state)
     else:
         if request.task is Task.GUIDE and goal is None:
             raise RefusalError(f"{request.said}: where to?", question=True)
         if person == SPEAKER and goal == START:
             raise RefusalError(f"{request.said}: you are here; name another place", [request.said])
-        first = [] if at is None else [Command(goal=person, goal_at=at) if person != ANYBODY else Command(goal=at)]
+        first = [] if at is None else _go_to(person, at, verb, state)
         commands = [*first, Command(goal=goal, task=request.task, object=ObjectKind(person), verb=verb)]
     memory = replace(state.memory, person=Location(phrase_of_name(person, NounKind.PERSON), "to"))
-    last = commands[-1]
+    last = commands[-1] if commands else Command()
     if last.goal is not None and reader.knowledge.place(last.goal) is not None:
         memory = replace(memory, place=Location(phrase_of_name(last.goal, NounKind.PLACE), "in"))
     after = reader.state_after(tuple(commands), memory, state)
     gone = last.task is Task.FOLLOW and last.goal is None
     return tuple(commands), replace(after, goal=None, at=None) if gone else after, notes
+
+
+def _go_to(person: str, at: str | None, verb: str, state: State) -> list[Command]:
+    """Goes to a known person at a place; for anybody to the place, unless the robot is there already."""
+    if person != ANYBODY:
+        return [Command(goal=person, goal_at=at, verb=verb)]
+    return [] if at == state.goal else [Command(goal=at, verb=verb)]
 
 
 _ONE: Final = frozenset(

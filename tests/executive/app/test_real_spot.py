@@ -28,7 +28,7 @@ from plant.spot_api.server.computer import Motors
 from plant.spot_api.server.estop import Tablet
 from skills.files.errors import InputError
 from skills.robot import Pose2D, RobotStoppedError
-from tests.plant.spot_api.lock_step import PASSWORD, USER, real_time
+from tests.plant.spot_api.lock_step import PASSWORD, USER, scripted_spot
 
 
 @pytest.fixture(scope="session")
@@ -41,7 +41,7 @@ def serve(credentials, monkeypatch, request):
     """Serves a robot; returns the server, the robot, and the access to it."""
     monkeypatch.setattr(computer, "POWER_ON_S", 0.1)
     settings = getattr(request, "param", {})
-    with real_time(credentials, **settings) as (server, robot):
+    with scripted_spot(credentials, **settings) as (server, robot):
         address = Address("127.0.0.1", server.port, credentials.certificate)
         yield SimpleNamespace(server=server, robot=robot, access=Access(address, USER, PASSWORD, power_on=True))
 

@@ -96,11 +96,11 @@ def served(request, tmp_path, monkeypatch):
     pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
     sys.path.insert(0, str(Path(__file__).parents[2] / "plant" / "spot_api"))
     from plant.spot_api.server.identity import credentials
-    from tests.plant.spot_api.lock_step import USER, real_time
+    from tests.plant.spot_api.lock_step import USER, scripted_spot
 
     held = credentials(tmp_path / "credentials")
     monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", SECRET)
-    with real_time(held, password=SECRET) as (server, _):
+    with scripted_spot(held, password=SECRET) as (server, _):
         request.node.server = server
         address = ["--robot", f"spot://127.0.0.1:{server.port}", "--certificate", str(held.certificate)]
         files = ["--out", str(tmp_path / "out"), "--store", str(tmp_path / "missions.db")]

@@ -5,11 +5,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import ModuleType
 
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.adapter.robot import ApiRobot
-from plant.spot_api.server.computer import PERIOD_S, Pace
+from plant.spot_api.server.computer import PERIOD_S, Computer, Pace
 from plant.spot_api.server.estop import Tablet
 from plant.spot_api.server.server import Options, SpotServer
 from skills.manipulation.arm.kinematics import arm_model
@@ -22,16 +23,17 @@ SILENT_S = 1.0
 
 
 @contextmanager
-def real_time(
-    credentials, *, tablet=Tablet.TABLET, password=PASSWORD, **scripted
+def scripted_spot(
+    credentials, *, tablet=Tablet.TABLET, password=PASSWORD, pace=Pace.REAL, **scripted
 ) -> Iterator[tuple[SpotServer, ScriptedRobot]]:
-    """Serves a scripted Spot in real time, stepped by a thread."""
+    """Serves a scripted Spot from a thread, which steps it in real time, or lets a client step it."""
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=spot_capabilities(), **scripted)
-    options = Options({USER: password}, tablet=tablet)
+    options = Options({USER: password}, tablet=tablet, pace=pace)
     server = SpotServer(robot, clock, arm_model(spot_capabilities()), credentials, options)
     stopping = threading.Event()
-    stepping = threading.Thread(target=server.computer.run, args=(stopping,), daemon=True)
+    work = server.computer.run if pace is Pace.REAL else server.computer.serve
+    stepping = threading.Thread(target=work, args=(stopping,), daemon=True)
     with server.running():
         stepping.start()
         try:
@@ -39,6 +41,23 @@ def real_time(
         finally:
             stopping.set()
             stepping.join()
+
+
+def robot_time(computer: Computer) -> ModuleType:
+    """Module `time` of a client in this process: the robot's time, which the main thread steps when it sleeps."""
+
+    def sleep(seconds: float) -> None:
+        if threading.current_thread() is threading.main_thread():
+            steps = max(1, round(seconds / PERIOD_S))
+            computer.do(lambda: [computer.step() for _ in range(steps)]).result()
+        else:
+            time.sleep(seconds)
+
+    made = ModuleType("time")
+    vars(made).update(vars(time), sleep=sleep)
+    for name in ("time", "monotonic", "perf_counter"):
+        vars(made).update({name: computer.now_s, f"{name}_ns": lambda: round(computer.now_s() * 1e9)})
+    return made
 
 
 class LockStep:

@@ -18,7 +18,7 @@ from plant.spot_api.adapter.connection import Address, Connection, WallClock
 from plant.spot_api.adapter.robot import ApiRobot
 from plant.spot_api.server import computer
 from skills.robot import ArmTrajectory
-from tests.plant.spot_api.lock_step import PASSWORD, USER, real_time
+from tests.plant.spot_api.lock_step import PASSWORD, USER, scripted_spot
 
 END_S, STILL_S = 0.4, 0.3
 READY_RAD = [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]
@@ -54,7 +54,7 @@ def serve(credentials, monkeypatch):
             monkeypatch.setattr(connection, "time", client.module())
             monkeypatch.setattr(computer, "time", robot_side.module())
             monkeypatch.setattr(computer, "POWER_ON_S", 0.1)
-            server, scripted = ending.enter_context(real_time(credentials))
+            server, scripted = ending.enter_context(scripted_spot(credentials))
             made = Connection(Address("127.0.0.1", server.port, credentials.certificate), USER, PASSWORD)
             made.synchronise()
             wall = WallClock(made)

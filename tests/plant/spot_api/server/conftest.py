@@ -1,6 +1,11 @@
-"""A server with a scripted robot, stepped in a thread, and the SDK's robot logged in to it."""
+"""A server with a scripted robot, and the SDK's robot logged in to it.
+
+In a test module with `PACE = Pace.CLIENT` the sleep of the test and of the SDK steps the robot, else a thread does.
+"""
 
 import os
+import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -12,11 +17,14 @@ import bosdyn.client
 from bosdyn.client.lease import LeaseKeepAlive
 from bosdyn.client.robot_command import RobotCommandClient, blocking_stand
 from bosdyn.client.robot_state import RobotStateClient
+from bosdyn.client.time_sync import TimeSyncEndpoint
+from google.protobuf.duration_pb2 import Duration
 
+from plant.spot_api.server.computer import Pace
 from plant.spot_api.server.server import SpotServer
 from skills.testing.blocks import Block
 from skills.testing.robot import ScriptedRobot
-from tests.plant.spot_api.lock_step import PASSWORD, USER, real_time
+from tests.plant.spot_api.lock_step import PASSWORD, USER, robot_time, scripted_spot
 
 
 @dataclass
@@ -35,8 +43,16 @@ class Served:
 
 
 @pytest.fixture
-def served(credentials) -> Iterator[Served]:
-    with real_time(credentials, blocks=[Block(1.7, -1.5, 1.9, 1.5)]) as (server, scripted):
+def served(credentials, request, monkeypatch) -> Iterator[Served]:
+    pace = getattr(request.module, "PACE", Pace.REAL)
+    with scripted_spot(credentials, pace=pace, blocks=[Block(1.7, -1.5, 1.9, 1.5)]) as (server, scripted):
+        if pace is Pace.CLIENT:
+            monkeypatch.setattr(TimeSyncEndpoint, "clock_skew", Duration())
+            monkeypatch.setattr("bosdyn.util._clock_source_fn", server.computer.now_s)
+            sdk = [module for name, module in sys.modules.items() if name.startswith("bosdyn.")]
+            for module in (request.module, *sdk):
+                if vars(module).get("time") is time:
+                    monkeypatch.setattr(module, "time", robot_time(server.computer))
         yield Served(server, scripted)
 
 

@@ -30,7 +30,9 @@ from bosdyn.geometry import EulerZXY
 
 from plant.spot_api.messages import timestamp
 from plant.spot_api.server.arm import smooth
+from plant.spot_api.server.computer import Pace
 
+PACE = Pace.CLIENT
 Progress = basic_command_pb2.RobotCommandFeedbackStatus
 
 
@@ -53,6 +55,7 @@ def base_feedback(spot, command_id):
 def test_a_velocity_is_driven_until_its_end(spot):
     command = sent(spot, Build.synchro_velocity_command(0.5, 0.0, 0.0), ahead_s=1.0)
     assert wait_until(lambda: base_feedback(spot, command).status == Progress.STATUS_COMMAND_TIMED_OUT)
+    time.sleep(0.2)
     x_m = get_odom_tform_body(spot.tree).x
     assert x_m == pytest.approx(0.5, abs=0.08)
     time.sleep(0.2)

@@ -12,9 +12,11 @@ from bosdyn.client.robot_command import DockedError
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 
 from plant.spot_api.messages import timestamp
+from plant.spot_api.server.computer import Pace
 from plant.spot_api.server.docking import DOCK_ID
 from skills.robot import Pose2D
 
+PACE = Pace.CLIENT
 Api = docking_pb2
 Answer, Progress, State = Api.DockingCommandResponse, Api.DockingCommandFeedbackResponse, Api.DockState
 

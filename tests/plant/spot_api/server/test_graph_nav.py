@@ -22,12 +22,13 @@ from bosdyn.client.lease import LeaseClient
 from bosdyn.client.robot_command import RobotCommandBuilder as Build
 
 from plant.spot_api.messages import pose
-from plant.spot_api.server.computer import SeenTag
+from plant.spot_api.server.computer import Pace, SeenTag
 from plant.spot_api.server.state import WorldObjectService
 from skills.robot import Pose2D
 
 Feedback = graph_nav_pb2.NavigationFeedbackResponse
 Init = graph_nav_pb2.SetLocalizationRequest
+PACE = Pace.CLIENT
 AT = {"a": (0.0, 0.0, 0.0), "b": (0.9, 0.0, 0.0), "c": (0.9, 0.9, math.pi / 2), "beyond": (3.0, 0.0, 0.0)}
 EDGES = (("a", "b"), ("c", "b"), ("b", "beyond"))
 

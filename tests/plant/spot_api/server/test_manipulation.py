@@ -17,10 +17,12 @@ from bosdyn.client.robot_command import block_until_arm_arrives
 from google.protobuf.wrappers_pb2 import FloatValue
 from pydrake.math import RotationMatrix
 
+from plant.spot_api.server.computer import Pace
 from plant.spot_api.server.manipulation import _allows, _only_from_above
 from plant.spot_api.server.rays import first_hit_m
 
 Api = manipulation_api_pb2
+PACE = Pace.CLIENT
 ENDS = (
     Api.MANIP_STATE_DONE,
     Api.MANIP_STATE_GRASP_SUCCEEDED,

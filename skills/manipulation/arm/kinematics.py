@@ -11,6 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -120,13 +121,16 @@ class ArmModel:
         """
         if self._own is not None:
             return tuple(self._own.solutions(X_BH, margin_rad))
-        solutions = self._closed_form(X_BH) if self.solver is None else self.solver(X_BH)
-        return tuple(q for q in solutions if self.within_limits(q, margin_rad))
+        if self.solver is None:
+            return tuple(self._closed_form(X_BH, margin_rad))
+        return tuple(q for q in self.solver(X_BH) if self.within_limits(q, margin_rad))
 
     def reaches(self, X_BH: RigidTransform, margin_rad: float = 0.03) -> bool:
         """Returns whether there are joint angles that put the hand at X_BH and keep margin_rad from the limits."""
         if self._own is not None:
             return self._own.reaches(X_BH, margin_rad)
+        if self.solver is None:
+            return any(True for _ in self._closed_form(X_BH, margin_rad))
         return bool(self.inverse(X_BH, margin_rad))
 
     @cached_property
@@ -149,14 +153,18 @@ class ArmModel:
             self.upper_rad,
         )
 
-    def _closed_form(self, X_BH: RigidTransform) -> list[FloatArray]:
-        """Returns every branch of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
-        solutions = []
-        for q_arm in self._arm_branches(X_BH.translation() - self.p_BS):
+    def _closed_form(self, X_BH: RigidTransform, margin_rad: float) -> Iterator[FloatArray]:
+        """Iterates over the branches of an arm with shoulder yaw, two pitch joints and a spherical wrist."""
+        R_BH, p_SW = X_BH.rotation().matrix(), X_BH.translation() - self.p_BS
+        lower, upper = (self.lower_rad + margin_rad).tolist(), (self.upper_rad - margin_rad).tolist()
+        for q_arm in self._arm_branches(p_SW):
+            if not _all_between(lower, map(wrap, q_arm), upper):
+                continue
             R_BE = _axis_rotation((0, 0, 1), q_arm[0]) @ _axis_rotation((0, 1, 0), q_arm[1] + q_arm[2])
-            for q_wrist in _wrist_branches(R_BE.T @ X_BH.rotation().matrix()):
-                solutions.append(wrap(np.array([*q_arm, *q_wrist])))
-        return solutions
+            for q_wrist in _wrist_branches(R_BE.T @ R_BH):
+                q_rad = [wrap(angle) for angle in (*q_arm, *q_wrist)]
+                if _all_between(lower, q_rad, upper):
+                    yield np.array(q_rad)
 
     def nearest_inverse(
         self, X_BH: RigidTransform, q_near_rad: FloatArray, margin_rad: float = 0.03
@@ -198,6 +206,11 @@ def _axis_rotation(axis: tuple[float, ...], angle_rad: float) -> NDArray[np.floa
     x, y, z = axis
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.asarray(np.eye(3) + s * across + (1.0 - c) * across @ across)
+
+
+def _all_between(lower: Iterable[float], values: Iterable[float], upper: Iterable[float]) -> bool:
+    """Returns whether values, perhaps fewer than the limits, are within them."""
+    return all(low <= value <= high for value, low, high in zip(values, lower, upper, strict=False))
 
 
 def _wrist_branches(R: NDArray[np.float64]) -> list[tuple[float, float, float]]:

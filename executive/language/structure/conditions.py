@@ -121,15 +121,17 @@ def _door(words: str, state: State, reader: PlainReader) -> SpokenCondition | No
 def parse_opening(text: str, state: State, reader: PlainReader) -> tuple[OpenDoor, State] | None:
     """Parses a request to have a door opened, with the state after it; None for other texts.
 
-    Raises RefusalError when the robot is to open the door itself, and see `_between`.
+    Raises RefusalError when the robot is to open a door without a plug-in itself, and see `_between`.
     """
     text = re.sub(r" for (?:me|us|you|him|her|them)$", "", text, flags=re.IGNORECASE)
     match = next((found for form in _P.each("opening") if (found := form.fullmatch(text)) is not None), None)
     if match is None or (match["it"] and state.door is None):
         return None
-    if match.groupdict().get("own"):
-        raise RefusalError(f"I cannot open doors; say 'ask somebody to open {match['door'] or 'it'}'", [text])
-    door = state.door if match["it"] and state.door is not None else DoorOpen(door=_between(match, reader.knowledge))
+    own, doors = match.groupdict().get("own"), [door for door in reader.knowledge.doors if door.opens is not None]
+    door = state.door if match["it"] or (own and not doors) else DoorOpen(door=_between(match, reader.knowledge))
+    if door is None or (own and all(set(door.door) != {*one.between} for one in doors)):
+        said = match["door"] or "it"
+        raise RefusalError(f"I cannot open {said} myself; say 'ask somebody to open {said}'", [text])
     return OpenDoor(door=DoorToOpen(door=door.door)), replace(state, door=door, goal=None, at=None)
 
 

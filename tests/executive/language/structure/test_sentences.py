@@ -59,6 +59,17 @@ def test_a_note_says_which_place_is_meant(meant, sentence, notes):
     assert meant(sentence).notes == notes
 
 
+def test_a_door_with_a_plug_in_is_opened_and_no_other(parser, worlds):
+    doors = [
+        door.model_copy(update={"opens": {"plugin": "http"}} if "office" in door.between else {})
+        for door in worlds["shop"].doors
+    ]
+    knowledge = worlds["shop"].model_copy(update={"doors": tuple(doors)})
+    understood = partial(understand, parser=parser, knowledge=knowledge, require_wake=False)
+    assert noted(understood("please open the office door for me").steps) == 'Open "office" - "side aisle"'
+    assert "cannot open the bathroom door myself" in understood("open the bathroom door").reason
+
+
 def test_all_commands_stand_in_their_order(meant):
     answer = meant("if there is a beer in the kitchen bring it, otherwise go to the hall")
     assert [command.goal for command in answer.commands] == ["kitchen", "start", "hall"]

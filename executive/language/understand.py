@@ -184,7 +184,8 @@ def meaning(said: Trace, pipeline: Pipeline, clauses: Sequence[Clause] | None = 
     """Understands a text for one robot, given as an empty trace, and perhaps its clauses."""
     trace = pipeline.run(said)
     mentioned = _MENTIONED.search(said.text) is not None
-    if pipeline.knowledge is not None and (mentioned or trace.refusal is not None):
+    refused = trace.refusal is not None and trace.refused_at != "cleaning"
+    if pipeline.knowledge is not None and (mentioned or refused):
         from executive.language.structure.sentence import read_structure
 
         found = read_structure(trace, clauses, pipeline, said.memory)

@@ -70,6 +70,10 @@ def test_a_door_with_a_plug_in_is_opened_and_no_other(parser, worlds):
     assert "cannot open the bathroom door myself" in understood("open the bathroom door").reason
 
 
+def test_a_sentence_of_too_many_words_is_not_read_for_people(meant):
+    assert "too many for one sentence" in meant("follow me, " * 40).reason
+
+
 def test_all_commands_stand_in_their_order(meant):
     answer = meant("if there is a beer in the kitchen bring it, otherwise go to the hall")
     assert [command.goal for command in answer.commands] == ["kitchen", "start", "hall"]

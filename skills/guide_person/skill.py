@@ -10,10 +10,10 @@ import shapely
 
 from skills.api import Cause, Job, Running, Step, Succeeded
 from skills.follow_person.target import Target, TargetOptions
-from skills.geometry import bearing_rad, grid_inside
+from skills.geometry import bearing_rad, grid_inside, wrap
 from skills.meet_person.skill import MeetPerson, person_text
 from skills.navigate.arm_footprint import ArmFootprint
-from skills.navigate.footprint import footprint_clear
+from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company
 from skills.perception.people import SeenPerson
@@ -27,8 +27,10 @@ from skills.speak.skill import say
 _TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
 _SLOWEST_M_S = 0.25
 _AHEAD_M, _AHEAD_RAD = 3.0, 1.2
-_STEPS_IN, _STANDS_S, _BEHIND_M = 3, 2.0, 1.7
-"""Drives into the room, time for which the person stands before its door, and how far behind the robot they stand."""
+_STEPS_IN, _STANDS_S = 3, 2.0
+"""Drives into the room, and time for which the person stands before its door."""
+_COMES_M, _STEP_IN_M, _YAWS_RAD = 2.7, 0.3, (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
+"""Distance at which a person comes after the robot, least further distance, and turns of the robot there."""
 _ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
 """Wait before the robot asks the person to come; how far along their last direction it looks for one who walked."""
 
@@ -178,20 +180,21 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         return self._is_close() and self.context.clock.now() > end_s - self.options.arrive_s + _STANDS_S
 
     def _pose_further_in(self) -> Pose2D | None:
-        """The nearest free pose in the room that leaves room for the person behind the robot; None without one."""
-        here, area = self.context.pose(), self._inputs.area_W
+        """A free pose in the room, so far from the person that they come in as well; None without one."""
+        area, here = self._inputs.area_W, self.context.pose()
         if self._target is None or not area or not self._is_close():
             return None
-        footprint, costmap = ArmFootprint(self.context).now(), self.context.free_space()
-        x, y = self._target.seen.place_W
-        for at in sorted(
-            grid_inside(area, 0.25, first_m=0.3, margin_m=-0.4), key=lambda at: math.dist(at, (here.x_m, here.y_m))
-        ):
-            away = np.array([x, y]) - at
-            behind_W = at + away * min(1.0, _BEHIND_M / max(float(np.linalg.norm(away)), 1e-6))
-            pose = Pose2D(float(at[0]), float(at[1]), math.atan2(-away[1], -away[0]))
-            if _inside(area, behind_W) and footprint_clear(costmap, footprint, pose):
-                return pose
+        person_W, footprint = np.array(self._target.seen.place_W), ArmFootprint(self.context).now()
+        points = grid_inside(area, 0.25, first_m=0.3, margin_m=-0.4)
+        away_m = np.linalg.norm(points - person_W, axis=1)
+        drive_m = np.linalg.norm(points - (here.x_m, here.y_m), axis=1)
+        for n in np.lexsort((drive_m, np.maximum(0.0, _COMES_M - away_m).round(1))):
+            if away_m[n] > self._gap_m() + _STEP_IN_M:
+                (x, y), ahead_rad = points[n], math.atan2(*(points[n] - person_W)[::-1])
+                poses = [Pose2D(float(x), float(y), wrap(ahead_rad + turn)) for turn in _YAWS_RAD]
+                clear_m = footprint_clearance_m(self.context.free_space(), footprint, pose_array(poses))
+                if clear_m.max() > SAFE_MARGIN_M:
+                    return poses[int(np.argmax(clear_m > SAFE_MARGIN_M))]
         return None
 
     def _fetch(self) -> Routine[None]:

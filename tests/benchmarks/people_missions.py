@@ -97,8 +97,9 @@ def case(folder: Path, seed: int) -> Case:
             room = whom
         taken = [(world.start.x_m, world.start.y_m), *people.values()]
         there = [p for p in points[rng.permutation(len(points))] if inside(world.rooms[room], p)]
-        spot = next(p for p in there if all(math.dist(p, other) > APART_M for other in taken))
-        people[name] = (float(spot[0]), float(spot[1]))
+        spot = next((p for p in there if all(math.dist(p, other) > APART_M for other in taken)), None)
+        if spot is not None:
+            people[name] = (float(spot[0]), float(spot[1]))
     return Case(kind, seed, whom, people)
 
 

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8329,
     "executive/cli": 5009,
-    "skills": 29690,
+    "skills": 29721,
     "plant": 21956,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 515, 94, 14

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import shapely
 
-from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
+from skills.api import Cause, ClearableCostmap, Failed, Question, Running, SkillContext, Succeeded
 from skills.follow_person.target import Target, TargetOptions
 from skills.geometry import bearing_rad, wrap
 from skills.navigate.arm_footprint import ArmFootprint
@@ -43,7 +43,8 @@ class FollowPersonOptions:
     down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`. For a person
     who comes towards it within `meeting_m`, it goes aside for `aside_s` at most. A person who stays hidden for `lost_s`
     is lost, or for `gone_s` once the robot stands where they were seen last: the robot says so and searches through
-    `doors` doors, then asks and listens for `asking_s`. At the beginning it looks for the person for `finding_s`.
+    `doors` doors, then asks and listens for `asking_s`. Somebody found then is asked for their name within `hearing_m`,
+    with `answer_s` for the answer. At the beginning it looks for the person for `finding_s`.
     """
 
     behind_m: Length = 1.6
@@ -59,6 +60,8 @@ class FollowPersonOptions:
     finding_s: Delay = 8.0
     asking_s: Delay = 12.0
     search_s: Delay = 20.0
+    hearing_m: Length = 2.8
+    answer_s: Delay = 5.0
     doors: Tries = 2
     tries: Tries = 8
     max_speed_m_s: Speed = 1.2
@@ -102,6 +105,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         self._outline, self._tries = ArmFootprint(self.context).now(), 0
         self._planned_s = self._aside_until_s = -math.inf
         self._aside: Pose2D | None = None
+        self._before: SeenPerson | None = None
         self._remark.withdraw()
         self._remark = self.context.listen()
         self._company.watch = PeopleWatch(self.context, self.options.people)
@@ -128,6 +132,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         try:
             self._target = yield from self._find(inputs)
             while not (yield from self._keep_behind(self._target)):
+                self._before = self._target.seen
                 yield from self._search(self._target)
         except _Told as told:
             return Succeeded(f'stopped following {self._inputs.person} when told "{told}"')
@@ -186,6 +191,8 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             if hidden_s > self.options.gone_s and self._goal is None:
                 return False
             here, seen_W = self.context.pose(), target.seen.place_W
+            if self._before is not None and not (yield from self._is_right(target, self._before)):
+                return False
             near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
             inside = near and place is not None and place.covers(shapely.Point(seen_W))
             if inside and target.stands_still(self._now()):
@@ -198,6 +205,25 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             doing = f"following {self._inputs.person}" if not hidden_s else f"going to where {self._inputs.person} went"
             yield from self._tick(self._drive(doing))
         return False
+
+    def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
+        """Asks a person near who was found after a search for their name; a wrong one is the person no longer."""
+        here, near_m = self.context.pose(), self.options.hearing_m
+        if target.hidden_s(self._now()) or math.dist((here.x_m, here.y_m), target.seen.place_W) > near_m:
+            return True
+        self._before = None
+        if self._inputs.place_W is None:  # the person before the robot has no name
+            return True
+        text, name = f"Are you {self._inputs.person}?", f"{self.name} of {self.context.robot.name}"
+        asked = self.context.ask(Question(name, text, ("yes", "no"), "", self.options.answer_s))
+        try:
+            while not asked.done():
+                yield from self._tick(self._drive("asking who it is"))
+        finally:
+            asked.withdraw()
+        if asked.result() == "no":
+            target.reject(before)
+        return asked.result() != "no"
 
     def _search(self, target: Target) -> Routine[None]:
         """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""

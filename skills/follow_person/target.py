@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,6 +86,11 @@ class Target:
             self._note(one)
             apart = (each for each in people if math.dist(each.place_W, one.place_W) > _ONE_BODY_M)
             self._others |= {each.track for each in apart if now_s - each.stamp_s < self._options.hidden_s}
+
+    def reject(self, before: SeenPerson) -> None:
+        """Takes the person of now for somebody else; the followed one was seen `before`."""
+        self._others.add(self.seen.track)
+        self.seen = replace(before, track=0)
 
     def _note(self, one: SeenPerson) -> None:
         """Lengthens the trail to the person; cuts off a loop."""

@@ -7,7 +7,7 @@ import pytest
 from planar_people import PeopleDetector, person_at
 from planar_robot import Bench
 
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.follow_person.skill import FollowPerson, FollowPersonOptions
 from skills.ports import FollowPersonInputs
 from skills.robot import Pose2D
@@ -35,18 +35,33 @@ class Remark:
 
 
 class Walk:
-    """One run behind a person who walks from x = 3.2 m to `to_m` at a speed, and is gone after `gone_s`."""
+    """One run behind a person who walks from x = 3.2 m to `to_m` at a speed, and is gone from `gone_s` to `back_s`.
+
+    Who comes back answers "Are you Robin?" with `answer`.
+    """
 
     def __init__(
-        self, to_m=6.5, *, speed_m_s=0.6, gone_s=math.inf, told_s=math.inf, others=(), cameras=False, **inputs
+        self,
+        to_m=6.5,
+        *,
+        speed_m_s=0.6,
+        gone_s=math.inf,
+        back_s=math.inf,
+        answer="yes",
+        told_s=math.inf,
+        others=(),
+        cameras=False,
+        **inputs,
     ):
         self.bench = Bench(START, unmapped=[person_at(3.2, LANE_M), *others], cameras=cameras)
-        self.to_m, self.speed_m_s, self.gone_s, self.x_m = to_m, speed_m_s, gone_s, 3.2
+        self.to_m, self.speed_m_s, self.gone_s, self.back_s, self.x_m = to_m, speed_m_s, gone_s, back_s, 3.2
+        self.questions = []
         for _ in range(10):
             self.bench.tick()
         self.remark = Remark(self.bench, told_s)
         self.detector = PeopleDetector(self.bench, [])
-        context = replace(self.bench.context(), listen=lambda: self.remark, detector=self.detector)
+        ask = lambda question: self.questions.append(question.text) or nobody_to_ask(replace(question, default=answer))  # noqa: E731
+        context = replace(self.bench.context(), listen=lambda: self.remark, detector=self.detector, ask=ask)
         self.skill, self.distances_m, self.messages = FollowPerson(context, QUICK), [], []
         self.inputs = FollowPersonInputs("Robin", **inputs)
         self.skill.begin(self.inputs)
@@ -56,7 +71,7 @@ class Walk:
         now_s, boxes = self.bench.clock.now(), self.bench.robot.boxes
         boxes[:] = [box for box in boxes if box != person_at(self.x_m, LANE_M)]
         self.x_m = min(self.to_m, self.x_m + (0.05 * self.speed_m_s if now_s > 3.0 else 0.0))
-        if now_s < self.gone_s:
+        if not self.gone_s <= now_s < self.back_s:
             boxes.append(person_at(self.x_m, LANE_M))
         self.bench.tick()
         here = self.bench.robot.pose
@@ -117,6 +132,13 @@ def test_a_lost_person_is_searched_and_asked_for_before_the_skill_fails():
 def test_the_time_limit_ends_the_skill():
     step = Walk(time_limit_s=5.0, until_W=END, until="kitchen").run()
     assert isinstance(step, Failed) and step.cause is Cause.TIMEOUT
+
+
+@pytest.mark.parametrize(("answer", "outcome"), [("yes", Succeeded), ("no", Failed)])
+def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(answer, outcome):
+    walk = Walk(to_m=5.5, gone_s=6.0, back_s=10.0, answer=answer, place_W=(3.2, LANE_M), until_W=END)
+    assert isinstance(walk.run(), outcome)
+    assert walk.questions == ["Are you Robin?"]
 
 
 @pytest.mark.parametrize("at_s", [0.6, 4.0, 9.5])

@@ -57,3 +57,12 @@ def test_a_person_stands_still_after_five_seconds_in_one_place():
     for n in range(1, 52):
         target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], 2.0 + 0.1 * n)
         assert target.stands_still(2.0 + 0.1 * n) == (n >= 46)
+
+
+def test_somebody_rejected_is_not_taken_for_the_person_again():
+    target = walked()
+    before = target.seen
+    target.update([track(7, 5.4, 3.4)], 3.4)
+    target.reject(before)
+    target.update([track(7, 5.5, 3.5)], 3.5)
+    assert (target.seen.place_W, target.seen.track) == (before.place_W, 0)

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -118,12 +119,8 @@ def add(
         raise InputError(f"a {what.value} needs a name", hint=f"write errand world add {what.value} {folder} NAME")
     if not all(map(math.isfinite, (*(at or ()), *(size or ())))):
         raise InputError("--at and --size are numbers", hint="write them in metres and radians")
-    try:
-        with _restored(folder):
-            said = _ADDED.get(what, _add_furniture)(site, _Wanted(what, name or "", room, at, size, surface))
-            knowledge_of(open_world(str(folder)))
-    except WorldError as error:
-        raise InputError(str(error), hint="see `errand world show`", file=folder) from error
+    with _restored(folder):
+        said = _ADDED.get(what, _add_furniture)(site, _Wanted(what, name or "", room, at, size, surface))
     typer.echo(f"{folder}: {said}")
 
 
@@ -249,15 +246,18 @@ _ADDED: Final[Mapping[Addition, Callable[[_Site, _Wanted], str]]] = {
 
 @contextmanager
 def _restored(folder: Path) -> Iterator[None]:
-    """Restores the text files of a world if the block raises."""
+    """Restores the text files of a world if the block raises, or leaves a world that cannot be opened."""
     kept = {file: file.read_bytes() for pattern in ("*.yaml", "map/*") for file in folder.glob(pattern)}
     try:
         yield
-    except BaseException:
+        knowledge_of(open_world(str(folder)))
+    except BaseException as error:
         for file in {*folder.glob("*.yaml")} - kept.keys():
             file.unlink()
         for file, data in kept.items():
             file.write_bytes(data)
+        if isinstance(error, WorldError):
+            raise InputError(str(error), hint="see `errand world show`", file=folder) from error
         raise
 
 
@@ -291,14 +291,9 @@ def add_zone(
 
     site = _site(folder)
     room = None if place is None else site.room(place)
-    files = {key: str(file.resolve()) for key, file in (("mask", mask), ("info", info)) if file is not None}
-    home = f"{folder.resolve()}/"
-    outside = next((file for file in files.values() if not file.startswith(home)), None)
-    if outside is not None:
-        what = f"{Path(outside).name} does not lie in the folder of the world"
-        raise InputError(what, hint="copy it there with its picture", file=folder)
+    files = {key: relpath(file, folder) for key, file in (("mask", mask), ("info", info)) if file is not None}
     given = {"place": room, "polygon": None if polygon is None else _corners(polygon), "speed": speed, "share": share}
-    values = {**given, **{key: file.removeprefix(home) for key, file in files.items()}, "direction": direction}
+    values = {**given, **files, "direction": direction}
     facts = {"kind": kind.value, **{key: value for key, value in values.items() if value is not None}}
     try:
         ZoneFacts.model_validate(facts)
@@ -306,7 +301,9 @@ def add_zone(
         where, what, _ = first_error(error.errors())
         hint = "see `errand world zone add --help`"
         raise InputError(": ".join((*map(str, where), what)), hint=hint) from error
-    _rewrite(site, lambda file: with_entry(file, "zones", name, facts))
+    file = folder / "knowledge.yaml"
+    with _restored(folder):
+        file.write_text(with_entry(file, "zones", name, facts), encoding="utf-8")
     (made,) = (each for each in knowledge_of(open_world(str(folder))).known_zones() if each.name == name)
     typer.echo(f"{folder}: {made.words}")
 
@@ -328,7 +325,9 @@ def remove_zone(folder: Annotated[Path, _WORLD], name: Annotated[str, _ZONE]) ->
     if name not in (zones := site.facts.zones):
         hint = suggestion(name, zones) if zones else "it has no zones"
         raise InputError(f"there is no zone '{name}'", hint=hint, file=folder)
-    _rewrite(site, lambda file: without_entry(file, "zones", name))
+    file = folder / "knowledge.yaml"
+    with _restored(folder):
+        file.write_text(without_entry(file, "zones", name), encoding="utf-8")
     typer.echo(f"{folder}: no zone '{name}' any more")
 
 
@@ -347,17 +346,6 @@ def _site(folder: Path) -> _Site:
     if not folder.is_dir():
         raise InputError("there is no such folder", hint="`errand world from-map` makes a world", file=folder)
     return _Site(folder, open_world(str(folder)))
-
-
-def _rewrite(site: _Site, change: Callable[[Path], str]) -> None:
-    """Changes the text of a world's knowledge, if the result can be read. Raises InputError."""
-    file = site.folder / "knowledge.yaml"
-    try:
-        with _restored(site.folder):
-            file.write_text(change(file), encoding="utf-8")
-            knowledge_of(open_world(str(site.folder)))
-    except WorldError as error:
-        raise InputError(str(error), hint="see `errand world zone list`", file=site.folder) from error
 
 
 @world.command(cls=StartCommand)

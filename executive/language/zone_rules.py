@@ -9,6 +9,7 @@ from typing import Final
 
 from pydantic import ValidationError
 
+from executive.language.amounts import parse_number
 from executive.language.clauses import begins_action
 from executive.language.lexicon import Patterns, any_of, read_table
 from executive.language.questions import RefusalError
@@ -22,14 +23,9 @@ from skills.api import ZoneKind
 SLOWLY_M_S: Final = 0.3
 """Speed limit of "slowly"."""
 _FORMS: Final = Patterns("zones.yaml")
-_NUMBERS: Final = {
-    **{"half": 0.5, "quarter": 0.25, "three quarters": 0.75, "one": 1.0, "two": 2.0, "three": 3.0, "four": 4.0},
-    **{"five": 5.0, "ten": 10.0, "twenty": 20.0, "thirty": 30.0, "forty": 40.0, "fifty": 50.0},
-}
+_PARTS: Final = {"half": 0.5, "quarter": 0.25, "three quarters": 0.75}
 _UNITS_M_S: Final = {"m": 1.0, "c": 0.01, "k": 1.0 / 3.6}
 _SPEEDS: Final = ("slowly", "at_most")
-_LEFT: Final = (*_SPEEDS, "silent", "other")
-"""Rules that no other part of the language refuses."""
 _ADDRESS: Final = re.compile(r"\W*(?:(?:hey|hi|hello|ok|okay)\W+)?\w+\W*", re.IGNORECASE)
 Zones = Mapping[str, ZoneFacts]
 
@@ -110,10 +106,11 @@ def take_rules(text: str, knowledge: Knowledge) -> tuple[str, Zones]:
                     facts = _facts(kind, match, name)
                     zones[name if name not in zones else f"{name}, {facts.kind.replace('_', ' ')}"] = facts
                 text = _joined(text[: match.start()], text[end:])
-    unread = (form.search(text) for kind in _LEFT for form in forms.get(kind, ()))
-    left = next((match for match in unread if match is not None), None)
-    if left is not None and _FORMS.speaks.search(text[: left.start()]) is None:
-        raise RefusalError(f"I do not understand '{left[0]}' here; say it as a clause of its own", [left[0]])
+    for left in filter(None, (form.search(text) for rows in forms.values() for form in rows)):
+        begin = text[: left.start()]
+        is_said, other = _FORMS.speaks.search(begin) is not None, left.re not in forms["keep_out"]
+        if re.search(r"\bbut\W*$", begin, re.IGNORECASE) if is_said else other:
+            raise RefusalError(f"I do not understand '{left[0]}' here; say it in a sentence of its own", [left[0]])
     return text, zones
 
 
@@ -150,9 +147,8 @@ def _facts(kind: str, match: re.Match[str], room: str) -> ZoneFacts:
     if kind not in _SPEEDS:
         return ZoneFacts(kind=ZoneKind(kind), place=room)
     said = match.groupdict()
-    number = said.get("amount") or "one"
-    unit = said.get("unit") or "m"
-    speed = _NUMBERS.get(number.lower()) or float(number)
+    number, unit = said.get("amount") or "one", said.get("unit") or "m"
+    speed = _PARTS.get(number.lower()) or parse_number(number) or 0.0
     try:
         limit = SLOWLY_M_S if kind == "slowly" else round(speed * _UNITS_M_S[unit[0].lower()], 3)
         return ZoneFacts(kind=ZoneKind.SPEED_LIMIT, place=room, speed=limit)

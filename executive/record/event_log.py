@@ -112,6 +112,7 @@ class EventLog(RunVisitor):
         self._tick_limit_s, self._start_s = 0.0, 0.0
         self._ticks_s: list[float] = []
         self._ticks_logged_s = -math.inf
+        self._has_zones = False
 
     def begin(self, settings: RunSettings, worker: Worker) -> None:
         """Notes the wall time, and the tick period; a tick that takes longer overruns."""
@@ -158,6 +159,9 @@ class EventLog(RunVisitor):
     def _log(self, topic: str, message: Mapping[str, Any]) -> None:
         now_s = self._clock.now()
         robot = str(message.get("robot") or message.get("robot_name") or "") if self._apart else ""
+        if topic == TREE and self._has_zones:
+            message = {"zones": [], **message}  # viewers remove those of the mission before
+        self._has_zones = self._has_zones or (topic == TREE and "zones" in message)
         for shown_under, shown in viewer_messages(topic, message, now_s):
             self._write(shown_under, plain_values(shown), now_s, robot)
         if now_s - self._flushed_s >= FLUSH_EVERY_S:
@@ -220,7 +224,7 @@ def viewer_messages(topic: str, message: Message, now_s: float) -> Iterator[tupl
         yield TRANSFORM, transform_of(message)
     elif topic == MAP and "data" in message:
         yield GRID, grid_of(message, now_s)
-    elif topic == TREE and message.get("zones"):
+    elif topic == TREE and "zones" in message:
         yield ZONES, scene_of(message["zones"], now_s)
 
 

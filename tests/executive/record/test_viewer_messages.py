@@ -74,6 +74,19 @@ def test_zones_become_outlines_on_the_floor_with_their_rules():
     assert len([*viewer_messages("tree", {"robot": "Alice"}, 1.5)]) == 1
 
 
+def test_viewers_remove_the_zones_of_the_mission_before(tmp_path, clock):
+    log = EventLog(tmp_path / "log.mcap", clock)
+    for more in (
+        {},
+        {"zones": zone_messages([Zone("den", ZoneKind.SILENT, ((0.0, 0.0), (2.0, 0.0), (2.0, 2.0)))])},
+        {},
+    ):
+        log("tree", {"robot": "Alice", "root": {}, **more})
+    log.close()
+    scenes = [event.data for event in read_events(log.path) if event.topic == "map/zones"]
+    assert [len(scene["entities"]) for scene in scenes] == [1, 0]
+
+
 def test_every_topic_of_a_mission_has_a_schema_of_its_own(tmp_path, compiled, run_tree, make, clock):
     log = EventLog(tmp_path / "log.mcap", clock)
     run_tree(compiled(*make.FETCH), log=log)

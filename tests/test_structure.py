@@ -25,7 +25,7 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1594,
     "executive/testing": 818,
-    "executive/app": 8329,
+    "executive/app": 8332,
     "executive/cli": 4997,
     "skills": 29721,
     "plant": 21956,

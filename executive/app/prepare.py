@@ -202,10 +202,13 @@ def _open(request: Request) -> tuple[Request, Mission | None, World, Knowledge]:
 
 
 def _check_masks(tree: CompiledTree) -> None:
-    """Reads the filter masks of a tree's zones. Raises InputError for a mask that cannot be read."""
+    """Reads the filter masks of a tree's zones again. Raises InputError for a mask that cannot be read."""
     if files := [zone.mask.file for zone in tree.zones if zone.mask is not None]:
         from skills.estimate.grid_map import load_filter_mask  # most worlds have no masks, and need no pictures
+        from skills.navigate.zone_map import zone_map
 
+        load_filter_mask.cache_clear()
+        zone_map.cache_clear()
         for file in files:
             load_filter_mask(Path(file))
 

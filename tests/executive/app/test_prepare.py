@@ -215,13 +215,14 @@ def test_the_parts_of_different_files_have_different_prints(asked_file):
     assert len({asked_file(text).request.fingerprint for text in texts}) == 2
 
 
-def test_a_mask_that_cannot_be_read_is_refused_before_the_run(tmp_path):
+def test_a_mask_is_read_again_before_each_run_and_refused_where_it_cannot_be(tmp_path):
     zones = "knowledge: {zones: {wet: {kind: keep_out, mask: mask.yaml}}}"
     (tmp_path / "go.yaml").write_text(f"name: go\n{zones}\nsteps: [{{say: go to the kitchen}}]\n", encoding="utf-8")
-    (tmp_path / "mask.yaml").write_text(
-        "image: gone.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.25\n",
-        encoding="utf-8",
-    )
+    text = "image: mask.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    (tmp_path / "mask.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "mask.pgm").write_bytes(b"P5 2 2 255\n" + bytes(4))
+    prepare(Request(file=tmp_path / "go.yaml"), ask=None)
+    (tmp_path / "mask.pgm").unlink()
     with pytest.raises(InputError) as caught:
         prepare(Request(file=tmp_path / "go.yaml"), ask=None)
     assert (caught.value.file, caught.value.line) == (tmp_path / "mask.yaml", 1)

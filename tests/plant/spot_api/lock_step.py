@@ -40,6 +40,7 @@ def scripted_spot(
             yield server, robot
         finally:
             stopping.set()
+            server.computer.do(lambda: None)  # it waits for work no longer
             stepping.join()
 
 
@@ -131,5 +132,8 @@ class LockStep:
         self.robot.return_lease(lease)
 
     def close(self) -> None:
+        work = self.server.computer.do
         self._stopping.set()
+        work(lambda: None)  # it waits for work no longer
+        del work  # the server's thread drops the robot, and with it the renderer
         self._thread.join()

@@ -17,6 +17,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import cv2
 import numpy as np
 
 from executive.app.mission_run import run_request
@@ -27,13 +28,14 @@ from executive.mission.request import Request
 from executive.record.history import read_history
 from executive.record.schemas import DOORS
 from executive.words.knowledge import Knowledge, load_knowledge
-from executive.words.outlines import inside
 from plant.worlds.world import load_world
+from skills.estimate.grid_map import load_grid_map
 
 WORLDS = ("flat", "shop", "lab")
 MOST_DOORS = 2
 LATEST_S, LIMIT_S = 10.0, 300.0
 WITHIN_S = 15.0
+BODY_M, JAMB_M = 0.2, 0.1
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def case(number: int, *, detour: bool = False) -> Case:
         knowledge = load_knowledge(load_world(world).folder / "knowledge.yaml")
         room = str(rng.choice(list(knowledge.places)))
         doors = [door.between for door in knowledge.doors if room in door.between]
-        if _starts_in(knowledge, room) or not (2 if detour else 1) <= len(doors) <= MOST_DOORS:
+        if not (2 if detour else 1) <= len(doors) <= MOST_DOORS or not _is_cut_off(world, knowledge, room):
             continue
         times = [0.1 if rng.random() < 0.5 else round(float(rng.uniform(1.0, LATEST_S)), 1) for _ in doors]
         order = rng.permutation(len(doors))
@@ -75,8 +77,21 @@ def case(number: int, *, detour: bool = False) -> Case:
         return Case(number, world, room, tuple(closes))
 
 
-def _starts_in(knowledge: Knowledge, room: str) -> bool:
-    return inside(knowledge.places[room].polygon, (knowledge.start.x, knowledge.start.y))
+def _is_cut_off(world: str, knowledge: Knowledge, room: str) -> bool:
+    """Returns whether the doors of a room are its only ways in, from the robot's start, on the map."""
+    grid = load_grid_map(load_world(world).keepout_map_path).with_unknown_blocked()
+    free = grid.distance > BODY_M
+    for door in knowledge.doors:
+        if room in door.between:
+            cells = np.argwhere(free)
+            near = np.hypot(*(grid.centres(cells) - door.at).T) < 0.5 * door.width + JAMB_M
+            free[tuple(cells[near].T)] = False
+    labels = cv2.connectedComponents(free.astype(np.uint8), connectivity=8)[1]
+    places = (knowledge.start, knowledge.places[room].pose)
+    cells = np.argwhere(free)
+    nearest = [cells[np.argmin(np.hypot(*(grid.centres(cells) - [at.x, at.y]).T))] for at in places]
+    here, there = (int(labels[tuple(cell)]) for cell in nearest)
+    return here != there
 
 
 def run_case(drawn: Case, out: Path) -> Result:

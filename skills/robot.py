@@ -208,6 +208,18 @@ class Battery:
 
 
 @dataclass(frozen=True)
+class DoorHandle:
+    """Handle of a door before the robot: its position (x, y, z) in the body frame (m), as the robot faces the door.
+
+    The door's hinges are on the left (`hinge_left`) or on the right, and it opens towards the robot (`pull`) or away.
+    """
+
+    p_BH: tuple[float, float, float]
+    hinge_left: bool
+    pull: bool
+
+
+@dataclass(frozen=True)
 class ArmTrajectory:
     """Joint positions (K, arm joints) at times from the start (K,), interpolated linearly. Raises ValueError."""
 
@@ -336,6 +348,9 @@ class Robot(Protocol):
 
     def undock(self, *, until_s: float, lease: Lease) -> CommandId:
         """Stands up and leaves the docking station; refused like `dock`."""
+
+    def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
+        """Opens a door with the arm and walks through; only where `Capabilities.opens_doors`, else refused."""
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when the arm is still at its end."""

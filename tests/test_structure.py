@@ -18,8 +18,8 @@ LINES = {
     "executive/language": 8240,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8400,
-    "executive/run": 3217,
+    "executive/tree": 8404,
+    "executive/run": 3218,
     "executive/record": 1412,
     "executive/store": 1666,
     "executive/conversation": 595,
@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29721,
-    "plant": 21956,
+    "skills": 29791,
+    "plant": 22017,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 515, 94, 14
+MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

@@ -336,7 +336,8 @@ _CHECKS: Final[Mapping[str, Check]] = {
     "battery": _reading(Battery, lambda it: None if 0.0 <= it.charge <= 1.0 else f"a charge of {it.charge}"),
     "faults": _typed(tuple, lambda it: None if all(isinstance(one, str) for one in it) else f"faults {it!r:.80}"),
     **dict.fromkeys(
-        ("drive", "stand", "sit", "dock", "undock", "move_arm", "point_head", "set_gripper", "stop"), _COMMAND
+        ("drive", "stand", "sit", "dock", "undock", "open_door", "move_arm", "point_head", "set_gripper", "stop"),
+        _COMMAND,
     ),
     "command_status": _typed(CommandStatus, _status),
     "lease_holder": _or_none(_LEASE),

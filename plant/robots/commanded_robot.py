@@ -23,6 +23,7 @@ from skills.robot import (
     CommandId,
     CommandState,
     CommandStatus,
+    DoorHandle,
     FloatArray,
     Gripper,
     GripperKind,
@@ -171,6 +172,10 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
     def undock(self, *, until_s: float, lease: Lease) -> CommandId:
         """Refuses: see `dock`."""
         return self._commands.refuse("undock: the robot has no docking station", CommandCause.UNSUPPORTED)
+
+    def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: a simulated robot turns no handle."""
+        return self._commands.refuse("open_door: the robot opens no doors", CommandCause.UNSUPPORTED)
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when its end is reached and the arm is still."""

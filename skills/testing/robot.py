@@ -21,6 +21,7 @@ from skills.robot import (
     CommandId,
     CommandState,
     CommandStatus,
+    DoorHandle,
     FloatArray,
     FrameTree,
     Gripper,
@@ -48,7 +49,7 @@ _BATTERY_RUNTIME_S = 5400.0
 _CHARGING_S = 600.0
 _FINGER_M = 0.03
 _LEAST_CLAMP_N = 2.0
-_LACKS = frozenset({"there is no arm", "there is no head", "there is no gripper", "there is no docking station"})
+_LACKS = "there is no "
 _EPOCH = "scripted"
 
 BASE_ONLY = Capabilities(
@@ -243,10 +244,13 @@ class ScriptedRobot:
         """Refuses: there is no docking station."""
         return self._begin("undock", None, until_s, lease, "there is no docking station")
 
+    def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
+        """Refuses: there is no door command."""
+        return self._begin("open_door", handle, until_s, lease, "there is no door command")
+
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory that begins near the arm's angles."""
-        fault = self._arm_fault(trajectory)
-        return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, fault)
+        return self._begin("move_arm", (trajectory, self.q_rad.copy()), until_s, lease, self._arm_fault(trajectory))
 
     def _arm_fault(self, trajectory: ArmTrajectory) -> str:
         """Reason why the arm cannot follow a trajectory; empty when it can."""
@@ -283,9 +287,8 @@ class ScriptedRobot:
         """Stops all motion, or only the given command; the gripper keeps its force."""
         self.calls.append("stop")
         if lease != self._lease:
-            return self._commands.add(
-                CommandStatus(CommandState.REFUSED, "the lease was taken away", CommandCause.NO_LEASE)
-            )
+            gone = CommandStatus(CommandState.REFUSED, "the lease was taken away", CommandCause.NO_LEASE)
+            return self._commands.add(gone)
         self._commands.stop(only)
         return self._commands.add(CommandStatus(CommandState.DONE))
 
@@ -324,14 +327,12 @@ class ScriptedRobot:
         driving = ("drive",) if float(np.max(np.abs(self.velocity))) > 0.01 else ()
         return (*driving, *(part for part in self._commands.moving_parts if part != "drive"))
 
-    def _begin(
-        self, part: str, goal: object, until_s: float, lease: Lease, fault: str, *, verb: str | None = None
-    ) -> CommandId:
+    def _begin(self, part: str, goal: object, until_s: float, lease: Lease, fault: str, *, verb: str = "") -> CommandId:
         verb = verb or part
         self.calls.append(verb)
         causes = (
             (CommandCause.NO_LEASE, "the lease was taken away" if lease != self._lease else ""),
-            (CommandCause.UNSUPPORTED if fault in _LACKS else CommandCause.INVALID, fault),
+            (CommandCause.UNSUPPORTED if fault.startswith(_LACKS) else CommandCause.INVALID, fault),
             (self.refusal_cause, self.refuse_because.get(verb, "")),
         )
         for cause, refusal in causes:

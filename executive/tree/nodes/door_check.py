@@ -126,25 +126,29 @@ def _looks(builder: PlanBuilder, door: Door, key: str) -> Iterator[NodeSpec]:
 
 
 def _open_plan(_: Assembler, block: OpenDoor, builder: PlanBuilder) -> Assembled:
-    """Looks at a door; where it is closed, calls its plug-in or asks the people there, and waits before it."""
+    """Looks at a door; where it is closed, calls its plug-in, or asks the people there and waits before it."""
     door, key, wanted = _door(builder, block.door.between), builder.key("open"), block.door
-    look, again = builder.at("look"), builder.at("again")
+    look = builder.at("look")
     first = look.node("selector", _FROM_EITHER, *_looks(look, door, key), part="look")
     first = _known_or(look, door, first, key, wanted.max_age_s)
-    ask, ports = builder.at("ask"), _ports(builder.knowledge, door)
-    please = {"text": f"Please open the {_name(door)}."}
-    opens = ask.skill("speak", please) if door.opens is None else ask.skill("open_door", ports)
-    looks = again.node("selector", _FROM_EITHER, *_looks(again, door, key), part="look")
-    patient = again.node("retry", "look until it can tell", looks, attempts=_LOOKS, causes=_CANNOT_TELL)
-    wait = builder.node(
-        "wait for", f"wait until {wanted}", patient, part="wait", key=key, words=str(wanted), every_s=2.0
-    )
-    work = builder.sequence("ask, and wait", opens, wait, part="ask-and-wait")
+    if door.opens is None:
+        work = _asks(builder, door, key, str(wanted))
+    else:
+        work = builder.at("open").skill("open_door", _ports(builder.knowledge, door))
     opened = builder.node("choose", f"{wanted}?", first, work, part="choose", branches=_IF_CLOSED, key=key)
     late = f"the {_name(door)} was not opened"
     node = builder.node("timeout", wanted.words, opened, limit_s=wanted.within_s, late=late)
     goal = door_goal(builder.knowledge, door.between, GoalKind.DOOR_OPENED)
     return Assembled((node,), (StepPart(node.path_id, goal=goal),))
+
+
+def _asks(builder: PlanBuilder, door: Door, key: str, words: str) -> NodeSpec:
+    """Asks the people there to open a door, and looks every two seconds until `key` says that it is open."""
+    ask, again = builder.at("ask").skill("speak", {"text": f"Please open the {_name(door)}."}), builder.at("again")
+    looks = again.node("selector", _FROM_EITHER, *_looks(again, door, key), part="look")
+    patient = again.node("retry", "look until it can tell", looks, attempts=_LOOKS, causes=_CANNOT_TELL)
+    wait = builder.node("wait for", f"wait until {words}", patient, part="wait", key=key, words=words, every_s=2.0)
+    return builder.sequence("ask, and wait", ask, wait, part="ask-and-wait")
 
 
 PLANS: Final[StepPlans] = {OpenDoor: _open_plan}

@@ -11,23 +11,26 @@ import numpy as np
 from bosdyn.api import (
     arm_command_pb2,
     basic_command_pb2,
+    geometry_pb2,
     gripper_command_pb2,
     mobility_command_pb2,
     robot_command_pb2,
 )
 from bosdyn.api.docking import docking_pb2
+from bosdyn.api.spot import door_pb2
+from bosdyn.client.frame_helpers import BODY_FRAME_NAME
 from bosdyn.client.robot_command import RobotCommandBuilder
 from bosdyn.geometry import EulerZXY
 
 from plant.spot_api.adapter.readings import TIP_RADIUS_M
 from plant.spot_api.adapter.statuses import trouble
-from skills.robot import ArmTrajectory, CommandCause, CommandId, CommandState, CommandStatus, FloatArray
+from skills.robot import ArmTrajectory, CommandCause, CommandId, CommandState, CommandStatus, DoorHandle, FloatArray
 
 FASTEST_M_S, FASTEST_RAD_S = 0.8, 1.0
 _FASTEST_JOINT_RAD_S, _FASTEST_JOINT_RAD_S2 = 2.5, 15.0
 _MOST_POINTS: Final = 250
 _REMEMBERED: Final = 1000
-_MOBILITY: Final = {"base", "posture", "dock"}
+_MOBILITY: Final = {"base", "posture", "dock", "door"}
 """Parts that are one command of the robot."""
 _JOINTS: Final = ("sh0", "sh1", "el0", "el1", "wr0", "wr1")
 _DONE, _RUNNING = CommandStatus(CommandState.DONE), CommandStatus(CommandState.RUNNING)
@@ -36,6 +39,7 @@ _Stand: Final = basic_command_pb2.StandCommand.Feedback
 _Sit: Final = basic_command_pb2.SitCommand.Feedback
 _Claw: Final = gripper_command_pb2.ClawGripperCommand.Feedback
 _Dock: Final = docking_pb2.DockingCommandFeedbackResponse
+_Door: Final = door_pb2.DoorCommand.Feedback
 _Move: Final = arm_command_pb2.ArmJointMoveCommand.Feedback
 
 
@@ -98,7 +102,7 @@ def halt(part: str | None) -> Any:
     if part is None or part in _MOBILITY:
         stop = mobility_command_pb2.MobilityCommand.Request(stop_request=basic_command_pb2.StopCommand.Request())
         command.synchronized_command.mobility_command.CopyFrom(stop)
-    if part in (None, "arm"):
+    if part in (None, "arm", "door"):
         command.synchronized_command.arm_command.arm_stop_command.SetInParent()
     return command
 
@@ -185,6 +189,25 @@ def status_of(feedback: Any, part: str) -> CommandStatus:
 def docking_status(number: int) -> CommandStatus:
     """Returns the protocol's status of a command to dock or undock, by the number of its feedback."""
     return _DONE if number in (_Dock.STATUS_DOCKED, _Dock.STATUS_AT_PREP_POSE) else _judged(_Dock.Status, number)
+
+
+def door_command(handle: DoorHandle) -> Any:
+    """Builds the command that grasps a door's handle and opens the door; the ray ends 0.1 m behind the handle."""
+    command = door_pb2.DoorCommand.Request()
+    grasp = command.auto_grasp_command
+    grasp.frame_name = BODY_FRAME_NAME
+    x, y, z = handle.p_BH
+    grasp.search_ray_start_in_frame.CopyFrom(geometry_pb2.Vec3(x=0.0, y=y, z=z))
+    grasp.search_ray_end_in_frame.CopyFrom(geometry_pb2.Vec3(x=x + 0.1, y=y, z=z))
+    sides, swings = door_pb2.DoorCommand.HingeSide, door_pb2.DoorCommand.SwingDirection
+    grasp.hinge_side = sides.Value(f"HINGE_SIDE_{'LEFT' if handle.hinge_left else 'RIGHT'}")
+    grasp.swing_direction = swings.Value(f"SWING_DIRECTION_{'PULL' if handle.pull else 'PUSH'}")
+    return command
+
+
+def door_status(number: int) -> CommandStatus:
+    """Returns the protocol's status of a door command, by the number of its feedback."""
+    return _judged(_Door.Status, number, _Door.STATUS_COMPLETED)
 
 
 def _stopped(cause: CommandCause, reason: str) -> CommandStatus:

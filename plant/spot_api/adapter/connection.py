@@ -14,6 +14,7 @@ import bosdyn.client
 import grpc
 from bosdyn.api import estop_pb2, lease_pb2, power_pb2, robot_command_pb2, robot_id_pb2, robot_state_pb2, time_sync_pb2
 from bosdyn.api.docking import docking_pb2
+from bosdyn.api.spot import door_pb2
 
 from plant.spot_api.adapter.statuses import call_trouble, response_trouble, trouble
 from plant.spot_api.messages import seconds
@@ -27,7 +28,12 @@ _ROUND_TRIPS: Final = 5
 _FILES: Final[Mapping[str, str]] = {
     **{name: name.replace("-", "_") for name in ("estop", "image", "lease", "power", "robot-command", "robot-id")},
     **{name: name.replace("-", "_") for name in ("robot-state", "time-sync", "gripper-camera-param")},
-    **{"docking": "docking.docking", "keepalive": "keepalive.keepalive", "manipulation": "manipulation_api"},
+    **{
+        "docking": "docking.docking",
+        "door": "spot.door",
+        "keepalive": "keepalive.keepalive",
+        "manipulation": "manipulation_api",
+    },
     **{"velodyne-point-cloud": "point_cloud", "graph-nav-service": "graph_nav.graph_nav"},
 }
 """Files of the SDK that describe the services that are called, by the names of the services."""
@@ -210,6 +216,16 @@ class Connection:
         """Returns the status of a command to dock or undock. Raises LostError."""
         request = docking_pb2.DockingCommandFeedbackRequest(docking_command_id=number)
         return int(self.call("docking", "DockingCommandFeedback", request, checked=False).status)
+
+    def open_door(self, command: Any) -> int:
+        """Sends a door command; returns the command's number. Raises LostError."""
+        request = door_pb2.OpenDoorCommandRequest(lease=self.lease, door_command=command)
+        return int(self.call("door", "OpenDoor", request).door_command_id)
+
+    def opening(self, number: int) -> int:
+        """Returns the status of a door command. Raises LostError."""
+        answer = self.call("door", "OpenDoorFeedback", door_pb2.OpenDoorFeedbackRequest(door_command_id=number))
+        return int(answer.feedback.status)
 
     def docked(self) -> bool:
         """Returns whether the robot stands on a docking station. Raises LostError."""

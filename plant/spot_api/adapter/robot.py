@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any, Final
@@ -18,7 +18,7 @@ from bosdyn.api import manipulation_api_pb2, robot_state_pb2
 from bosdyn.client.robot_command import RobotCommandBuilder
 
 from plant.spot_api.adapter import commands
-from plant.spot_api.adapter.commands import Sent, SentCommands, docking_status, status_of
+from plant.spot_api.adapter.commands import Sent, SentCommands, docking_status, door_status, status_of
 from plant.spot_api.adapter.connection import Connection, LostError, RobotClock
 from plant.spot_api.adapter.heartbeat import Heartbeat
 from plant.spot_api.adapter.readings import off_path_rad
@@ -31,6 +31,7 @@ from skills.robot import (
     CommandId,
     CommandState,
     CommandStatus,
+    DoorHandle,
     Gripper,
     Image,
     Imu,
@@ -66,8 +67,9 @@ class ApiRobot:
     ) -> None:
         """Reads the robot's first state. The robot keeps `padding_m` from obstacles by itself. Raises LostError."""
         self._name, self._connection, self._clock = name, connection, clock
-        docks, self._padding_m = connection.has("docking"), padding_m
-        self._capabilities = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S, docks=docks)
+        docks, doors = connection.has("docking"), connection.has("door") and capabilities.arm is not None
+        self._padding_m = padding_m
+        self._capabilities = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S, docks=docks, opens_doors=doors)
         self.sensors, self.heartbeat = Sensors(connection, clock, capabilities), Heartbeat(connection)
         self._sent = SentCommands()
         self._unsure: set[str | None] = set()
@@ -183,13 +185,23 @@ class ApiRobot:
         return self._dock(None, until_s, lease)
 
     def _dock(self, station: int | None, until_s: float, lease: Lease) -> CommandId:
-        if (refused := self._objection("dock", lease, until_s)) is not None:
+        end_s = self._clock.robot_time_s() + until_s - self._clock.now()
+        return self._ask("dock", lambda: self._connection.dock(station, end_s), until_s, lease)
+
+    def open_door(self, handle: DoorHandle, *, until_s: float, lease: Lease) -> CommandId:
+        """Opens a door with the arm and walks through."""
+        command = commands.door_command(handle)
+        return self._ask("door", lambda: self._connection.open_door(command), until_s, lease)
+
+    def _ask(self, part: str, call: Callable[[], int], until_s: float, lease: Lease) -> CommandId:
+        """Asks a service of its own for a command; `call` returns the number of the command there."""
+        if (refused := self._objection(part, lease, until_s)) is not None:
             return refused
         try:
-            number = self._connection.dock(station, self._clock.robot_time_s() + until_s - self._clock.now())
+            number = call()
         except LostError as error:
-            return self._lost(error, "dock", "dock")
-        return self._sent.add(Sent(number, "dock", until_s=until_s + _LATE_S))
+            return self._lost(error, part, part)
+        return self._sent.add(Sent(number, part, until_s=until_s + _LATE_S))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory, and holds at its end; done when the robot says so, stopped when it leaves it."""
@@ -310,6 +322,8 @@ class ApiRobot:
             try:
                 if sent.part == "dock":
                     status = docking_status(self._connection.docking(sent.number))
+                elif sent.part == "door":
+                    status = door_status(self._connection.opening(sent.number))
                 else:
                     status = status_of(self._connection.feedback(sent.number).synchronized_feedback, sent.part)
             except LostError as error:

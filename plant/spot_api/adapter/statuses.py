@@ -15,7 +15,7 @@ GOOD: Final = frozenset(
         *("CODE_UNSPECIFIED", "CODE_OK", "STATUS_OK", "STATUS_SUCCESS", "ESTOP_LEVEL_NONE", "STATUS_UNMANAGED"),
         *("STATUS_IN_PROGRESS", "STATUS_PROCESSING", "STATUS_IS_STANDING", "STATUS_IS_SITTING", "STATUS_COMPLETE"),
         *("STATUS_AT_GOAL", "STATUS_APPLYING_FORCE", "PLANNER_STATUS_UNKNOWN", "PLANNER_STATUS_SUCCESS"),
-        *("PLANNER_STATUS_MODIFIED", "STATUS_COMMAND_TIMED_OUT", "STATUS_AT_PREP_POSE"),
+        *("PLANNER_STATUS_MODIFIED", "STATUS_COMMAND_TIMED_OUT", "STATUS_AT_PREP_POSE", "STATUS_COMPLETED"),
     }
 )
 """Names of statuses with which a command goes on, or is done."""
@@ -52,6 +52,9 @@ MEANINGS: Final[Mapping[str, tuple[Cause, str]]] = {
     "STATUS_ERROR_NOT_DOCKED": (Cause.INVALID, "the robot stands on no dock"),
     "STATUS_ERROR_GRIPPER_HOLDING_ITEM": (Cause.BLOCKED, "the gripper holds something; put it down first"),
     "STATUS_ERROR_NOT_AVAILABLE": (Cause.REFUSED, "the robot cannot dock now; let it stand up first"),
+    "STATUS_NOT_DETECTED": (Cause.BLOCKED, "the robot sees no handle there; put it straight before the door"),
+    "STATUS_DOOR_PLANE_NOT_DETECTED": (Cause.BLOCKED, "the robot sees no door there; put it straight before the door"),
+    "STATUS_ROBOT_COMMAND_ERROR": (Cause.REFUSED, "the robot cannot open doors now; let it stand up first"),
     "STATUS_ERROR_SYSTEM": (Cause.FAULT, f"an error within the robot; {_REPORT}"),
     "STATUS_OLD_DOCKING_COMMAND": (Cause.STOPPED, "replaced by another command"),
     **dict.fromkeys(
@@ -64,7 +67,7 @@ MEANINGS: Final[Mapping[str, tuple[Cause, str]]] = {
     "STATUS_COMMAND_OVERRIDDEN": (Cause.STOPPED, "replaced by another command"),
     "STATUS_ROBOT_FROZEN": (Cause.STOPPED, "the robot is frozen; unfreeze it on the tablet"),
     "STATUS_INCOMPATIBLE_HARDWARE": (Cause.UNSUPPORTED, "this robot's hardware cannot do it"),
-    "STATUS_STALLED": (Cause.BLOCKED, "the arm is stalled; look what is in its way"),
+    "STATUS_STALLED": (Cause.BLOCKED, "the arm or the door is stalled; look what is in its way"),
     "PLANNER_STATUS_FAILED": (Cause.BLOCKED, "the robot cannot follow the arm's path"),
     # power
     "STATUS_SHORE_POWER_CONNECTED": (Cause.UNPOWERED, "the charger is connected; unplug it"),

@@ -23,7 +23,7 @@ from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.fault_kinds import VERBS, Effect
 from skills.faults.faulty_robot import Fault, inject_faults
-from skills.robot import ArmTrajectory
+from skills.robot import ArmTrajectory, DoorHandle
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
@@ -93,6 +93,7 @@ class UseAll(Skill):
             robot.point_head(0.1, 0.1, until_s=until_s, lease=lease),
             robot.dock(520, until_s=until_s, lease=lease),
             robot.undock(until_s=until_s, lease=lease),
+            robot.open_door(DoorHandle((1.0, 0.0, 0.5), True, True), until_s=until_s, lease=lease),
         ]
 
     def drive(self):

@@ -15,10 +15,11 @@ from planar_robot import Bench, Box
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.navigate.skill import Navigate, NavigateInputs
+from skills.open_door.arm_door import ArmDoor
 from skills.open_door.http_door import HttpDoor
 from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import Doorway
-from skills.robot import Pose2D
+from skills.robot import CommandCause, CommandId, CommandState, CommandStatus, Pose2D
 from skills.stack import StackError, door_opener
 
 PANEL = Box(7.0, 4.03, 7.9, 4.07, 0.0, 2.0)
@@ -138,3 +139,42 @@ def test_wrong_options_are_refused_at_their_place(given, path, message):
         door_opener(given)
     assert refused.value.path == path
     assert message in refused.value.message
+
+
+# Where the robot stands before a door in a wall along x, whose handle is on its east side -> hinge left, pull.
+@pytest.mark.parametrize(
+    ("here", "p_BH", "hinge_left", "pull"),
+    [
+        (Pose2D(7.45, 5.25, -math.pi / 2), (1.2, 0.35, 0.48), False, False),
+        (Pose2D(7.45, 2.85, math.pi / 2), (1.2, -0.35, 0.48), True, True),
+    ],
+)
+def test_the_handle_is_seen_from_the_side_of_the_robot(here, p_BH, hinge_left, pull):
+    door = ArmDoor((7.8, 4.05, 1.0), -math.pi / 2)
+    handle = door.handle_from(here, 0.52, (7.45, 4.05))
+    assert handle.p_BH == pytest.approx(p_BH)
+    assert (handle.hinge_left, handle.pull) == (hinge_left, pull)
+
+
+def test_a_robot_that_opens_no_doors_says_so():
+    _, step = run(OpenDoor, INPUTS, ArmDoor((7.8, 4.05, 1.0), 0.0))
+    assert (step.cause, step.message) == (
+        Cause.PRECONDITION,
+        "this robot cannot open the door between corridor and kitchen with an arm",
+    )
+
+
+# How the door command ends -> the skill's last step.
+@pytest.mark.parametrize(
+    ("state", "cause", "ends"),
+    [(CommandState.DONE, None, None), (CommandState.STOPPED, CommandCause.BLOCKED, Cause.EXECUTION)],
+)
+def test_a_robot_with_an_arm_opens_the_door_itself(state, cause, ends):
+    bench, handles = Bench(BEFORE, unmapped=[PANEL]), []
+    capabilities = dataclasses.replace(bench.robot.capabilities(), opens_doors=True)
+    bench.robot.capabilities = lambda: capabilities
+    bench.robot.open_door = lambda handle, **_: handles.append(handle) or CommandId(99)
+    bench.robot.command_status = lambda _: CommandStatus(state, "the door is stalled", cause)
+    _, step = run(OpenDoor, INPUTS, ArmDoor((7.8, 4.05, 1.0), -math.pi / 2), bench)
+    assert handles[0].pull is False
+    assert getattr(step, "cause", None) is ends, step

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlantConfig
 from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
 from plant.robots.robot_kind import PlacedRobot
-from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, Pose2D
+from skills.robot import ArmTrajectory, CommandCause, CommandState, DoorHandle, LeaseError, Pose2D
 
 
 @pytest.fixture
@@ -109,6 +109,10 @@ def test_a_lease_of_an_earlier_start_does_not_count(engine, spot, lease):
         (lambda spot, lease: spot.point_head(0.0, 0.0, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
         (lambda spot, lease: spot.dock(520, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
         (lambda spot, lease: spot.undock(until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
+        (
+            lambda spot, lease: spot.open_door(DoorHandle((1.0, 0.0, 0.5), True, True), until_s=9.0, lease=lease),
+            CommandCause.UNSUPPORTED,
+        ),
         (lambda spot, lease: spot.sit(until_s=0.0, lease=lease), CommandCause.LATE),
         (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 3.0), until_s=0.2, lease=lease), CommandCause.LATE),
         (lambda spot, lease: spot.drive(0.1, 0.0, 0.0, until_s=0.2, lease=lease), CommandCause.NONE),

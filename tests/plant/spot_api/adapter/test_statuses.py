@@ -17,6 +17,7 @@ from bosdyn.api import (
 )
 from bosdyn.api.docking import docking_pb2
 from bosdyn.api.keepalive import keepalive_pb2
+from bosdyn.api.spot import door_pb2
 
 from plant.spot_api.adapter.commands import Sent, SentCommands, status_of
 from plant.spot_api.adapter.statuses import CODES, GOOD, MEANINGS, call_trouble, response_trouble, trouble
@@ -26,6 +27,8 @@ READ = (
     header_pb2.CommonError.Code,
     docking_pb2.DockingCommandResponse.Status,
     docking_pb2.DockingCommandFeedbackResponse.Status,
+    door_pb2.OpenDoorCommandResponse.Status,
+    door_pb2.DoorCommand.Feedback.Status,
     lease_pb2.LeaseUseResult.Status,
     lease_pb2.AcquireLeaseResponse.Status,
     lease_pb2.TakeLeaseResponse.Status,

@@ -1,0 +1,95 @@
+"""Spot's own door command through the adapter: its message, its feedback, and a robot without that service."""
+
+import pytest
+from bosdyn.api import basic_command_pb2
+from bosdyn.api.spot import door_pb2
+
+from plant.robots.spot.kind import spot_capabilities
+from skills.robot import CommandCause, CommandState, DoorHandle
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import LockStep
+
+HANDLE = DoorHandle((1.2, -0.35, 0.5), hinge_left=True, pull=False)
+PROCESSING = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_PROCESSING
+STATUS = door_pb2.DoorCommand.Feedback.Status
+
+
+def scripted():
+    clock = VirtualClock()
+    return ScriptedRobot(clock, capabilities=spot_capabilities()), clock
+
+
+@pytest.fixture
+def step(credentials):
+    made = LockStep(scripted, credentials)
+    made.lease = made.robot.acquire_lease("test")
+    made.connection.power(True)
+    assert made.until(lambda: made.robot.powered)
+    yield made
+    made.close()
+
+
+class DoorService:
+    """Door service that notes the commands, and gives one status as feedback after `after` calls for it."""
+
+    def __init__(self, ends_with, after=3):
+        self.commands, self.asked, self.ends_with, self.after = [], 0, ends_with, after
+
+    def OpenDoor(self, request, timeout):
+        self.commands.append(request)
+        return door_pb2.OpenDoorCommandResponse(status=door_pb2.OpenDoorCommandResponse.STATUS_OK, door_command_id=7)
+
+    def OpenDoorFeedback(self, request, timeout):
+        assert request.door_command_id == 7
+        self.asked += 1
+        status = self.ends_with if self.asked >= self.after else STATUS.Value("STATUS_IN_PROGRESS")
+        answer = door_pb2.OpenDoorFeedbackResponse(status=PROCESSING)
+        answer.feedback.status = status
+        return answer
+
+
+def opened(step, service):
+    """Opens a door by a service; returns the last status."""
+    step.connection._stubs["door"] = service
+    command = step.robot.open_door(HANDLE, until_s=step.now() + 30.0, lease=step.lease)
+    assert step.until(lambda: step.robot.command_status(command).state is not CommandState.RUNNING, 40.0)
+    return step.robot.command_status(command)
+
+
+def test_a_robot_with_arm_and_door_service_opens_doors(step):
+    assert step.robot.capabilities().opens_doors
+
+
+def test_the_command_searches_the_handle_before_the_robot_and_pushes(step):
+    service = DoorService(STATUS.Value("STATUS_COMPLETED"))
+    assert opened(step, service).state is CommandState.DONE
+    (request,) = service.commands
+    grasp = request.door_command.auto_grasp_command
+    assert grasp.frame_name == "body"
+    end = grasp.search_ray_end_in_frame
+    assert (end.x, end.y, end.z) == pytest.approx((1.3, -0.35, 0.5))
+    assert door_pb2.DoorCommand.HingeSide.Name(grasp.hinge_side) == "HINGE_SIDE_LEFT"
+    assert door_pb2.DoorCommand.SwingDirection.Name(grasp.swing_direction) in (
+        "SWING_DIRECTION_PUSH",
+        "SWING_DIRECTION_OUTSWING",
+    )
+    assert request.lease.resource == "body"
+
+
+@pytest.mark.parametrize("status", ["STATUS_STALLED", "STATUS_NOT_DETECTED"])
+def test_a_door_that_is_stalled_or_not_seen_stops_the_command(step, status):
+    ended = opened(step, DoorService(STATUS.Value(status)))
+    assert (ended.state, ended.cause) == (CommandState.STOPPED, CommandCause.BLOCKED)
+
+
+def test_the_door_command_needs_the_lease(step):
+    step.robot.return_lease(step.lease)
+    command = step.robot.open_door(HANDLE, until_s=step.now() + 30.0, lease=step.lease)
+    assert step.robot.command_status(command).cause is CommandCause.NO_LEASE
+
+
+def test_a_server_without_doors_refuses_the_command_plainly(step):
+    command = step.robot.open_door(HANDLE, until_s=step.now() + 30.0, lease=step.lease)
+    refused = step.robot.command_status(command)
+    assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.UNSUPPORTED), refused

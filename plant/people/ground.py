@@ -79,7 +79,7 @@ class Ground:
         self, from_W: Point, least_m: float, clear_m: float, rng: np.random.Generator, count: int
     ) -> Iterator[Point]:
         """Draws up to `count` points with a clearance (m), at least so far from a point, in the part that holds it."""
-        _, parts = cv2.connectedComponents((self._clearance_m >= SHOULDERS_M).astype(np.uint8))
+        _, parts = cv2.connectedComponents((self._clearance_m >= LEAST_M).astype(np.uint8))
         row, column = self._cell(from_W)
         cells = np.argwhere((parts == parts[row, column]) & (self._clearance_m >= clear_m))
         for _ in range(count if len(cells) else 0):

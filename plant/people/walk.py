@@ -129,14 +129,13 @@ class Walk(
     def take_detour(self, corners_W: tuple[Point, ...], *, passing: bool = True) -> None:
         """Replaces the rest of the path by another to its end, `passing` close by what is in the way."""
         pause_s = (self._detour[0] if self._detour is not None else self._legs[self._leg]).pause_s
-        self.take_path(corners_W, pause_s)
-        self._passing = passing
+        self.take_path(corners_W, pause_s, passing=passing)
 
-    def take_path(self, corners_W: tuple[Point, ...], pause_s: float = 0.0) -> None:
-        """Replaces the present path by another."""
+    def take_path(self, corners_W: tuple[Point, ...], pause_s: float = 0.0, *, passing: bool = False) -> None:
+        """Replaces the present path by another, perhaps `passing` close by what is in the way."""
         leg = Leg(corners_W, pause_s)
         self._detour, self._done_m = (leg, leg.lengths_m()), 0.0
-        self._asides, self._passing = (), False
+        self._asides, self._passing = (), passing
 
     def drop_path(self) -> None:
         """Ends the given path where the person stands."""

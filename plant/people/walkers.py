@@ -39,7 +39,7 @@ PATIENCE_S = 4.0
 """A person who has waited this long looks for another path, and again after the same time."""
 PASS_M = 0.22
 """On a detour, a person stops only for an outline nearer than this."""
-APART_M, PASS_APART_M = 0.8, 0.45
+APART_M, PASS_APART_M = 0.8, 0.42
 """People who keep apart stop for the centre of a person ahead nearer than this; on a detour, than the second."""
 STEPS_M = 0.15
 DOOR_M = 0.6
@@ -54,7 +54,7 @@ PLAN_S = 0.7
 """Time between two paths of a person who follows a robot."""
 WANDERS_M, WANDERER_CLEAR_M, PAUSES_S = 2.0, 0.45, (0.5, 4.0)
 _DRAWS = 20
-_BODY_OUTLINE_M = 0.2 * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+_BODY_OUTLINE_M = 0.12 * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
 Barriers = Sequence[tuple[Point, Point]]
 """Ends (x, y) of each doorway whose door is not open."""
@@ -143,10 +143,12 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         if walk.done and route.says is not None and name not in self._spoke:
             self._speak(name, walk, route.says)
         if walk.done and route.wanders and self._plans_now(name):
-            ground = self._blocked_ground(())
+            near = [*self._around(name, walk)]
+            ground = self._blocked_ground(near)
             rng = np.random.default_rng([*route.stream, round(self._now_s / PLAN_S)])
             goals_W = ground.free_points(walk.place_W, WANDERS_M, WANDERER_CLEAR_M, rng, _DRAWS)
-            any(self._set_off(walk, ground, goal_W, pause_s=float(rng.uniform(*PAUSES_S))) for goal_W in goals_W)
+            pause_s, passing = float(rng.uniform(*PAUSES_S)), bool(near)
+            any(self._set_off(walk, ground, goal_W, pause_s=pause_s, passing=passing) for goal_W in goals_W)
         return True
 
     def _plans_now(self, name: str) -> bool:
@@ -163,14 +165,21 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             self._say(name, words)
 
     def _set_off(
-        self, walk: Walk, ground: Ground, goal_W: Point, *, pause_s: float = 0.0, short_m: float = 0.0
+        self,
+        walk: Walk,
+        ground: Ground,
+        goal_W: Point,
+        *,
+        pause_s: float = 0.0,
+        short_m: float = 0.0,
+        passing: bool = False,
     ) -> bool:
         """Gives a person a path that ends short of a goal; returns whether there is one."""
         with contextlib.suppress(WorldError):
             path = Leg(ground.plan_path(walk.place_W, goal_W, who="somebody"), pause_s)
             length_m = path.lengths_m()[-1]
             if length_m > short_m:
-                walk.take_path(path.part(0.0, length_m - short_m), pause_s)
+                walk.take_path(path.part(0.0, length_m - short_m), pause_s, passing=passing)
                 return True
         return False
 
@@ -198,14 +207,23 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         walk.held_s = 0.0
         if walk.turn_round():
             return
-        people = self._people_near(name, walk) if self._routes[name].apart else ()
-        near = [*self._outlines_W(walk), *(np.array(at_W) + _BODY_OUTLINE_M for at_W in people)]
+        if self._routes[name].wanders and any(self._people_near(name, walk)):
+            walk.drop_path()
+            return
+        near = [*self._around(name, walk)]
         with contextlib.suppress(WorldError):
             path = self._blocked_ground(near).plan_path(walk.place_W, walk.next_stop_W, who=name)
             walk.take_detour(path, passing=bool(near))
             return
         if self._routes[name].wanders:
             walk.drop_path()
+
+    def _around(self, name: str, walk: Walk) -> Iterator[FloatArray]:
+        """Outlines (K, 2) of the robots and, if the person keeps apart, the people close around a person."""
+        yield from self._outlines_W(walk)
+        for other, there in self._walks.items() if self._routes[name].apart else ():
+            if other != name and math.dist(there.place_W, walk.place_W) < APART_M:
+                yield np.array(there.place_W) + _BODY_OUTLINE_M
 
     def _patience_s(self, name: str, walk: Walk) -> float:
         """Time for which a person waits before looking for another path: of two people, the first by name less."""

@@ -50,3 +50,11 @@ def test_a_missing_path_is_reported_with_both_ends():
     box = [np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], dtype=float) for x0, y0, x1, y1 in sides]
     with pytest.raises(WorldError, match=r"Kim finds no path from \(0, 0\) to \(4, 0\)"):
         Ground(box, (A, B)).plan_path(A, B, who="Kim")
+
+
+def test_free_points_are_drawn_for_a_person_who_is_hemmed_in():
+    ground = Ground(WALL, (A, B))
+    points = list(ground.free_points((1.67, 0.0), 1.0, 0.5, np.random.default_rng(3), 20))
+    assert len(points) > 10
+    assert all(math.dist(point, (1.67, 0.0)) >= 1.0 for point in points)
+    assert all(shapely.Point(point).distance(shapely.Polygon(WALL[0])) > 0.4 for point in points)

@@ -5,7 +5,7 @@ fetch a drink       fulfilled, as in process (nightly)
 graph_nav           localised by the robot, fulfilled (nightly)
 navigation          by the API, within 0.2 m
 cut for 4.5 s       paused; goes on by itself (nightly)
-lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run
+lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run (nightly)
 """
 
 from contextlib import ExitStack
@@ -170,6 +170,7 @@ def test_a_run_whose_robot_is_silent_for_a_while_goes_on_by_itself(tmp_path):
 
 
 @pytest.mark.mission
+@pytest.mark.nightly
 def test_a_run_whose_lease_is_taken_goes_on_when_the_operator_resumes_it(tmp_path):
     control = Control(attended=True, pace=None)
     tablets = []

@@ -26,8 +26,8 @@ BUDGETS = {
 
 
 @pytest.mark.mission
-def test_a_fetch_keeps_its_budgets(repeated):
-    out, report = repeated
+def test_a_fetch_keeps_its_budgets(recorded):
+    out, report, _ = recorded
     work = report["work"]
     logged = [event.data for event in read_events(out / "log.mcap") if event.topic == "work"]
     assert logged == [work]

@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 8240,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8404,
+    "executive/tree": 8432,
     "executive/run": 3218,
     "executive/record": 1412,
     "executive/store": 1666,

@@ -13,7 +13,7 @@ from py_trees.behaviour import Behaviour
 from py_trees.common import Status
 
 from executive.tree.behaviour import ExplainedLeaf, cause_of, message_of
-from executive.tree.board import FromBoard, FromBoardOr, PlaceOf
+from executive.tree.board import Constant, FromBoard, FromBoardOr, PlaceOf
 from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import goal_in_words, goal_pose
@@ -26,12 +26,13 @@ from executive.tree.plan import PlanBuilder, pose_2d
 from executive.words.command import SPEAKER, START, Command, Task
 from executive.words.expression import Template, Value
 from executive.words.knowledge import ANYBODY, Knowledge, Place
-from executive.words.outlines import inside
+from executive.words.outlines import distance_m, inside
 from skills.api import Cause, Failed, ObjectObservation
 from skills.quantities import Coordinate
 from skills.robot import Pose2D
 
 MOST_PEOPLE: Final = 12
+NEAR_ROOM_M: Final = 1.2
 ANSWER_WITHIN_S: Final = 12.0
 """Time for the answer to "Are you Robin?"."""
 STILL_NEAR_M: Final = 3.5
@@ -189,6 +190,25 @@ class EachInTurn(ForEachFound):
         return f"{self.did[0]} {people} {'person' if people == 1 else 'people'} {self.where}"
 
 
+class NearRoom(ExplainedLeaf):
+    """Leaf that checks that the robot is in a room, or at most `NEAR_ROOM_M` from it, so that it sees who is there.
+
+    SUCCESS if it is, else FAILURE with EXECUTION.
+    """
+
+    kind = "near room"
+    area: Constant | FromBoard
+    context: RunContext
+
+    def update(self) -> Status:
+        """Compares the robot's pose with the outline."""
+        area, pose = self.area.read(self.context.board), self.context.pose()
+        here = (pose.x_m, pose.y_m)
+        if inside(area, here) or distance_m(area, here) <= NEAR_ROOM_M:
+            return self.say("looks from here")
+        return self.fail(Failed(Cause.EXECUTION, "the robot is not near the room"))
+
+
 class NextRoom(ExplainedLeaf):
     """Leaf that chooses the nearest of `places` whose turn is not `over`, and writes its name, pose and outline.
 
@@ -273,7 +293,7 @@ def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -
         "next room", "the next room", part="next", places=places, room=room, pose=pose, area=area, over=over
     )
     ports: dict[str, object] = {"place": FromBoard(room), "area_W": FromBoard(area)}
-    drive = builder.navigate(FromBoard(pose), "the next room")
+    drive = _to_room(builder, FromBoard(pose), FromBoard(area), "the next room")
     visit = builder.sequence(
         "look there", drive, _meet_one_plan(builder.at("there"), person, ports, expected=False), part="visit"
     )
@@ -314,9 +334,17 @@ def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], 
 
 
 def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
-    """Goes to a room, or to another place in it where somebody stands at its pose; then does something there."""
-    drive = go_near_plan(builder, pose_2d(builder.knowledge.places[room].pose), f"the {room}")
+    """Goes to a room, and does something there."""
+    place = builder.knowledge.places[room]
+    drive = _to_room(builder, pose_2d(place.pose), Constant(place.polygon), f"the {room}")
     return builder.sequence(f"in the {room}", drive, then)
+
+
+def _to_room(builder: PlanBuilder, pose: Pose2D | FromBoard, area: Constant | FromBoard, to: str) -> NodeSpec:
+    """Goes to a pose in a room; where somebody stands there or in the door, as near as that."""
+    near = builder.node("near room", f"is {to} near?", part="near", area=area)
+    once = builder.at("once").skill("navigate", {"goal": pose})
+    return builder.node("selector", f"go to {to}", once, near, builder.navigate(pose, to), part="to-room")
 
 
 def _each_person(

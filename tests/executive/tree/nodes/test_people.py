@@ -113,6 +113,27 @@ def test_a_person_who_is_not_in_the_usual_room_is_looked_for_in_the_nearest_othe
     assert len(drives) == len(set(drives))
 
 
+def test_robot_looks_from_the_door_where_somebody_stands_at_the_rooms_pose(result_of, there, script, robot):
+    there["Robin"] = (4.0, 1.0, "kitchen")
+    drive = script.ends["navigate"]
+
+    def blocked(skill):
+        if (skill.inputs.goal.x_m, skill.inputs.goal.y_m) != ROOMS["kitchen"]:
+            return drive(skill)
+        robot.standing = Pose2D(3.4, 0.0, 0.0)
+        return Failed(Cause.PLANNING, "the goal is blocked")
+
+    script.ends["navigate"] = blocked
+    assert result_of(TO_ROBIN).outcome is Outcome.SUCCESS
+    assert script.begun.count("clear_costmap") == 0
+
+
+def test_a_room_that_cannot_be_reached_is_the_cause(result_of, there, script):
+    script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "the door is closed")
+    result = result_of("Take [Nothing] to [kitchen] and do [greet] to [some person]")
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.PLANNING)
+
+
 def test_robot_says_that_the_person_is_not_found_when_all_others_say_no(result_of, there):
     there |= {"Sam": (1.0, 0.0, "hall"), "Maya": (4.0, 1.0, "kitchen")}
     result = result_of(TO_ROBIN)

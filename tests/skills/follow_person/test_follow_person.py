@@ -70,7 +70,8 @@ class Walk:
         """One tick of everybody; returns the skill's step."""
         now_s, boxes = self.bench.clock.now(), self.bench.robot.boxes
         boxes[:] = [box for box in boxes if box != person_at(self.x_m, LANE_M)]
-        self.x_m = min(self.to_m, self.x_m + (0.05 * self.speed_m_s if now_s > 3.0 else 0.0))
+        step_m = 0.05 * self.speed_m_s if now_s > 3.0 else 0.0
+        self.x_m += math.copysign(min(abs(step_m), abs(self.to_m - self.x_m)), step_m)
         if not self.gone_s <= now_s < self.back_s:
             boxes.append(person_at(self.x_m, LANE_M))
         self.bench.tick()
@@ -132,6 +133,20 @@ def test_a_lost_person_is_searched_and_asked_for_before_the_skill_fails():
 def test_the_time_limit_ends_the_skill():
     step = Walk(time_limit_s=5.0, until_W=END, until="kitchen").run()
     assert isinstance(step, Failed) and step.cause is Cause.TIMEOUT
+
+
+def test_robot_goes_aside_for_a_person_who_comes_back():
+    walk = Walk(to_m=5.5)
+    while walk.bench.clock.now() < 8.0:
+        walk.tick()
+    walk.to_m, walk.speed_m_s = 0.6, -0.6
+    while walk.x_m > 2.0 and walk.bench.clock.now() < 25.0:
+        here = walk.bench.robot.pose
+        blocked = 0.0 < walk.x_m - here.x_m < 1.3 and abs(here.y_m - LANE_M) < 0.6
+        walk.speed_m_s = 0.0 if blocked else -0.6
+        walk.tick()
+    assert walk.x_m <= 2.0
+    assert min(walk.distances_m) > 0.6
 
 
 @pytest.mark.parametrize(("answer", "outcome"), [("yes", Succeeded), ("no", Failed)])

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29791,
+    "skills": 29794,
     "plant": 22034,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

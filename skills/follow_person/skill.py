@@ -16,6 +16,7 @@ from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clea
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company
+from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
@@ -62,7 +63,7 @@ class FollowPersonOptions:
     search_s: Delay = 20.0
     hearing_m: Length = 2.8
     answer_s: Delay = 5.0
-    doors: Tries = 2
+    doors: Tries = 3
     tries: Tries = 8
     max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
@@ -349,20 +350,22 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
 
     def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:
-        """Poses behind the doors where the person may have gone, the likeliest first."""
-        seen_W, heading = np.array(target.seen.place_W), np.array(target.seen.velocity_W)
-        heading = heading / max(float(np.linalg.norm(heading)), 1e-3)
+        """Poses behind the doors where the person may have gone: from room to room, each time the likeliest door."""
+        place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*self.context.doors]
 
-        def unlikely(middle_W: tuple[float, float]) -> float:
-            off = np.array(middle_W) - seen_W
-            return float(np.linalg.norm(off) - 1.5 * off @ heading / max(float(np.linalg.norm(off)), 1e-3))
+        def unlikely_m(door: Doorway) -> float:
+            off = np.array(door.middle_W) - place_W
+            along = float(off @ heading) / max(float(np.linalg.norm(off) * np.linalg.norm(heading)), 1e-3)
+            return float(np.linalg.norm(off)) - 1.5 * along
 
-        for door in sorted(self.context.doors, key=lambda door: unlikely(door.middle_W))[: self.options.doors]:
-            through = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
-            here = self.context.pose()
-            through *= math.copysign(1.0, float((np.array(door.middle_W) - (here.x_m, here.y_m)) @ through))
-            yaw = math.atan2(through[1], through[0])
-            beyond = [(*(np.array(door.middle_W) + far_m * through), yaw) for far_m in (1.0, 1.4, 0.7)]
+        for _ in range(min(self.options.doors, len(left))):
+            door = min(left, key=unlikely_m)
+            left.remove(door)
+            here, middle_W = self.context.pose(), np.array(door.middle_W)
+            heading = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
+            heading *= math.copysign(1.0, float((middle_W - (here.x_m, here.y_m)) @ heading))
+            yaw, place_W = math.atan2(heading[1], heading[0]), middle_W + heading
+            beyond = [(*(middle_W + far_m * heading), yaw) for far_m in (1.0, 1.4, 0.7)]
             if (pose := self._free(np.array(beyond))) is not None:
                 yield pose
 

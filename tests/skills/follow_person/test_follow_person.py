@@ -3,12 +3,16 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from planar_people import PeopleDetector, person_at
 from planar_robot import Bench
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.follow_person.skill import FollowPerson, FollowPersonOptions
+from skills.follow_person.target import Target, TargetOptions
+from skills.perception.doorway import Doorway
+from skills.perception.people import SeenPerson
 from skills.ports import FollowPersonInputs
 from skills.robot import Pose2D
 
@@ -154,6 +158,15 @@ def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(a
     walk = Walk(to_m=5.5, gone_s=6.0, back_s=10.0, answer=answer, place_W=(3.2, LANE_M), until_W=END)
     assert isinstance(walk.run(), outcome)
     assert walk.questions == ["Are you Robin?"]
+
+
+def test_the_search_goes_from_room_to_room_through_the_nearest_doors():
+    walk = Walk()
+    doors = (Doorway((6.0, 5.4), 1.0, 0.0), Doorway((7.5, 5.4), 1.0, 0.0), Doorway((1.0, 5.4), 1.0, 0.0))
+    walk.skill.context = replace(walk.skill.context, doors=doors)
+    seen = SeenPerson((4.0, LANE_M), 0.01 * np.eye(2), 1.0, 0.0, START, velocity_W=(0.6, 0.0))
+    poses = list(walk.skill._poses_beyond_doors(Target(seen, START, TargetOptions())))
+    assert [round(pose.x_m, 1) for pose in poses[:2]] == [7.0, 8.5]
 
 
 @pytest.mark.parametrize("at_s", [0.6, 4.0, 9.5])

@@ -75,6 +75,15 @@ class Ground:
             raise WorldError(f"{who} finds no path from {_text(start_W)} to {_text(goal_W)}; choose other waypoints")
         return self._shortened((start_W, *cells, goal_W))
 
+    def plan_on(self, start_W: Point, goal_W: Point, *, who: str) -> tuple[Point, ...]:
+        """Plans as `plan_path`, for a person who may stand too close to something now and steps away first."""
+        if self._clear_m(np.array([start_W]))[0] >= LEAST_M:
+            return self.plan_path(start_W, goal_W, who=who)
+        cells = np.argwhere(self._clearance_m >= SHOULDERS_M)
+        row, column = cells[int(np.argmin(np.hypot(*(cells - self._cell(start_W)).T)))]
+        x, y = (np.array([column, row]) + 0.5) * _CELL_M + self._low
+        return (start_W, *self.plan_path((float(x), float(y)), goal_W, who=who))
+
     def free_points(
         self, from_W: Point, least_m: float, clear_m: float, rng: np.random.Generator, count: int
     ) -> Iterator[Point]:

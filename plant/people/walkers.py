@@ -176,7 +176,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
     ) -> bool:
         """Gives a person a path that ends short of a goal; returns whether there is one."""
         with contextlib.suppress(WorldError):
-            path = Leg(ground.plan_path(walk.place_W, goal_W, who="somebody"), pause_s)
+            path = Leg(ground.plan_on(walk.place_W, goal_W, who="somebody"), pause_s)
             length_m = path.lengths_m()[-1]
             if length_m > short_m:
                 walk.take_path(path.part(0.0, length_m - short_m), pause_s, passing=passing)
@@ -212,7 +212,7 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             return
         near = [*self._around(name, walk)]
         with contextlib.suppress(WorldError):
-            path = self._blocked_ground(near).plan_path(walk.place_W, walk.next_stop_W, who=name)
+            path = self._blocked_ground(near).plan_on(walk.place_W, walk.next_stop_W, who=name)
             walk.take_detour(path, passing=bool(near))
             return
         if self._routes[name].wanders:

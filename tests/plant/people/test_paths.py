@@ -52,6 +52,15 @@ def test_a_missing_path_is_reported_with_both_ends():
         Ground(box, (A, B)).plan_path(A, B, who="Kim")
 
 
+def test_a_person_close_to_a_wall_steps_away_first():
+    ground, close = Ground(WALL, (A, B)), (1.8, 0.0)
+    with pytest.raises(WorldError, match="Kim cannot stand"):
+        ground.plan_path(close, A, who="Kim")
+    path = ground.plan_on(close, A, who="Kim")
+    assert path[0] == close and path[-1] == A
+    assert clearance_m(path[1:], WALL) > SHOULDERS_M - 0.06
+
+
 def test_free_points_are_drawn_for_a_person_who_is_hemmed_in():
     ground = Ground(WALL, (A, B))
     points = list(ground.free_points((1.67, 0.0), 1.0, 0.5, np.random.default_rng(3), 20))

@@ -107,11 +107,11 @@ class DoorWatch:
         self._clear(old)
         return bool(old)
 
-    def costmap(self, costmap: FreeSpace) -> FreeSpace:
-        """The costmap with the closed doors as obstacles."""
-        if not (closed := self.closed):
+    def costmap(self, costmap: FreeSpace, doors: Sequence[Doorway] | None = None) -> FreeSpace:
+        """The costmap with the closed doors, or with `doors`, as obstacles."""
+        if not (panelled := self.closed if doors is None else doors):
             return costmap
-        turns = [(door, door.through_rad) for door in closed]
+        turns = [(door, door.through_rad) for door in panelled]
         panels = [(np.array(d.middle_W), np.array([-np.sin(a), np.cos(a)]), d.width_m) for d, a in turns]
         return with_segments(costmap, panels, _PANEL_M)
 
@@ -162,6 +162,13 @@ class DoorWatch:
             return ()
         regions = self.regions(footprint, here, goals, people_W)
         return regions.doors_between(self.closed) if regions.cut_off else ()
+
+    def doors_on_path(self, footprint: Footprint, here: Pose2D, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
+        """The closed doors through which a path would lead to the goals; others may lead there, too."""
+        doors, free = self._context.doors, self._context.free_space()
+        doors_W = np.array([door.middle_W for door in doors]).reshape(-1, 2)
+        regions = Regions(self.costmap(free, doors), footprint, here, goals, np.empty((0, 2)), doors_W)
+        return tuple(door for door in regions.doors_between(doors) if door in self.closed)
 
 
 class Regions:

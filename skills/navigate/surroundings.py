@@ -306,10 +306,13 @@ class Surroundings:
         ahead_m = np.concatenate([[0.0], progress_m(on_path)[::2]])
         return replace(pace, most_m_s=min(pace.most_m_s, self._zones.speed_m_s(self.footprint, poses, ahead_m)))
 
-    def closed_doors(self, goals: Sequence[Pose2D]) -> tuple[Doorway, ...]:
-        """The closed doors that leave no path to any of the goals."""
+    def closed_doors(self, goals: Sequence[Pose2D], *, on_path: bool = False) -> tuple[Doorway, ...]:
+        """The closed doors that leave no path to any of the goals, or (`on_path`) that a path would lead through."""
+        here = self._context.pose()
+        if on_path and self.doors.closed:
+            return self.doors.doors_on_path(self.footprint, here, goals)
         people_W = [one.place_W for one in self.persons()]
-        return self.doors.blocking_doors(self.footprint, self._context.pose(), goals, people_W)
+        return self.doors.blocking_doors(self.footprint, here, goals, people_W)
 
     def cut_off(self, goals: Sequence[Pose2D]) -> bool:
         """Returns whether all goals are certainly out of reach."""

@@ -203,7 +203,7 @@ class TripPlanning:
         """Waits for people, robots or doors, or looks again. Raises SkillFailure at the limits of the options."""
         robot = self._robot_may_go()
         may_go = robot or self._people_may_go()
-        if not robot and (self._waits_for_doors() or self._plans_detour()):
+        if not robot and (self._waits_for_doors(may_go) or self._plans_detour()):
             return
         self._replans += not may_go
         if self._replans < self._options.replans and self._around.doors.forget_distant(self._context.pose()):
@@ -224,12 +224,13 @@ class TripPlanning:
         if robot and not self._map_leads and isinstance(self._context.costmap, ClearableCostmap):
             self.ask(map_alone=True)
 
-    def _waits_for_doors(self) -> bool:
+    def _waits_for_doors(self, may_go: bool) -> bool:
         """Returns whether to go to closed doors that leave no path, or to wait for them; calls their plug-ins.
 
         Raises SkillFailure once patience is over.
         """
-        doors, options = self._around.closed_doors(self._goals), self._options.doors
+        options, no_detour = self._options.doors, self._detours and not may_go
+        doors = self._around.closed_doors(self._goals, on_path=no_detour)
         if not doors:
             return False
         if self._around.doors.doubt(doors):

@@ -212,3 +212,9 @@ def test_a_table_of_sentences_is_scored(measure):
 def test_objects_close_together_are_told_apart():
     result = result_of("touching", "--scenes", 2, "--seed", 4800)
     assert result["all"]["objects"] > 4 and result["all"]["found"] > 0.5, result
+
+
+@pytest.mark.nightly
+def test_a_room_behind_closed_doors_is_given_up(tmp_path):
+    result = result_of("closed_doors", "--first", 9853, "--count", 1, "--out", tmp_path)
+    assert (result["named"], result["given_up_late"]) == (1, []), result

@@ -113,6 +113,13 @@ def test_only_doors_that_block_every_path_are_reported():
     assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN, Pose2D(9.0, 5.5, 0.0))) == ()
 
 
+def test_closed_doors_on_a_path_count_though_others_may_lead_there():
+    bench, doors = watch(RIGHT_PANEL)
+    footprint = Footprint.of(bench.robot.capabilities())
+    assert doors.doors_on_path(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
+    assert doors.doors_on_path(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
+
+
 def test_behind_a_closed_door_the_failure_is_final_and_names_the_door():
     bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
     step = go(bench, KITCHEN)

@@ -6,7 +6,6 @@ from typing import ClassVar
 
 from skills.api import Cause, Part, Running, Succeeded
 from skills.check_door.skill import CheckDoorInputs
-from skills.navigate.cut_off import DoorWatch
 from skills.open_door.arm_door import ArmDoor
 from skills.open_door.calls import DoorCalls
 from skills.perception.doorway import DoorState, Doorway
@@ -42,6 +41,8 @@ class OpenDoor(RoutineSkill[CheckDoorInputs]):
 
     def run(self, inputs: CheckDoorInputs) -> Routine[Succeeded]:
         """Calls the plug-in, and waits for the door."""
+        from skills.navigate.cut_off import DoorWatch  # OpenCV takes its time; trees are compiled without it
+
         context, begun_s = self.context, self.context.clock.now()
         door = next((each for each in context.doors if each.middle_W == inputs.middle_W), None)
         if door is None or door.opener is None:

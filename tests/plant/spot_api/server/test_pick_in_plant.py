@@ -33,8 +33,9 @@ pytestmark = pytest.mark.mission
 
 
 @pytest.fixture
-def at_the_table(credentials):
+def at_the_table(credentials, monkeypatch):
     """A robot before the kitchen table, the server's calls on it, and the simulation; nothing runs by itself."""
+    monkeypatch.setattr("plant.spot_api.server.leases.STALE_S", math.inf)  # wall time: a slow step is no silent client
     world = open_world("flat")
     simulation = simulate(world, {"Alice": only_robot("Alice", world, seed=1, start=START)}, seed=1, record=False)
     robot = simulation.robots["Alice"]

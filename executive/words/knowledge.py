@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -81,7 +81,7 @@ class Door(_Facts):
     between: tuple[str, str] = Field(description="the rooms on its two sides")
     at: Corner = Field(description="its middle (x, y)")
     width: Opening = Field(description="clear width, m")
-    opens: dict[str, str | float | bool] | None = Field(
+    opens: dict[str, Any] | None = Field(
         default=None, description="the plug-in that opens it and its options, as `{plugin: http, url: ..}`"
     )
 

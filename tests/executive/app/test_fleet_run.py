@@ -110,6 +110,9 @@ class Fleet:
     def show_live(self):
         return None
 
+    def visitors(self, control):
+        return ()
+
     def leave(self, artifacts, out):
         return None
 

@@ -77,7 +77,8 @@ def test_a_check_imports_nothing_that_understands_sentences_and_no_skill_that_de
     language, skills = (line.split() for line in run.stdout.splitlines()[-2:])
     assert language == ["executive.language.parser", "executive.language.questions"]
     assert skills == [
-        f"skills.{name}.skill" for name in ("charge", "check_door", "clear_costmap", "locate_dock", "speak")
+        f"skills.{name}.skill"
+        for name in ("charge", "check_door", "clear_costmap", "locate_dock", "open_door", "speak")
     ]
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-MOST_TO_THE_FIRST_TICK = 29
+MOST_TO_THE_FIRST_TICK = 32
 MOST_TO_THE_GRIPPER = 42
 
 

@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 818,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29806,
+    "skills": 29808,
     "plant": 22043,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

@@ -212,7 +212,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         here, near_m = self.context.pose(), self.options.hearing_m
         if target.hidden_s(self._now()) or math.dist((here.x_m, here.y_m), target.seen.place_W) > near_m:
             return True
-        self._before = None
+        self._before, target.farthest_m = None, self.options.target.farthest_m
         if self._inputs.place_W is None:  # the person before the robot has no name
             return True
         text, name = f"Are you {self._inputs.person}?", f"{self.name} of {self.context.robot.name}"
@@ -230,6 +230,8 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""
         say(self.context, "I have lost sight of you.")
         self._company.most_m_s = math.inf
+        if self._inputs.place_W is not None:  # the robot asks for the name
+            target.farthest_m = math.inf
         for goal in self._poses_beyond_doors(target):
             self._halt()
             self._plan(goal)

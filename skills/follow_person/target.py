@@ -38,10 +38,10 @@ class TargetOptions:
 
 
 class Target:
-    """The followed person. `seen` is the last view."""
+    """The followed person: the last view `seen`, and the largest distance `farthest_m` (m) of one that continues it."""
 
     def __init__(self, first: SeenPerson, here: Pose2D, options: TargetOptions) -> None:
-        self.seen, self._options = first, options
+        self.seen, self._options, self.farthest_m = first, options, options.farthest_m
         self._trail = [(here.x_m, here.y_m), first.place_W]
         self._others: set[int] = set()
         self._places: deque[tuple[float, tuple[float, float]]] = deque([(first.stamp_s, first.place_W)])
@@ -105,7 +105,7 @@ class Target:
     def _again(self, people: Sequence[SeenPerson], now_s: float) -> SeenPerson | None:
         """The track that continues the person's after a gap: the nearest to the prediction that is nobody else's."""
         options, expected_W = self._options, self.place_W(now_s)
-        reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), options.farthest_m)
+        reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), self.farthest_m)
         new = [each for each in people if each.track not in self._others and each.stamp_s > self.seen.stamp_s]
         near = [each for each in new if math.dist(each.place_W, expected_W) <= reach_m]
         return min(near, key=lambda each: math.dist(each.place_W, expected_W), default=None)

@@ -52,6 +52,15 @@ def test_a_track_too_far_away_is_somebody_else():
     assert target.seen.track == 1
 
 
+def test_on_a_search_somebody_far_away_may_be_the_person():
+    target = walked()
+    target.update([track(7, 10.0, 12.0)], 12.0)
+    assert target.seen.track == 1
+    target.farthest_m = 20.0
+    target.update([track(7, 10.0, 12.1)], 12.1)
+    assert target.seen.track == 7
+
+
 def test_a_person_stands_still_after_five_seconds_in_one_place():
     target = walked()
     for n in range(1, 52):

@@ -144,8 +144,8 @@ class Doors(Stateful, saved=("_panels",)):
         return [_doorway(door) for door in ajar]
 
     def call(self, at_W: tuple[float, float]) -> None:
-        """Opens the door at a position (x, y) from the next step on, as its drive would; from any thread."""
-        name = next(name for name, door in self._doors.items() if door.at == at_W)
+        """Opens the door nearest to a position (x, y) from the next step on, as its drive would; from any thread."""
+        name = min(self._doors, key=lambda name: math.dist(self._doors[name].at, at_W))
         self._panels[name].called = True
 
     def before_step(self, now_s: float, dt_s: float) -> None:

@@ -27,6 +27,8 @@ from skills.speak.skill import say
 
 _BACK_M = 3.0
 """Length of the trail on which the robot looks for a free pose."""
+_SURELY_M = 0.1
+"""Distance of a person from the edge of a place at which they are certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
 _WALKS_M_S = 0.25
@@ -187,7 +189,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
 
     def _keep_behind(self, target: Target) -> Routine[bool]:
         """Follows until the person stands in the place (True), or is lost (False)."""
-        place = None if self._inputs.until_W is None else shapely.Polygon(self._inputs.until_W)
+        place = None if self._inputs.until_W is None else shapely.Polygon(self._inputs.until_W).buffer(-_SURELY_M)
         while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
             if hidden_s > self.options.gone_s and self._goal is None:
                 return False

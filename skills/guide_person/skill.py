@@ -26,6 +26,8 @@ from skills.speak.skill import say
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
 _SLOWEST_M_S = 0.25
+_SURELY_M = 0.25
+"""Distance of a person from the edge of a room at which they are certainly in it, and not in its door."""
 _AHEAD_M, _AHEAD_RAD = 3.0, 1.2
 _STEPS_IN, _STANDS_S = 3, 2.0
 """Drives into the room, and time for which the person stands before its door."""
@@ -251,11 +253,12 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         area, here = self._inputs.area_W, self.context.pose()
         if self._target is None or self._gap_m() > self.options.wait_m:
             return False
-        return not area or (_inside(area, self._target.seen.place_W) and _inside(area, (here.x_m, here.y_m)))
+        return not area or (_inside(area, self._target.seen.place_W, _SURELY_M) and _inside(area, (here.x_m, here.y_m)))
 
 
-def _inside(area_W: Sequence[tuple[float, float]], point_W: Sequence[float]) -> bool:
-    return bool(shapely.Polygon(area_W).covers(shapely.Point(point_W)))
+def _inside(area_W: Sequence[tuple[float, float]], point_W: Sequence[float], by_m: float = 0.0) -> bool:
+    """Returns whether a point is in an area, by_m or more from its edge."""
+    return bool(shapely.Polygon(area_W).buffer(-by_m).covers(shapely.Point(point_W)))
 
 
 def _further_on(one: SeenPerson) -> list[tuple[float, float]]:

@@ -134,6 +134,15 @@ def test_robot_makes_room_for_a_person_who_waits_before_the_door():
     assert guided.at[1] < 4.0
 
 
+def test_a_person_who_stands_on_the_edge_of_the_place_is_asked_in():
+    first = Guided()
+    assert isinstance(first.go(), Succeeded)
+    edge_m = first.at[1] + 0.1
+    guided = Guided()
+    guided.go(replace(INPUTS, area_W=((0.1, 0.1), (9.9, 0.1), (9.9, edge_m), (0.1, edge_m))))
+    assert "Please come in." in guided.said
+
+
 def test_a_remark_before_both_are_there_ends_it_and_is_no_success():
     guided = Guided()
     step = guided.go(at_s={6.0: lambda: guided.control.tell("stop")})

@@ -24,10 +24,10 @@ LINES = {
     "executive/store": 1666,
     "executive/conversation": 595,
     "executive/view": 1594,
-    "executive/testing": 818,
+    "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29808,
+    "skills": 29813,
     "plant": 22043,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

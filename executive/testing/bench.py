@@ -24,6 +24,7 @@ from skills.api import Cause, Costmap, Detector, Localiser, Skill, SkillContext
 from skills.faults.fault_kinds import STANDARD_FAULTS, FaultKind
 from skills.faults.faulty_robot import Fault, inject_faults, parse_fault
 from skills.files.yaml_source import read_yaml
+from skills.perception.doorway import Doorway
 from skills.robot import Capabilities, Clock, Robot
 from skills.testing.blocks import ROOM, TABLE_CAN, Block, grid_of
 from skills.testing.clock import VirtualClock
@@ -135,6 +136,7 @@ class SkillBench:
         localiser: Localiser | None = None,
         costmap: Costmap | None = None,
         detector: Detector | None = None,
+        doors: tuple[Doorway, ...] = (),
         seed: int = 0,
     ) -> None:
         """Takes the robot's lease. Ideal estimators replace those that are not given."""
@@ -153,6 +155,7 @@ class SkillBench:
             seed=seed,
             board=Board(_PREFIX),
             detector=detector or PlainColours(),
+            doors=doors,
         )
         self._sense(robot)
 
@@ -233,10 +236,11 @@ def scripted_bench(
     blocks: Sequence[Block] = (*ROOM, TABLE_CAN),
     *,
     localised: bool = True,
+    doors: tuple[Doorway, ...] = (),
 ) -> tuple[SkillBench, ScriptedRobot]:
     """Builds a bench with a scripted robot, by default in the room with a table and a can; returns both."""
     clock = VirtualClock()
     robot = ScriptedRobot(clock, capabilities=capabilities, blocks=blocks, start=start)
     place = KnownPlace(start.pose)
     place.localised = localised
-    return SkillBench(robot, clock, localiser=place, costmap=BlockCostmap(blocks)), robot
+    return SkillBench(robot, clock, localiser=place, costmap=BlockCostmap(blocks), doors=doors), robot

@@ -31,8 +31,10 @@ from skills.faults.faulty_robot import parse_fault
 from skills.files.errors import with_article
 from skills.files.schema import validate
 from skills.files.yaml_source import YamlSource, read_yaml
+from skills.perception.doorway import Doorway
 from skills.quantities import Angle, Coordinate, Delay, Duration, Height, Length, Quantity, Share, Turn
 from skills.robot import Capabilities, Pose2D
+from skills.stack import StackError, door_opener
 from skills.testing.blocks import ROOM, TABLE_CAN, Block
 from skills.testing.robot import ScriptedRobot, Start
 
@@ -86,12 +88,36 @@ class BlockSetup(_Strict):
     loose: bool = Field(default=False, description="whether the robot can take it")
 
 
+class DoorSetup(_Strict):
+    """Door that the scripted robot knows; blocks make it closed."""
+
+    at: tuple[Coordinate, Coordinate] = Field(description="its middle (x, y) in metres")
+    width: Length = Field(description="clear width in metres")
+    through: Angle = Field(default=0.0, description="direction through it, radians")
+    opens: dict[str, Any] | None = Field(default=None, description="the plug-in that opens it, and its options")
+
+    @field_validator("opens")
+    @classmethod
+    def _is_a_plug_in(cls, opens: dict[str, Any] | None) -> dict[str, Any] | None:
+        try:
+            return opens if opens is None or door_opener(opens) else None
+        except StackError as error:
+            raise ValueError(str(error)) from error
+
+    @property
+    def doorway(self) -> Doorway:
+        """Doorway of the skills."""
+        opener = None if self.opens is None else door_opener(self.opens)
+        return Doorway(self.at, self.width, self.through, opener=opener)
+
+
 class WorldSetup(_Strict):
     """World of a test."""
 
     room: bool = Field(default=True, description="a room of 6 m by 5 m, with a table before the origin")
     can: bool = Field(default=True, description="a red can near the edge of the table")
     blocks: tuple[BlockSetup, ...] = Field(default=(), description="further blocks (scripted only)")
+    doors: tuple[DoorSetup, ...] = Field(default=(), description="doors that the robot knows (scripted only)")
 
 
 class Expectation(_Strict):
@@ -239,7 +265,8 @@ def bench_of_setup(
     """Builds a bench with the scripted robot and the world that a file describes; returns both."""
     pose = Pose2D(setup.pose.x, setup.pose.y, setup.pose.yaw)
     start = Start(pose, setup.arm, setup.in_gripper, setup.holding, setup.charge, setup.docked, setup.pulled_at_s)
-    return scripted_bench(capabilities, start, blocks_of(world), localised=not setup.lost)
+    doors = tuple(door.doorway for door in world.doors)
+    return scripted_bench(capabilities, start, blocks_of(world), localised=not setup.lost, doors=doors)
 
 
 def blocks_of(world: WorldSetup) -> tuple[Block, ...]:

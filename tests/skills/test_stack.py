@@ -64,7 +64,7 @@ def test_a_skill_takes_its_options_from_the_stack():
             ("localiser", "matching", "sigma"),
             "did you mean 'sigma_m'?",
         ),
-        ({"skills": {"fly": {}}}, ("skills", "fly"), "known are back_off"),
+        ({"skills": {"fly": {}}}, ("skills", "fly"), "known are "),
         ({"skills": {"navigate": {"people": {"periods": 1}}}}, ("skills", "navigate", "people", "periods"), "period_s"),
         ({"costmap": 3}, ("costmap",), "use"),
         ([], (), "localiser"),

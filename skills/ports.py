@@ -138,7 +138,8 @@ class FindPeopleInputs:
     """Area to search: the corners (x, y) of `area_W`, with the name `place`.
 
     `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
-    counts all people. People near the positions of `avoid` do not count.
+    counts all people. People near the positions of `avoid` do not count. A person counts once a picture shows them;
+    with `unpictured`, bodies that two scans show count too, after all others.
     """
 
     area_W: tuple[tuple[Coordinate, Coordinate], ...]
@@ -146,6 +147,7 @@ class FindPeopleInputs:
     person: str = PERSON
     count: Tries = 1
     avoid: tuple[ObjectObservation, ...] = ()
+    unpictured: bool = False
 
 
 class FindPeoplePorts(Skill[FindPeopleInputs]):

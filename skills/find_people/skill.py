@@ -65,12 +65,13 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             tracker.update(by_lidar, by_scan=True, apart_m=SCAN_APART_M)
             for people in by_camera or ():
                 tracker.update(people, by_scan=False, apart_m=same_m)
-            least = 0 if by_camera is None else 1
-            found = [
-                one
-                for one in tracker.people
-                if one.looks >= least and one.looks + one.scans > 1 and area.covers(shapely.Point(one.place_W))
-            ]
+            if inputs.unpictured:
+                again = yield from self._in_scan(f"looking for people in the {inputs.place}")
+                tracker.update(again, by_scan=True, apart_m=SCAN_APART_M)
+            least = 0 if by_camera is None or inputs.unpictured else 1
+            inside = (one for one in tracker.people if area.covers(shapely.Point(one.place_W)))
+            found = [one for one in inside if one.looks >= least and one.looks + one.scans > 1]
+            found.sort(key=lambda one: by_camera is not None and one.looks == 0)
             if 0 < inputs.count <= len(found):
                 break
         return self._ended(inputs, tuple(_observation(one, inputs) for one in found))

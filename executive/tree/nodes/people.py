@@ -352,9 +352,10 @@ def _each_person(
 ) -> NodeSpec:
     """Builds rounds of a look for one more person and a visit."""
     seen, over = builder.key("seen"), builder.key("over")
-    avoid = {"avoid": FromBoardOr(over, ())} if builder.has_ports("find_people", ("avoid",)) else {}
+    own = {"avoid": FromBoardOr(over, ()), "unpictured": True}
+    own = {port: value for port, value in own.items() if builder.has_ports("find_people", (port,))}
     outputs = {"observation": seen, "observations": builder.key("all")}
-    look = builder.skill("find_people", {**ports, "person": person, "count": 1, **avoid}, outputs)
+    look = builder.skill("find_people", {**ports, "person": person, "count": 1, **own}, outputs)
     return _each_in_turn(builder.at("each"), title, look, visit, seen, over, limit=MOST_PEOPLE, **options)
 
 

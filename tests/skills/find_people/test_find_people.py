@@ -4,10 +4,11 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from planar_people import PeopleDetector, person_at
 from planar_robot import LENS, TWO_ROOMS, Bench, Box
 
-from skills.api import ObjectKind, ObjectObservation, Running, Succeeded
+from skills.api import Failed, ObjectKind, ObjectObservation, Running, Succeeded
 from skills.find_people.skill import FindPeople, FindPeopleInputs
 from skills.robot import Pose2D
 
@@ -74,3 +75,20 @@ def test_people_near_avoided_positions_do_not_count():
         bench.tick()
     skill.end()
     assert step.message == "nobody else is seen in the room from here"
+
+
+@pytest.mark.parametrize(("unpictured", "kind"), [(False, Failed), (True, Succeeded)])
+def test_a_body_that_no_picture_shows_counts_only_where_that_is_asked_for(unpictured, kind, monkeypatch):
+    # a body 1.5 m ahead, as wide as a person, for whom the detector sees nobody
+    bench = Bench(Pose2D(1.5, 2.0, 0.0), unmapped=(person_at(3.0, 2.0),), surveyed=TWO_ROOMS)
+    take = bench.robot.image
+    lit = lambda source: replace(take(source), grey=np.full((LENS.height, LENS.width), 120, np.uint8))  # noqa: E731
+    monkeypatch.setattr(bench.robot, "image", lit)
+    for _ in range(10):
+        bench.tick()
+    skill = FindPeople(replace(bench.context(), detector=PeopleDetector(bench, [])))
+    skill.begin(FindPeopleInputs(ROOM, "room", unpictured=unpictured))
+    while isinstance(step := skill.step(), Running):
+        bench.tick()
+    skill.end()
+    assert isinstance(step, kind), step

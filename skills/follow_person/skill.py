@@ -6,11 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
-import shapely
 
 from skills.api import Cause, ClearableCostmap, Failed, Question, Running, SkillContext, Succeeded
-from skills.follow_person.target import Target, TargetOptions
-from skills.geometry import bearing_rad, wrap
+from skills.follow_person.target import Target, TargetOptions, people_about
+from skills.geometry import inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
@@ -22,8 +21,8 @@ from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import FollowPersonInputs, FollowPersonPorts, NavigateInputs
 from skills.quantities import Delay, Duration, Factor, Length, Speed, Tries, Turn
 from skills.robot import FloatArray, Pose2D
-from skills.routine import Routine, RoutineSkill, SkillFailure
-from skills.speak.skill import say
+from skills.routine import Routine, SkillFailure
+from skills.speak.skill import ListeningSkill, say
 
 _BACK_M = 3.0
 """Length of the trail on which the robot looks for a free pose."""
@@ -87,7 +86,7 @@ class _Told(Exception):  # noqa: N818 - no program error
     """Somebody told the robot to end."""
 
 
-class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
+class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     """Implementation of `FollowPersonPorts`; the navigate skill drives."""
 
     Options: ClassVar[type] = FollowPersonOptions
@@ -99,7 +98,6 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         self._company = Company(PeopleWatch(context, self.options.people))
         self._navigate = Navigate(_at_pace(context, self.options.max_speed_m_s), None, self._company)
         self._goal: Pose2D | None = None
-        self._remark = context.listen()
 
     def begin(self, inputs: FollowPersonInputs) -> None:
         """Starts to look for the person."""
@@ -109,21 +107,17 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         self._planned_s = self._aside_until_s = -math.inf
         self._aside: Pose2D | None = None
         self._before: SeenPerson | None = None
-        self._remark.withdraw()
-        self._remark = self.context.listen()
         self._company.watch = PeopleWatch(self.context, self.options.people)
 
     def end(self) -> None:
         """Stops the base, and listens no longer."""
         self._halt()
-        self._remark.withdraw()
         super().end()
 
     def suspend(self) -> None:
         """Stops the base; the person may walk on."""
         self._halt()
         super().suspend()
-        self._remark.withdraw()
 
     def resume(self, inputs: FollowPersonInputs) -> None:
         """Looks for the person again, first where they were seen last."""
@@ -154,8 +148,8 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         if self._target is not None:
             self._target.update(company.watch.tracks(), self._now())
             company.track = self._target.seen.track
-        if self._remark.done():
-            raise _Told(self._remark.result())
+        if self.remark is not None:
+            raise _Told(self.remark)
         if self._now() > self._limit_s:
             where = f" in the {self._inputs.until}" if self._inputs.until else ""
             raise SkillFailure(
@@ -176,20 +170,16 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
 
     def _first(self, inputs: FollowPersonInputs, waited: bool) -> SeenPerson | None:
         """The nearest person ahead, or at the place of the inputs; a standing one without a picture after a wait."""
-        here, options = self.context.pose(), self.options
-        tracks = self._company.watch.tracks()
-        if inputs.place_W is None:
-            centre_W, reach_m = (here.x_m, here.y_m), options.ahead_m
-            tracks = tuple(one for one in tracks if abs(bearing_rad(here, one.place_W)) < options.ahead_rad)
-        else:
-            centre_W, reach_m = inputs.place_W, _SAME_PLACE_M * (2.0 if waited else 1.0)
+        tracks, ahead_rad = self._company.watch.tracks(), self.options.ahead_rad
+        reach_m = self.options.ahead_m if inputs.place_W is None else _SAME_PLACE_M * (2.0 if waited else 1.0)
+        near = people_about(tracks, self.context.pose(), inputs.place_W, reach_m, ahead_rad)
         sure = {one.track for one in self._company.others()}
-        near = [one for one in tracks if math.dist(one.place_W, centre_W) < reach_m and (waited or one.track in sure)]
-        return min(near, key=lambda one: (one.track not in sure, math.dist(one.place_W, centre_W)), default=None)
+        known = [one for one in near if waited or one.track in sure]
+        return min(known, key=lambda one: one.track not in sure, default=None)
 
     def _keep_behind(self, target: Target) -> Routine[bool]:
         """Follows until the person stands in the place (True), or is lost (False)."""
-        place = None if self._inputs.until_W is None else shapely.Polygon(self._inputs.until_W).buffer(-_SURELY_M)
+        place = self._inputs.until_W
         while (hidden_s := target.hidden_s(self._now())) < self.options.lost_s:
             if hidden_s > self.options.gone_s and self._goal is None:
                 return False
@@ -197,8 +187,8 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
             if self._before is not None and not (yield from self._is_right(target, self._before)):
                 return False
             near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
-            inside = near and place is not None and place.covers(shapely.Point(seen_W))
-            if inside and target.stands_still(self._now()):
+            rests = near and place is not None and target.stands_still(self._now())
+            if rests and place and inside_polygon(np.array([seen_W]), place, -_SURELY_M).all():
                 return True
             if self._now() >= self._planned_s + self.options.replan_s:
                 self._planned_s = self._now()
@@ -312,7 +302,7 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         end_W = np.array(target.seen.place_W)
         path = np.vstack([target.trail, np.linspace(end_W, (here.x_m, here.y_m), 10)])
         paths = with_discs(NoObstacles(), np.column_stack([path, np.full(len(path), _PERSON_M)]))
-        return pose_aside(self.context.costmap, paths, self._outline, here, GivingWayOptions(reach_m=_ASIDE_M))
+        return pose_aside(self.context.free_space(), paths, self._outline, here, GivingWayOptions(reach_m=_ASIDE_M))
 
     def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
         """The nearest free pose behind the person on their trail; None to stay.
@@ -346,11 +336,11 @@ class FollowPerson(FollowPersonPorts, RoutineSkill[FollowPersonInputs]):
         points = np.linspace(
             straight[0], straight[0] + share * (straight[1] - straight[0]), 1 + math.ceil(length_m / 0.1)
         )
-        return bool(self.context.costmap.clearance_m(points).min() > self._outline.inscribed_m + SAFE_MARGIN_M)
+        return bool(self.context.free_space().clearance_m(points).min() > self._outline.inscribed_m + SAFE_MARGIN_M)
 
     def _free(self, poses: FloatArray) -> Pose2D | None:
         """The first of some poses (N, 3) with clearance."""
-        clear = footprint_clearance_m(self.context.costmap, self._outline, poses) > SAFE_MARGIN_M
+        clear = footprint_clearance_m(self.context.free_space(), self._outline, poses) > SAFE_MARGIN_M
         return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
 
     def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from skills.geometry import bearing_rad
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import predicted_place_W
 from skills.quantities import Delay, Length, Speed
@@ -35,6 +36,20 @@ class TargetOptions:
     farthest_m: Length = 3.0
     still_s: Delay = 5.0
     still_m: Length = 0.5
+
+
+def people_about(
+    people: Sequence[SeenPerson],
+    here: Pose2D,
+    place_W: tuple[float, float] | None,
+    reach_m: float,
+    ahead_rad: float,
+) -> list[SeenPerson]:
+    """The people within reach_m of a place, the nearest first; without a place, of the robot, and ahead of it."""
+    centre_W = (here.x_m, here.y_m) if place_W is None else place_W
+    about = (one for one in people if math.dist(one.place_W, centre_W) <= reach_m)
+    ahead = [one for one in about if place_W is not None or abs(bearing_rad(here, one.place_W)) < ahead_rad]
+    return sorted(ahead, key=lambda one: math.dist(one.place_W, centre_W))
 
 
 class Target:

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import ClassVar, Final
 
 import numpy as np
-import shapely
 
-from skills.api import Cause, Job, Running, Step, Succeeded
-from skills.follow_person.target import Target, TargetOptions
-from skills.geometry import bearing_rad, grid_inside, wrap
+from skills.api import Cause, Running, Step, Succeeded
+from skills.follow_person.target import Target, TargetOptions, people_about
+from skills.geometry import grid_inside, inside_polygon, wrap
 from skills.meet_person.skill import MeetPerson, person_text
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
@@ -21,8 +20,8 @@ from skills.perception.people_tracking import PeopleOptions, PeopleWatch
 from skills.ports import GuidePersonInputs, GuidePersonPorts, MeetPersonInputs, NavigateInputs
 from skills.quantities import Delay, Length, Speed, Tries
 from skills.robot import Pose2D
-from skills.routine import ENDED_EARLY, Patience, Routine, RoutineSkill, SkillFailure
-from skills.speak.skill import say
+from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
+from skills.speak.skill import ListeningSkill, say
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
 _SLOWEST_M_S = 0.25
@@ -66,12 +65,11 @@ class Leading(Navigate):
         return most_m_s, waits
 
 
-class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
+class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
     """Implementation of `GuidePersonPorts`."""
 
     Options: ClassVar[type] = GuidePersonOptions
     options: GuidePersonOptions
-    _remark: Job[str] | None = None
 
     def begin(self, inputs: GuidePersonInputs) -> None:
         """Starts with the person at the place of the inputs."""
@@ -81,30 +79,23 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         self._target: Target | None = None
         self._behind = Patience(self.context.clock, self.options.behind_s)
         self._waiting, self._asked = Patience(self.context.clock, _ASK_AFTER_S), False
-        self._remark = self.context.listen()
 
     def step(self) -> Step:
         """Looks for the person; then as `RoutineSkill.step`."""
         watch, now_s = self._company.watch, self.context.clock.now()
         watch.step(np.zeros(3))
         if self._target is None:
-            if (first := self._first(watch.tracks())) is not None:
+            if (first := next(iter(self._candidates(watch.tracks())), None)) is not None:
                 self._target = Target(first, self.context.pose(), TargetOptions())
         else:
             self._target.update(watch.tracks(), now_s)
         self._company.track = 0 if self._target is None else self._target.seen.track
         return super().step()
 
-    def _first(self, tracks: Sequence[SeenPerson]) -> SeenPerson | None:
-        """The person nearest to where they should be; without such a place, the nearest one ahead."""
-        here = self.context.pose()
-        if self._place_W is not None:
-            centre_W, reach_m = self._place_W, self.options.same_m
-        else:
-            centre_W, reach_m = (here.x_m, here.y_m), _AHEAD_M
-            tracks = [one for one in tracks if abs(bearing_rad(here, one.place_W)) < _AHEAD_RAD]
-        near = [one for one in tracks if math.dist(one.place_W, centre_W) <= reach_m]
-        return min(near, key=lambda one: math.dist(one.place_W, centre_W), default=None)
+    def _candidates(self, tracks: Sequence[SeenPerson]) -> list[SeenPerson]:
+        """People who may be the one to guide, the likeliest first."""
+        reach_m = _AHEAD_M if self._place_W is None else self.options.same_m
+        return people_about(tracks, self.context.pose(), self._place_W, reach_m, _AHEAD_RAD)
 
     def _gap_m(self) -> float:
         """Distance from the robot to the person, in metres; infinite while they are hidden."""
@@ -113,34 +104,11 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
         here = self.context.pose()
         return math.dist(self._target.seen.place_W, (here.x_m, here.y_m))
 
-    def suspend(self) -> None:
-        """Stands, and hears no remark meanwhile."""
-        self._withdraw()
-        super().suspend()
-
-    def resume(self, inputs: GuidePersonInputs) -> None:
-        """Continues; after a long pause, from where the person was seen last."""
-        if self._remark is None:
-            self.begin(inputs)
-            return
-        self._remark = self.context.listen()
-        super().resume(inputs)
-
-    def end(self) -> None:
-        """Ends the drive."""
-        self._withdraw()
-        super().end()
-
-    def _withdraw(self) -> None:
-        if self._remark is not None:
-            self._remark.withdraw()
-
     def trouble(self) -> SkillFailure | None:
         """Returns a failure when a person ends it before both are there."""
-        if self._remark is None or not self._is_told() or self._are_there():
+        if (said := self.remark) is None or self._are_there():
             return None
-        inputs, said = self._inputs, self._remark.result()
-        return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {self._who} was at {inputs.place}")
+        return SkillFailure(Cause.POSTCONDITION, f"'{said}' was said before {self._who} was at {self._inputs.place}")
 
     def run(self, inputs: GuidePersonInputs) -> Routine[Succeeded]:
         """Leads the person, and goes back for them as often as needed."""
@@ -175,7 +143,7 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
     def _must_stop(self) -> bool:
         """Sets the pace; returns whether the drive has to end, since the person fell behind or has ended it."""
         self._company.most_m_s = self._pace_m_s()
-        return self._is_behind() or self._is_told()
+        return self._is_behind() or self.remark is not None
 
     def _waits_outside(self, end_s: float) -> bool:
         """Returns whether the person has stood near the robot for a while, but not at the goal."""
@@ -245,20 +213,15 @@ class GuidePerson(GuidePersonPorts, RoutineSkill[GuidePersonInputs]):
     def _is_close(self) -> bool:
         return self._gap_m() <= self.options.close_m
 
-    def _is_told(self) -> bool:
-        return self._remark is not None and self._remark.done()
-
     def _are_there(self) -> bool:
         """Returns whether the person is seen near the robot, and both are at the goal."""
         area, here = self._inputs.area_W, self.context.pose()
         if self._target is None or self._gap_m() > self.options.wait_m:
             return False
-        return not area or (_inside(area, self._target.seen.place_W, _SURELY_M) and _inside(area, (here.x_m, here.y_m)))
-
-
-def _inside(area_W: Sequence[tuple[float, float]], point_W: Sequence[float], by_m: float = 0.0) -> bool:
-    """Returns whether a point is in an area, by_m or more from its edge."""
-    return bool(shapely.Polygon(area_W).buffer(-by_m).covers(shapely.Point(point_W)))
+        if not area:
+            return True
+        robot_is_in = inside_polygon(np.array([(here.x_m, here.y_m)]), area).all()
+        return bool(robot_is_in and inside_polygon(np.array([self._target.seen.place_W]), area, -_SURELY_M).all())
 
 
 def _further_on(one: SeenPerson) -> list[tuple[float, float]]:

@@ -1,11 +1,12 @@
-"""The speak skill: says a sentence to the people around."""
+"""The speak skill says a sentence to the people around; skills that move speak and listen by the same means."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from skills.api import Cause, Failed, Part, Running, Skill, SkillContext, Step, Succeeded
+from skills.api import Cause, Failed, InputsT, Job, Part, Running, Skill, SkillContext, Step, Succeeded
 from skills.quantities import Delay
+from skills.routine import RoutineSkill
 
 SPEECH_TOPIC: Final = "speech"
 LONGEST_TEXT: Final = 500
@@ -88,3 +89,39 @@ def _refusal(text: str) -> Failed | None:
     if len(text) > LONGEST_TEXT:
         return Failed(Cause.PRECONDITION, f"{len(text)} characters are too many to say; {LONGEST_TEXT} are the most")
     return None
+
+
+class ListeningSkill(RoutineSkill[InputsT]):
+    """Routine that hears what people say to the robot; nothing while it is suspended."""
+
+    _heard: Job[str] | None = None
+
+    @property
+    def remark(self) -> str | None:
+        """Words that somebody has said, or nothing so far."""
+        return self._heard.result() if self._heard is not None and self._heard.done() else None
+
+    def begin(self, inputs: InputsT) -> None:
+        """Starts to listen; see `RoutineSkill.begin`."""
+        super().begin(inputs)
+        self._heard = self.context.listen()
+
+    def suspend(self) -> None:
+        """Listens no longer; see `RoutineSkill.suspend`."""
+        self._stop_listening()
+        super().suspend()
+
+    def resume(self, inputs: InputsT) -> None:
+        """Listens again; see `RoutineSkill.resume`."""
+        super().resume(inputs)
+        self._heard = self.context.listen()
+
+    def end(self) -> None:
+        """Listens no longer; see `RoutineSkill.end`."""
+        self._stop_listening()
+        super().end()
+
+    def _stop_listening(self) -> None:
+        if self._heard is not None:
+            self._heard.withdraw()
+        self._heard = None

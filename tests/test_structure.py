@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 8240,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8432,
+    "executive/tree": 8433,
     "executive/run": 3218,
     "executive/record": 1412,
     "executive/store": 1666,
@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29813,
+    "skills": 29821,
     "plant": 22043,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

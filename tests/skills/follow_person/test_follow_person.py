@@ -11,6 +11,7 @@ from planar_robot import Bench
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.follow_person.skill import FollowPerson, FollowPersonOptions
 from skills.follow_person.target import Target, TargetOptions
+from skills.navigate.zones import Zone, ZoneKind
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.ports import FollowPersonInputs
@@ -55,6 +56,7 @@ class Walk:
         told_s=math.inf,
         others=(),
         cameras=False,
+        zones=(),
         **inputs,
     ):
         self.bench = Bench(START, unmapped=[person_at(3.2, LANE_M), *others], cameras=cameras)
@@ -65,7 +67,9 @@ class Walk:
         self.remark = Remark(self.bench, told_s)
         self.detector = PeopleDetector(self.bench, [])
         ask = lambda question: self.questions.append(question.text) or nobody_to_ask(replace(question, default=answer))  # noqa: E731
-        context = replace(self.bench.context(), listen=lambda: self.remark, detector=self.detector, ask=ask)
+        context = replace(
+            self.bench.context(), listen=lambda: self.remark, detector=self.detector, ask=ask, zones=zones
+        )
         self.skill, self.distances_m, self.messages = FollowPerson(context, QUICK), [], []
         self.inputs = FollowPersonInputs("Robin", **inputs)
         self.skill.begin(self.inputs)
@@ -104,6 +108,13 @@ def test_robot_keeps_behind_a_person_until_they_stand_in_the_place():
     assert 1.2 <= walk.distances_m[-1] <= 2.1
     assert min(walk.distances_m) > 1.1 and max(walk.distances_m) < 2.9
     assert not walk.bench.robot.driving
+
+
+def test_robot_stays_out_of_a_keep_out_zone_through_which_the_person_goes():
+    zone = Zone("lab", ZoneKind.KEEP_OUT, ((4.4, 4.0), (5.6, 4.0), (5.6, 7.0), (4.4, 7.0)))
+    walk = Walk(zones=(zone,), time_limit_s=20.0)
+    assert walk.run().cause is Cause.TIMEOUT
+    assert 2.5 < walk.bench.robot.pose.x_m < 4.4  # as near as the zone allows
 
 
 def test_without_anybody_ahead_the_skill_fails():

@@ -97,6 +97,21 @@ class Ground:
             if math.dist((x, y), from_W) >= least_m:
                 yield float(x), float(y)
 
+    def aside(self, from_W: Point, lines_W: Iterable[Sequence[Point]], clear_m: float) -> Point | None:
+        """Returns the nearest free point at a distance (m) from some lines, in the part that holds a point."""
+        lines = np.full(self._free.shape, 255, np.uint8)
+        for line in lines_W:
+            cv2.polylines(lines, [self._cell(np.array(line))[:, ::-1].astype(np.int32)], False, 0)
+        _, parts = cv2.connectedComponents((self._clearance_m >= LEAST_M).astype(np.uint8))
+        row, column = self._cell(from_W)
+        free = (parts == parts[row, column]) & (self._clearance_m >= SHOULDERS_M)
+        away_m = cv2.distanceTransform(lines, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * _CELL_M
+        points_W = (np.argwhere(free & (away_m >= clear_m))[:, ::-1] + 0.5) * _CELL_M + self._low
+        if not len(points_W):
+            return None
+        x, y = points_W[int(np.argmin(np.hypot(*(points_W - from_W).T)))]
+        return float(x), float(y)
+
     def sees(self, from_W: Point, to_W: Point) -> bool:
         """Returns whether no obstacle lies between two points."""
         points = np.linspace(from_W, to_W, max(2, math.ceil(math.dist(from_W, to_W) / _CELL_M)))

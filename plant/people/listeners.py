@@ -16,6 +16,8 @@ from plant.worlds.world import Point
 
 EYES_M: Final = (1.2, 1.8)
 """Shapes between these heights hide people from robots that speak."""
+FACES_RAD: Final = 1.0
+"""A robot faces the people whose bearing is not more to either side."""
 BESIDE_M: Final = 0.4
 _WHO: Final = re.compile(r"\bare you (?P<name>[^?,.]+)\?", re.IGNORECASE)
 _STREAM: Final = 14
@@ -33,11 +35,20 @@ class Listeners:
         self._walls: Ground | None = None
 
     def hearer(self, robot: str) -> str | None:
-        """Returns the nearest person who hears a robot speak now; None when nobody does."""
-        robot_W = self._place_W(self._engine.world.robots[robot].body)
-        away_m = {name: math.dist(self._place_W(body), robot_W) for name, body in self._bodies.items()}
-        near = sorted((each for each in away_m if away_m[each] <= HEARS_M), key=lambda name: away_m[name])
-        return next((name for name in near if self._in_sight(robot_W, self._place_W(self._bodies[name]))), None)
+        """Returns the nearest person whom a robot faces and who hears it speak now, else the nearest; or None."""
+        world = self._engine.world
+        X_WR = world.plant.EvalBodyPoseInWorld(self._engine.context, world.robots[robot].body)
+        robot_W = float(X_WR.translation()[0]), float(X_WR.translation()[1])
+        places_W = {name: self._place_W(body) for name, body in self._bodies.items()}
+        away_m = {name: math.dist(place_W, robot_W) for name, place_W in places_W.items()}
+
+        def not_faced(name: str) -> bool:
+            x, y, _ = X_WR.inverse() @ np.array([*places_W[name], X_WR.translation()[2]])
+            return abs(math.atan2(y, x)) > FACES_RAD
+
+        heard = (name for name in away_m if away_m[name] <= HEARS_M)
+        near = sorted(heard, key=lambda name: (not_faced(name), away_m[name]))
+        return next((name for name in near if self._in_sight(robot_W, places_W[name])), None)
 
     def answer(self, person: str, question: str, options: Sequence[str] = ()) -> str | None:
         """Returns a person's answer to a question; None when the person has none.

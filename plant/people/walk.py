@@ -149,6 +149,12 @@ class Walk(
         return self._legs[self._leg].corners_W[-1]
 
     @property
+    def left_m(self) -> float:
+        """Length of the present path that is left. Raises IndexError when there is none."""
+        lengths_m = self._lengths_m[self._leg] if self._detour is None else self._detour[1]
+        return lengths_m[-1] - self._done_m
+
+    @property
     def on_detour(self) -> bool:
         """Returns whether the person walks close by something that was in the way."""
         return self._passing
@@ -183,21 +189,27 @@ class Walk(
         if self._asides:
             self._aside_m = 0.0 if over else done_m
             self._asides = self._asides[over:]
+            self._passing = self._passing and bool(self._asides)
             self._wait_s = leg.pause_s if over else 0.0
             return
         self._done_m = done_m
         if over:
-            self._wait_s, self._done_m, self._leg, self._detour = leg.pause_s, 0.0, self._leg + 1, None
-            self._passing = False
-            if self._loops and self.done:
-                self._leg = 0
+            self.arrive()
         elif self._lapse < len(self._lapses) and self.walked_m >= self._lapses[self._lapse].after_m:
             self._begin(self._lapses[self._lapse])
+
+    def arrive(self) -> None:
+        """Ends the present path here, near enough to its end, with the pause there."""
+        self._wait_s = (self._detour[0] if self._detour is not None else self._legs[self._leg]).pause_s
+        self._done_m, self._leg, self._detour = 0.0, self._leg + 1, None
+        self._asides, self._passing = (), False
+        if self._loops and self.done:
+            self._leg = 0
 
     def _walked(self, step_m: float) -> None:
         """Adds a step to the walked path and the trail."""
         self.walked_m += step_m
-        if self._lapses and math.dist(self.place_W, self._trail[0]) >= TRAIL_STEP_M:
+        if math.dist(self.place_W, self._trail[0]) >= TRAIL_STEP_M:
             self._trail = (self.place_W, *self._trail[: TRAIL_POINTS - 1])
 
     def _begin(self, lapse: Lapse) -> None:
@@ -219,6 +231,16 @@ class Walk(
         self._asides = (Leg(back.part(0.0, self._aside_m)[::-1], 0.0),)
         self._wait_s, self._aside_m = back.pause_s, 0.0
         return True
+
+    def step_aside(self, corners_W: tuple[Point, ...], pause_s: float) -> None:
+        """Leaves the path for another, pauses at its end, and comes back."""
+        self._asides, self._aside_m = (Leg(corners_W, pause_s), Leg(corners_W[::-1], 0.0)), 0.0
+        self._passing = True
+
+    @property
+    def trail_W(self) -> tuple[Point, ...]:
+        """Places where the person was, the latest first."""
+        return self._trail
 
     def _stand_between(self, a: Point, b: Point, from_a_m: float, dt_s: float) -> None:
         """Sets the position at a distance from corner a towards corner b, and turns towards b."""

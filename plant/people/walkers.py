@@ -15,7 +15,9 @@ import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import cache
 
+import cv2
 import numpy as np
+import shapely
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
 
@@ -37,11 +39,17 @@ AHEAD_RAD = 1.2
 """Angle to either side of the heading that counts as ahead."""
 PATIENCE_S = 4.0
 """A person who has waited this long looks for another path, and again after the same time."""
-PASS_M = 0.22
+PASS_M = 0.26
 """On a detour, a person stops only for an outline nearer than this."""
 APART_M, PASS_APART_M = 0.8, 0.42
-"""People who keep apart stop for the centre of a person ahead nearer than this; on a detour, than the second."""
+"""People who keep apart stop where the path so far ahead comes nearer than the second to the centre of a person."""
 STEPS_M = 0.15
+MEET_M, WAY_M = 1.6, 3.0
+"""People nearer than this meet, and one makes way for the other: leaves this length of the other's path free."""
+DETOUR_M = 3.0
+"""People walk so much farther at most to go round others."""
+GIVES_WAY_S, ASIDE_S, ASIDE_M = 0.5, 3.0, 0.6
+"""Time until a person makes way for another, time aside where nobody can pass, and distance from the others' paths."""
 DOOR_M = 0.6
 """People stop for a closed door that crosses their path within this length."""
 HEARS_M = 3.0
@@ -54,7 +62,7 @@ PLAN_S = 0.7
 """Time between two paths of a person who follows a robot."""
 WANDERS_M, WANDERER_CLEAR_M, PAUSES_S = 2.0, 0.45, (0.5, 4.0)
 _DRAWS = 20
-_BODY_OUTLINE_M = 0.12 * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+_HALF_BODY_M = 0.12
 
 Barriers = Sequence[tuple[Point, Point]]
 """Ends (x, y) of each doorway whose door is not open."""
@@ -200,36 +208,67 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         return True
 
     def _wait(self, name: str, walk: Walk, dt_s: float) -> None:
-        """Waits for a robot, a person or a door; after a while, looks for another path."""
+        """Waits for a robot, a person or a door; after a while, looks for another path, or steps aside."""
         walk.held_s += dt_s
-        if walk.held_s < self._patience_s(name, walk):
+        first = [*self._with_right_of_way(name, walk)]
+        if walk.held_s < (GIVES_WAY_S if first else PATIENCE_S):
             return
         walk.held_s = 0.0
         if walk.turn_round():
             return
-        if self._routes[name].wanders and any(self._people_near(name, walk)):
+        if self._is_taken(name, walk):
+            walk.arrive()
+            if not walk.done and (path := self._path_around(name, walk, ())) is not None:
+                walk.take_detour(path, passing=False)
+            return
+        wanders = self._routes[name].wanders
+        if wanders and any(self._people_near(name, walk)):
             walk.drop_path()
             return
         near = [*self._around(name, walk)]
-        with contextlib.suppress(WorldError):
-            path = self._blocked_ground(near).plan_on(walk.place_W, walk.next_stop_W, who=name)
+        ways = [_swept_W(*part) for other in first for part in itertools.pairwise(other.ahead_W(WAY_M))]
+        most_m = walk.left_m + (DETOUR_M if first or any(self._people_near(name, walk)) else math.inf)
+        path = self._path_around(name, walk, [*near, *ways])
+        if path is not None and Leg(path, 0.0).lengths_m()[-1] < most_m:
             walk.take_detour(path, passing=bool(near))
-            return
-        if self._routes[name].wanders:
+        elif wanders:
             walk.drop_path()
+        elif near:
+            self._step_aside(name, walk, first, near)
+
+    def _is_taken(self, name: str, walk: Walk) -> bool:
+        """Returns whether somebody stands where a person close by wants to stop."""
+        others = (there for other, there in self._walks.items() if other != name and not there.walks)
+        taken = any(math.dist(there.place_W, walk.next_stop_W) < PASS_APART_M for there in others)
+        return taken and math.dist(walk.place_W, walk.next_stop_W) < APART_M + PASS_APART_M
+
+    def _path_around(self, name: str, walk: Walk, outlines_W: Sequence[FloatArray]) -> tuple[Point, ...] | None:
+        """Path to the next stop around some outlines; None if there is none, or the person is inside one."""
+        ground = self._blocked_ground(outlines_W)
+        with contextlib.suppress(WorldError):
+            return ground.plan_path(walk.place_W, walk.next_stop_W, who=name)
+        return None
+
+    def _step_aside(self, name: str, walk: Walk, first: Sequence[Walk], near: Sequence[FloatArray]) -> None:
+        """Lets others through where nobody can pass: off their ways and the person's own, and back after a while."""
+        lines_W = (walk.trail_W, *(each.ahead_W(WAY_M) for each in (walk, *first)))
+        ground = self._blocked_ground(near)
+        if (place_W := ground.aside(walk.place_W, lines_W, ASIDE_M)) is not None:
+            with contextlib.suppress(WorldError):
+                walk.step_aside(ground.plan_on(walk.place_W, place_W, who=name), ASIDE_S)
+
+    def _with_right_of_way(self, name: str, walk: Walk) -> Iterator[Walk]:
+        """People close by who walk and for whom a person makes way: those who come later by name."""
+        for other, there in self._walks.items() if self._routes[name].apart else ():
+            if other > name and there.walks and math.dist(there.place_W, walk.place_W) < MEET_M:
+                yield there
 
     def _around(self, name: str, walk: Walk) -> Iterator[FloatArray]:
         """Outlines (K, 2) of the robots and, if the person keeps apart, the people close around a person."""
         yield from self._outlines_W(walk)
         for other, there in self._walks.items() if self._routes[name].apart else ():
-            if other != name and math.dist(there.place_W, walk.place_W) < APART_M:
-                yield np.array(there.place_W) + _BODY_OUTLINE_M
-
-    def _patience_s(self, name: str, walk: Walk) -> float:
-        """Time for which a person waits before looking for another path: of two people, the first by name less."""
-        if self._routes[name].apart and any(self._people_near(name, walk)):
-            return 0.5 + 0.5 * sorted(self._walks).index(name)
-        return PATIENCE_S
+            if other != name and math.dist(there.place_W, walk.place_W) < MEET_M:
+                yield _swept_W(there.place_W, there.place_W)
 
     def _blocked_ground(self, outlines_W: Sequence[FloatArray]) -> Ground:
         """Ground with closed doors and some outlines as obstacles."""
@@ -249,11 +288,16 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
         return route.yields and any(self._close_ahead(walk, outline_W) for outline_W in self._outlines_W(walk))
 
     def _people_near(self, name: str, walk: Walk) -> Iterator[Point]:
-        """Positions of the other walking people near a person, whom the next steps of the person bring nearer."""
-        reach_m = PASS_APART_M if walk.on_detour else APART_M
+        """Positions of the other walking people whom the next steps of a person would bring too near."""
         for other, there in self._walks.items():
             away_m = math.dist(there.place_W, walk.place_W)
-            if other != name and away_m < reach_m and math.dist(there.place_W, walk.ahead_W(STEPS_M)[-1]) < away_m:
+            if other == name or away_m > APART_M + PASS_APART_M:
+                continue
+            nearer = math.dist(there.place_W, walk.ahead_W(STEPS_M)[-1]) < away_m
+            if (
+                nearer
+                and shapely.LineString(walk.ahead_W(APART_M)).distance(shapely.Point(there.place_W)) < PASS_APART_M
+            ):
                 yield there.place_W
 
     def _away_m(self, robot: str, walk: Walk) -> float:
@@ -314,6 +358,13 @@ def segments_cross(a: tuple[Point, Point], b: tuple[Point, Point]) -> bool:
         return (x1 - x0) * (p[1] - y0) - (y1 - y0) * (p[0] - x0)
 
     return side(a, b[0]) * side(a, b[1]) < 0.0 and side(b, a[0]) * side(b, a[1]) < 0.0
+
+
+def _swept_W(a_W: Point, b_W: Point) -> FloatArray:
+    """Convex outline (K, 2) of a person on the way from one point to another."""
+    box = _HALF_BODY_M * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    corners = np.concatenate([box + a_W, box + b_W]).astype(np.float32)
+    return np.asarray(cv2.convexHull(corners).reshape(-1, 2), dtype=np.float64)
 
 
 def _nearest_on(polygon: FloatArray, point: FloatArray) -> FloatArray:

@@ -24,6 +24,14 @@ def test_the_nearest_person_in_sight_hears_the_robot(simulation):
     assert simulation.listeners.hearer("Alice") == "Robin"
 
 
+def test_of_two_people_the_one_whom_the_robot_faces_hears_it(simulation, monkeypatch):
+    at = {"Robin": (8.4, 4.05), "Kim": (10.3, 4.8), "Maya": (5.8, 4.5)}
+    bodies = {body: at[name] for name, body in simulation.listeners._bodies.items()}
+    place_W = simulation.listeners._place_W
+    monkeypatch.setattr(simulation.listeners, "_place_W", lambda body: bodies.get(body) or place_W(body))
+    assert simulation.listeners.hearer("Alice") == "Kim"
+
+
 @pytest.mark.parametrize(("robin", "hears"), [((11.5, 0.7), None), (BEFORE_DOOR, "Robin")])
 def test_behind_a_wall_or_too_far_away_nobody_hears(simulation, monkeypatch, robin, hears):
     at = {"Robin": robin, "Kim": (10.6, 6.0), "Maya": (5.8, 4.5)}

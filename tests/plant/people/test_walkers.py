@@ -1,5 +1,6 @@
 """People who walk in the plant."""
 
+import itertools
 import math
 from types import MappingProxyType
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from executive.words.mission import Route
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.engine import Engine
 from plant.models.catalogue import load_catalogue
@@ -14,8 +16,9 @@ from plant.people.walk import Leg, Walk
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
+from plant.simulation import Simulation
 from plant.worlds.seeding import Lapse, PointRoute, PointStop
-from plant.worlds.world import DoorRule, WorldError
+from plant.worlds.world import DoorRule, WorldError, load_world
 from skills.robot import Pose2D
 
 STEP_S = 0.0125
@@ -323,6 +326,32 @@ def test_people_who_meet_pass_each_other_apart(hall):
     stage.engine.advance(12.0)
     assert min(apart_m) > 0.4
     assert [round(y, 3) for _, y in stage.engine.walkers.places_W()] == [3.0, -3.0]
+
+
+HALL_W, ROOM_W = (5.6, 4.5), (8.6, 2.5)
+"""Points of the flat on both sides of a door through which one person goes at a time."""
+
+
+def flat_walkers(**routes):
+    people = {name: Route(waypoints=points, apart=True, start=0.0) for name, points in routes.items()}
+    world = load_world("flat").without_people().with_routes(people)
+    return Simulation(world, seed=1, visuals=False).engine.walkers
+
+
+def test_people_who_meet_in_a_doorway_make_way():
+    walkers = flat_walkers(Kim=(HALL_W, ROOM_W), Lee=(ROOM_W, HALL_W), Robin=((8.1, 3.6), (4.6, 4.5)))
+    apart_m = []
+    for _ in range(600):
+        walkers.before_step(0.05)
+        apart_m.extend(math.dist(*pair) for pair in itertools.combinations(walkers.places_W(), 2))
+    assert all(walkers[name].done for name in ("Kim", "Lee", "Robin")) and min(apart_m) > 0.4
+
+
+def test_a_person_stops_beside_somebody_who_stands_at_the_end_of_the_route():
+    walkers = flat_walkers(Kim=(ROOM_W,), Robin=(HALL_W, ROOM_W))
+    for _ in range(300):
+        walkers.before_step(0.05)
+    assert walkers["Robin"].done and 0.4 < math.dist(walkers["Robin"].place_W, ROOM_W) < 1.3
 
 
 def test_wandering_people_walk_to_free_points_that_their_seeds_draw(hall):

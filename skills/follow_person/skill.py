@@ -1,5 +1,6 @@
 """The follow_person skill: keeps behind a walking person, searches for a person whom it has lost, and asks."""
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -9,7 +10,7 @@ import numpy as np
 
 from skills.api import Cause, ClearableCostmap, Failed, Question, Running, SkillContext, Succeeded
 from skills.follow_person.target import Target, TargetOptions, people_about
-from skills.geometry import inside_polygon, wrap
+from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
@@ -30,7 +31,9 @@ _SURELY_M = 0.1
 """Distance of a person from the edge of a place at which they are certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
-_WALKS_M_S = 0.25
+_WALKS_M_S, _THERE_M, _FACES_RAD = 0.25, 0.4, 0.9
+_ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
+"""Angles (rad) round a person, from the nearest to the farthest."""
 _CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
 """Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
 _PERSON_M, _ASIDE_M = 0.3, 4.0
@@ -42,11 +45,13 @@ class FollowPersonOptions:
     """Distances (m) between the middles of robot and person, and patience (s).
 
     The robot drives to `behind_m` behind where the person will be in `ahead_s`, plans again every `replan_s`, and slows
-    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`. For a person
-    who comes towards it within `meeting_m`, it goes aside for `aside_s` at most. A person who stays hidden for `lost_s`
-    is lost, or for `gone_s` once the robot stands where they were seen last: the robot says so and searches through
-    `doors` doors, then asks and listens for `asking_s`. Somebody found then is asked for their name within `hearing_m`,
-    with `answer_s` for the answer. At the beginning it looks for the person for `finding_s`.
+    down so that it stands at `close_m`. It stays where it is while a standing person is within `near_m`, and turns to
+    one who is more than `turn_rad` to the side. For a person who comes towards it within `meeting_m`, it goes aside for
+    `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the robot stands where they
+    were seen last: the robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or
+    `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be another is asked for the
+    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`. At the beginning
+    the robot looks for the person for `finding_s`. It fails after `tries` drives in a row that failed.
     """
 
     behind_m: Length = 1.6
@@ -62,12 +67,16 @@ class FollowPersonOptions:
     finding_s: Delay = 8.0
     asking_s: Delay = 12.0
     search_s: Delay = 20.0
+    plans: Tries = 6
+    again_s: Duration = 1.0
     hearing_m: Length = 2.8
     answer_s: Delay = 5.0
+    silences: Tries = 2
     doors: Tries = 3
-    tries: Tries = 8
+    tries: Tries = 30
     max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
+    turn_rad: Turn = 0.6
     ahead_m: Length = 4.0
     target: TargetOptions = field(default_factory=TargetOptions)
     people: PeopleOptions = field(default_factory=lambda: PeopleOptions(period_s=1.0, idle_s=4.0, track_m=7.0))
@@ -103,10 +112,9 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         """Starts to look for the person."""
         super().begin(inputs)
         self._inputs, self._limit_s = inputs, self.context.clock.now() + inputs.time_limit_s
-        self._outline, self._tries = ArmFootprint(self.context).now(), 0
+        self._outline, self._tries, self._silences = ArmFootprint(self.context).now(), 0, 0
         self._planned_s = self._aside_until_s = -math.inf
         self._aside: Pose2D | None = None
-        self._before: SeenPerson | None = None
         self._company.watch = PeopleWatch(self.context, self.options.people)
 
     def end(self) -> None:
@@ -129,7 +137,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         try:
             self._target = yield from self._find(inputs)
             while not (yield from self._keep_behind(self._target)):
-                self._before = self._target.seen
+                self._target.doubt()
                 yield from self._search(self._target)
         except _Told as told:
             return Succeeded(f'stopped following {self._inputs.person} when told "{told}"')
@@ -146,7 +154,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         company = self._company
         company.watch.step(np.zeros(3))
         if self._target is not None:
-            self._target.update(company.watch.tracks(), self._now())
+            self._target.update(company.watch.tracks(), company.others(), self._now())
             company.track = self._target.seen.track
         if self.remark is not None:
             raise _Told(self.remark)
@@ -184,7 +192,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             if hidden_s > self.options.gone_s and self._goal is None:
                 return False
             here, seen_W = self.context.pose(), target.seen.place_W
-            if self._before is not None and not (yield from self._is_right(target, self._before)):
+            if target.doubted is not None and not (yield from self._is_right(target, target.doubted)):
                 return False
             near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
             rests = near and place is not None and target.stands_still(self._now())
@@ -200,12 +208,16 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return False
 
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
-        """Asks a person near who was found after a search for their name; a wrong one is the person no longer."""
-        here, near_m = self.context.pose(), self.options.hearing_m
-        if target.hidden_s(self._now()) or math.dist((here.x_m, here.y_m), target.seen.place_W) > near_m:
-            return True
-        self._before, target.farthest_m = None, self.options.target.farthest_m
+        """Asks a doubted person for their name, once they are the nearest one whom the robot faces, or the nearest.
+
+        Who says no or nothing, so often, is the person no longer.
+        """
+        here, doubted_W = self.context.pose(), target.seen.place_W
+        faces_rad = math.pi if target.stands_still(self._now()) else _FACES_RAD
+        ahead = people_about(self._company.watch.tracks(), here, None, self.options.hearing_m, faces_rad)
         if self._inputs.place_W is None:  # the person before the robot has no name
+            target.doubted = None
+        if target.doubted is None or target.hidden_s(self._now()) or not ahead or ahead[0].place_W != doubted_W:
             return True
         text, name = f"Are you {self._inputs.person}?", f"{self.name} of {self.context.robot.name}"
         asked = self.context.ask(Question(name, text, ("yes", "no"), "", self.options.answer_s))
@@ -214,9 +226,15 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
                 yield from self._tick(self._drive("asking who it is"))
         finally:
             asked.withdraw()
-        if asked.result() == "no":
+        answer = asked.result()
+        self._silences = self._silences + 1 if answer not in ("yes", "no") else 0
+        if answer == "yes":
+            target.trust()
+        elif answer == "no" or self._silences >= self.options.silences:
+            self._silences = 0
             target.reject(before)
-        return asked.result() != "no"
+            return False
+        return True
 
     def _search(self, target: Target) -> Routine[None]:
         """Looks for a lost person through the doors where they were going, then asks. Raises SkillFailure."""
@@ -224,11 +242,15 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         self._company.most_m_s = math.inf
         if self._inputs.place_W is not None:  # the robot asks for the name
             target.farthest_m = math.inf
-        for goal in self._poses_beyond_doors(target):
+        for goal in self._poses_to_search(target):
             self._halt()
-            self._plan(goal)
-            until_s = self._now() + self.options.search_s
-            while self._goal is not None and self._now() < until_s:
+            until_s, tries = self._now() + self.options.search_s, 0
+            while _apart_m(goal, self.context.pose()) > _THERE_M and self._now() < until_s:
+                if self._goal is None and self._now() >= self._planned_s + self.options.again_s:
+                    if (tries := tries + 1) > self.options.plans:
+                        break
+                    self._planned_s = self._now()
+                    self._plan(goal)
                 yield from self._tick(self._drive(f"searching {self._inputs.person}"))
                 if not target.hidden_s(self._now()):
                     return
@@ -254,6 +276,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             self._navigate.begin(inputs)
         elif not self._navigate.retarget(inputs):
             return
+        else:
+            self._tries = 0
         self._goal = goal
 
     def _drive(self, doing: str) -> str:
@@ -312,15 +336,34 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         here, options, walks = self.context.pose(), self.options, target.speed_m_s > _WALKS_M_S
         end_W = np.array(target.place_W(self._now() + (options.ahead_s if walks and not hidden_s else 0.0)))
         distance_m = math.dist((here.x_m, here.y_m), end_W)
-        if not hidden_s and not walks and options.close_m - 0.1 < distance_m < options.near_m:
-            return None
+        near_m = options.behind_m if walks else options.near_m
+        if not hidden_s and (options.close_m - 0.1 if not walks else 0.0) < distance_m < near_m:
+            return self._turned(here, target.seen.place_W)
         trail = target.trail if hidden_s else np.vstack([target.trail, end_W])
         behind_m = 0.0 if hidden_s else options.behind_m
         straight = np.array([(here.x_m, here.y_m), end_W])
         if not hidden_s and distance_m > behind_m and self._is_clear(straight):
             trail = straight
-        poses = np.array(list(_poses_behind(trail, behind_m))).reshape(-1, 3)
-        return self._free(poses)
+        along, around = _poses_behind(trail, behind_m), self._poses_around(here, end_W) if behind_m else ()
+        poses = [*along, *around] if walks else [*around, *along]
+        return self._free(np.array(poses).reshape(-1, 3))
+
+    def _poses_around(self, here: Pose2D, end_W: FloatArray) -> Iterator[tuple[float, float, float]]:
+        """Poses about a person, whom they face with nothing between; the nearest to the robot first."""
+        towards_rad = math.atan2(*(np.array((here.x_m, here.y_m)) - end_W)[::-1])
+        for away_m in (self.options.behind_m, self.options.close_m, self.options.near_m):
+            for angle in towards_rad + _ROUND:
+                way = np.array([math.cos(angle), math.sin(angle)])
+                between = end_W + np.linspace(_PERSON_M + 0.1, away_m, 8)[:, None] * way
+                if self.context.costmap.clearance_m(between).min() > 0.0:
+                    yield float(between[-1, 0]), float(between[-1, 1]), wrap(angle + math.pi)
+
+    def _turned(self, here: Pose2D, place_W: tuple[float, float]) -> Pose2D | None:
+        """The pose here that faces a person, where the robot can turn; None when it faces them nearly."""
+        turn_rad = bearing_rad(here, place_W)
+        if abs(turn_rad) < self.options.turn_rad:
+            return None
+        return self._free(np.array([(here.x_m, here.y_m, wrap(here.yaw_rad + turn_rad))]))
 
     def _clear_trail(self, target: Target, hidden_s: float) -> None:
         """Clears the costmap where the person has walked: behind a jamb the LiDAR cannot see that they have gone."""
@@ -343,6 +386,19 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         clear = footprint_clearance_m(self.context.free_space(), self._outline, poses) > SAFE_MARGIN_M
         return Pose2D(*poses[int(np.argmax(clear))].tolist()) if clear.any() else None
 
+    def _poses_to_search(self, target: Target) -> Iterator[Pose2D]:
+        """Poses beyond the likeliest door, in the place where the person was going, and beyond more doors."""
+        likely = self._poses_beyond_doors(target)
+        yield from itertools.islice(likely, 1)
+        until_W = self._inputs.until_W
+        for door in self.context.doors if until_W is not None else ():
+            for yaw in (door.through_rad, wrap(door.through_rad + math.pi)):
+                beyond = np.array(list(_beyond(door, yaw)))
+                inside = beyond[inside_polygon(beyond[:, :2], until_W or ())]
+                if len(inside) and (pose := self._free(inside)) is not None:
+                    yield pose
+        yield from likely
+
     def _poses_beyond_doors(self, target: Target) -> Iterator[Pose2D]:
         """Poses behind the doors where the person may have gone: from room to room, each time the likeliest door."""
         place_W, heading, left = np.array(target.seen.place_W), np.array(target.seen.velocity_W), [*self.context.doors]
@@ -358,10 +414,16 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             here, middle_W = self.context.pose(), np.array(door.middle_W)
             heading = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
             heading *= math.copysign(1.0, float((middle_W - (here.x_m, here.y_m)) @ heading))
-            yaw, place_W = math.atan2(heading[1], heading[0]), middle_W + heading
-            beyond = [(*(middle_W + far_m * heading), yaw) for far_m in (1.0, 1.4, 0.7)]
-            if (pose := self._free(np.array(beyond))) is not None:
+            place_W = middle_W + heading
+            if (pose := self._free(np.array(list(_beyond(door, math.atan2(*heading[::-1])))))) is not None:
                 yield pose
+
+
+def _beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
+    """Poses beyond a door in a direction through it."""
+    for far_m in (1.0, 1.4, 0.7):
+        x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
+        yield float(x), float(y), yaw_rad
 
 
 def _poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:

@@ -17,6 +17,9 @@ _TRAIL_STEP_M = 0.1
 _ONE_BODY_M = 0.6
 """Distance within which two tracks may be parts of one person."""
 _TRAIL_POINTS = 100
+_STANDS_M_S = 0.2
+_GAP_M = 1.5
+"""Distance from the trail at which a person was seen again and a new trail begins."""
 _LOOP_M, _LOOP_POINTS = 0.4, 8
 """Distance from a point of the trail, so many points back, at which the person has come back to it."""
 
@@ -26,11 +29,14 @@ class TargetOptions:
     """Conditions for another track to be the person again after a gap.
 
     The person is hidden once no scan has shown them for `hidden_s`. A track that begins later continues theirs within
-    `again_m` of the prediction, and farther by `again_m_s` for each second, up to `farthest_m`. A person stands still
-    while all positions of `still_s` lie within `still_m`.
+    `again_m` of the prediction, and farther by `again_m_s` for each second, up to `farthest_m`; after more than
+    `sure_s`, or when somebody has come within `close_m`, it may be another person's. A person stands still while all
+    positions of `still_s` lie within `still_m`.
     """
 
     hidden_s: Delay = 0.6
+    sure_s: Delay = 1.0
+    close_m: Length = 0.9
     again_m: Length = 0.8
     again_m_s: Speed = 0.7
     farthest_m: Length = 3.0
@@ -53,12 +59,18 @@ def people_about(
 
 
 class Target:
-    """The followed person: the last view `seen`, and the largest distance `farthest_m` (m) of one that continues it."""
+    """The followed person: the last view `seen`, and the largest distance `farthest_m` (m) of one that continues it.
+
+    `doubted` is the last view of the person if this may be somebody else.
+    """
 
     def __init__(self, first: SeenPerson, here: Pose2D, options: TargetOptions) -> None:
         self.seen, self._options, self.farthest_m = first, options, options.farthest_m
+        self.doubted: SeenPerson | None = None
         self._trail = [(here.x_m, here.y_m), first.place_W]
         self._others: set[int] = set()
+        self._others_before: frozenset[int] = frozenset()
+        self._others_W: list[tuple[float, float]] = []
         self._places: deque[tuple[float, tuple[float, float]]] = deque([(first.stamp_s, first.place_W)])
 
     @property
@@ -91,21 +103,36 @@ class Target:
         off = np.array(self.seen.place_W) - (here.x_m, here.y_m)
         return float(off @ self.seen.velocity_W) / max(float(np.linalg.norm(off)), 1e-3)
 
-    def update(self, people: Sequence[SeenPerson], now_s: float) -> None:
-        """Takes in the tracks of now."""
-        one = next((one for one in people if one.track == self.seen.track), None)
+    def update(self, tracks: Sequence[SeenPerson], others: Sequence[SeenPerson], now_s: float) -> None:
+        """Takes in the tracks of now, and those of them that are `others` beyond doubt."""
+        one = next((one for one in tracks if one.track == self.seen.track), None)
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
-            one = self._again(people, now_s) or one
+            one = self._again(tracks, now_s) or one
         if one is not None and one.stamp_s > self.seen.stamp_s:
+            again = one.track != self.seen.track and self.hidden_s(now_s) > self._options.sure_s
+            if again and math.dist(self._trail[-1], one.place_W) > _GAP_M:
+                self._trail = [(one.here_W.x_m, one.here_W.y_m)]
+            if again or any(math.dist(each.place_W, one.place_W) < self._options.close_m for each in others):
+                self.doubt()
             self.seen = one
             self._note(one)
-            apart = (each for each in people if math.dist(each.place_W, one.place_W) > _ONE_BODY_M)
+            apart = (each for each in tracks if math.dist(each.place_W, one.place_W) > _ONE_BODY_M)
             self._others |= {each.track for each in apart if now_s - each.stamp_s < self._options.hidden_s}
+
+    def doubt(self) -> None:
+        """Doubts from now on that the person in view is the followed one."""
+        if self.doubted is None:
+            self.doubted, self._others_before = self.seen, frozenset(self._others)
+
+    def trust(self) -> None:
+        """Takes the person of now for the followed one."""
+        self.doubted, self.farthest_m = None, self._options.farthest_m
 
     def reject(self, before: SeenPerson) -> None:
         """Takes the person of now for somebody else; the followed one was seen `before`."""
-        self._others.add(self.seen.track)
-        self.seen = replace(before, track=0)
+        self._others = {*self._others_before, self.seen.track}
+        self._others_W.append(self.seen.place_W)
+        self.seen, self.doubted = replace(before, track=0), None
 
     def _note(self, one: SeenPerson) -> None:
         """Lengthens the trail to the person; cuts off a loop."""
@@ -121,6 +148,15 @@ class Target:
         """The track that continues the person's after a gap: the nearest to the prediction that is nobody else's."""
         options, expected_W = self._options, self.place_W(now_s)
         reach_m = min(options.again_m + options.again_m_s * self.hidden_s(now_s), self.farthest_m)
-        new = [each for each in people if each.track not in self._others and each.stamp_s > self.seen.stamp_s]
+        new = [
+            each
+            for each in people
+            if each.track not in self._others and each.stamp_s > self.seen.stamp_s and not self._was_rejected(each)
+        ]
         near = [each for each in new if math.dist(each.place_W, expected_W) <= reach_m]
         return min(near, key=lambda each: math.dist(each.place_W, expected_W), default=None)
+
+    def _was_rejected(self, one: SeenPerson) -> bool:
+        """Returns whether a person stands where one stood who is somebody else."""
+        stands = math.hypot(*one.velocity_W) < _STANDS_M_S
+        return stands and any(math.dist(one.place_W, place_W) < _ONE_BODY_M for place_W in self._others_W)

@@ -88,7 +88,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
             if (first := next(iter(self._candidates(watch.tracks())), None)) is not None:
                 self._target = Target(first, self.context.pose(), TargetOptions())
         else:
-            self._target.update(watch.tracks(), now_s)
+            self._target.update(watch.tracks(), (), now_s)
         self._company.track = 0 if self._target is None else self._target.seen.track
         return super().step()
 

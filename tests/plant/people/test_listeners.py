@@ -24,7 +24,7 @@ def test_the_nearest_person_in_sight_hears_the_robot(simulation):
     assert simulation.listeners.hearer("Alice") == "Robin"
 
 
-def test_of_two_people_the_one_whom_the_robot_faces_hears_it(simulation, monkeypatch):
+def test_the_person_whom_the_robot_faces_hears_it_before_a_nearer_one(simulation, monkeypatch):
     at = {"Robin": (8.4, 4.05), "Kim": (10.3, 4.8), "Maya": (5.8, 4.5)}
     bodies = {body: at[name] for name, body in simulation.listeners._bodies.items()}
     place_W = simulation.listeners._place_W

@@ -17,7 +17,7 @@ def track(number, x, stamp_s, y=0.0, speed_m_s=1.0):
 def walked(seconds=2.0, others=()):
     target = Target(track(1, 2.0, 0.0), HERE, TargetOptions())
     for stamp_s in np.arange(0.1, seconds + 0.05, 0.1):
-        target.update([track(1, 2.0 + stamp_s, stamp_s), *others], stamp_s)
+        target.update([track(1, 2.0 + stamp_s, stamp_s), *others], (), stamp_s)
     return target
 
 
@@ -29,49 +29,93 @@ def test_the_trail_leads_from_the_robot_to_the_person():
 def test_a_person_who_comes_back_takes_the_loop_off_the_trail():
     target = walked()
     for n in range(1, 16):
-        target.update([track(1, 4.0 - 0.1 * n, 2.0 + 0.1 * n, speed_m_s=-1.0)], 2.0 + 0.1 * n)
+        target.update([track(1, 4.0 - 0.1 * n, 2.0 + 0.1 * n, speed_m_s=-1.0)], (), 2.0 + 0.1 * n)
     assert target.trail[:, 0].max() < 3.3
 
 
 def test_a_new_track_near_the_prediction_is_the_person_again():
     target = walked()
-    target.update([track(7, 5.4, 3.4)], 3.4)
+    target.update([track(7, 5.4, 3.4)], (), 3.4)
     assert (target.seen.track, target.hidden_s(3.4)) == (7, 0.0)
 
 
 def test_nobody_is_taken_for_the_person_who_was_seen_beside_them():
     other = track(2, 4.5, 2.0, y=0.8)
     target = walked(others=[other])
-    target.update([track(2, 4.6, 3.4, y=0.2)], 3.4)
+    target.update([track(2, 4.6, 3.4, y=0.2)], (), 3.4)
     assert target.seen.track == 1 and target.hidden_s(3.4) > 1.0
 
 
 def test_a_track_too_far_away_is_somebody_else():
     target = walked()
-    target.update([track(7, 9.0, 3.0)], 3.0)
+    target.update([track(7, 9.0, 3.0)], (), 3.0)
     assert target.seen.track == 1
 
 
 def test_on_a_search_somebody_far_away_may_be_the_person():
     target = walked()
-    target.update([track(7, 10.0, 12.0)], 12.0)
+    target.update([track(7, 10.0, 12.0)], (), 12.0)
     assert target.seen.track == 1
     target.farthest_m = 20.0
-    target.update([track(7, 10.0, 12.1)], 12.1)
+    target.update([track(7, 10.0, 12.1)], (), 12.1)
     assert target.seen.track == 7
 
 
 def test_a_person_stands_still_after_five_seconds_in_one_place():
     target = walked()
     for n in range(1, 52):
-        target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], 2.0 + 0.1 * n)
+        target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], (), 2.0 + 0.1 * n)
         assert target.stands_still(2.0 + 0.1 * n) == (n >= 46)
 
 
 def test_somebody_rejected_is_not_taken_for_the_person_again():
     target = walked()
     before = target.seen
-    target.update([track(7, 5.4, 3.4)], 3.4)
+    target.update([track(7, 5.4, 3.4)], (), 3.4)
     target.reject(before)
-    target.update([track(7, 5.5, 3.5)], 3.5)
+    target.update([track(7, 5.5, 3.5)], (), 3.5)
     assert (target.seen.place_W, target.seen.track) == (before.place_W, 0)
+
+
+def test_a_person_is_not_doubted_after_a_short_gap():
+    target = walked()
+    target.update([track(7, 2.9 + 2.0, 2.9)], (), 2.9)
+    assert target.seen.track == 7 and target.doubted is None
+
+
+def test_a_person_is_doubted_after_a_long_gap_or_a_close_crossing_until_trusted():
+    target, before = walked(), walked().seen
+    target.update([track(7, 5.4, 3.4)], (), 3.4)
+    assert target.doubted.track == before.track
+    target.trust()
+    assert target.doubted is None
+    other = track(2, 5.5, 3.5, y=0.5)
+    target.update([track(7, 5.5, 3.5), other], (other,), 3.5)
+    assert target.doubted.track == 7
+
+
+def test_a_person_may_be_one_who_was_seen_beside_somebody_rejected():
+    target = walked()
+    before = target.seen
+    target.update([track(7, 5.4, 3.4), track(8, 5.4, 3.4, y=2.0)], (), 3.4)
+    target.reject(before)
+    target.update([track(7, 5.5, 3.5), track(8, 5.5, 3.5, y=1.5)], (), 3.5)
+    assert target.seen.track == 8
+
+
+def test_a_person_is_nobody_who_stands_where_somebody_was_rejected():
+    target = walked()
+    before = target.seen
+    target.update([track(7, 5.4, 3.4)], (), 3.4)
+    target.reject(before)
+    target.update([track(9, 5.4, 3.6, speed_m_s=0.0)], (), 3.6)
+    assert target.seen.track == 0
+    target.update([track(9, 5.4, 3.7, speed_m_s=0.5)], (), 3.7)
+    assert target.seen.track == 9
+
+
+def test_a_person_seen_again_far_from_the_trail_begins_a_new_one():
+    target = walked()
+    target.farthest_m = 20.0
+    target.update([track(7, 9.0, 8.0, y=3.0)], (), 8.0)
+    assert target.trail.tolist() == [[0.0, 0.0], [9.0, 3.0]]

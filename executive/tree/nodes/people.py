@@ -139,7 +139,8 @@ class EachInTurn(ForEachFound):
     | SUCCESS | SUCCESS, with `first` | SUCCESS |
     | SUCCESS | FAILURE other than ERROR or CANCELLED | RUNNING; the next tick looks again |
 
-    With `first` and `expected`, a single person who gave no answer counts at the end; the message says so.
+    With `first` and `expected`, a single person who gave no answer counts at the end; the message says so. With an
+    `area`, the robot must have looked from inside it at the end, else FAILURE with EXECUTION.
     """
 
     kind = "each in turn"
@@ -148,6 +149,7 @@ class EachInTurn(ForEachFound):
     beside: str = ""
     whom: str = ""
     expected: bool = False
+    area: tuple[tuple[float, float], ...] = ()
     context: RunContext
     _whys: tuple[str, ...] = field(default=(), init=False)
     _silent: tuple[ObjectObservation, ...] = field(default=(), init=False)
@@ -182,6 +184,8 @@ class EachInTurn(ForEachFound):
         elif self._whys:
             more = f"; and {len(self._whys) - 4} more" if len(self._whys) > 4 else ""
             self._end(Cause.POSTCONDITION, "; ".join(self._whys[:4]) + more)
+        elif self.area and not inside(self.area, (self.context.pose().x_m, self.context.pose().y_m)):
+            self._end(Cause.EXECUTION, f"{self._report()}, and did not see all of it: the robot looked from outside")
         else:
             self._end(None, self._report())
 
@@ -437,6 +441,7 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
     visit = builder.sequence(
         "greet somebody", _go_beside(builder, ANYBODY, builder.key("seen"), room), greet, part="visit"
     )
-    options = {"first": False, "where": f"in the {room}"}
+    area = builder.knowledge.places[room].polygon
+    options = {"first": False, "where": f"in the {room}", "area": area}
     each = _each_person(builder, "greet each person here", ANYBODY, _ports_of(builder, room), visit, **options)
     return _in_room(builder, room, each)

@@ -200,10 +200,18 @@ def test_a_drink_is_brought_to_where_the_person_was_met(result_of, there, script
 
 
 def test_each_person_in_the_room_is_greeted_once(result_of, there, script):
-    there |= {"Sam": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall"), "Maya": (4.0, 0.0, "kitchen")}
+    there |= {"Sam": (1.0, 0.0, "hall"), "Robin": (-0.5, 1.0, "hall"), "Maya": (4.0, 0.0, "kitchen")}
     result = result_of(GREET)
     assert (result.outcome, result.message) == (Outcome.SUCCESS, "greeted 2 people in the hall")
     assert script.begun.count("speak") == 2
+
+
+def test_a_robot_that_looked_from_outside_does_not_claim_to_have_greeted_all(result_of, there, script):
+    there["Sam"] = (-1.5, 0.0, "hall")
+    result = result_of(GREET)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.EXECUTION)
+    assert result.message.startswith("greeted 1 person in the hall, and did not see all of it")
+    assert script.begun.count("speak") == 1
 
 
 def test_greeting_an_empty_room_fails_and_says_so(result_of, there, script):

@@ -15,10 +15,10 @@ ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
 LINES = {
     "executive/words": 3285,
-    "executive/language": 8240,
+    "executive/language": 8252,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8433,
+    "executive/tree": 8438,
     "executive/run": 3218,
     "executive/record": 1412,
     "executive/store": 1666,

@@ -156,7 +156,18 @@ def parse_speech(text: str, reader: PlainReader) -> SpeechRequest | None:
     if (match := forms.tell_to.fullmatch(text)) is not None:
         return SpeechRequest(_told(f"please {match['act']}"), _listener(match))
     match = forms.tell.fullmatch(text) or forms.let_know.fullmatch(text)
-    return None if match is None else _relayed(match["text"], text, _listener(match), parser)
+    if match is None:
+        _refuse_stranger(text, reader.knowledge)
+        return None
+    return _relayed(match["text"], text, _listener(match), parser)
+
+
+def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
+    """Raises RefusalError where somebody is told or asked something whose name is not known."""
+    match = re.match(r"(?:tell|ask|greet) (?P<who>(?-i:[A-Z])[a-z]+)\b", text, re.IGNORECASE)
+    if match is not None and match["who"] not in knowledge.people:
+        known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
+        raise RefusalError(f"I know no person '{match['who']}'{known}", [match["who"]])
 
 
 def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser) -> SpeechRequest:
@@ -252,6 +263,7 @@ def parse_question(text: str, knowledge: Knowledge) -> QuestionRequest | None:
     match, open_one = forms.wants_one.fullmatch(text), forms.wants_what.fullmatch(text)
     found = match or open_one
     if found is None or _listener(found).name is None:
+        _refuse_stranger(text, knowledge)
         what = (
             f"I do not understand the question in '{text}'; I can ask somebody by name whether they want this or that"
         )

@@ -16,6 +16,7 @@ from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clea
 from skills.navigate.giving_way import GivingWayOptions, pose_aside
 from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import Company
+from skills.navigate.trip_planning import place_text
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import PeopleOptions, PeopleWatch
@@ -51,7 +52,8 @@ class FollowPersonOptions:
     were seen last: the robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or
     `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be another is asked for the
     name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`. At the beginning
-    the robot looks for the person for `finding_s`. It fails after `tries` drives in a row that failed.
+    the robot looks for the person for `finding_s`. It fails after `tries` drives in a row that failed, and at the end
+    if the person was out of its sight for longer than `longest_loss_s`.
     """
 
     behind_m: Length = 1.6
@@ -74,6 +76,7 @@ class FollowPersonOptions:
     silences: Tries = 2
     doors: Tries = 3
     tries: Tries = 30
+    longest_loss_s: Delay = 10.0
     max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
     turn_rad: Turn = 0.6
@@ -143,6 +146,9 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             return Succeeded(f'stopped following {self._inputs.person} when told "{told}"')
         self._halt()
         yield from self.pause(0.5, "coming to rest")
+        if (lost_s := self._target.longest_loss_s) > self.options.longest_loss_s:
+            why = f"is with {inputs.person} in the {inputs.until}, but had lost them for {lost_s:.0f} s on the way"
+            raise SkillFailure(Cause.POSTCONDITION, why)
         return Succeeded(f"followed {self._inputs.person} to the {inputs.until or 'place'}")
 
     def _now(self) -> float:
@@ -173,7 +179,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
                 say(self.context, "I follow you.")
                 return Target(first, self.context.pose(), self.options.target)
             yield from self._tick(f"looking for {self._inputs.person}")
-        where = "ahead" if inputs.place_W is None else f"at ({inputs.place_W[0]:.2f}, {inputs.place_W[1]:.2f})"
+        where = "ahead" if inputs.place_W is None else f"at {place_text(inputs.place_W)}"
         raise SkillFailure(Cause.PRECONDITION, f"nobody is seen {where}, so {self._inputs.person} cannot be followed")
 
     def _first(self, inputs: FollowPersonInputs, waited: bool) -> SeenPerson | None:
@@ -261,10 +267,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             yield from self._tick(f"waiting for {self._inputs.person}")
             if not target.hidden_s(self._now()):
                 return
-        (x, y), hidden_s = target.seen.place_W, target.hidden_s(self._now())
-        raise SkillFailure(
-            Cause.EXECUTION, f"{self._inputs.person} is lost, seen last at ({x:.2f}, {y:.2f}) {hidden_s:.0f} s ago"
-        )
+        last, hidden_s = place_text(target.seen.place_W), target.hidden_s(self._now())
+        raise SkillFailure(Cause.EXECUTION, f"{self._inputs.person} is lost, seen last at {last} {hidden_s:.0f} s ago")
 
     def _plan(self, goal: Pose2D | None) -> None:
         """Starts or changes the drive; None keeps the present goal."""

@@ -18,6 +18,8 @@ _ONE_BODY_M = 0.6
 """Distance within which two tracks may be parts of one person."""
 _TRAIL_POINTS = 100
 _STANDS_M_S = 0.2
+_LOST_M = 5.0
+"""A person farther from the robot is lost."""
 _GAP_M = 1.5
 """Distance from the trail at which a person was seen again and a new trail begins."""
 _LOOP_M, _LOOP_POINTS = 0.4, 8
@@ -61,12 +63,14 @@ def people_about(
 class Target:
     """The followed person: the last view `seen`, and the largest distance `farthest_m` (m) of one that continues it.
 
-    `doubted` is the last view of the person if this may be somebody else.
+    `doubted` is the last view of the person if this may be somebody else, `longest_loss_s` the longest time for which
+    nobody who was the person was seen near the robot.
     """
 
     def __init__(self, first: SeenPerson, here: Pose2D, options: TargetOptions) -> None:
         self.seen, self._options, self.farthest_m = first, options, options.farthest_m
         self.doubted: SeenPerson | None = None
+        self.longest_loss_s, self._near_s = 0.0, first.stamp_s
         self._trail = [(here.x_m, here.y_m), first.place_W]
         self._others: set[int] = set()
         self._others_before: frozenset[int] = frozenset()
@@ -105,6 +109,7 @@ class Target:
 
     def update(self, tracks: Sequence[SeenPerson], others: Sequence[SeenPerson], now_s: float) -> None:
         """Takes in the tracks of now, and those of them that are `others` beyond doubt."""
+        self.longest_loss_s = max(self.longest_loss_s, now_s - self._near_s)
         one = next((one for one in tracks if one.track == self.seen.track), None)
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
             one = self._again(tracks, now_s) or one
@@ -115,6 +120,7 @@ class Target:
             if again or any(math.dist(each.place_W, one.place_W) < self._options.close_m for each in others):
                 self.doubt()
             self.seen = one
+            self._near_s = one.stamp_s if one.distance_m < _LOST_M else self._near_s
             self._note(one)
             apart = (each for each in tracks if math.dist(each.place_W, one.place_W) > _ONE_BODY_M)
             self._others |= {each.track for each in apart if now_s - each.stamp_s < self._options.hidden_s}
@@ -132,6 +138,7 @@ class Target:
         """Takes the person of now for somebody else; the followed one was seen `before`."""
         self._others = {*self._others_before, self.seen.track}
         self._others_W.append(self.seen.place_W)
+        self._near_s = before.stamp_s
         self.seen, self.doubted = replace(before, track=0), None
 
     def _note(self, one: SeenPerson) -> None:

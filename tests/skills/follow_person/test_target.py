@@ -119,3 +119,15 @@ def test_a_person_seen_again_far_from_the_trail_begins_a_new_one():
     target.farthest_m = 20.0
     target.update([track(7, 9.0, 8.0, y=3.0)], (), 8.0)
     assert target.trail.tolist() == [[0.0, 0.0], [9.0, 3.0]]
+
+
+def test_the_longest_loss_counts_the_time_with_somebody_rejected():
+    target = walked()
+    before = target.seen
+    target.update([track(7, 4.2, 3.0)], (), 3.0)
+    target.update([track(7, 4.2, 9.0)], (), 9.0)
+    assert target.longest_loss_s == pytest.approx(6.0)
+    target.reject(before)
+    target.update([track(8, 4.2, 15.0)], (), 15.0)
+    target.update([track(8, 4.2, 15.1)], (), 15.1)
+    assert target.longest_loss_s == pytest.approx(13.0)

@@ -31,7 +31,7 @@ _TASKS: Final = {
 class PeopleRequest:
     """Request about a person: the task (None: go to them), and the person, their place and the destination in words.
 
-    `form` is the group of patterns that matched, `after` the words of the following clause.
+    `form` is the group of patterns that matched.
     """
 
     form: str

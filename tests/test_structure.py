@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29919,
+    "skills": 29930,
     "plant": 22142,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

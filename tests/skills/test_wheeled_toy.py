@@ -52,8 +52,8 @@ def case_of(name):
     return SuiteCase(SKILLS[name], file.inputs(n, SKILLS[name]), make, samples=4)
 
 
-LONG = ("approach", "grasp", "hand_over")
-"""Those of `place` are like them: it drives, looks, and moves the arm and the gripper."""
+LONG = ("approach", "follow_person", "grasp", "guide_person", "hand_over", "meet_person")
+"""Those of `place` and of `navigate` are like them: they drive, look, and move the arm and the gripper."""
 
 
 @pytest.mark.parametrize("part", sorted(PARTS))

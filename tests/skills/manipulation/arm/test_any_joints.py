@@ -33,7 +33,7 @@ def poses(model, count):
 
 
 def test_solutions_put_the_hand_at_the_pose_and_differ(model):
-    for _, X_BH in poses(model, 20):
+    for _, X_BH in poses(model, 6):
         found = model.inverse(X_BH)
         assert found
         assert all(model.X_BH(q).IsNearlyEqualTo(X_BH, 1e-4) for q in found)

@@ -102,7 +102,7 @@ class Simulation:
 
         `label` names the run that the state belongs to.
         """
-        writer = SnapshotWriter(path, self.engine, self.referee, {**self._facts(), "label": label}, sorted(self.robots))
+        writer = SnapshotWriter(path, self.engine, self.referee, {**self._facts(), "label": label})
         writer()
         self.engine.after_advance(writer.write_if_due)
         return writer

@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import os
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import astuple, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from plant.referee.referee import Referee
 
 PERIOD_S: Final = 1.0
-MAGIC: Final = b"errand plant 3\n"
+MAGIC: Final = b"errand plant 4\n"
 _WORLD: Final = "world: "
 _POINT_VALUES: Final = 4
 _SLOTS: Final = (".a", ".b")
@@ -158,13 +158,11 @@ class SnapshotWriter:
     The file stands in for a real world, which stays while the executive is away; the journal stores the mission itself.
     """
 
-    def __init__(
-        self, path: Path, engine: Engine, referee: Referee, facts: Mapping[str, Any], robots: Sequence[str]
-    ) -> None:
+    def __init__(self, path: Path, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:
         self._file = SnapshotFile(path, width=1 + _POINT_VALUES)
         self._engine, self._referee, self._facts = engine, referee, dict(facts)
-        self._robots, self._from = tuple(robots), 0
-        self._points = dict.fromkeys(robots, 0)
+        self._names, self._from = referee.names, 0
+        self._points = dict.fromkeys(self._names, 0)
         self._due_s = 0.0
 
     @property
@@ -186,21 +184,21 @@ class SnapshotWriter:
     def content(self) -> bytes:
         """Returns the content of a snapshot now, without the points of the paths."""
         world = {_WORLD + name: (array.shape, array.tobytes()) for name, array in self._engine.world_state().items()}
-        paths = {"robots": self._robots, "from": self._from}
+        paths = {"names": self._names, "from": self._from}
         values = {"facts": self._facts, "engine": self._engine.state(), "referee": self._referee.state()}
         return encode(self._file.next_number, {**values, "paths": paths}, world, self._file.rows)
 
     def _append_points(self) -> None:
-        """Appends the new points of the paths; paths that began again are appended as a whole."""
-        if any(len(self._referee.points(robot)) < count for robot, count in self._points.items()):
+        """Appends the new points of the paths; all paths are appended as a whole when one has become shorter."""
+        if any(len(self._referee.points(name)) < count for name, count in self._points.items()):
             self._from = self._file.rows.count
-            self._points = dict.fromkeys(self._robots, 0)
-        for number, robot in enumerate(self._robots):
-            grown = self._referee.points(robot)[self._points[robot] :]
+            self._points = dict.fromkeys(self._names, 0)
+        for number, name in enumerate(self._names):
+            grown = self._referee.points(name)[self._points[name] :]
             if grown:
                 points = np.array(grown, dtype=np.float64)
                 self._file.append(np.column_stack([np.full(len(points), float(number)), points]))
-                self._points[robot] += len(points)
+                self._points[name] += len(points)
 
 
 def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping[str, Any]) -> None:
@@ -218,7 +216,7 @@ def restore(snapshot: Snapshot, engine: Engine, referee: Referee, facts: Mapping
     try:
         values = snapshot.values["paths"]
         rows = snapshot.rows[values["from"] :]
-        paths = {robot: rows[rows[:, 0] == number, 1:] for number, robot in enumerate(values["robots"])}
+        paths = {name: rows[rows[:, 0] == number, 1:] for number, name in enumerate(values["names"])}
         engine.resume(snapshot.values["engine"], world)
         referee.resume(snapshot.values["referee"], paths)
     except (KeyError, TypeError, ValueError) as error:

@@ -36,7 +36,7 @@ DoorHistories = Callable[[], Mapping[tuple[float, float], Sequence[tuple[float, 
 class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_bases", "_persons")):
     """Referee of one plant: call `observe` at about 20 Hz while it runs, and `judge` at any time.
 
-    Its saved state is the whole record without the paths; of people it has only their positions.
+    Its saved state is the whole record without the paths, which only grow: `points` returns them by name.
     """
 
     def __init__(
@@ -138,12 +138,15 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         return judge(conditions, truth, collisions=self._counter.collisions)
 
     def resume(self, state: State, paths: Mapping[str, FloatArray]) -> None:
-        """Restores a record with the paths of the robots, (N, 4) like `points`. Raises ValueError for other shapes."""
+        """Restores a record with the paths of robots and people, (N, 4) like `points`.
+
+        Raises KeyError for an unknown name, ValueError for other shapes.
+        """
         if any(path.shape[1:] != (PATH_VALUES,) for path in paths.values()):
             raise ValueError("the paths have no times")
         self.restore(state)
-        self._paths = {name: list(path) for name, path in paths.items()}
-        self._person_paths = {name: [np.append(p_W, self._now_s)] for name, p_W in self._persons.items()}
+        for name, path in paths.items():
+            self._path(name)[:] = path
 
     def forget_past(self) -> None:
         """Forgets the record, so that the next mission is judged by what happens from now on."""
@@ -157,9 +160,20 @@ class Referee(Stateful, saved=("_counter", "_histories", "_given", "_now_s", "_b
         """Records that a person has moved an object to its present pose. Raises KeyError for an unknown object."""
         self._histories[name].record_move(self._position(plant_context, self._entities.objects[name]), time_s)
 
-    def points(self, robot: str) -> Sequence[FloatArray]:
-        """Points of `path`, each with its time (s); the list only grows, and must not be changed."""
-        return self._paths[robot]
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the robots and of the people."""
+        return (*sorted(self._paths), *sorted(self._person_paths))
+
+    def points(self, name: str) -> Sequence[FloatArray]:
+        """Points of the path of a robot or a person, each with its time (s); must not be changed. Raises KeyError.
+
+        A robot's only grows; a person's loses some of its older points when it has many.
+        """
+        return self._path(name)
+
+    def _path(self, name: str) -> list[FloatArray]:
+        return self._paths[name] if name in self._paths else self._person_paths[name]
 
     def _speeds_before(self) -> dict[str, float]:
         """Lowest recent speed of each robot; a push that has just begun does not count as the robot's own motion."""

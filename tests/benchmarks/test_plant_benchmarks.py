@@ -35,6 +35,6 @@ def test_one_picture(benchmark, simulation, source):
 
 
 def test_one_snapshot_of_the_state(benchmark, simulation, tmp_path):
-    writer = SnapshotWriter(tmp_path / "often.plant", simulation.engine, simulation.referee, {}, ["Alice"])
+    writer = SnapshotWriter(tmp_path / "often.plant", simulation.engine, simulation.referee, {})
     benchmark.pedantic(writer, rounds=50, warmup_rounds=5)
     benchmark.extra_info["snapshots per second"] = round(1.0 / benchmark.stats["median"], 1)

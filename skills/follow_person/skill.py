@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skills.api import Cause, ClearableCostmap, Failed, Question, Running, SkillContext, Succeeded
-from skills.follow_person.target import Target, TargetOptions, people_about
+from skills.follow_person.target import Target, TargetOptions, people_about, poses_behind
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
@@ -26,8 +26,6 @@ from skills.robot import FloatArray, Pose2D
 from skills.routine import Routine, SkillFailure
 from skills.speak.skill import ListeningSkill, say
 
-_BACK_M = 3.0
-"""Length of the trail on which the robot looks for a free pose."""
 _SURELY_M = 0.1
 """Distance of a person from the edge of a place at which they are certainly in it."""
 _SAME_PLACE_M = 1.5
@@ -37,8 +35,8 @@ _ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
 """Angles (rad) round a person, from the nearest to the farthest."""
 _CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
 """Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
-_PERSON_M, _ASIDE_M = 0.3, 4.0
-"""Radius of a person on a path, and reach of the search for a pose aside from it."""
+_PERSON_M, _ASIDE_M, _BY_DOOR_M = 0.3, 4.0, 1.2
+"""Radius of a person on a path, reach of the search for a pose aside from it, and distance from a doorway."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +108,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         self._company = Company(PeopleWatch(context, self.options.people))
         self._navigate = Navigate(_at_pace(context, self.options.max_speed_m_s), None, self._company)
         self._goal: Pose2D | None = None
+        self._aside: Pose2D | None = None
 
     def begin(self, inputs: FollowPersonInputs) -> None:
         """Starts to look for the person."""
@@ -117,7 +116,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         self._inputs, self._limit_s = inputs, self.context.clock.now() + inputs.time_limit_s
         self._outline, self._tries, self._silences = ArmFootprint(self.context).now(), 0, 0
         self._planned_s = self._aside_until_s = -math.inf
-        self._aside: Pose2D | None = None
+        self._aside, self._made_way = None, False
         self._company.watch = PeopleWatch(self.context, self.options.people)
 
     def end(self) -> None:
@@ -315,15 +314,25 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
     def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
         """The pose to drive to: behind the person, or aside from the path of one who comes towards the robot."""
         here, now_s, options = self.context.pose(), self._now(), self.options
-        near = math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
-        away_m_s = target.away_m_s(here)
-        if near and not hidden_s and away_m_s < -max(_WALKS_M_S, 0.6 * target.speed_m_s):
+        near = not hidden_s and math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
+        away_m_s, blocks = target.away_m_s(here), near and self._blocks_door(target, here)
+        if blocks or (near and away_m_s < -max(_WALKS_M_S, 0.6 * target.speed_m_s)):
             if now_s >= self._aside_until_s:
                 self._aside = self._pose_aside(target, here)
             self._aside_until_s = now_s + options.aside_s
         elif away_m_s > _WALKS_M_S:
             self._aside_until_s = -math.inf
         return self._aside if now_s < self._aside_until_s else self._pose_behind(target, hidden_s)
+
+    def _blocks_door(self, target: Target, here: Pose2D) -> bool:
+        """Returns once whether the person has stood still by a doorway, perhaps since the robot is in the way."""
+        if not target.stands_still(self._now()):
+            self._made_way = False
+        elif not self._made_way:
+            places_W = (here.x_m, here.y_m), target.seen.place_W
+            self._made_way = True
+            return any(door.distance_m(place_W) < _BY_DOOR_M for door in self.context.doors for place_W in places_W)
+        return False
 
     def _pose_aside(self, target: Target, here: Pose2D) -> Pose2D | None:
         """The nearest pose off the path of a person who comes back."""
@@ -348,7 +357,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         straight = np.array([(here.x_m, here.y_m), end_W])
         if not hidden_s and distance_m > behind_m and self._is_clear(straight):
             trail = straight
-        along, around = _poses_behind(trail, behind_m), self._poses_around(here, end_W) if behind_m else ()
+        along, around = poses_behind(trail, behind_m), self._poses_around(here, end_W) if behind_m else ()
         poses = [*along, *around] if walks else [*around, *along]
         return self._free(np.array(poses).reshape(-1, 3))
 
@@ -428,21 +437,6 @@ def _beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float
     for far_m in (1.0, 1.4, 0.7):
         x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
         yield float(x), float(y), yaw_rad
-
-
-def _poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:
-    """Poses on a trail at least so far behind its end, the nearest to the end first: along it, and facing its end."""
-    end, back_m = trail[-1], 0.0
-    for n in range(len(trail) - 1, 0, -1):
-        length = float(np.linalg.norm(trail[n] - trail[n - 1]))
-        back_m += length
-        if back_m - length > behind_m + _BACK_M:
-            return
-        along = math.atan2(*(trail[n] - trail[n - 1])[::-1])
-        for point in np.linspace(trail[n], trail[n - 1], max(1, math.ceil(length / 0.15)), endpoint=False):
-            if np.linalg.norm(end - point) >= behind_m:
-                for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
-                    yield float(point[0]), float(point[1]), yaw
 
 
 def _apart_m(a: Pose2D, b: Pose2D) -> float:

@@ -2,7 +2,7 @@
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,8 @@ _TRAIL_STEP_M = 0.1
 _ONE_BODY_M = 0.6
 """Distance within which two tracks may be parts of one person."""
 _TRAIL_POINTS = 100
+_BACK_M = 3.0
+"""Length of the trail on which the robot looks for a free pose."""
 _STANDS_M_S = 0.2
 _LOST_M = 5.0
 """A person farther from the robot is lost."""
@@ -167,3 +169,18 @@ class Target:
         """Returns whether a person stands where one stood who is somebody else."""
         stands = math.hypot(*one.velocity_W) < _STANDS_M_S
         return stands and any(math.dist(one.place_W, place_W) < _ONE_BODY_M for place_W in self._others_W)
+
+
+def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, float, float]]:
+    """Poses on a trail at least so far behind its end, the nearest to the end first: along it, and facing its end."""
+    end, back_m = trail[-1], 0.0
+    for n in range(len(trail) - 1, 0, -1):
+        length = float(np.linalg.norm(trail[n] - trail[n - 1]))
+        back_m += length
+        if back_m - length > behind_m + _BACK_M:
+            return
+        along = math.atan2(*(trail[n] - trail[n - 1])[::-1])
+        for point in np.linspace(trail[n], trail[n - 1], max(1, math.ceil(length / 0.15)), endpoint=False):
+            if np.linalg.norm(end - point) >= behind_m:
+                for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
+                    yield float(point[0]), float(point[1]), yaw

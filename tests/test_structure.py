@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 29930,
+    "skills": 29941,
     "plant": 22154,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

@@ -74,7 +74,7 @@ class FollowPersonOptions:
     silences: Tries = 2
     doors: Tries = 3
     tries: Tries = 30
-    longest_loss_s: Delay = 10.0
+    longest_loss_s: Delay = 20.0
     max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
     turn_rad: Turn = 0.6

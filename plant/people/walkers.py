@@ -55,7 +55,7 @@ DOOR_M = 0.6
 HEARS_M = 3.0
 """People hear a robot within this distance, and a robot hears them."""
 BEHIND_M, SETS_OFF_M = 1.5, 1.9
-"""Length of the path to the robot at which a person behind it stops, and at which the person sets off again."""
+"""Length of the path to the robot at which a person behind it stops, and distance from which on the person follows."""
 NEAR_M = 2.0
 """A robot nearer than this ends the lapse of a person who follows it."""
 PLAN_S = 0.7
@@ -200,11 +200,13 @@ class Walkers(Stateful, saved=("_walks", "_leaders", "_plans_s", "_spoke", "_now
             walk.lapsed = False
         if walk.lapsed or walk.pauses:
             return walk.pauses or walk.goes_back
-        close = walk.done and self._away_m(leader, walk) < SETS_OFF_M
-        if not walk.on_detour and not close and self._plans_now(name):
-            x, y, _ = self._plant.EvalBodyPoseInWorld(self._context, self._robots[leader].body).translation()
-            if not self._set_off(walk, self._blocked_ground(()), (float(x), float(y)), short_m=BEHIND_M):
-                walk.drop_path()
+        if walk.on_detour or not self._plans_now(name):
+            return True
+        x, y, _ = self._plant.EvalBodyPoseInWorld(self._context, self._robots[leader].body).translation()
+        ground, robot_W = self._blocked_ground(()), (float(x), float(y))
+        close = walk.done and math.dist(robot_W, walk.place_W) < SETS_OFF_M and ground.sees(walk.place_W, robot_W)
+        if not close and not self._set_off(walk, ground, robot_W, short_m=BEHIND_M):
+            walk.drop_path()
         return True
 
     def _wait(self, name: str, walk: Walk, dt_s: float) -> None:

@@ -1,7 +1,7 @@
 """The guide_person skill: goes ahead of a person at their pace, waits for them, and goes back for them."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -10,7 +10,7 @@ import numpy as np
 from skills.api import Cause, Running, Step, Succeeded
 from skills.follow_person.target import Target, TargetOptions, people_about
 from skills.geometry import grid_inside, inside_polygon, wrap
-from skills.meet_person.skill import MeetPerson, person_text
+from skills.meet_person.skill import MeetPerson, MeetPersonOptions, person_text
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
 from skills.navigate.skill import Navigate
@@ -24,7 +24,10 @@ from skills.routine import ENDED_EARLY, Patience, Routine, SkillFailure
 from skills.speak.skill import ListeningSkill, say
 
 _TRACKING: Final = PeopleOptions(period_s=1.0, idle_s=4.0, track_m=6.0, hidden_s=8.0)
+_NEAR: Final = MeetPersonOptions(apart_m=(1.3, 1.6, 2.2, 2.7))
+"""Where the robot goes for a person who fell behind: not beside them, if they stand in a doorway."""
 _SLOWEST_M_S = 0.25
+_CLEAR_M = SAFE_MARGIN_M + 0.05
 _SURELY_M = 0.25
 """Distance of a person from the edge of a room at which they are certainly in it, and not in its door."""
 _AHEAD_M, _AHEAD_RAD = 3.0, 1.2
@@ -33,7 +36,7 @@ _STEPS_IN, _STANDS_S = 3, 2.0
 _COMES_M, _STEP_IN_M, _YAWS_RAD = 2.7, 0.3, (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
 """Distance at which a person comes after the robot, least further distance, and turns of the robot there."""
 _ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
-"""Wait before the robot asks the person to come; how far along their last direction it looks for one who walked."""
+"""Wait before the robot asks the person to come; steps in which it looks ahead and back for one who walked."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +131,13 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         for _ in range(_STEPS_IN):
             drive = NavigateInputs(goal, 0.25, 0.4, self.options.most_m_s)
             leading = Leading(self.context, None, self._company)
-            if (yield from self.perform(leading, drive, self._must_stop)) is ENDED_EARLY:
+            try:
+                ended = yield from self.perform(leading, drive, self._must_stop)
+            except SkillFailure as failure:
+                if goal is inputs.goal or failure.cause is not Cause.PLANNING:
+                    raise
+                break
+            if ended is ENDED_EARLY:
                 break
             end_s = self.context.clock.now() + self.options.arrive_s
             while not (self._are_there() or self._waits_outside(end_s)) and self.context.clock.now() < end_s:
@@ -150,21 +159,24 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return self._is_close() and self.context.clock.now() > end_s - self.options.arrive_s + _STANDS_S
 
     def _pose_further_in(self) -> Pose2D | None:
-        """A free pose in the room, so far from the person that they come in as well; None without one."""
+        """A free pose in the room, so far from where the person was seen last that they come in; None without one."""
         area, here = self._inputs.area_W, self.context.pose()
-        if self._target is None or not area or not self._is_close():
+        if self._target is None or not area:
             return None
         person_W, footprint = np.array(self._target.seen.place_W), ArmFootprint(self.context).now()
+        apart_m = math.dist(person_W, (here.x_m, here.y_m))
+        if apart_m > self.options.wait_m:
+            return None
         points = grid_inside(area, 0.25, first_m=0.3, margin_m=-0.4)
         away_m = np.linalg.norm(points - person_W, axis=1)
         drive_m = np.linalg.norm(points - (here.x_m, here.y_m), axis=1)
         for n in np.lexsort((drive_m, np.maximum(0.0, _COMES_M - away_m).round(1))):
-            if away_m[n] > self._gap_m() + _STEP_IN_M:
+            if away_m[n] > apart_m + _STEP_IN_M:
                 (x, y), ahead_rad = points[n], math.atan2(*(points[n] - person_W)[::-1])
                 poses = [Pose2D(float(x), float(y), wrap(ahead_rad + turn)) for turn in _YAWS_RAD]
                 clear_m = footprint_clearance_m(self.context.free_space(), footprint, pose_array(poses))
-                if clear_m.max() > SAFE_MARGIN_M:
-                    return poses[int(np.argmax(clear_m > SAFE_MARGIN_M))]
+                if clear_m.max() > _CLEAR_M:
+                    return poses[int(np.argmax(clear_m > _CLEAR_M))]
         return None
 
     def _fetch(self) -> Routine[None]:
@@ -175,10 +187,10 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         last = None if self._target is None else self._target.seen
         if last is not None:
             say(self.context, "I come back for you.")
-        for place_W in (self._place_W,) if last is None else (last.place_W, *_further_on(last)):
+        for place_W in (self._place_W,) if self._target is None else _places_of(self._target):
             try:
                 goal = MeetPersonInputs(inputs.person, place_W)
-                met = yield from self.perform(MeetPerson(self.context), goal, self._is_close)
+                met = yield from self.perform(MeetPerson(self.context, _NEAR), goal, self._is_close)
             except SkillFailure as failure:
                 if failure.cause not in (Cause.POSTCONDITION, Cause.PLANNING):
                     raise
@@ -224,10 +236,15 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         return bool(robot_is_in and inside_polygon(np.array([self._target.seen.place_W]), area, -_SURELY_M).all())
 
 
-def _further_on(one: SeenPerson) -> list[tuple[float, float]]:
-    """Place on which a person who walked is now, if they kept their direction."""
-    speed_m_s = math.hypot(*one.velocity_W)
-    if speed_m_s < _WALKS_M_S:
-        return []
-    x, y = (at + _ON_M * v / speed_m_s for at, v in zip(one.place_W, one.velocity_W, strict=True))
-    return [(x, y)]
+def _places_of(target: Target) -> Iterator[tuple[float, float]]:
+    """Places of a person who is out of sight: the last one, further in the same direction, and back along the trail."""
+    last, speed_m_s = target.seen, target.speed_m_s
+    yield last.place_W
+    if speed_m_s >= _WALKS_M_S:
+        x, y = (at + _ON_M * v / speed_m_s for at, v in zip(last.place_W, last.velocity_W, strict=True))
+        yield x, y
+    trail, back_m = target.trail[::-1], _ON_M
+    for (x, y), length_m in zip(trail[1:], np.cumsum(np.linalg.norm(np.diff(trail, axis=0), axis=1)), strict=True):
+        if length_m >= back_m:
+            back_m += _ON_M
+            yield float(x), float(y)

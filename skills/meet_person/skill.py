@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import ClassVar, Final
 
 import numpy as np
@@ -26,7 +27,8 @@ _SCAN_AGE_S = 1.0
 _ARM_M = 0.5
 """Distance from a person's axis up to which their own body is in the costmap."""
 _STEP_M = 0.1
-_MOST_POSES = 4
+_POSES_EACH = 2
+"""Free poses at each distance from the person to which the robot tries to drive."""
 
 
 def person_text(name: str) -> str:
@@ -63,7 +65,7 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         """Drives beside the person, again if they have moved meanwhile."""
         place_W, who = inputs.place_W, person_text(inputs.person)
         for drives in range(self.options.tries + 1):
-            if drives or place_W is None or self._away_m(place_W) <= self.options.near_m:
+            if drives or place_W is None or self._is_in_view(place_W):
                 person = yield from self._look(who, place_W)
                 if person is None:
                     nobody = f"nobody is seen within {self.options.ahead_m:g} m"
@@ -103,9 +105,11 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         near = [one for one in people if math.dist(one.place_W, place_W) <= self.options.same_m]
         return sorted(near, key=lambda one: math.dist(one.place_W, place_W))
 
-    def _away_m(self, place_W: tuple[float, float]) -> float:
+    def _is_in_view(self, place_W: tuple[float, float]) -> bool:
+        """Returns whether the robot stands beside a place, with no wall between."""
         here = self.context.pose()
-        return math.dist(place_W, (here.x_m, here.y_m))
+        towards = Pose2D(here.x_m, here.y_m, here.yaw_rad + bearing_rad(here, place_W))
+        return math.dist(place_W, (here.x_m, here.y_m)) <= self.options.near_m and self._sees(towards, place_W)
 
     def _is_beside(self, person: SeenPerson) -> bool:
         return (
@@ -115,12 +119,14 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def _go_beside(self, place_W: tuple[float, float], name: str) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
-        poses = [pose for m in self.options.apart_m for pose in facing_poses(place_W, self.context.pose(), m)]
-        footprint, costmap = ArmFootprint(self.context).now(), self.context.free_space()
-        free = [pose for pose in poses if footprint_clear(costmap, footprint, pose) and self._sees(pose, place_W)]
+        footprint, costmap, here = ArmFootprint(self.context).now(), self.context.free_space(), self.context.pose()
+        free = []
+        for apart_m in self.options.apart_m:
+            poses = (pose for pose in facing_poses(place_W, here, apart_m) if footprint_clear(costmap, footprint, pose))
+            free += [*islice((pose for pose in poses if self._sees(pose, place_W)), _POSES_EACH)]
         if not free:
             raise SkillFailure(Cause.PLANNING, f"there is no free place to stand beside {name}")
-        yield from go_to_one(self, [NavigateInputs(pose, 0.15, 0.2) for pose in free[:_MOST_POSES]])
+        yield from go_to_one(self, [NavigateInputs(pose, 0.15, 0.2) for pose in free])
 
     def _sees(self, pose: Pose2D, place_W: tuple[float, float]) -> bool:
         """Returns whether no wall or table is between a pose and a person."""

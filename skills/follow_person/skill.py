@@ -33,6 +33,7 @@ _SAME_PLACE_M = 1.5
 _WALKS_M_S, _THERE_M, _FACES_RAD = 0.25, 0.4, 0.9
 _ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
 """Angles (rad) round a person, from the nearest to the farthest."""
+_TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
 _CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
 """Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
 _PERSON_M, _ASIDE_M, _BY_DOOR_M = 0.3, 4.0, 1.2
@@ -73,7 +74,7 @@ class FollowPersonOptions:
     answer_s: Delay = 5.0
     silences: Tries = 2
     doors: Tries = 3
-    tries: Tries = 30
+    tries: Tries = 60
     longest_loss_s: Delay = 20.0
     max_speed_m_s: Speed = 1.2
     ahead_rad: Turn = 1.2
@@ -294,7 +295,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         self._tries = self._tries + 1 if isinstance(step, Failed) else 0
         if isinstance(step, Failed):
             self._planned_s = self._now() + self.options.replan_s
-            if step.cause not in (Cause.PLANNING, Cause.POSTCONDITION) or self._tries > self.options.tries:
+            if step.cause not in _TRIED_AGAIN or self._tries > self.options.tries:
                 raise SkillFailure(step.cause, step.message)
         return doing
 

@@ -237,14 +237,21 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
 
 
 def _places_of(target: Target) -> Iterator[tuple[float, float]]:
-    """Places of a person who is out of sight: the last one, further in the same direction, and back along the trail."""
-    last, speed_m_s = target.seen, target.speed_m_s
-    yield last.place_W
-    if speed_m_s >= _WALKS_M_S:
-        x, y = (at + _ON_M * v / speed_m_s for at, v in zip(last.place_W, last.velocity_W, strict=True))
-        yield x, y
-    trail, back_m = target.trail[::-1], _ON_M
+    """Places of a person who is out of sight: the last one, further in the same direction, and back along the trail.
+
+    Where the robot sees the person from one of them, that place comes next.
+    """
+    last, trail = target.seen, target.trail[::-1]
+    guesses, back_m = [last.place_W], _ON_M
+    if target.speed_m_s >= _WALKS_M_S:
+        x, y = (at + _ON_M * v / target.speed_m_s for at, v in zip(last.place_W, last.velocity_W, strict=True))
+        guesses.append((x, y))
     for (x, y), length_m in zip(trail[1:], np.cumsum(np.linalg.norm(np.diff(trail, axis=0), axis=1)), strict=True):
         if length_m >= back_m:
             back_m += _ON_M
-            yield float(x), float(y)
+            guesses.append((float(x), float(y)))
+    for place_W in guesses:
+        yield place_W
+        if target.seen.stamp_s > last.stamp_s:
+            last = target.seen
+            yield last.place_W

@@ -3,13 +3,16 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from planar_people import person_at
 from planar_robot import TWO_ROOMS, Bench
 
 from executive.run.control import Control
 from skills.api import Cause, Failed, Running, Succeeded
-from skills.guide_person.skill import GuidePerson, GuidePersonOptions
+from skills.follow_person.target import Target, TargetOptions
+from skills.guide_person.skill import GuidePerson, GuidePersonOptions, _places_of
+from skills.perception.people import SeenPerson
 from skills.ports import GuidePersonInputs
 from skills.robot import Pose2D
 
@@ -191,3 +194,17 @@ def test_a_cancel_stops_the_robot_and_hears_no_remark():
 def test_without_a_place_the_person_ahead_is_guided(at, ends):
     guided = Guided(at=at)
     assert isinstance(guided.go(replace(INPUTS, place_W=None)), ends)
+
+
+def test_a_person_out_of_sight_is_looked_for_ahead_behind_and_where_they_are_seen():
+    def seen(x_m, stamp_s, number=1):
+        place_W, here = (x_m, 0.0), Pose2D(0.0, 0.0, 0.0)
+        return SeenPerson(place_W, 0.01 * np.eye(2), 1.0, stamp_s, here, track=number, velocity_W=(1.0, 0.0), scans=9)
+
+    target = Target(seen(1.0, 0.0), Pose2D(0.0, 0.0, 0.0), TargetOptions())
+    for n in range(1, 31):
+        target.update([seen(1.0 + 0.1 * n, 0.1 * n)], (), 0.1 * n)
+    places = _places_of(target)
+    assert [next(places)[0] for _ in range(3)] == pytest.approx([4.0, 6.0, 2.0], abs=0.11)
+    target.update([seen(4.5, 5.0, 2)], (), 5.0)
+    assert next(places) == (4.5, 0.0)

@@ -12,7 +12,7 @@ from executive.tree.nodes.carry import carried_along_plan, carry_plan, goal_in_w
 from executive.tree.nodes.clearing import clear_plan, is_clearing, refuse_everything
 from executive.tree.nodes.dock import charge_plan
 from executive.tree.nodes.guard import HoldsNothingElse
-from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan, met_after
+from executive.tree.nodes.people import follow_plan, go_to_goal_plan, greet_plan, guide_plan
 from executive.tree.nodes.pick_up import held_plan, known_held_plan, pick_up_plan
 from executive.tree.nodes.search import (
     find_plan,
@@ -27,6 +27,7 @@ from executive.tree.nodes.search import (
 from executive.tree.plan import Assembled, PlanBuilder, StepPart
 from executive.words.command import START, TIME_UNITS_S, Command, Task
 from executive.words.goal import GoalCondition, When
+from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import Do, Say
 from skills.detect.descriptions import count_of
 from skills.files.errors import InputError, listing
@@ -67,7 +68,7 @@ def _plan(assembler: Assembler, step: Do | Say, builder: PlanBuilder) -> Assembl
     refuse_several(builder)
     refuse_everything(builder)
     node = _giving(assembler, step, _BY_TASK[command.task](builder), builder)
-    flow.held, flow.met = held_after(command, held, knowledge), met_after(command, flow.met, knowledge)
+    flow.held, flow.met = held_after(command, held, knowledge), _met_after(command, flow.met, knowledge)
     lets_go = command.item is not None or command.task is Task.PLACE
     flow.opening = opening and command.task is not Task.GRASP and flow.held == held and not lets_go
     goal = command_goal(command, knowledge, _elsewhere(builder))
@@ -232,3 +233,11 @@ _BY_TASK: Final[Mapping[Task | None, Callable[[PlanBuilder], NodeSpec]]] = {
     None: go_plan,
 }
 PLANS: Final[StepPlans] = {Do: _plan, Say: _plan}
+
+
+def _met_after(command: Command, met: frozenset[str], knowledge: Knowledge) -> frozenset[str]:
+    """Returns the people who stand where the robot has met them, after a command that succeeded."""
+    if command.task in (Task.FOLLOW, Task.GUIDE) and command.object is not None:
+        return met - {knowledge.person(command.object.name) or ""}
+    goes = command.task is None and command.item is None and command.goal is not None
+    return met | set(filter(None, (knowledge.person(command.goal or ""),))) if goes else met

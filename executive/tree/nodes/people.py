@@ -18,14 +18,14 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import goal_in_words, goal_pose
 from executive.tree.nodes.clearing import ForEachFound
-from executive.tree.nodes.pick_up import go_near_plan
+from executive.tree.nodes.pick_up import go_near_plan, poses_nearby
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.recovery import OnlyIfKnown
 from executive.tree.nodes.speech import AskPeople
 from executive.tree.plan import PlanBuilder, pose_2d
-from executive.words.command import SPEAKER, START, Command, Task
+from executive.words.command import SPEAKER, START
 from executive.words.expression import Template, Value
-from executive.words.knowledge import ANYBODY, Knowledge, Place
+from executive.words.knowledge import ANYBODY, Place
 from executive.words.outlines import distance_m, inside
 from skills.api import Cause, Failed, ObjectObservation
 from skills.quantities import Coordinate
@@ -139,8 +139,7 @@ class EachInTurn(ForEachFound):
     | SUCCESS | SUCCESS, with `first` | SUCCESS |
     | SUCCESS | FAILURE other than ERROR or CANCELLED | RUNNING; the next tick looks again |
 
-    With `first` and `expected`, a single person who gave no answer counts at the end; the message says so. With an
-    `area`, the robot must have looked from inside it at the end, else FAILURE with EXECUTION.
+    With `first` and `expected`, a single person who gave no answer counts at the end; the message says so.
     """
 
     kind = "each in turn"
@@ -149,7 +148,6 @@ class EachInTurn(ForEachFound):
     beside: str = ""
     whom: str = ""
     expected: bool = False
-    area: tuple[tuple[float, float], ...] = ()
     context: RunContext
     _whys: tuple[str, ...] = field(default=(), init=False)
     _silent: tuple[ObjectObservation, ...] = field(default=(), init=False)
@@ -184,8 +182,6 @@ class EachInTurn(ForEachFound):
         elif self._whys:
             more = f"; and {len(self._whys) - 4} more" if len(self._whys) > 4 else ""
             self._end(Cause.POSTCONDITION, "; ".join(self._whys[:4]) + more)
-        elif self.area and not inside(self.area, (self.context.pose().x_m, self.context.pose().y_m)):
-            self._end(Cause.EXECUTION, f"{self._report()}, and did not see all of it: the robot looked from outside")
         else:
             self._end(None, self._report())
 
@@ -242,14 +238,6 @@ class NextRoom(ExplainedLeaf):
         return self.say(f"the next room is the {room}")
 
 
-def met_after(command: Command, met: frozenset[str], knowledge: Knowledge) -> frozenset[str]:
-    """Returns the people who stand where the robot has met them, after a command that succeeded."""
-    if command.task in (Task.FOLLOW, Task.GUIDE) and command.object is not None:
-        return met - {knowledge.person(command.object.name) or ""}
-    goes = command.task is None and command.item is None and command.goal is not None
-    return met | set(filter(None, (knowledge.person(command.goal or ""),))) if goes else met
-
-
 def person_text(person: str) -> str:
     """Name of a person in a sentence."""
     return {SPEAKER: "the person who asked", ANYBODY: "somebody"}.get(person, person)
@@ -276,7 +264,8 @@ def meet_plan(builder: PlanBuilder, person: str, place: str | None = None) -> No
     others = tuple(dict.fromkeys(room for room in (usual, *knowledge.places) if room != said))
     here = builder.at("here")
     near = here.node("only if near", f"{person} is near", _go_beside(here, person, met), key=met)
-    there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, _ports_of(builder, said)))
+    ports = {"area_W": knowledge.places[said].polygon, "place": said}
+    there = _in_room(builder.at(said), said, _meet_one_plan(builder.at(said), person, ports))
     elsewhere = (_elsewhere_plan(builder.at("elsewhere"), person, others),) if others else ()
     return builder.node(
         "selector",
@@ -305,12 +294,9 @@ def _elsewhere_plan(builder: PlanBuilder, person: str, rooms: tuple[str, ...]) -
     return _each_in_turn(builder, title, following, visit, room, over, limit=len(rooms) + 1, first=True)
 
 
-def _ports_of(builder: PlanBuilder, room: str) -> dict[str, object]:
-    """Inputs of a look for people in a room."""
-    return {"area_W": builder.knowledge.places[room].polygon, "place": room}
-
-
-def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], *, expected: bool = True) -> NodeSpec:
+def _meet_one_plan(
+    builder: PlanBuilder, person: str, ports: Mapping[str, object], *, expected: bool = True
+) -> NodeSpec:
     """Goes beside one person after the other, until one of them is the one who is meant."""
     seen, observations, met = builder.key("seen"), builder.key("all"), builder.met_key(person)
     who = builder.node(
@@ -333,42 +319,54 @@ def _meet_one_plan(builder: PlanBuilder, person: str, ports: dict[str, object], 
         always=len(builder.knowledge.people) > 1 or not expected,
     )
     visit = builder.sequence(f"meet {person}", _go_beside(builder, person, seen, ports["place"]), who, part="visit")
-    options = {"whom": person, "expected": expected, "first": True, "met": met, "beside": who.options["beside"]}
-    return _each_person(builder, f"is {person} here?", person, ports, visit, **options)
+    own = {"whom": person, "expected": expected, "first": True, "met": met, "beside": who.options["beside"]}
+    return _each_person(builder, f"is {person} here?", person, ports, visit, **own)
 
 
 def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
     """Goes to a room, and does something there."""
     place = builder.knowledge.places[room]
-    drive = _to_room(builder, pose_2d(place.pose), Constant(place.polygon), f"the {room}")
-    return builder.sequence(f"in the {room}", drive, then)
+    to = _to_room(builder, pose_2d(place.pose), Constant(place.polygon), f"the {room}")
+    return builder.sequence(f"in the {room}", to, then)
 
 
 def _to_room(builder: PlanBuilder, pose: Pose2D | FromBoard, area: Constant | FromBoard, to: str) -> NodeSpec:
-    """Goes to a pose in a room; where somebody stands there or in the door, as near as that."""
+    """Goes to a pose in a room, or beside it; where somebody stands in the door, as near as that."""
     near = builder.node("near room", f"is {to} near?", part="near", area=area)
-    once = builder.at("once").skill("navigate", {"goal": pose})
-    return builder.node("selector", f"go to {to}", once, near, builder.navigate(pose, to), part="to-room")
+    once, *beside = _drives(builder, pose)
+    return builder.node("selector", f"go to {to}", once, near, *beside, builder.navigate(pose, to), part="to-room")
+
+
+def _drives(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[NodeSpec]:
+    """Drives to a pose in a room, and to poses beside it."""
+    poses = enumerate((pose, *poses_nearby(builder, pose).values()))
+    return [builder.at(f"pose-{n}").skill("navigate", {"goal": each}) for n, each in poses]
 
 
 def _each_person(
-    builder: PlanBuilder, title: str, person: str, ports: dict[str, object], visit: NodeSpec, **options: Any
+    builder: PlanBuilder, title: str, person: str, ports: Mapping[str, object], visit: NodeSpec, **options: Any
 ) -> NodeSpec:
-    """Builds rounds of a look for one more person and a visit."""
+    """Builds rounds of a look for one more person and a visit; with a pose `middle`, the last look is from there."""
     seen, over = builder.key("seen"), builder.key("over")
     own = {"avoid": FromBoardOr(over, ()), "unpictured": True}
     own = {port: value for port, value in own.items() if builder.has_ports("find_people", (port,))}
     outputs = {"observation": seen, "observations": builder.key("all")}
-    look = builder.skill("find_people", {**ports, "person": person, "count": 1, **own}, outputs)
+    own |= {**ports, "person": person, "count": 1}
+    look, middle = builder.skill("find_people", own, outputs), builder.at("middle")
+    if (pose := options.pop("middle", None)) is not None:
+        there = middle.node("selector", "go to the middle", *_drives(middle, pose), part="there")
+        again = middle.sequence("look from the middle", there, middle.skill("find_people", own, outputs))
+        look = builder.node("selector", "look", look, again, part="look")
     return _each_in_turn(builder.at("each"), title, look, visit, seen, over, limit=MOST_PEOPLE, **options)
 
 
 def _each_in_turn(
     builder: PlanBuilder, title: str, look: NodeSpec, visit: NodeSpec, key: str, over: str, **options: Any
 ) -> NodeSpec:
-    keys = {"key": key, "done": over, "missed": over, "forgets": (over,)}
-    texts = {"did": ("greeted", ""), "where": "here", "misses": MOST_PEOPLE}
-    return builder.node("each in turn", title, look, visit, **{**keys, **texts, **options})
+    own = {"key": key, "done": over, "missed": over, "forgets": (over,), "misses": MOST_PEOPLE}
+    return builder.node(
+        "each in turn", title, look, visit, **{**own, "did": ("greeted", ""), "where": "here", **options}
+    )
 
 
 def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "") -> NodeSpec:
@@ -402,10 +400,11 @@ def guide_plan(builder: PlanBuilder) -> NodeSpec:
     person, goal = person_of(builder), builder.command.goal
     if goal is None:
         raise builder.error(f"it is not said where to guide {person_text(person)}", "name a place")
-    to = goal_in_words(builder, goal)
+    to, area_W = goal_in_words(builder, goal), _guided_area(builder, goal)
     ports = {"person": ANYBODY if person == SPEAKER else person, "goal": goal_pose(builder, goal), "place": to}
-    area = {"area_W": _guided_area(builder, goal)}
-    return _with_person(builder, person, f"guide {person_text(person)} to {to}", "guide_person", {**ports, **area})
+    return _with_person(
+        builder, person, f"guide {person_text(person)} to {to}", "guide_person", ports | {"area_W": area_W}
+    )
 
 
 def _guided_area(builder: PlanBuilder, goal: str) -> tuple[tuple[float, float], ...]:
@@ -421,8 +420,8 @@ def _guided_area(builder: PlanBuilder, goal: str) -> tuple[tuple[float, float], 
 def _with_person(builder: PlanBuilder, person: str, title: str, skill: str, ports: dict[str, object]) -> NodeSpec:
     if person in (SPEAKER, ANYBODY):
         return builder.sequence(title, builder.skill(skill, ports))
-    find = meet_plan(builder.at("meet"), person)
-    return builder.sequence(title, find, builder.skill(skill, {**ports, "place_W": PlaceOf(builder.met_key(person))}))
+    work = builder.skill(skill, {**ports, "place_W": PlaceOf(builder.met_key(person))})
+    return builder.sequence(title, meet_plan(builder.at("meet"), person), work)
 
 
 def greet_plan(builder: PlanBuilder) -> NodeSpec:
@@ -436,12 +435,11 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
         return builder.sequence(f"greet {person}", meet_plan(builder.at("meet"), person, place), greet)
     if place is None:
         raise builder.error("it is not said where the people are", "name the room")
-    room = builder.knowledge.room(place)
-    greet = builder.skill("speak", {"text": "Hello!"})
-    visit = builder.sequence(
-        "greet somebody", _go_beside(builder, ANYBODY, builder.key("seen"), room), greet, part="visit"
-    )
-    area = builder.knowledge.places[room].polygon
-    options = {"first": False, "where": f"in the {room}", "area": area}
-    each = _each_person(builder, "greet each person here", ANYBODY, _ports_of(builder, room), visit, **options)
+    room, greet = builder.knowledge.room(place), builder.skill("speak", {"text": "Hello!"})
+    beside = _go_beside(builder, ANYBODY, builder.key("seen"), room)
+    visit = builder.sequence("greet somebody", beside, greet, part="visit")
+    facts = builder.knowledge.places[room]
+    ports = {"area_W": facts.polygon, "place": room}
+    options = {"first": False, "where": f"in the {room}", "middle": pose_2d(facts.pose)}
+    each = _each_person(builder, "greet each person here", ANYBODY, ports, visit, **options)
     return _in_room(builder, room, each)

@@ -206,11 +206,25 @@ def test_each_person_in_the_room_is_greeted_once(result_of, there, script):
     assert script.begun.count("speak") == 2
 
 
-def test_a_robot_that_looked_from_outside_does_not_claim_to_have_greeted_all(result_of, there, script):
-    there["Sam"] = (-1.5, 0.0, "hall")
+def test_a_person_hidden_behind_another_is_greeted_after_a_look_from_the_middle(result_of, there, script, robot):
+    there |= {"Sam": (1.5, 0.5, "hall"), "Robin": (1.0, 1.8, "hall")}
+    look = script.ends["find_people"]
+    hidden = Failed(Cause.POSTCONDITION, "nobody is seen in the hall from here")
+    places = []
+    script.ends["find_people"] = lambda skill: (
+        places.append(robot.standing) or (hidden if len(places) == 2 else look(skill))
+    )
     result = result_of(GREET)
-    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.EXECUTION)
-    assert result.message.startswith("greeted 1 person in the hall, and did not see all of it")
+    assert places[1] != places[0] == places[2]
+    assert (result.outcome, result.message) == (Outcome.SUCCESS, "greeted 2 people in the hall")
+
+
+def test_a_robot_that_does_not_get_into_the_room_does_not_claim_to_have_greeted_all(result_of, there, script):
+    there["Sam"] = (1.0, 0.0, "hall")
+    drive, blocked = script.ends["navigate"], Failed(Cause.PLANNING, "there is no path")
+    script.ends["navigate"] = lambda skill: blocked if script.begun.count("speak") else drive(skill)
+    result = result_of(GREET)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.PLANNING)
     assert script.begun.count("speak") == 1
 
 

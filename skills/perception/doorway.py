@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 _STRIP_M = 0.05
 _HEIGHTS_M = (0.1, 1.9)
-_IN_PLANE_M = 0.2
+_IN_PLANE_M, _IN_PLANE_SHARE = 0.2, 0.3
+"""Distance from the plane of a door at which a ray ends in it; from a flat angle, jambs are no farther along it."""
 _BEYOND_M = 0.5
 _FEWEST = 5
 _CLEARLY = 0.8
@@ -142,7 +143,8 @@ def _counts(door: Doorway, strips: int, scan: Scan, X_WL: RigidTransform) -> Cou
     crosses &= (height > _HEIGHTS_M[0]) & (height < _HEIGHTS_M[1])
     beyond = ((scan.ranges_m - crossing) * towards)[crosses]
     strip = np.minimum((aside[crosses] / door.width_m * strips).astype(np.int64), strips - 1)
-    goes, ends = beyond > _BEYOND_M, np.abs(beyond) <= _IN_PLANE_M
+    flat = towards[crosses] / np.sqrt(np.maximum(1e-6, 1.0 - towards[crosses] ** 2))
+    goes, ends = beyond > _BEYOND_M, np.abs(beyond) <= np.minimum(_IN_PLANE_M, _IN_PLANE_SHARE * door.width_m * flat)
     return np.array([np.bincount(strip[kind], minlength=strips) for kind in (goes, ends, ~goes & ~ends)])
 
 

@@ -164,10 +164,12 @@ def parse_speech(text: str, reader: PlainReader) -> SpeechRequest | None:
 
 def _refuse_stranger(text: str, knowledge: Knowledge) -> None:
     """Raises RefusalError where somebody is told or asked something whose name is not known."""
-    match = re.match(r"(?:tell|ask|greet) (?P<who>(?-i:[A-Z])[a-z]+)\b", text, re.IGNORECASE)
-    if match is not None and match["who"] not in knowledge.people:
-        known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
-        raise RefusalError(f"I know no person '{match['who']}'{known}", [match["who"]])
+    match = re.match(r"(?:[Tt]ell|[Aa]sk) (?P<who>[A-Z][a-z]+)\b", text)
+    names = knowledge.spellings(knowledge.people)
+    if match is None or any(name.lower().startswith(match["who"].lower()) for name in names):
+        return
+    known = f"; known are {listing(knowledge.people)}" if knowledge.people else ""
+    raise RefusalError(f"I know no person '{match['who']}'{known}", [match["who"]])
 
 
 def _relayed(said: str | None, text: str, to: Listener, parser: DependencyParser) -> SpeechRequest:

@@ -139,7 +139,8 @@ class FindPeopleInputs:
 
     `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
     counts all people. People near the positions of `avoid` do not count. A person counts once a picture shows them;
-    with `unpictured`, bodies that two scans show count too, after all others.
+    with `unpictured`, bodies that two scans show count too, after all others. With `moves`, the robot goes to where the
+    rest of the area is in view, as long as too few people are found.
     """
 
     area_W: tuple[tuple[Coordinate, Coordinate], ...]
@@ -148,6 +149,7 @@ class FindPeopleInputs:
     count: Tries = 1
     avoid: tuple[ObjectObservation, ...] = ()
     unpictured: bool = False
+    moves: bool = False
 
 
 class FindPeoplePorts(Skill[FindPeopleInputs]):
@@ -163,10 +165,10 @@ class FindPeoplePorts(Skill[FindPeopleInputs]):
     }
     causes: ClassVar[Mapping[Cause, str]] = {
         Cause.PRECONDITION: "there is no new scan",
-        Cause.EXECUTION: "it is too dark to see, a camera gives no picture, or the robot refuses to turn",
+        Cause.EXECUTION: "it is dark, there is no picture, the robot refuses to turn, or part of the area is hidden",
         Cause.POSTCONDITION: "nobody is seen, or fewer than asked for",
     }
-    default_timeout_s = 60.0
+    default_timeout_s = 150.0
     max_data_age_s: ClassVar[Mapping[str, float]] = {"localisation": 1.0}
 
 

@@ -1,25 +1,30 @@
-"""The find_people skill: turns in place and looks for people in an area."""
+"""The find_people skill: looks for people in an area, turns in place, and goes to where more of the area is in view."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import ClassVar
 
+import numpy as np
 import shapely
+from numpy.typing import NDArray
 
-from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded, SurveyView
+from skills.api import Cause, ObjectKind, ObjectObservation, Running, SkillContext, Succeeded, SurveyView
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
+from skills.geometry import grid_inside, wrap
+from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
-from skills.navigate.footprint import SAFE_MARGIN_M, footprint_clearance_m, pose_array
+from skills.navigate.footprint import SAFE_MARGIN_M, Footprint, footprint_clear, footprint_clearance_m, pose_array
 from skills.perception.class_forms import PERSON
 from skills.perception.detector.camera_images import DETECTION_LATENCY_S, is_dark, turn_upright
 from skills.perception.people import SeenPerson, located_people, people_detections, people_in_scan
 from skills.perception.people_tracking import SCAN_APART_M, PeopleTracker
-from skills.ports import FindPeopleInputs, FindPeoplePorts
-from skills.quantities import Count, Delay, Length, Share, Turn, TurnRate
-from skills.robot import Image
+from skills.ports import FindPeopleInputs, FindPeoplePorts, NavigateInputs
+from skills.quantities import Count, Delay, Length, Share, Tries, Turn, TurnRate
+from skills.robot import FloatArray, Image, Pose2D
 from skills.routine import Patience, Routine, SkillFailure
 
 _SCAN_AGE_S = 1.0
@@ -27,6 +32,12 @@ _AHEAD_RAD = 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
 _AVOID_M = 0.9
 """Distance within which somebody counts as a person who is already known."""
+_STANDS_M, _GRID_M, _SIGHT_M = 0.2, 0.4, 0.1
+"""Clearance of a place where a person may stand, grid of such places, and step along a line of sight."""
+_OWN_M = 0.3
+"""Distance from the robot's middle within which an obstacle hides nothing."""
+_PLACES, _YAWS_RAD = 4, (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
+"""Places from which most is in view, to which the robot tries to drive, and its turns there."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +45,8 @@ class FindPeopleOptions:
     """Search in `looks` directions, with turns of `turn_rad` in between.
 
     A person counts when seen twice within `same_m`: in two directions, or in one by both a camera and the LiDAR. A
-    detection needs `least_score`, within `reach_m` of the camera.
+    detection needs `least_score`, within `reach_m` of the camera. A robot that may move goes to `places` more places,
+    while more than `hidden` of the area, as a share of where people may stand, was not in view; else it cannot tell.
     """
 
     looks: Count = 5
@@ -44,6 +56,8 @@ class FindPeopleOptions:
     same_m: Length = 0.7
     least_score: Share = 0.5
     reach_m: Length = 6.0
+    places: Tries = 4
+    hidden: Share = 0.1
 
 
 class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
@@ -53,10 +67,26 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     options: FindPeopleOptions
 
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
-        """Looks and turns until enough people were seen twice."""
-        area, same_m = shapely.Polygon(inputs.area_W), self.options.same_m
+        """Looks until enough people were seen twice; from further places if the robot may move."""
+        view, tracker = _View(self.context, inputs, self.options.reach_m), PeopleTracker(self.options.same_m)
+        found = yield from self._look_round(inputs, tracker, view)
+        for _ in range(self.options.places if inputs.moves else 0):
+            if 0 < inputs.count <= len(found) or view.hidden <= self.options.hidden or not (goals := view.goals()):
+                break
+            try:
+                yield from go_to_one(self, goals)
+            except SkillFailure as failure:
+                if failure.cause in (Cause.ERROR, Cause.PRECONDITION):
+                    raise
+                break
+            found = yield from self._look_round(inputs, tracker, view)
+        return self._ended(inputs, tuple(_observation(one, inputs) for one in found), view)
+
+    def _look_round(self, inputs: FindPeopleInputs, tracker: PeopleTracker, view: "_View") -> Routine[list[SeenPerson]]:
+        """Looks and turns in place until enough people were seen twice; returns them."""
+        view.look()
+        area, same_m, found = shapely.Polygon(inputs.area_W), self.options.same_m, list[SeenPerson]()
         area = area.difference(shapely.MultiPoint([one.position_W[:2] for one in inputs.avoid]).buffer(_AVOID_M))
-        tracker, found = PeopleTracker(same_m), list[SeenPerson]()
         for look in range(self.options.looks):
             if look:
                 yield from self._turn()
@@ -74,7 +104,7 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
             found.sort(key=lambda one: by_camera is not None and one.looks == 0)
             if 0 < inputs.count <= len(found):
                 break
-        return self._ended(inputs, tuple(_observation(one, inputs) for one in found))
+        return found
 
     def _turn(self) -> Routine[None]:
         """Turns in place as far as the footprint stays clear."""
@@ -90,11 +120,14 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
         command, rest_s = (0.0, 0.0, turn_rad_s), self.options.settle_s
         yield from self.move(command, for_s, "turning to see more", settle_s=rest_s, enough=lacks_clearance)
 
-    def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...]) -> Succeeded:
-        """Returns the result. Raises SkillFailure when too few people were found."""
-        if not found or len(found) < inputs.count:
-            else_ = " else" if inputs.avoid else ""
-            few = count_sentence(found, ()) if found else f"nobody{else_} is seen in the {inputs.place} from here"
+    def _ended(self, inputs: FindPeopleInputs, found: tuple[ObjectObservation, ...], view: "_View") -> Succeeded:
+        """Returns the result. Raises SkillFailure when too few people were found, or a part of the area was hidden."""
+        enough = len(found) >= max(1, inputs.count)
+        else_ = " else" if inputs.avoid else ""
+        few = count_sentence(found, ()) if found else f"nobody{else_} is seen in the {inputs.place} from here"
+        if inputs.moves and view.hidden > self.options.hidden and not (enough and inputs.count):
+            raise SkillFailure(Cause.EXECUTION, f"{few}, and {view.hidden:.0%} of it was never in view")
+        if not enough:
             raise SkillFailure(Cause.POSTCONDITION, few)
         who = "somebody" if found[0].kind.name == PERSON else found[0].kind.name
         said = f"saw {who} in the {found[0].surface}" if inputs.count == 1 else count_sentence(found, ())
@@ -149,3 +182,53 @@ def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservatio
     x_m, y_m = seen.place_W
     middle_W = (x_m, y_m, _SIZE_M[2] / 2)
     return ObjectObservation(seen.stamp_s, ObjectKind(inputs.person), middle_W, _SIZE_M, 0.0, seen.score, inputs.place)
+
+
+class _View:
+    """Places of an area where a person may stand, and which of them were in view."""
+
+    def __init__(self, context: SkillContext, inputs: FindPeopleInputs, reach_m: float) -> None:
+        self._context, self._reach_m = context, reach_m
+        points = grid_inside(inputs.area_W, _GRID_M, first_m=_GRID_M / 2)
+        known_W = np.array([one.position_W[:2] for one in inputs.avoid]).reshape(-1, 2)
+        away_m = np.linalg.norm(points[:, None] - known_W[None], axis=2)
+        free = context.costmap.clearance_m(points) > _STANDS_M
+        self._points: FloatArray = points[free & (away_m > _AVOID_M).all(axis=1)]
+        self._seen: NDArray[np.bool_] = np.zeros(len(self._points), bool)
+
+    @property
+    def hidden(self) -> float:
+        """Share of the places that were not in view yet."""
+        return 1.0 - float(self._seen.mean()) if len(self._seen) else 0.0
+
+    def look(self) -> None:
+        """Notes what is in view from here."""
+        here = self._context.pose()
+        self._seen |= self._in_view(np.array((here.x_m, here.y_m)), self._points)
+
+    def goals(self) -> list[NavigateInputs]:
+        """Free poses from which most of the hidden places are in view, the best first."""
+        here, hidden = self._context.pose(), self._points[~self._seen]
+        gains = np.array([self._in_view(point, hidden).sum() for point in self._points])
+        drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)
+        best = (n for n in np.lexsort((drives_m, -gains)) if gains[n] > 0)
+        footprint = ArmFootprint(self._context).now()
+        poses = (pose for n in best if (pose := self._free_pose(self._points[n], hidden, footprint)) is not None)
+        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _PLACES)]
+
+    def _free_pose(self, at_W: FloatArray, hidden: FloatArray, footprint: Footprint) -> Pose2D | None:
+        """A pose at a place (2,), turned to the hidden places as far as it is free; None without one."""
+        towards = hidden[self._in_view(at_W, hidden)].mean(axis=0) - at_W
+        yaws = math.atan2(towards[1], towards[0]) + np.array(_YAWS_RAD)
+        poses = (Pose2D(float(at_W[0]), float(at_W[1]), wrap(yaw)) for yaw in yaws)
+        costmap = self._context.free_space()
+        return next((pose for pose in poses if footprint_clear(costmap, footprint, pose)), None)
+
+    def _in_view(self, eye_W: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
+        """Mask (N,) of the places (N, 2) that are within reach of a place (2,), with no obstacle between."""
+        away_m = np.linalg.norm(points - eye_W, axis=1)
+        shares = np.linspace(0.0, 1.0, 1 + math.ceil(self._reach_m / _SIGHT_M))
+        lines = eye_W + shares[None, :, None] * (points - eye_W)[:, None]
+        clear = self._context.costmap.clearance_m(lines.reshape(-1, 2)).reshape(lines.shape[:2]) > 0.0
+        near = away_m[:, None] * shares < _OWN_M
+        return np.asarray((away_m <= self._reach_m) & (clear | near).all(axis=1))

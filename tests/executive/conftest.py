@@ -315,6 +315,7 @@ class FindPeopleInputs:
     person: str
     count: int
     avoid: tuple[ObjectObservation, ...] = ()
+    moves: bool = False
 
 
 @dataclass(frozen=True)

@@ -346,17 +346,12 @@ def _drives(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[NodeSpec]:
 def _each_person(
     builder: PlanBuilder, title: str, person: str, ports: Mapping[str, object], visit: NodeSpec, **options: Any
 ) -> NodeSpec:
-    """Builds rounds of a look for one more person and a visit; with a pose `middle`, the last look is from there."""
+    """Builds rounds of a look for one more person, from more places once nobody is seen from here, and a visit."""
     seen, over = builder.key("seen"), builder.key("over")
-    own = {"avoid": FromBoardOr(over, ()), "unpictured": True}
+    own = {"avoid": FromBoardOr(over, ()), "unpictured": True, "moves": True}
     own = {port: value for port, value in own.items() if builder.has_ports("find_people", (port,))}
     outputs = {"observation": seen, "observations": builder.key("all")}
-    own |= {**ports, "person": person, "count": 1}
-    look, middle = builder.skill("find_people", own, outputs), builder.at("middle")
-    if (pose := options.pop("middle", None)) is not None:
-        there = middle.node("selector", "go to the middle", *_drives(middle, pose), part="there")
-        again = middle.sequence("look from the middle", there, middle.skill("find_people", own, outputs))
-        look = builder.node("selector", "look", look, again, part="look")
+    look = builder.skill("find_people", {**own, **ports, "person": person, "count": 1}, outputs)
     return _each_in_turn(builder.at("each"), title, look, visit, seen, over, limit=MOST_PEOPLE, **options)
 
 
@@ -438,8 +433,7 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
     room, greet = builder.knowledge.room(place), builder.skill("speak", {"text": "Hello!"})
     beside = _go_beside(builder, ANYBODY, builder.key("seen"), room)
     visit = builder.sequence("greet somebody", beside, greet, part="visit")
-    facts = builder.knowledge.places[room]
-    ports = {"area_W": facts.polygon, "place": room}
-    options = {"first": False, "where": f"in the {room}", "middle": pose_2d(facts.pose)}
+    ports = {"area_W": builder.knowledge.places[room].polygon, "place": room}
+    options = {"first": False, "where": f"in the {room}"}
     each = _each_person(builder, "greet each person here", ANYBODY, ports, visit, **options)
     return _in_room(builder, room, each)

@@ -194,10 +194,10 @@ def people_looks(
     if person in knowledge.people and len(knowledge.people) > 1:
         hint = "ask whether anybody is there"
         raise builder.error(f"the robot knows nobody by face, and {person} may be any of several people", hint)
-    plans = []
+    plans, moves = [], {"moves": True} if builder.has_ports("find_people", ("moves",)) else NO_PORTS
     for room in knowledge.rooms_to_search(person, place):
         below, facts = builder.at(room), knowledge.places[room]
-        ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1}
+        ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1, **moves}
         tally = {_TALLY: below.key("all")} if tallied else {}
         look = below.skill("find_people", ports, {"observation": key, **tally})
         drive = below.navigate(pose_2d(facts.pose), f"the {room}")

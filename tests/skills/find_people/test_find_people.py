@@ -8,7 +8,7 @@ import pytest
 from planar_people import PeopleDetector, person_at
 from planar_robot import LENS, TWO_ROOMS, Bench, Box
 
-from skills.api import Failed, ObjectKind, ObjectObservation, Running, Succeeded
+from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Running, Succeeded
 from skills.find_people.skill import FindPeople, FindPeopleInputs
 from skills.robot import Pose2D
 
@@ -92,3 +92,40 @@ def test_a_body_that_no_picture_shows_counts_only_where_that_is_asked_for(unpict
         bench.tick()
     skill.end()
     assert isinstance(step, kind), step
+
+
+# the room on the left, in which a screen hides the right half of it
+SCREEN = (*TWO_ROOMS, Box(2.6, 0.1, 2.7, 2.2))
+
+
+def _ended(bench, inputs):
+    for _ in range(10):
+        bench.tick()
+    skill = FindPeople(bench.context())
+    skill.begin(inputs)
+    while isinstance(step := skill.step(), Running):
+        bench.tick()
+    skill.end()
+    return step
+
+
+def test_a_robot_that_may_move_finds_a_person_behind_a_screen():
+    hidden = Box(3.9, 0.9, 4.3, 1.3)
+    bench = Bench(Pose2D(1.8, 1.6, 0.0), unmapped=(hidden,), surveyed=SCREEN, cameras=False)
+    step = _ended(bench, FindPeopleInputs(ROOM, "room", moves=True))
+    assert isinstance(step, Succeeded), step.message
+    assert math.dist(step.outputs["observation"].position_W[:2], (4.1, 1.1)) < 0.3
+
+
+def test_a_robot_that_sees_the_whole_empty_room_stays_where_it_is():
+    bench = Bench(Pose2D(1.5, 2.0, 0.0), surveyed=TWO_ROOMS, cameras=False)
+    step = _ended(bench, FindPeopleInputs(ROOM, "room", moves=True))
+    assert (step.cause, step.message) == (Cause.POSTCONDITION, "nobody is seen in the room from here")
+    assert math.dist((bench.robot.pose.x_m, bench.robot.pose.y_m), (1.5, 2.0)) < 0.1
+
+
+def test_a_hidden_part_is_the_cause_where_no_pose_shows_it():
+    closed = (*TWO_ROOMS, Box(2.4, 0.1, 2.5, 3.9))
+    bench = Bench(Pose2D(1.5, 2.0, 0.0), surveyed=closed, cameras=False)
+    step = _ended(bench, FindPeopleInputs(ROOM, "room", moves=True))
+    assert (step.cause, step.message[-23:]) == (Cause.EXECUTION, "of it was never in view")

@@ -206,25 +206,18 @@ def test_each_person_in_the_room_is_greeted_once(result_of, there, script):
     assert script.begun.count("speak") == 2
 
 
-def test_a_person_hidden_behind_another_is_greeted_after_a_look_from_the_middle(result_of, there, script, robot):
-    there |= {"Sam": (1.5, 0.5, "hall"), "Robin": (1.0, 1.8, "hall")}
-    look = script.ends["find_people"]
-    hidden = Failed(Cause.POSTCONDITION, "nobody is seen in the hall from here")
-    places = []
-    script.ends["find_people"] = lambda skill: (
-        places.append(robot.standing) or (hidden if len(places) == 2 else look(skill))
-    )
-    result = result_of(GREET)
-    assert places[1] != places[0] == places[2]
-    assert (result.outcome, result.message) == (Outcome.SUCCESS, "greeted 2 people in the hall")
+def test_robot_moves_to_see_the_whole_room_before_it_claims_to_have_greeted_all(compiled):
+    tree = compiled(GREET)
+    looks = [node for node in tree.mission.walk() if node.name == "find_people"]
+    assert [look.options["inputs"]["moves"] for look in looks] == [Constant(True)]
 
 
-def test_a_robot_that_does_not_get_into_the_room_does_not_claim_to_have_greeted_all(result_of, there, script):
+def test_a_robot_that_saw_too_little_of_the_room_does_not_claim_to_have_greeted_all(result_of, there, script):
     there["Sam"] = (1.0, 0.0, "hall")
-    drive, blocked = script.ends["navigate"], Failed(Cause.PLANNING, "there is no path")
-    script.ends["navigate"] = lambda skill: blocked if script.begun.count("speak") else drive(skill)
+    look, hidden = script.ends["find_people"], Failed(Cause.EXECUTION, "60% of it was never in view")
+    script.ends["find_people"] = lambda skill: hidden if script.begun.count("speak") else look(skill)
     result = result_of(GREET)
-    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.PLANNING)
+    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.EXECUTION)
     assert script.begun.count("speak") == 1
 
 

@@ -81,7 +81,8 @@ class SelfFilter:
         """Returns whether each (x, y, z) row is not part of the robot.
 
         All are given in one frame with the body's axes; `arm_F` holds the arm's points (`ArmShape`) and may be empty.
-        While `holding`, points about the hand count as the held object.
+        Above the body only the body's margin counts, so that a person just before the stowed arm is seen. While
+        `holding`, points about the hand count as the held object.
         """
         x0, x1, y0, y1 = self.outline_m
         m = self.body_margin_m
@@ -89,7 +90,9 @@ class SelfFilter:
         own = (x > x0 - m) & (x < x1 + m) & (y > y0 - m) & (y < y1 + m)
         segments = list(pairwise(arm_F))
         for index, (start, end) in enumerate(segments, start=1):
-            radius_m = self.held_radius_m if holding and index == len(segments) else self.arm_radius_m
+            is_stowed = max(start[0], end[0]) < x1 + m and abs(start[1]) < y1 and abs(end[1]) < y1
+            radius_m = m if is_stowed else self.arm_radius_m
+            radius_m = self.held_radius_m if holding and index == len(segments) else radius_m
             own |= segment_distance(points_F[:, :3], start, end) < radius_m
         return np.asarray(~own)
 

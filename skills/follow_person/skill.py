@@ -30,7 +30,7 @@ _SURELY_M = 0.1
 """Distance of a person from the edge of a place at which they are certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
-_WALKS_M_S, _THERE_M, _FACES_RAD = 0.25, 0.4, 0.9
+_WALKS_M_S, _THERE_M, _FACES_RAD, _SEEN_S = 0.25, 0.4, 0.9, 0.6
 _ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
 """Angles (rad) round a person, from the nearest to the farthest."""
 _TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
@@ -201,7 +201,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             if target.doubted is not None and not (yield from self._is_right(target, target.doubted)):
                 return False
             near = not hidden_s and math.dist((here.x_m, here.y_m), seen_W) < self.options.near_m + 0.5
-            rests = near and place is not None and target.stands_still(self._now())
+            rests = near and target.doubted is None and target.stands_still(self._now())
             if rests and place and inside_polygon(np.array([seen_W]), place, -_SURELY_M).all():
                 return True
             if self._now() >= self._planned_s + self.options.replan_s:
@@ -214,17 +214,22 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return False
 
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
-        """Asks a doubted person for their name, once they are the nearest one whom the robot faces, or the nearest.
+        """Asks a doubted person for their name, once they are the nearest of all and, unless they stand still, faced.
 
         Who says no or nothing, so often, is the person no longer.
         """
         here, doubted_W = self.context.pose(), target.seen.place_W
-        faces_rad = math.pi if target.stands_still(self._now()) else _FACES_RAD
-        ahead = people_about(self._company.watch.tracks(), here, None, self.options.hearing_m, faces_rad)
+        tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _SEEN_S]
+        near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
+        faced = [one for one in near if abs(bearing_rad(here, one.place_W)) < _FACES_RAD]
+        hears = (faced or near if target.stands_still(self._now()) else faced)[:1]
         if self._inputs.place_W is None:  # the person before the robot has no name
             target.doubted = None
-        if target.doubted is None or target.hidden_s(self._now()) or not ahead or ahead[0].place_W != doubted_W:
+        if target.doubted is None or not hears or not hears[0].place_W == near[0].place_W == doubted_W:
             return True
+        if target.stands_still(self._now()):
+            self._halt()
+            self._plan(self._turned(here, doubted_W))
         text, name = f"Are you {self._inputs.person}?", f"{self.name} of {self.context.robot.name}"
         asked = self.context.ask(Question(name, text, ("yes", "no"), "", self.options.answer_s))
         try:

@@ -39,8 +39,10 @@ _BODY_FEWEST_POINTS = 8
 _COLUMNS = 450
 _FRONT_TO_AXIS_M = 0.1
 _AXIS_SIGMA_M = 0.08
-_OWN_M = (0.1, 0.19, 0.05)
-"""Reach of the arm and the held object beyond the robot's outline: behind, ahead, to the sides."""
+_OWN_M = (0.1, 0.05)
+"""Reach of the robot beyond its outline: behind, to the sides."""
+STOWED_AHEAD_M, ARM_AHEAD_M = 0.05, 0.19
+"""Reach of the robot beyond its outline ahead: with a stowed, empty arm, and else."""
 
 
 @dataclass(frozen=True)
@@ -78,39 +80,41 @@ def people_in_scan(
     footprint_m: Sequence[tuple[float, float]],
     furthest_m: float = 3.5,
     survey: SurveyView | None = None,
+    *,
+    ahead_m: float = ARM_AHEAD_M,
 ) -> list[SeenPerson]:
     """Detects people in a LiDAR scan, nearest first; ignores points in and right around the robot's footprint."""
+    corners = np.array(footprint_m)
+    own_m = np.array([corners.min(axis=0) - (_OWN_M[0], _OWN_M[1]), corners.max(axis=0) + (ahead_m, _OWN_M[1])])
     if survey is not None and len(scan.elevations_rad) > 1:
-        clusters = _unexplained_clusters(scan, X_WB, footprint_m, furthest_m, survey)
+        clusters = _unexplained_clusters(scan, X_WB, own_m, furthest_m, survey)
         people = [_person(scan.stamp_s, X_WB, cluster) for cluster in clusters if _is_body_sized(cluster)]
     else:
-        people = _lone_people(scan, X_WB, footprint_m, furthest_m)
+        people = _lone_people(scan, X_WB, own_m, furthest_m)
     return sorted((p for p in people if p.distance_m < furthest_m), key=lambda person: person.distance_m)
 
 
 def _unexplained_clusters(
     scan: Scan,
     X_WB: RigidTransform,
-    footprint_m: Sequence[tuple[float, float]],
+    own_m: FloatArray,
     furthest_m: float,
     survey: SurveyView,
 ) -> list[FloatArray]:
     """Clusters of returns, in the levelled body frame, that the survey does not explain."""
     points = scan_points(scan, azimuths=_COLUMNS, heights_m=_BODY_HEIGHTS_M, max_range_m=furthest_m + 0.5)[:, :3]
-    points = points[~_is_own(points, np.array(footprint_m))]
+    points = points[~_is_own(points, own_m)]
     here = Pose2D.from_transform(X_WB)
     return _clusters(points[survey.is_unexplained(placed_points(points, here))], _CELL_M)
 
 
-def _lone_people(
-    scan: Scan, X_WB: RigidTransform, footprint_m: Sequence[tuple[float, float]], furthest_m: float
-) -> list[SeenPerson]:
+def _lone_people(scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m: float) -> list[SeenPerson]:
     """Detects the people who stand alone in a scan of a place without a survey."""
     points_B = scan.points_B()
     level = points_B @ scan.X_OB.rotation().matrix().T
     height = level[:, 2] + scan.X_OB.translation()[2]
     distance = np.hypot(points_B[:, 0], points_B[:, 1])
-    own = _is_own(points_B, np.array(footprint_m))
+    own = _is_own(points_B, own_m)
     planar = len(scan.elevations_rad) == 1
     near = (
         (height > (_LEGS_LOWEST_M if planar else _LOWEST_M))
@@ -127,12 +131,9 @@ def _lone_people(
     ]
 
 
-def _is_own(points_B: FloatArray, corners: FloatArray) -> NDArray[np.bool_]:
-    """Returns which points belong to the robot's own arm and the held object."""
-    (x0, y0), (x1, y1) = corners.min(axis=0), corners.max(axis=0)
-    behind, ahead, aside = _OWN_M
-    x, y = points_B[:, 0], points_B[:, 1]
-    return np.asarray((x > x0 - behind) & (x < x1 + ahead) & (y > y0 - aside) & (y < y1 + aside))
+def _is_own(points_B: FloatArray, own_m: FloatArray) -> NDArray[np.bool_]:
+    """Mask of the points in the robot's own rectangle, given by its least and greatest x and y (2, 2)."""
+    return np.asarray(np.all((points_B[:, :2] > own_m[0]) & (points_B[:, :2] < own_m[1]), axis=1))
 
 
 def _clusters(points_B: FloatArray, cell_m: float) -> list[FloatArray]:

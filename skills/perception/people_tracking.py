@@ -16,6 +16,8 @@ from skills.api import Job, ObstacleLayerView, SkillContext, SurveyView
 from skills.geometry import relative_pose
 from skills.perception.class_forms import PERSON
 from skills.perception.people import (
+    ARM_AHEAD_M,
+    STOWED_AHEAD_M,
     SeenPerson,
     cameras_towards,
     located_people,
@@ -285,13 +287,14 @@ class PeopleWatch:
         tracks_all = options.track_m > 0.0
         if scan is None or scan.stamp_s <= self._scan_s or not (tracks_all or self._seen):
             return
-        self._scan_s = scan.stamp_s
+        self._scan_s, robot = scan.stamp_s, self._context.robot
         found = people_in_scan(
             scan,
             self._context.localiser.estimate().X_WO @ scan.X_OB,
-            self._context.robot.capabilities().footprint_m,
+            robot.capabilities().footprint_m,
             options.track_m or options.reach_m,
             costmap if isinstance(costmap := self._context.costmap, SurveyView) else None,
+            ahead_m=ARM_AHEAD_M if robot.gripper().holding else STOWED_AHEAD_M,
         )
         self._tracker.update(found, by_scan=True, apart_m=SCAN_APART_M, births=tracks_all)
         if tracks_all:

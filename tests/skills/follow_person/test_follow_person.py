@@ -171,6 +171,19 @@ def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(a
     assert walk.questions == ["Are you Robin?"]
 
 
+def test_nobody_is_asked_while_somebody_else_stands_nearer_to_the_robot():
+    walk = Walk(to_m=5.5, place_W=(3.2, LANE_M), until_W=END)
+    while walk.bench.clock.now() < 8.5:
+        walk.tick()
+    here = walk.bench.robot.pose
+    walk.bench.robot.boxes.append(person_at(here.x_m, here.y_m + 1.0))
+    for _ in range(40):
+        walk.tick()
+    walk.skill._target.doubt()
+    walk.run(20.0)
+    assert walk.questions == []
+
+
 def test_the_search_goes_from_room_to_room_through_the_nearest_doors():
     walk = Walk()
     doors = (Doorway((6.0, 5.4), 1.0, 0.0), Doorway((7.5, 5.4), 1.0, 0.0), Doorway((1.0, 5.4), 1.0, 0.0))

@@ -7,7 +7,7 @@ import pytest
 from analytic_scan import scan_of
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
-from skills.perception.people import cameras_towards, people_in_scan
+from skills.perception.people import STOWED_AHEAD_M, cameras_towards, people_in_scan
 from skills.robot import CameraCapabilities, Pose2D, Scan
 
 OUTLINE = ((0.56, 0.25), (0.56, -0.25), (-0.5, -0.25), (-0.5, 0.25))
@@ -76,6 +76,14 @@ def people_before_wall(discs, x_m=3.0, **more):
 def test_a_person_close_to_a_surveyed_wall_is_found():
     (person,) = people_before_wall([(2.55, 0.0, 0.2)])
     assert person.place_W == pytest.approx((2.55, 0.0), abs=0.12)
+
+
+def test_a_person_just_before_a_stowed_arm_is_where_they_stand():
+    # the robot ends at x = 0.5; the person's near side is 0.13 m ahead
+    scan = scan_of([(0.83, 0.0, 0.2)], wall_x=3.0)
+    X_WB, survey = RigidTransform([0.0, 0.0, 0.52]), SurveyedWall(3.0)
+    (person,) = people_in_scan(scan, X_WB, OUTLINE, 6.0, survey, ahead_m=STOWED_AHEAD_M)
+    assert person.place_W == pytest.approx((0.83, 0.0), abs=0.12)
 
 
 def test_two_people_side_by_side_are_two_people_where_a_survey_explains_the_walls():

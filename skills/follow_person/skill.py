@@ -8,8 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from skills.api import Cause, ClearableCostmap, Failed, Question, Running, SkillContext, Succeeded
-from skills.follow_person.target import Target, TargetOptions, people_about, poses_behind
+from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, Succeeded
+from skills.follow_person.target import (
+    Target,
+    TargetOptions,
+    line_through,
+    people_about,
+    poses_behind,
+    poses_beyond,
+)
 from skills.geometry import bearing_rad, inside_polygon, wrap
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import SAFE_MARGIN_M, NoObstacles, footprint_clearance_m, with_discs
@@ -30,7 +37,7 @@ _SURELY_M = 0.1
 """Distance of a person from the edge of a place at which they are certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
-_WALKS_M_S, _THERE_M, _FACES_RAD, _SEEN_S = 0.25, 0.4, 0.9, 0.6
+_WALKS_M_S, _THERE_M, _FACES_RAD, _SEEN_S, _LOCKED = 0.25, 0.4, 0.9, 0.6, 3
 _ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
 """Angles (rad) round a person, from the nearest to the farthest."""
 _TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
@@ -165,10 +172,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         if self.remark is not None:
             raise _Told(self.remark)
         if self._now() > self._limit_s:
-            where = f" in the {self._inputs.until}" if self._inputs.until else ""
-            raise SkillFailure(
-                Cause.TIMEOUT, f"followed {self._inputs.person} for {self._inputs.time_limit_s:.0f} s{where}"
-            )
+            for_s = f"for {self._inputs.time_limit_s:.0f} s"
+            raise SkillFailure(Cause.TIMEOUT, f"followed {self._inputs.person} {for_s}")
 
     def _find(self, inputs: FollowPersonInputs) -> Routine[Target]:
         """Looks for the person to follow. Raises SkillFailure when nobody is seen."""
@@ -230,8 +235,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         if target.stands_still(self._now()):
             self._halt()
             self._plan(self._turned(here, doubted_W))
-        text, name = f"Are you {self._inputs.person}?", f"{self.name} of {self.context.robot.name}"
-        asked = self.context.ask(Question(name, text, ("yes", "no"), "", self.options.answer_s))
+        asked = self.ask_for_name(self._inputs.person, self.options.answer_s)
         try:
             while not asked.done():
                 yield from self._tick(self._drive("asking who it is"))
@@ -272,8 +276,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             yield from self._tick(f"waiting for {self._inputs.person}")
             if not target.hidden_s(self._now()):
                 return
-        last, hidden_s = place_text(target.seen.place_W), target.hidden_s(self._now())
-        raise SkillFailure(Cause.EXECUTION, f"{self._inputs.person} is lost, seen last at {last} {hidden_s:.0f} s ago")
+        last = f"seen last at {place_text(target.seen.place_W)} {target.hidden_s(self._now()):.0f} s ago"
+        raise SkillFailure(Cause.EXECUTION, f"{self._inputs.person} is lost, {last}")
 
     def _plan(self, goal: Pose2D | None) -> None:
         """Starts or changes the drive; None keeps the present goal."""
@@ -318,33 +322,36 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return max(0.0, target.away_m_s(here)) + options.gain * max(0.0, distance_m - options.close_m)
 
     def _next_pose(self, target: Target, hidden_s: float) -> Pose2D | None:
-        """The pose to drive to: behind the person, or aside from the path of one who comes towards the robot."""
+        """The pose to drive to: behind the person, or aside from the path of one who comes towards the robot.
+
+        After `_LOCKED` drives in a row that failed, it is aside from the path of the nearest other person.
+        """
         here, now_s, options = self.context.pose(), self._now(), self.options
         near = not hidden_s and math.dist((here.x_m, here.y_m), target.seen.place_W) < options.meeting_m
         away_m_s, blocks = target.away_m_s(here), near and self._blocks_door(target, here)
         if blocks or (near and away_m_s < -max(_WALKS_M_S, 0.6 * target.speed_m_s)):
             if now_s >= self._aside_until_s:
-                self._aside = self._pose_aside(target, here)
+                self._aside = self._pose_aside(np.vstack([target.trail, line_through(target.seen, here, 0.0)]), here)
             self._aside_until_s = now_s + options.aside_s
+        elif self._tries >= _LOCKED and now_s >= self._aside_until_s:
+            others = people_about(self._company.others(), here, None, options.meeting_m, math.pi)
+            self._aside = self._pose_aside(line_through(others[0], here, options.meeting_m), here) if others else None
+            self._aside_until_s = now_s + options.aside_s if self._aside else -math.inf
         elif away_m_s > _WALKS_M_S:
             self._aside_until_s = -math.inf
         return self._aside if now_s < self._aside_until_s else self._pose_behind(target, hidden_s)
 
     def _blocks_door(self, target: Target, here: Pose2D) -> bool:
         """Returns once whether the person has stood still by a doorway, perhaps since the robot is in the way."""
-        if not target.stands_still(self._now()):
-            self._made_way = False
-        elif not self._made_way:
-            places_W = (here.x_m, here.y_m), target.seen.place_W
-            self._made_way = True
-            return any(door.distance_m(place_W) < _BY_DOOR_M for door in self.context.doors for place_W in places_W)
-        return False
+        made_way, self._made_way = self._made_way, target.stands_still(self._now())
+        if made_way or not self._made_way:
+            return False
+        places_W = (here.x_m, here.y_m), target.seen.place_W
+        return any(door.distance_m(place_W) < _BY_DOOR_M for door in self.context.doors for place_W in places_W)
 
-    def _pose_aside(self, target: Target, here: Pose2D) -> Pose2D | None:
-        """The nearest pose off the path of a person who comes back."""
-        end_W = np.array(target.seen.place_W)
-        path = np.vstack([target.trail, np.linspace(end_W, (here.x_m, here.y_m), 10)])
-        paths = with_discs(NoObstacles(), np.column_stack([path, np.full(len(path), _PERSON_M)]))
+    def _pose_aside(self, path_W: FloatArray, here: Pose2D) -> Pose2D | None:
+        """The nearest pose off the path (N, 2) of a person."""
+        paths = with_discs(NoObstacles(), np.column_stack([path_W, np.full(len(path_W), _PERSON_M)]))
         return pose_aside(self.context.free_space(), paths, self._outline, here, GivingWayOptions(reach_m=_ASIDE_M))
 
     def _pose_behind(self, target: Target, hidden_s: float) -> Pose2D | None:
@@ -410,9 +417,9 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         likely = self._poses_beyond_doors(target)
         yield from itertools.islice(likely, 1)
         until_W = self._inputs.until_W
-        for door in self.context.doors if until_W is not None else ():
+        for door in self.context.doors if until_W else ():
             for yaw in (door.through_rad, wrap(door.through_rad + math.pi)):
-                beyond = np.array(list(_beyond(door, yaw)))
+                beyond = np.array(list(poses_beyond(door, yaw)))
                 inside = beyond[inside_polygon(beyond[:, :2], until_W or ())]
                 if len(inside) and (pose := self._free(inside)) is not None:
                     yield pose
@@ -434,15 +441,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             heading = np.array([math.cos(door.through_rad), math.sin(door.through_rad)])
             heading *= math.copysign(1.0, float((middle_W - (here.x_m, here.y_m)) @ heading))
             place_W = middle_W + heading
-            if (pose := self._free(np.array(list(_beyond(door, math.atan2(*heading[::-1])))))) is not None:
+            if (pose := self._free(np.array(list(poses_beyond(door, math.atan2(*heading[::-1])))))) is not None:
                 yield pose
-
-
-def _beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
-    """Poses beyond a door in a direction through it."""
-    for far_m in (1.0, 1.4, 0.7):
-        x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
-        yield float(x), float(y), yaw_rad
 
 
 def _apart_m(a: Pose2D, b: Pose2D) -> float:

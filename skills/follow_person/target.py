@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skills.geometry import bearing_rad
+from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import predicted_place_W
 from skills.quantities import Delay, Length, Speed
@@ -184,3 +185,18 @@ def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, fl
             if np.linalg.norm(end - point) >= behind_m:
                 for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
                     yield float(point[0]), float(point[1]), yaw
+
+
+def poses_beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
+    """Poses beyond a door in a direction through it."""
+    for far_m in (1.0, 1.4, 0.7):
+        x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
+        yield float(x), float(y), yaw_rad
+
+
+def line_through(one: SeenPerson, here: Pose2D, beyond_m: float) -> FloatArray:
+    """Points (20, 2) from a person to the robot, and so far beyond it."""
+    off = np.array((here.x_m, here.y_m)) - one.place_W
+    return np.array(
+        one.place_W + np.linspace(0.0, 1.0 + beyond_m / max(float(np.linalg.norm(off)), 1e-3), 20)[:, None] * off
+    )

@@ -35,6 +35,8 @@ _STEPS_IN, _STANDS_S = 3, 2.0
 """Drives into the room, and time for which the person stands before its door."""
 _COMES_M, _STEP_IN_M, _YAWS_RAD = 2.7, 0.3, (0.0, 0.8, -0.8, 1.6, -1.6, 2.4, -2.4, math.pi)
 """Distance at which a person comes after the robot, least further distance, and turns of the robot there."""
+_TIMES_ASKED, _ANSWER_S = 2, 5.0
+"""Number of questions for the name of somebody who may be another, and the time for each answer."""
 _ASK_AFTER_S, _WALKS_M_S, _ON_M = 2.0, 0.3, 2.0
 """Wait before the robot asks the person to come; steps in which it looks ahead and back for one who walked."""
 
@@ -80,6 +82,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         self._inputs, self._place_W, self._who = inputs, inputs.place_W, person_text(inputs.person)
         self._company = Company(PeopleWatch(self.context, _TRACKING))
         self._target: Target | None = None
+        self._doubted = False
         self._behind = Patience(self.context.clock, self.options.behind_s)
         self._waiting, self._asked = Patience(self.context.clock, _ASK_AFTER_S), False
 
@@ -119,6 +122,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
         for _ in range(self.options.returns + 1):
             say(self.context, f"Please follow me to {inputs.place}.")
             if (yield from self._lead()):
+                yield from self._make_sure()
                 say(self.context, f"Here we are: {inputs.place}.")
                 apart_m = self._gap_m()
                 return Succeeded(f"{self._who} came along to {inputs.place}, {apart_m:.1f} m from the robot")
@@ -148,6 +152,24 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
             say(self.context, "Please come in.")
             goal = further
         return self._are_there()
+
+    def _make_sure(self) -> Routine[None]:
+        """Asks somebody who may be another for their name, twice. Raises SkillFailure unless they say yes."""
+        doubted, answer = self._doubted or (self._target is not None and self._target.doubted is not None), ""
+        if self._inputs.place_W is None or not doubted:
+            return
+        for _ in range(_TIMES_ASKED):
+            asked = self.ask_for_name(self._inputs.person, _ANSWER_S)
+            try:
+                while not asked.done():
+                    yield Running(f"asking whether it is {self._who}")
+            finally:
+                asked.withdraw()
+            if answer := asked.result():
+                break
+        if answer != "yes":
+            why = f"is not {self._who}" if answer else f"did not say whether they are {self._who}"
+            raise SkillFailure(Cause.POSTCONDITION, f"the person who came along to {self._inputs.place} {why}")
 
     def _must_stop(self) -> bool:
         """Sets the pace; returns whether the drive has to end, since the person fell behind or has ended it."""
@@ -198,6 +220,7 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
                 continue
             if met is not ENDED_EARLY and not self._is_close():
                 self._place_W, self._target = met.outputs["person"].position_W[:2], None
+                self._doubted = True
             return
         why = f"lost {self._who} on the way to {inputs.place}: {failures[0].message}"
         raise SkillFailure(failures[0].cause, why)

@@ -68,9 +68,12 @@ class CollisionGuard:
         return self._place_W if now_s - self._danger_s < self._options.clear_s else None
 
     def _suddenly_ahead(self, here: Pose2D, returns_W: FloatArray) -> Place | None:
-        """Position of unexplained returns on the ground that the robot covers until it stands, None without any."""
+        """Position of unexplained returns on the ground that the robot covers until it stands, None without any.
+
+        The speed is that of the fastest point of the outline, so that a robot which turns in place stops too.
+        """
         velocity, options = self._velocity_W(here), self._options
-        speed = float(np.linalg.norm(velocity[:2]))
+        speed = float(np.linalg.norm(velocity[:2])) + abs(float(velocity[2])) * self.footprint.circumscribed_m
         if len(returns_W) < options.least_points or speed < 0.05:
             return None
         until_s = options.reaction_s + 0.5 * speed / options.stop_m_s2

@@ -171,6 +171,18 @@ def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(a
     assert walk.questions == ["Are you Robin?"]
 
 
+def test_after_drives_that_failed_the_robot_makes_way_for_the_person_next_to_it(monkeypatch):
+    walk = Walk(to_m=5.5)
+    while walk.bench.clock.now() < 6.0:
+        walk.tick()
+    here = walk.bench.robot.pose
+    other = SeenPerson((here.x_m + 1.2, here.y_m), np.eye(2), 1.0, 6.0, here, track=9)
+    monkeypatch.setattr(walk.skill._company, "others", lambda: (other,))
+    walk.skill._tries = 3
+    aside = walk.skill._next_pose(walk.skill._target, 0.0)
+    assert abs(aside.y_m - here.y_m) > 0.5
+
+
 def test_nobody_is_asked_while_somebody_else_stands_nearer_to_the_robot():
     walk = Walk(to_m=5.5, place_W=(3.2, LANE_M), until_W=END)
     while walk.bench.clock.now() < 8.5:

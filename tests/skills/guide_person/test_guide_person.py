@@ -9,7 +9,7 @@ from planar_people import person_at
 from planar_robot import TWO_ROOMS, Bench
 
 from executive.run.control import Control
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.follow_person.target import Target, TargetOptions
 from skills.guide_person.skill import GuidePerson, GuidePersonOptions, _places_of
 from skills.perception.people import SeenPerson
@@ -26,7 +26,7 @@ STEP_M, APART_M = 0.05, 1.4
 class Guided:
     """A bench with a person who walks along the robot's path, and what the robot says."""
 
-    def __init__(self, at=ROBIN, unmapped=(), **options):
+    def __init__(self, at=ROBIN, unmapped=(), answer="yes", **options):
         self.bench = Bench(START, unmapped=unmapped, surveyed=TWO_ROOMS, cameras=False)
         self.at, self.trail, self.body = at, [], None
         self.stays = lambda now_s: False
@@ -34,7 +34,9 @@ class Guided:
         self.stand(at)
         for _ in range(10):
             self.bench.tick()
-        context = replace(self.bench.context(), listen=self.control.listen)
+        self.questions = []
+        ask = lambda question: self.questions.append(question.text) or nobody_to_ask(replace(question, default=answer))  # noqa: E731
+        context = replace(self.bench.context(), listen=self.control.listen, ask=ask)
         self.skill = GuidePerson(context, GuidePersonOptions(**options))
 
     def stand(self, at):
@@ -90,6 +92,7 @@ def test_robot_and_person_arrive_together():
     assert guided.apart_m() < 3.0
     assert guided.at[1] < 4.0
     assert guided.said == ["Please follow me to the kitchen.", "Here we are: the kitchen."]
+    assert guided.questions == []
 
 
 def test_robot_waits_and_goes_back_for_a_person_who_stops():
@@ -99,6 +102,18 @@ def test_robot_waits_and_goes_back_for_a_person_who_stops():
     assert isinstance(step, Succeeded), step
     assert guided.said.count("Please follow me to the kitchen.") >= 2
     assert "I wait for you." in guided.said
+
+
+@pytest.mark.parametrize(
+    ("answer", "ends", "asked"),
+    [("yes", Succeeded, 1), ("no", Failed, 1), ("", Failed, 2)],
+    ids=["yes", "no", "silence"],
+)
+def test_somebody_who_was_out_of_sight_is_guided_only_if_they_say_that_they_are_the_person(answer, ends, asked):
+    guided = Guided(answer=answer)
+    step = guided.go(at_s={4.0: lambda: guided.skill._target.doubt()})
+    assert isinstance(step, ends), step
+    assert guided.questions == ["Are you Robin?"] * asked
 
 
 def test_robot_does_not_claim_to_have_guided_a_person_who_is_lost():

@@ -174,11 +174,15 @@ class FindPeoplePorts(Skill[FindPeopleInputs]):
 
 @dataclass(frozen=True)
 class MeetPersonInputs:
-    """Name of a person and of their room, and the point (x, y) where they were seen; None: the nearest one ahead."""
+    """Name of a person and of their room, and the point (x, y) where they were seen; None: the nearest one ahead.
+
+    With `within_m`, the robot may stop at this distance (m) where nothing nearer is free.
+    """
 
     person: str
     place_W: tuple[Coordinate, Coordinate] | None = None
     place: str = ""
+    within_m: Length | None = None
 
 
 class MeetPersonPorts(Skill[MeetPersonInputs]):

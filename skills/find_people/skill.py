@@ -57,7 +57,7 @@ class FindPeopleOptions:
     least_score: Share = 0.5
     reach_m: Length = 6.0
     places: Tries = 4
-    hidden: Share = 0.1
+    hidden: Share = 0.15
 
 
 class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
@@ -194,12 +194,13 @@ class _View:
         away_m = np.linalg.norm(points[:, None] - known_W[None], axis=2)
         free = context.costmap.clearance_m(points) > _STANDS_M
         self._points: FloatArray = points[free & (away_m > _AVOID_M).all(axis=1)]
+        self._places = max(1, int(free.sum()))
         self._seen: NDArray[np.bool_] = np.zeros(len(self._points), bool)
 
     @property
     def hidden(self) -> float:
-        """Share of the places that were not in view yet."""
-        return 1.0 - float(self._seen.mean()) if len(self._seen) else 0.0
+        """Share of all places of the area that were not in view yet, without those beside known people."""
+        return float((~self._seen).sum()) / self._places
 
     def look(self) -> None:
         """Notes what is in view from here."""

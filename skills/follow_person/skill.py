@@ -12,6 +12,7 @@ from skills.api import Cause, ClearableCostmap, Failed, Running, SkillContext, S
 from skills.follow_person.target import (
     Target,
     TargetOptions,
+    is_addressed,
     line_through,
     people_about,
     poses_behind,
@@ -37,7 +38,7 @@ _SURELY_M = 0.1
 """Distance of a person from the edge of a place at which they are certainly in it."""
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
-_WALKS_M_S, _THERE_M, _FACES_RAD, _SEEN_S, _LOCKED = 0.25, 0.4, 0.9, 0.6, 3
+_WALKS_M_S, _THERE_M, _SEEN_S, _LOCKED = 0.25, 0.4, 0.6, 3
 _ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
 """Angles (rad) round a person, from the nearest to the farthest."""
 _TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
@@ -219,22 +220,21 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return False
 
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
-        """Asks a doubted person for their name, once they are the nearest of all and, unless they stand still, faced.
+        """Asks a doubted person for their name where nobody else takes it for their own question.
 
         Who says no or nothing, so often, is the person no longer.
         """
-        here, doubted_W = self.context.pose(), target.seen.place_W
+        here, seen, stands = self.context.pose(), target.seen, target.stands_still(self._now())
         tracks = [one for one in self._company.watch.tracks() if one.stamp_s > self._now() - _SEEN_S]
         near = people_about(tracks, here, None, self.options.hearing_m, math.pi)
-        faced = [one for one in near if abs(bearing_rad(here, one.place_W)) < _FACES_RAD]
-        hears = (faced or near if target.stands_still(self._now()) else faced)[:1]
         if self._inputs.place_W is None:  # the person before the robot has no name
             target.doubted = None
-        if target.doubted is None or not hears or not hears[0].place_W == near[0].place_W == doubted_W:
+        in_sight = self._is_clear(np.array([(here.x_m, here.y_m), seen.place_W]))
+        if target.doubted is None or not is_addressed(seen, near, here, still=stands, in_sight=in_sight):
             return True
-        if target.stands_still(self._now()):
+        if stands:
             self._halt()
-            self._plan(self._turned(here, doubted_W))
+            self._plan(self._turned(here, seen.place_W))
         asked = self.ask_for_name(self._inputs.person, self.options.answer_s)
         try:
             while not asked.done():

@@ -21,6 +21,8 @@ _TRAIL_POINTS = 100
 _BACK_M = 3.0
 """Length of the trail on which the robot looks for a free pose."""
 _STANDS_M_S = 0.2
+_FACES_RAD = 0.9
+"""Bearing up to which the robot faces a person."""
 _LOST_M = 5.0
 """A person farther from the robot is lost."""
 _GAP_M = 1.5
@@ -61,6 +63,18 @@ def people_about(
     about = (one for one in people if math.dist(one.place_W, centre_W) <= reach_m)
     ahead = [one for one in about if place_W is not None or abs(bearing_rad(here, one.place_W)) < ahead_rad]
     return sorted(ahead, key=lambda one: math.dist(one.place_W, centre_W))
+
+
+def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, still: bool, in_sight: bool) -> bool:
+    """Returns whether a person takes a question for their own, of those within hearing, the nearest first.
+
+    That is who is the nearest of all and faced. A person who stands `still` need not be faced if nobody else is, nor
+    be the nearest if they are the nearest faced one, `in_sight` of the robot.
+    """
+    faced = [each for each in near if abs(bearing_rad(here, each.place_W)) < _FACES_RAD]
+    first = next(iter(faced or near if still else faced), None)
+    is_first = first is not None and first.place_W == one.place_W
+    return is_first and (near[0].place_W == one.place_W or (still and in_sight))
 
 
 class Target:

@@ -26,7 +26,7 @@ PERSON_SIZE_M: Final = (0.5, 0.5, 1.7)
 _SCAN_AGE_S = 1.0
 _ARM_M = 0.5
 """Distance from a person's axis up to which their own body is in the costmap."""
-_STEP_M = 0.1
+_STEP_M, _SHORT_M = 0.1, 0.25
 _POSES_EACH = 2
 """Free poses at each distance from the person to which the robot tries to drive."""
 
@@ -63,7 +63,7 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def run(self, inputs: MeetPersonInputs) -> Routine[Succeeded]:
         """Drives beside the person, again if they have moved meanwhile."""
-        place_W, who = inputs.place_W, person_text(inputs.person)
+        place_W, who, near_m = inputs.place_W, person_text(inputs.person), self.options.near_m
         for drives in range(self.options.tries + 1):
             if drives or place_W is None or self._is_in_view(place_W):
                 person = yield from self._look(who, place_W)
@@ -72,9 +72,10 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
                     why = nobody if place_W is None else f"{who} is not seen at {place_text(place_W)}"
                     raise SkillFailure(Cause.POSTCONDITION, why)
                 place_W = person.place_W
-                if self._is_beside(person):
+                if self._is_beside(person, near_m):
                     return self._met(inputs, person)
-            yield from self._go_beside(place_W, who)
+            near_m = max(near_m, inputs.within_m or 0.0)
+            yield from self._go_beside(place_W, who, inputs.within_m)
         raise SkillFailure(Cause.POSTCONDITION, f"{who} does not stay where the robot goes")
 
     def _look(self, name: str, place_W: tuple[float, float] | None) -> Routine[SeenPerson | None]:
@@ -111,17 +112,17 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
         towards = Pose2D(here.x_m, here.y_m, here.yaw_rad + bearing_rad(here, place_W))
         return math.dist(place_W, (here.x_m, here.y_m)) <= self.options.near_m and self._sees(towards, place_W)
 
-    def _is_beside(self, person: SeenPerson) -> bool:
+    def _is_beside(self, person: SeenPerson, near_m: float) -> bool:
         return (
-            person.distance_m <= self.options.near_m
+            person.distance_m <= near_m
             and abs(bearing_rad(self.context.pose(), person.place_W)) <= self.options.facing_rad
         )
 
-    def _go_beside(self, place_W: tuple[float, float], name: str) -> Routine[None]:
+    def _go_beside(self, place_W: tuple[float, float], name: str, within_m: float | None) -> Routine[None]:
         """Drives to the nearest free pose that faces a place. Raises SkillFailure when there is none."""
         footprint, costmap, here = ArmFootprint(self.context).now(), self.context.free_space(), self.context.pose()
         free = []
-        for apart_m in self.options.apart_m:
+        for apart_m in (*self.options.apart_m, *(() if within_m is None else (within_m - _SHORT_M,))):
             poses = (pose for pose in facing_poses(place_W, here, apart_m) if footprint_clear(costmap, footprint, pose))
             free += [*islice((pose for pose in poses if self._sees(pose, place_W)), _POSES_EACH)]
         if not free:

@@ -33,6 +33,8 @@ from skills.robot import Pose2D
 
 MOST_PEOPLE: Final = 12
 NEAR_ROOM_M: Final = 1.2
+GREETS_WITHIN_M: Final = 2.35
+"""Distance from which the robot greets somebody whom it cannot come nearer to."""
 ANSWER_WITHIN_S: Final = 12.0
 """Time for the answer to "Are you Robin?"."""
 STILL_NEAR_M: Final = 3.5
@@ -364,9 +366,9 @@ def _each_in_turn(
     )
 
 
-def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "") -> NodeSpec:
+def _go_beside(builder: PlanBuilder, person: str, key: str, place: object = "", **options: object) -> NodeSpec:
     """Goes beside the person who was seen under a key, in a room called `place`; notes there where they are now."""
-    ports = {"person": person, "place_W": PlaceOf(key), "place": place}
+    ports = {"person": person, "place_W": PlaceOf(key), "place": place, **options}
     return builder.skill("meet_person", ports, {"person": key})
 
 
@@ -431,7 +433,8 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
     if place is None:
         raise builder.error("it is not said where the people are", "name the room")
     room, greet = builder.knowledge.room(place), builder.skill("speak", {"text": "Hello!"})
-    beside = _go_beside(builder, ANYBODY, builder.key("seen"), room)
+    within = {"within_m": GREETS_WITHIN_M} if builder.has_ports("meet_person", ("within_m",)) else {}
+    beside = _go_beside(builder, ANYBODY, builder.key("seen"), room, **within)
     visit = builder.sequence("greet somebody", beside, greet, part="visit")
     ports = {"area_W": builder.knowledge.places[room].polygon, "place": room}
     options = {"first": False, "where": f"in the {room}"}

@@ -4,7 +4,7 @@ import math
 
 import pytest
 from planar_people import person_at
-from planar_robot import TWO_ROOMS, Bench
+from planar_robot import TWO_ROOMS, Bench, Box
 
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.meet_person.skill import MeetPerson
@@ -72,6 +72,16 @@ def test_without_anybody_near_there_is_nobody_to_meet(people):
     bench = Bench(START, unmapped=people, surveyed=TWO_ROOMS, cameras=False)
     step = met(bench, MeetPersonInputs("somebody"))
     assert (type(step), step.cause) == (Failed, Cause.POSTCONDITION)
+
+
+@pytest.mark.parametrize(("within_m", "ends"), [(None, Failed), (2.35, Succeeded)])
+def test_robot_stops_further_away_only_where_that_is_near_enough_and_nothing_nearer_is_free(within_m, ends):
+    # the person stands in a niche 0.5 m wide, into which the robot does not fit
+    niche = (Box(7.6, 5.05, 10.0, 5.15), Box(7.6, 5.65, 10.0, 5.75))
+    bench = Bench(START, unmapped=(person_at(9.0, 5.4),), surveyed=(*TWO_ROOMS, *niche), cameras=False)
+    step = met(bench, MeetPersonInputs("somebody", (9.0, 5.4), within_m=within_m))
+    assert isinstance(step, ends), step
+    assert within_m is None or 1.9 < apart_m(bench, 9.0, 5.4) < 2.35
 
 
 def test_robot_does_not_stand_on_the_other_side_of_a_wall():

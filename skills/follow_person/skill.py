@@ -15,6 +15,7 @@ from skills.follow_person.target import (
     is_addressed,
     line_through,
     people_about,
+    poses_around,
     poses_behind,
     poses_beyond,
 )
@@ -39,8 +40,6 @@ _SURELY_M = 0.1
 _SAME_PLACE_M = 1.5
 """Distance from the place where the person was seen last at which somebody is that person."""
 _WALKS_M_S, _THERE_M, _SEEN_S, _LOCKED = 0.25, 0.4, 0.6, 3
-_ROUND = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
-"""Angles (rad) round a person, from the nearest to the farthest."""
 _TRIED_AGAIN = (Cause.PLANNING, Cause.POSTCONDITION, Cause.EXECUTION)
 _CLEARED, _CLEARED_M, _LEFT_M = 20, 0.45, 0.7
 """Last points of the trail about which the costmap is cleared, radius, and their least distance from the person."""
@@ -58,8 +57,9 @@ class FollowPersonOptions:
     `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the robot stands where they
     were seen last: the robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or
     `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be another is asked for the
-    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`. At the beginning
-    the robot looks for the person for `finding_s`. It fails after `tries` drives in a row that failed, and at the end
+    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`; so is somebody who
+    has stood elsewhere than in the named place for `standing_s`. At the beginning the robot looks for the person for
+    `finding_s`. It fails after `tries` drives in a row that failed, and at the end
     if the person was out of its sight for longer than `longest_loss_s`.
     """
 
@@ -80,6 +80,7 @@ class FollowPersonOptions:
     again_s: Duration = 1.0
     hearing_m: Length = 2.8
     answer_s: Delay = 5.0
+    standing_s: Delay = 30.0
     silences: Tries = 2
     doors: Tries = 3
     tries: Tries = 60
@@ -210,6 +211,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             rests = near and target.doubted is None and target.stands_still(self._now())
             if rests and place and inside_polygon(np.array([seen_W]), place, -_SURELY_M).all():
                 return True
+            if rests and target.stood_s(self._now()) > self.options.standing_s:
+                target.doubt()
             if self._now() >= self._planned_s + self.options.replan_s:
                 self._planned_s = self._now()
                 self._clear_trail(target, hidden_s)
@@ -370,19 +373,14 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         straight = np.array([(here.x_m, here.y_m), end_W])
         if not hidden_s and distance_m > behind_m and self._is_clear(straight):
             trail = straight
-        along, around = poses_behind(trail, behind_m), self._poses_around(here, end_W) if behind_m else ()
+        along, around = poses_behind(trail, behind_m), self._around(here, end_W) if behind_m else ()
         poses = [*along, *around] if walks else [*around, *along]
         return self._free(np.array(poses).reshape(-1, 3))
 
-    def _poses_around(self, here: Pose2D, end_W: FloatArray) -> Iterator[tuple[float, float, float]]:
-        """Poses about a person, whom they face with nothing between; the nearest to the robot first."""
-        towards_rad = math.atan2(*(np.array((here.x_m, here.y_m)) - end_W)[::-1])
-        for away_m in (self.options.behind_m, self.options.close_m, self.options.near_m):
-            for angle in towards_rad + _ROUND:
-                way = np.array([math.cos(angle), math.sin(angle)])
-                between = end_W + np.linspace(_PERSON_M + 0.1, away_m, 8)[:, None] * way
-                if self.context.costmap.clearance_m(between).min() > 0.0:
-                    yield float(between[-1, 0]), float(between[-1, 1]), wrap(angle + math.pi)
+    def _around(self, here: Pose2D, end_W: FloatArray) -> Iterator[tuple[float, float, float]]:
+        """Poses about a person, whom they face with nothing between; see `poses_around`."""
+        away_m = (self.options.behind_m, self.options.close_m, self.options.near_m)
+        return poses_around(end_W, here, away_m, self.context.costmap)
 
     def _turned(self, here: Pose2D, place_W: tuple[float, float]) -> Pose2D | None:
         """The pose here that faces a person, where the robot can turn; None when it faces them nearly."""

@@ -4,10 +4,12 @@ import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
-from skills.geometry import bearing_rad
+from skills.api import FreeSpace
+from skills.geometry import bearing_rad, wrap
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import predicted_place_W
@@ -20,6 +22,9 @@ _ONE_BODY_M = 0.6
 _TRAIL_POINTS = 100
 _BACK_M = 3.0
 """Length of the trail on which the robot looks for a free pose."""
+_ROUND: Final = np.array([0.3 * (n // 2) * (-1) ** n for n in range(1, 22)])
+"""Angles (rad) round a person, from the nearest to the farthest."""
+_BODY_M = 0.4
 _STANDS_M_S = 0.2
 _FACES_RAD = 0.9
 """Bearing up to which the robot faces a person."""
@@ -36,9 +41,9 @@ class TargetOptions:
     """Conditions for another track to be the person again after a gap.
 
     The person is hidden once no scan has shown them for `hidden_s`. A track that begins later continues theirs within
-    `again_m` of the prediction, and farther by `again_m_s` for each second, up to `farthest_m`; after more than
-    `sure_s`, or when somebody has come within `close_m`, it may be another person's. A person stands still while all
-    positions of `still_s` lie within `still_m`.
+    `again_m` of the prediction, and farther by `again_m_s` for each second, up to `farthest_m`. After more than
+    `sure_s`, a new track, or one farther than `again_m` from the prediction, may be another person's; so may one after
+    somebody has come within `close_m`. A person stands still while all positions of `still_s` lie within `still_m`.
     """
 
     hidden_s: Delay = 0.6
@@ -87,7 +92,7 @@ class Target:
     def __init__(self, first: SeenPerson, here: Pose2D, options: TargetOptions) -> None:
         self.seen, self._options, self.farthest_m = first, options, options.farthest_m
         self.doubted: SeenPerson | None = None
-        self.longest_loss_s, self._near_s = 0.0, first.stamp_s
+        self.longest_loss_s, self._near_s, self._walked_s = 0.0, first.stamp_s, first.stamp_s
         self._trail = [(here.x_m, here.y_m), first.place_W]
         self._others: set[int] = set()
         self._others_before: frozenset[int] = frozenset()
@@ -119,6 +124,10 @@ class Target:
         last_W = self.seen.place_W
         return long_enough and all(math.dist(place, last_W) < self._options.still_m for _, place in self._places)
 
+    def stood_s(self, now_s: float) -> float:
+        """Time for which the person has stood still, since they were trusted last."""
+        return now_s - self._walked_s
+
     def away_m_s(self, here: Pose2D) -> float:
         """Speed at which the person goes away from the robot, negative towards it."""
         off = np.array(self.seen.place_W) - (here.x_m, here.y_m)
@@ -131,7 +140,10 @@ class Target:
         if one is None or now_s - one.stamp_s > self._options.hidden_s:
             one = self._again(tracks, now_s) or one
         if one is not None and one.stamp_s > self.seen.stamp_s:
-            again = one.track != self.seen.track and self.hidden_s(now_s) > self._options.sure_s
+            strange = (
+                one.track != self.seen.track or math.dist(one.place_W, self.place_W(now_s)) > self._options.again_m
+            )
+            again = strange and self.hidden_s(now_s) > self._options.sure_s
             if again and math.dist(self._trail[-1], one.place_W) > _GAP_M:
                 self._trail = [(one.here_W.x_m, one.here_W.y_m)]
             if again or any(math.dist(each.place_W, one.place_W) < self._options.close_m for each in others):
@@ -149,7 +161,7 @@ class Target:
 
     def trust(self) -> None:
         """Takes the person of now for the followed one."""
-        self.doubted, self.farthest_m = None, self._options.farthest_m
+        self.doubted, self.farthest_m, self._walked_s = None, self._options.farthest_m, self.seen.stamp_s
 
     def reject(self, before: SeenPerson) -> None:
         """Takes the person of now for somebody else; the followed one was seen `before`."""
@@ -165,6 +177,8 @@ class Target:
             back = next((n for n, point in enumerate(old) if math.dist(point, one.place_W) < _LOOP_M), None)
             self._trail = [*(self._trail if back is None else self._trail[: back + 1]), one.place_W][-_TRAIL_POINTS:]
         self._places.append((one.stamp_s, one.place_W))
+        if not self.stands_still(one.stamp_s):
+            self._walked_s = one.stamp_s
         while self._places[0][0] < one.stamp_s - self._options.still_s:
             self._places.popleft()
 
@@ -199,6 +213,19 @@ def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, fl
             if np.linalg.norm(end - point) >= behind_m:
                 for yaw in (along, math.atan2(*(end - point)[::-1])) if n < len(trail) - 1 else (along,):
                     yield float(point[0]), float(point[1]), yaw
+
+
+def poses_around(
+    person_W: FloatArray, here: Pose2D, away_m: Sequence[float], costmap: FreeSpace
+) -> Iterator[tuple[float, float, float]]:
+    """Poses at some distances from a person (2,), whom they face with nothing between; the nearest to `here` first."""
+    towards_rad = math.atan2(*(np.array((here.x_m, here.y_m)) - person_W)[::-1])
+    for distance_m in away_m:
+        for angle in towards_rad + _ROUND:
+            way = np.array([math.cos(angle), math.sin(angle)])
+            between = person_W + np.linspace(_BODY_M, distance_m, 8)[:, None] * way
+            if costmap.clearance_m(between).min() > 0.0:
+                yield float(between[-1, 0]), float(between[-1, 1]), wrap(angle + math.pi)
 
 
 def poses_beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:

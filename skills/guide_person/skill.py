@@ -136,13 +136,13 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
             drive = NavigateInputs(goal, 0.25, 0.4, self.options.most_m_s)
             leading = Leading(self.context, None, self._company)
             try:
-                ended = yield from self.perform(leading, drive, self._must_stop)
+                if (yield from self.perform(leading, drive, self._must_stop)) is ENDED_EARLY:
+                    break
             except SkillFailure as failure:
-                if goal is inputs.goal or failure.cause is not Cause.PLANNING:
+                if failure.cause is not Cause.PLANNING or not self._is_in():
                     raise
-                break
-            if ended is ENDED_EARLY:
-                break
+                if goal is not inputs.goal:
+                    break
             end_s = self.context.clock.now() + self.options.arrive_s
             while not (self._are_there() or self._waits_outside(end_s)) and self.context.clock.now() < end_s:
                 yield Running(f"waiting for {self._who} at {inputs.place}")
@@ -250,13 +250,17 @@ class GuidePerson(GuidePersonPorts, ListeningSkill[GuidePersonInputs]):
 
     def _are_there(self) -> bool:
         """Returns whether the person is seen near the robot, and both are at the goal."""
-        area, here = self._inputs.area_W, self.context.pose()
+        area = self._inputs.area_W
         if self._target is None or self._gap_m() > self.options.wait_m:
             return False
         if not area:
             return True
-        robot_is_in = inside_polygon(np.array([(here.x_m, here.y_m)]), area).all()
-        return bool(robot_is_in and inside_polygon(np.array([self._target.seen.place_W]), area, -_SURELY_M).all())
+        return self._is_in() and bool(inside_polygon(np.array([self._target.seen.place_W]), area, -_SURELY_M).all())
+
+    def _is_in(self) -> bool:
+        """Returns whether the robot is in the area at the goal."""
+        area, here = self._inputs.area_W, self.context.pose()
+        return bool(area) and bool(inside_polygon(np.array([(here.x_m, here.y_m)]), area).all())
 
 
 def _places_of(target: Target) -> Iterator[tuple[float, float]]:

@@ -10,7 +10,7 @@ from planar_robot import Bench
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
 from skills.follow_person.skill import FollowPerson, FollowPersonOptions
-from skills.follow_person.target import Target, TargetOptions, is_addressed
+from skills.follow_person.target import Target, TargetOptions
 from skills.navigate.zones import Zone, ZoneKind
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
@@ -181,35 +181,6 @@ def test_after_drives_that_failed_the_robot_makes_way_for_the_person_next_to_it(
     walk.skill._tries = 3
     aside = walk.skill._next_pose(walk.skill._target, 0.0)
     assert abs(aside.y_m - here.y_m) > 0.5
-
-
-AHEAD, BEHIND, FAR = (3.0, 0.0), (-1.0, 0.0), (5.0, 0.0)
-
-
-# people, the first is asked | stands still, in sight | addressed
-# nearest and ahead          |                        | yes
-# ahead, one ahead nearer    | yes, yes               | no
-# ahead, one behind nearer   | only if both           | yes
-# behind, alone              | only if still          | yes
-# behind, one ahead          | yes, yes               | no
-@pytest.mark.parametrize(
-    ("places", "still", "in_sight", "addressed"),
-    [
-        ((AHEAD, FAR), False, False, True),
-        ((FAR, AHEAD), True, True, False),
-        ((AHEAD, BEHIND), True, True, True),
-        ((AHEAD, BEHIND), True, False, False),
-        ((AHEAD, BEHIND), False, True, False),
-        ((BEHIND,), True, False, True),
-        ((BEHIND,), False, False, False),
-        ((BEHIND, AHEAD), True, True, False),
-    ],
-)
-def test_a_person_is_asked_only_where_nobody_else_answers(places, still, in_sight, addressed):
-    here = Pose2D(0.0, 0.0, 0.0)
-    people = [SeenPerson(place, np.eye(2), 1.0, 0.0, here) for place in places]
-    near = sorted(people, key=lambda one: math.hypot(*one.place_W))
-    assert is_addressed(people[0], near, here, still=still, in_sight=in_sight) is addressed
 
 
 def test_the_search_goes_from_room_to_room_through_the_nearest_doors():

@@ -1,9 +1,11 @@
 """The followed person among the tracks of all people."""
 
+import math
+
 import numpy as np
 import pytest
 
-from skills.follow_person.target import Target, TargetOptions
+from skills.follow_person.target import Target, TargetOptions, is_addressed
 from skills.perception.people import SeenPerson
 from skills.robot import Pose2D
 
@@ -92,6 +94,51 @@ def test_a_person_is_doubted_after_a_long_gap_or_a_close_crossing_until_trusted(
     other = track(2, 5.5, 3.5, y=0.5)
     target.update([track(7, 5.5, 3.5), other], (other,), 3.5)
     assert target.doubted.track == 7
+
+
+@pytest.mark.parametrize(("x", "doubted"), [(5.4, False), (3.0, True)])
+def test_a_track_goes_on_without_doubt_only_where_the_person_was_expected(x, doubted):
+    # last seen at 4.0 m with 1 m/s, 1.4 s before
+    target = walked()
+    target.update([track(1, x, 3.4)], (), 3.4)
+    assert target.seen.stamp_s == 3.4 and (target.doubted is not None) is doubted
+
+
+def test_the_time_that_a_person_has_stood_begins_anew_when_they_are_trusted():
+    target = walked()
+    for n in range(1, 152):
+        target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], (), 2.0 + 0.1 * n)
+    assert target.stood_s(17.1) == pytest.approx(10.6, abs=0.2)
+    target.trust()
+    assert target.stood_s(17.1) == pytest.approx(0.0, abs=0.2)
+
+
+AHEAD, BEHIND, FAR = (3.0, 0.0), (-1.0, 0.0), (5.0, 0.0)
+
+
+# people, the first is asked | stands still, in sight | addressed
+# nearest and ahead          |                        | yes
+# ahead, one ahead nearer    | yes, yes               | no
+# ahead, one behind nearer   | only if both           | yes
+# behind, alone              | only if still          | yes
+# behind, one ahead          | yes, yes               | no
+@pytest.mark.parametrize(
+    ("places", "still", "in_sight", "addressed"),
+    [
+        ((AHEAD, FAR), False, False, True),
+        ((FAR, AHEAD), True, True, False),
+        ((AHEAD, BEHIND), True, True, True),
+        ((AHEAD, BEHIND), True, False, False),
+        ((AHEAD, BEHIND), False, True, False),
+        ((BEHIND,), True, False, True),
+        ((BEHIND,), False, False, False),
+        ((BEHIND, AHEAD), True, True, False),
+    ],
+)
+def test_a_person_is_asked_only_where_nobody_else_answers(places, still, in_sight, addressed):
+    people = [SeenPerson(place, np.eye(2), 1.0, 0.0, HERE) for place in places]
+    near = sorted(people, key=lambda one: math.hypot(*one.place_W))
+    assert is_addressed(people[0], near, HERE, still=still, in_sight=in_sight) is addressed
 
 
 def test_a_person_may_be_one_who_was_seen_beside_somebody_rejected():

@@ -176,6 +176,13 @@ def test_without_a_path_to_the_goal_the_planner_gives_the_cause():
     assert (type(step), step.cause) == (Failed, Cause.PLANNING)
 
 
+def test_somebody_on_the_goal_is_no_failure_once_the_robot_is_in_the_room():
+    guided, taken = Guided(), person_at(GOAL.x_m, GOAL.y_m)
+    step = guided.go(at_s={9.0: lambda: guided.bench.robot.boxes.append(taken)})
+    assert isinstance(step, Succeeded), step
+    assert guided.at[1] < 4.0
+
+
 def test_a_suspended_robot_stands_and_goes_on_afterwards():
     guided = Guided()
     guided.skill.begin(INPUTS)

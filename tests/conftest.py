@@ -9,6 +9,8 @@ from functools import partial
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
+import pytest
+
 TRAINING = Path(__file__).parents[1] / "training"
 
 
@@ -32,6 +34,18 @@ def write_metadata(info):
     groups = project["entry-points"].items()
     lines = [f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in each.items()) for group, each in groups]
     (info / "entry_points.txt").write_text("".join(lines))
+
+
+LONG_SUITES = ("approach.skilltest.yaml", "place.skilltest.yaml")
+"""Skill tests whose suites run nightly, since each run plans the arm's reach anew."""
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Leaves long suites to the night; `test_every_skill` holds the same faults against every skill by day."""
+    for item in items:
+        if item.path.name in LONG_SUITES and ": " in item.name:
+            item.add_marker(pytest.mark.nightly)
 
 
 def pytest_collection_finish(session):

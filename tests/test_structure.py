@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 30180,
+    "skills": 30182,
     "plant": 22156,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

@@ -242,6 +242,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         try:
             while not asked.done():
                 yield from self._tick(self._drive("asking who it is"))
+                if target.hidden_s(self._now()) and not stands:
+                    return True
         finally:
             asked.withdraw()
         answer = asked.result()
@@ -418,8 +420,8 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         for door in self.context.doors if until_W else ():
             for yaw in (door.through_rad, wrap(door.through_rad + math.pi)):
                 beyond = np.array(list(poses_beyond(door, yaw)))
-                inside = beyond[inside_polygon(beyond[:, :2], until_W or ())]
-                if len(inside) and (pose := self._free(inside)) is not None:
+                is_in = inside_polygon(beyond[:1, :2], until_W or ()).all()
+                if is_in and (pose := self._free(beyond)) is not None:
                     yield pose
         yield from likely
 

@@ -229,8 +229,8 @@ def poses_around(
 
 
 def poses_beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
-    """Poses beyond a door in a direction through it."""
-    for far_m in (1.0, 1.4, 0.7):
+    """Poses beyond a door in a direction through it; the last one before it, for where somebody stands beyond."""
+    for far_m in (1.0, 1.4, 0.7, -0.8):
         x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
         yield float(x), float(y), yaw_rad
 

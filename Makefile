@@ -15,7 +15,8 @@ BIN := $(VENV)/bin
 DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 # Voices that speak to the tests of speech; without them those are skipped.
 VOICES := flite espeak-ng
-JOBS ?= 2
+# One more than there are processors, since tests of pages and of processes wait.
+JOBS ?= $(shell expr $$(nproc) + 1)
 # Tests start many processes; compiled modules are kept even where an environment would have none written.
 unexport PYTHONDONTWRITEBYTECODE
 

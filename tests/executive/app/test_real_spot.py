@@ -236,11 +236,11 @@ def test_a_pressed_estop_ends_the_run(serve):
 
 
 def test_a_robot_acts_alone_when_the_run_falls_silent(serve, monkeypatch):
-    monkeypatch.setattr(heartbeat, "LEASE_STALE_S", 0.5)
-    monkeypatch.setattr(heartbeat, "MOTORS_OFF_S", 1.0)
+    monkeypatch.setattr(heartbeat, "LEASE_STALE_S", 1.5)
+    monkeypatch.setattr(heartbeat, "MOTORS_OFF_S", 3.0)
     with connected("Alice", serve.access) as made:
         made.make_ready()
-        time.sleep(0.8)
+        time.sleep(1.8)
         other_client(serve).acquire()
-        time.sleep(1.5)
+        time.sleep(2.5)
         assert serve.server.computer.motors is Motors.OFF

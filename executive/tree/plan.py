@@ -194,8 +194,7 @@ class PlanBuilder:
         Poses at `nearby_m` from it, forward and left, are tried afterwards.
         """
         ports: dict[str, object] = {"goal": pose, **({"position_tolerance_m": 0.08} if exactly else {})}
-        if nearby_m and self.has_ports("navigate", ("nearby_m",)):
-            ports["nearby_m"] = nearby_m
+        ports |= self.optional_ports("navigate", {"nearby_m": nearby_m}) if nearby_m else {}
         drive, below = self.skill("navigate", ports), self.at("way")
         paths = {"navigate": drive.path_id}
         recoveries = [(below.skill(skill), rule.bind(paths)) for skill, rule in NAVIGATE_RECOVERIES.items()]
@@ -208,6 +207,10 @@ class PlanBuilder:
             return False
         known = {field.name for field in dataclasses.fields(kind.Inputs)}
         return known.issuperset(inputs) and set(kind.outputs).issuperset(outputs)
+
+    def optional_ports(self, skill: str, inputs: Mapping[str, object]) -> dict[str, object]:
+        """Returns those of some inputs whose ports the registered skill has; see `has_ports`."""
+        return {port: value for port, value in inputs.items() if self.has_ports(skill, (port,))}
 
     def surface(self, name: str) -> Surface:
         """Converts a surface of the knowledge file to the surface of the skills."""

@@ -57,7 +57,7 @@ def carry_plan(builder: PlanBuilder) -> NodeSpec:
 def _hand_over_plan(builder: PlanBuilder, item: ObjectKind, pose: Pose2D | FromBoard, person: str) -> NodeSpec:
     """Carries the item to a person and holds it out; the gripper opens when the person takes it."""
     to = "the start" if builder.command.goal == START else person
-    ports = {"person": person, **({"thing": str(item)} if builder.has_ports("hand_over", ("thing",)) else {})}
+    ports = {"person": person, **builder.optional_ports("hand_over", {"thing": str(item)})}
     way = _holding(builder, item, f"to {to}", go_near_plan(builder, pose, to))
     hand_over = builder.skill("hand_over", ports, _released(builder, "hand_over"))
     give = _holding(builder.at("give"), item, f"to {to}", hand_over, until_put_down=True)
@@ -311,7 +311,7 @@ def _pick_up_again_plan(builder: PlanBuilder, item: ObjectKind, to: str) -> Node
     set_down = below.skill("place", {"surface": FromBoard(keys["set-down"])})
     still_held = below.node("only if holding", f"set the {item} down", set_down)
     free = first.node("selector", "free the gripper", still_held, first.skill("stow"))
-    ports = {"distance_m": BACK_M} if builder.has_ports("back_off", ("distance_m",)) else {}
+    ports = builder.optional_ports("back_off", {"distance_m": BACK_M})
     stay = back.pause("stay", "look from here", LOOK_AGAIN_S)
     stand_back = back.node("selector", "stand back", back.skill("back_off", ports), stay)
     look = _look_plan(builder, item, keys)

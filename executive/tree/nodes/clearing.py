@@ -165,7 +165,7 @@ def clear_plan(builder: PlanBuilder, bring: Command) -> NodeSpec:
     if shared := set(surfaces) & set(builder.knowledge.surfaces_in(to)):
         raise builder.error(f"everything that is on the {min(shared)} is to be brought there", "name two surfaces")
     key, missed = builder.key("detection"), builder.key("missed")
-    extra = {"avoid": FromBoardOr(missed, ())} if builder.has_ports("detect", ("avoid",)) else {}
+    extra = builder.optional_ports("detect", {"avoid": FromBoardOr(missed, ())})
     looks = (look for _, look in look_plans(builder.at("left"), item, surfaces, key, extra))
     look = builder.at("left").node("selector", f"is anything left {place_phrase(builder.knowledge, place)}?", *looks)
     again = detect_plan(builder.at("find"), item, surfaces, key, extra)

@@ -18,7 +18,7 @@ from executive.tree.context import RunContext
 from executive.tree.node import NodeSpec
 from executive.tree.nodes.carry import goal_in_words, goal_pose
 from executive.tree.nodes.clearing import ForEachFound
-from executive.tree.nodes.pick_up import go_near_plan, poses_nearby
+from executive.tree.nodes.pick_up import go_near_plan
 from executive.tree.nodes.policies import FINAL_CAUSES
 from executive.tree.nodes.recovery import OnlyIfKnown
 from executive.tree.nodes.speech import AskPeople
@@ -34,7 +34,7 @@ from skills.robot import Pose2D
 MOST_PEOPLE: Final = 12
 NEAR_ROOM_M: Final = 1.2
 GREETS_WITHIN_M: Final = 2.35
-"""Distance from which the robot greets somebody whom it cannot come nearer to."""
+"""Greatest distance of a greeting, where no pose nearer to the person is free."""
 ANSWER_WITHIN_S: Final = 12.0
 """Time for the answer to "Are you Robin?"."""
 STILL_NEAR_M: Final = 3.5
@@ -333,25 +333,19 @@ def _in_room(builder: PlanBuilder, room: str, then: NodeSpec) -> NodeSpec:
 
 
 def _to_room(builder: PlanBuilder, pose: Pose2D | FromBoard, area: Constant | FromBoard, to: str) -> NodeSpec:
-    """Goes to a pose in a room, or beside it; where somebody stands in the door, as near as that."""
+    """Goes to a pose in a room, or near it; where somebody stands in the door, as near as that."""
+    once = builder.at("once").skill("navigate", {"goal": pose})
     near = builder.node("near room", f"is {to} near?", part="near", area=area)
-    once, *beside = _drives(builder, pose)
-    return builder.node("selector", f"go to {to}", once, near, *beside, builder.navigate(pose, to), part="to-room")
-
-
-def _drives(builder: PlanBuilder, pose: Pose2D | FromBoard) -> list[NodeSpec]:
-    """Drives to a pose in a room, and to poses beside it."""
-    poses = enumerate((pose, *poses_nearby(builder, pose).values()))
-    return [builder.at(f"pose-{n}").skill("navigate", {"goal": each}) for n, each in poses]
+    return builder.node("selector", f"go to {to}", once, near, go_near_plan(builder, pose, to), part="to-room")
 
 
 def _each_person(
     builder: PlanBuilder, title: str, person: str, ports: Mapping[str, object], visit: NodeSpec, **options: Any
 ) -> NodeSpec:
-    """Builds rounds of a look for one more person, from more places once nobody is seen from here, and a visit."""
+    """Builds rounds of a search for one more person and a visit."""
     seen, over = builder.key("seen"), builder.key("over")
     own = {"avoid": FromBoardOr(over, ()), "unpictured": True, "moves": True}
-    own = {port: value for port, value in own.items() if builder.has_ports("find_people", (port,))}
+    own = builder.optional_ports("find_people", own)
     outputs = {"observation": seen, "observations": builder.key("all")}
     look = builder.skill("find_people", {**own, **ports, "person": person, "count": 1}, outputs)
     return _each_in_turn(builder.at("each"), title, look, visit, seen, over, limit=MOST_PEOPLE, **options)
@@ -433,7 +427,7 @@ def greet_plan(builder: PlanBuilder) -> NodeSpec:
     if place is None:
         raise builder.error("it is not said where the people are", "name the room")
     room, greet = builder.knowledge.room(place), builder.skill("speak", {"text": "Hello!"})
-    within = {"within_m": GREETS_WITHIN_M} if builder.has_ports("meet_person", ("within_m",)) else {}
+    within = builder.optional_ports("meet_person", {"within_m": GREETS_WITHIN_M})
     beside = _go_beside(builder, ANYBODY, builder.key("seen"), room, **within)
     visit = builder.sequence("greet somebody", beside, greet, part="visit")
     ports = {"area_W": builder.knowledge.places[room].polygon, "place": room}

@@ -43,7 +43,7 @@ RECOVERIES: Final[Mapping[str, Recovery]] = {
 
 def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> NodeSpec:
     """Drives to a pose, called `to`, or to one nearby in the same room if there is no path."""
-    nearby = poses_nearby(builder, pose)
+    nearby = _nearby(builder, pose)
     direct = builder.navigate(pose, to, nearby_m=tuple(nearby))
     others = [
         builder.at(f"nearby-{n}").navigate(other, f"a place near {to}")
@@ -54,7 +54,7 @@ def go_near_plan(builder: PlanBuilder, pose: Pose2D | FromBoard, to: str) -> Nod
     return builder.node("selector", f"go to {to}, or near it", direct, *others, part="or-near", one_goal=True)
 
 
-def poses_nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:
+def _nearby(builder: PlanBuilder, pose: Pose2D | FromBoard) -> dict[tuple[float, float], Pose2D | FromBoard]:
     """Returns poses beside a goal by their offsets (m); for a known goal only those in the same room."""
     if isinstance(pose, FromBoard):
         return {offset: BesideBoard(pose.key, *offset) for offset in NEARBY_M}

@@ -194,7 +194,7 @@ def people_looks(
     if person in knowledge.people and len(knowledge.people) > 1:
         hint = "ask whether anybody is there"
         raise builder.error(f"the robot knows nobody by face, and {person} may be any of several people", hint)
-    plans, moves = [], {"moves": True} if builder.has_ports("find_people", ("moves",)) else NO_PORTS
+    plans, moves = [], builder.optional_ports("find_people", {"moves": True})
     for room in knowledge.rooms_to_search(person, place):
         below, facts = builder.at(room), knowledge.places[room]
         ports = {"area_W": facts.polygon, "place": room, "person": person, "count": 0 if tallied else 1, **moves}
@@ -228,7 +228,7 @@ def detect_plan(
 def find_again_plan(builder: PlanBuilder, item: ObjectKind, surfaces: tuple[str, ...], key: str) -> NodeSpec:
     """Looks from the present pose at the place where the object was detected before, and at the floor beside."""
     seen_on = SurfaceOfDetection(key, tuple(map(builder.surface, surfaces)))
-    floor = {"floor": True} if builder.has_ports("detect", ("floor",)) else NO_PORTS
+    floor = builder.optional_ports("detect", {"floor": True})
     look = detect_plan(builder, item, seen_on, key, floor)
     return builder.node("only if known", "look from here, if seen before", look, key=key)
 
@@ -249,7 +249,7 @@ def search_plan(
     )
     known = builder.last_known_of(item)
     first = tuple(each for each in surfaces if known is not None and each == known.surface)
-    floor = {"floor": True} if builder.has_ports("detect", ("floor",)) else NO_PORTS
+    floor = builder.optional_ports("detect", {"floor": True})
     looks = (*look_plans(builder, item, first, key, floor), *look_plans(builder, item, surfaces[len(first) :], key))
     further = look_plans(builder.at("elsewhere"), item, elsewhere, key)
     looked = place_phrase(builder.knowledge, place) + (f", nor on the {listing(elsewhere)}" if elsewhere else "")

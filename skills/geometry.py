@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skills.robot import FloatArray, Pose2D
+from skills.world_model import FreeSpace
 
+_SIGHT_STEP_M = 0.1
 AngleT = TypeVar("AngleT", float, FloatArray)
 
 
@@ -48,6 +50,19 @@ def facing_poses(point_W: tuple[float, float], here: Pose2D, stand_off_m: float,
         x, y = point_W[0] - stand_off_m * math.cos(yaw), point_W[1] - stand_off_m * math.sin(yaw)
         poses.append(Pose2D(x, y, wrap(yaw)))
     return sorted(poses, key=lambda pose: math.hypot(pose.x_m - here.x_m, pose.y_m - here.y_m))
+
+
+def line_of_sight(space: FreeSpace, from_W: FloatArray, points_W: FloatArray, *, beyond_m: float) -> NDArray[np.bool_]:
+    """Mask (N,) of the points (N, 2) to which no obstacle blocks the straight line from `from_W` (2,).
+
+    Obstacles within beyond_m of `from_W` do not count.
+    """
+    offsets = points_W - from_W
+    away_m = np.linalg.norm(offsets, axis=1)
+    steps_m = np.arange(beyond_m, float(away_m.max(initial=0.0)), _SIGHT_STEP_M)
+    lines_W = from_W + steps_m[None, :, None] * (offsets / np.maximum(away_m, 1e-6)[:, None])[:, None]
+    is_clear = space.clearance_m(lines_W.reshape(-1, 2)).reshape(len(points_W), len(steps_m)) > 0.0
+    return np.asarray((is_clear | (steps_m >= away_m[:, None])).all(axis=1))
 
 
 def grid_inside(

@@ -139,8 +139,8 @@ class FindPeopleInputs:
 
     `person` is the name of the wanted person; any person counts, since the skill recognises no faces. A `count` of 0
     counts all people. People near the positions of `avoid` do not count. A person counts once a picture shows them;
-    with `unpictured`, bodies that two scans show count too, after all others. With `moves`, the robot goes to where the
-    rest of the area is in view, as long as too few people are found.
+    with `unpictured`, bodies that two scans show count too, after all others. With `moves`, the robot drives to
+    viewpoints that show the rest of the area, until enough people are found.
     """
 
     area_W: tuple[tuple[Coordinate, Coordinate], ...]

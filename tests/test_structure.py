@@ -18,7 +18,7 @@ LINES = {
     "executive/language": 8254,
     "executive/speech": 1582,
     "executive/mission": 1646,
-    "executive/tree": 8442,
+    "executive/tree": 8439,
     "executive/run": 3218,
     "executive/record": 1412,
     "executive/store": 1666,
@@ -27,7 +27,7 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 30182,
+    "skills": 30174,
     "plant": 22156,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14

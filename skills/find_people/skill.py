@@ -1,4 +1,4 @@
-"""The find_people skill: looks for people in an area, turns in place, and goes to where more of the area is in view."""
+"""The find_people skill: looks for people in an area, turns in place, and drives to further viewpoints."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skills.api import Cause, ObjectKind, ObjectObservation, Running, SkillContext, Succeeded, SurveyView
 from skills.detect.descriptions import count_sentence
 from skills.detect.messages import detections_message
-from skills.geometry import grid_inside, wrap
+from skills.geometry import grid_inside, line_of_sight, wrap
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.base import MovingSkill
@@ -32,12 +32,12 @@ _AHEAD_RAD = 0.2
 _SIZE_M = (0.5, 0.5, 1.7)
 _AVOID_M = 0.9
 """Distance within which somebody counts as a person who is already known."""
-_STANDS_M, _GRID_M, _SIGHT_M = 0.2, 0.4, 0.1
-"""Clearance of a place where a person may stand, grid of such places, and step along a line of sight."""
+_STANDS_M, _GRID_M = 0.2, 0.4
+"""Clearance of a position where a person may stand, and distance between such positions."""
 _OWN_M = 0.3
 """Distance from the robot's middle within which an obstacle hides nothing."""
-_PLACES, _YAWS_RAD = 4, (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
-"""Places from which most is in view, to which the robot tries to drive, and its turns there."""
+_VIEWPOINTS, _YAWS_RAD = 4, (0.0, 0.8, -0.8, 1.6, -1.6, math.pi)
+"""Number of best viewpoints to which the robot tries to drive, and its turns there."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class FindPeopleOptions:
     """Search in `looks` directions, with turns of `turn_rad` in between.
 
     A person counts when seen twice within `same_m`: in two directions, or in one by both a camera and the LiDAR. A
-    detection needs `least_score`, within `reach_m` of the camera. A robot that may move goes to `places` more places,
-    while more than `hidden` of the area, as a share of where people may stand, was not in view; else it cannot tell.
+    detection needs `least_score`, within `reach_m` of the camera. A robot that may move drives to `viewpoints` more
+    viewpoints at most, until no more than the share `hidden` of the positions where people may stand was out of view.
     """
 
     looks: Count = 5
@@ -56,7 +56,7 @@ class FindPeopleOptions:
     same_m: Length = 0.7
     least_score: Share = 0.5
     reach_m: Length = 6.0
-    places: Tries = 4
+    viewpoints: Tries = 4
     hidden: Share = 0.15
 
 
@@ -67,10 +67,10 @@ class FindPeople(FindPeoplePorts, MovingSkill[FindPeopleInputs]):
     options: FindPeopleOptions
 
     def run(self, inputs: FindPeopleInputs) -> Routine[Succeeded]:
-        """Looks until enough people were seen twice; from further places if the robot may move."""
+        """Looks until enough people were seen twice; from further viewpoints if the robot may move."""
         view, tracker = _View(self.context, inputs, self.options.reach_m), PeopleTracker(self.options.same_m)
         found = yield from self._look_round(inputs, tracker, view)
-        for _ in range(self.options.places if inputs.moves else 0):
+        for _ in range(self.options.viewpoints if inputs.moves else 0):
             if 0 < inputs.count <= len(found) or view.hidden <= self.options.hidden or not (goals := view.goals()):
                 break
             try:
@@ -185,7 +185,7 @@ def _observation(seen: SeenPerson, inputs: FindPeopleInputs) -> ObjectObservatio
 
 
 class _View:
-    """Places of an area where a person may stand, and which of them were in view."""
+    """Positions in an area where a person may stand, and which of them were in view."""
 
     def __init__(self, context: SkillContext, inputs: FindPeopleInputs, reach_m: float) -> None:
         self._context, self._reach_m = context, reach_m
@@ -194,42 +194,37 @@ class _View:
         away_m = np.linalg.norm(points[:, None] - known_W[None], axis=2)
         free = context.costmap.clearance_m(points) > _STANDS_M
         self._points: FloatArray = points[free & (away_m > _AVOID_M).all(axis=1)]
-        self._places = max(1, int(free.sum()))
+        self._count = max(1, int(free.sum()))
         self._seen: NDArray[np.bool_] = np.zeros(len(self._points), bool)
 
     @property
     def hidden(self) -> float:
-        """Share of all places of the area that were not in view yet, without those beside known people."""
-        return float((~self._seen).sum()) / self._places
+        """Share of all positions in the area that were out of view, without those beside known people."""
+        return float((~self._seen).sum()) / self._count
 
     def look(self) -> None:
         """Notes what is in view from here."""
         here = self._context.pose()
-        self._seen |= self._in_view(np.array((here.x_m, here.y_m)), self._points)
+        self._seen |= self._shows(np.array((here.x_m, here.y_m)), self._points)
 
     def goals(self) -> list[NavigateInputs]:
-        """Free poses from which most of the hidden places are in view, the best first."""
+        """Free viewpoints, those that show most of the hidden positions first."""
         here, hidden = self._context.pose(), self._points[~self._seen]
-        gains = np.array([self._in_view(point, hidden).sum() for point in self._points])
+        gains = np.array([self._shows(point, hidden).sum() for point in self._points])
         drives_m = np.linalg.norm(self._points - (here.x_m, here.y_m), axis=1)
         best = (n for n in np.lexsort((drives_m, -gains)) if gains[n] > 0)
         footprint = ArmFootprint(self._context).now()
         poses = (pose for n in best if (pose := self._free_pose(self._points[n], hidden, footprint)) is not None)
-        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _PLACES)]
+        return [NavigateInputs(pose, 0.2, 0.4) for pose in islice(poses, _VIEWPOINTS)]
 
     def _free_pose(self, at_W: FloatArray, hidden: FloatArray, footprint: Footprint) -> Pose2D | None:
-        """A pose at a place (2,), turned to the hidden places as far as it is free; None without one."""
-        towards = hidden[self._in_view(at_W, hidden)].mean(axis=0) - at_W
-        yaws = math.atan2(towards[1], towards[0]) + np.array(_YAWS_RAD)
-        poses = (Pose2D(float(at_W[0]), float(at_W[1]), wrap(yaw)) for yaw in yaws)
-        costmap = self._context.free_space()
+        """A free pose at a position (2,), turned to the hidden positions if possible; None without one."""
+        towards = hidden[self._shows(at_W, hidden)].mean(axis=0) - at_W
+        (x, y), ahead_rad, costmap = at_W.tolist(), math.atan2(towards[1], towards[0]), self._context.free_space()
+        poses = (Pose2D(x, y, wrap(ahead_rad + turn_rad)) for turn_rad in _YAWS_RAD)
         return next((pose for pose in poses if footprint_clear(costmap, footprint, pose)), None)
 
-    def _in_view(self, eye_W: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
-        """Mask (N,) of the places (N, 2) that are within reach of a place (2,), with no obstacle between."""
-        away_m = np.linalg.norm(points - eye_W, axis=1)
-        shares = np.linspace(0.0, 1.0, 1 + math.ceil(self._reach_m / _SIGHT_M))
-        lines = eye_W + shares[None, :, None] * (points - eye_W)[:, None]
-        clear = self._context.costmap.clearance_m(lines.reshape(-1, 2)).reshape(lines.shape[:2]) > 0.0
-        near = away_m[:, None] * shares < _OWN_M
-        return np.asarray((away_m <= self._reach_m) & (clear | near).all(axis=1))
+    def _shows(self, eye_W: FloatArray, points_W: FloatArray) -> NDArray[np.bool_]:
+        """Mask (N,) of the positions (N, 2) within reach of a viewpoint (2,), with no obstacle between."""
+        is_near: NDArray[np.bool_] = np.linalg.norm(points_W - eye_W, axis=1) <= self._reach_m
+        return is_near & line_of_sight(self._context.costmap, eye_W, points_W, beyond_m=_OWN_M)

@@ -57,8 +57,8 @@ class FollowPersonOptions:
     `aside_s` at most. A person who stays hidden for `lost_s` is lost, or for `gone_s` once the robot stands where they
     were seen last: the robot says so, searches beyond `doors` doors and in the named place, each for `search_s` or
     `plans` plans `again_s` apart, then asks and listens for `asking_s`. Somebody who may be another is asked for the
-    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`; so is somebody who
-    has stood elsewhere than in the named place for `standing_s`. At the beginning the robot looks for the person for
+    name within `hearing_m`, with `answer_s` for the answer, and is another after so many `silences`. The robot also
+    asks a person who stands outside the named place for `standing_s`. At the beginning it looks for the person for
     `finding_s`. It fails after `tries` drives in a row that failed, and at the end
     if the person was out of its sight for longer than `longest_loss_s`.
     """
@@ -211,7 +211,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
             rests = near and target.doubted is None and target.stands_still(self._now())
             if rests and place and inside_polygon(np.array([seen_W]), place, -_SURELY_M).all():
                 return True
-            if rests and target.stood_s(self._now()) > self.options.standing_s:
+            if rests and target.standing_s(self._now()) > self.options.standing_s:
                 target.doubt()
             if self._now() >= self._planned_s + self.options.replan_s:
                 self._planned_s = self._now()
@@ -223,7 +223,7 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         return False
 
     def _is_right(self, target: Target, before: SeenPerson) -> Routine[bool]:
-        """Asks a doubted person for their name where nobody else takes it for their own question.
+        """Asks a doubted person for their name, unless somebody else may answer.
 
         Who says no or nothing, so often, is the person no longer.
         """
@@ -375,14 +375,10 @@ class FollowPerson(FollowPersonPorts, ListeningSkill[FollowPersonInputs]):
         straight = np.array([(here.x_m, here.y_m), end_W])
         if not hidden_s and distance_m > behind_m and self._is_clear(straight):
             trail = straight
-        along, around = poses_behind(trail, behind_m), self._around(here, end_W) if behind_m else ()
+        away_m = (options.behind_m, options.close_m, options.near_m) if behind_m else ()
+        along, around = poses_behind(trail, behind_m), poses_around(end_W, here, away_m, self.context.costmap)
         poses = [*along, *around] if walks else [*around, *along]
         return self._free(np.array(poses).reshape(-1, 3))
-
-    def _around(self, here: Pose2D, end_W: FloatArray) -> Iterator[tuple[float, float, float]]:
-        """Poses about a person, whom they face with nothing between; see `poses_around`."""
-        away_m = (self.options.behind_m, self.options.close_m, self.options.near_m)
-        return poses_around(end_W, here, away_m, self.context.costmap)
 
     def _turned(self, here: Pose2D, place_W: tuple[float, float]) -> Pose2D | None:
         """The pose here that faces a person, where the robot can turn; None when it faces them nearly."""

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from skills.api import FreeSpace
-from skills.geometry import bearing_rad, wrap
+from skills.geometry import bearing_rad, line_of_sight, wrap
 from skills.perception.doorway import Doorway
 from skills.perception.people import SeenPerson
 from skills.perception.people_tracking import predicted_place_W
@@ -71,10 +71,10 @@ def people_about(
 
 
 def is_addressed(one: SeenPerson, near: Sequence[SeenPerson], here: Pose2D, *, still: bool, in_sight: bool) -> bool:
-    """Returns whether a person takes a question for their own, of those within hearing, the nearest first.
+    """Returns whether only this person answers a question that all `near` people hear, the nearest of them first.
 
-    That is who is the nearest of all and faced. A person who stands `still` need not be faced if nobody else is, nor
-    be the nearest if they are the nearest faced one, `in_sight` of the robot.
+    The person must be the nearest, and ahead of the robot. Somebody who stands `still` may also be the nearest one
+    ahead, with no obstacle between (`in_sight`), or the nearest of all where nobody is ahead.
     """
     faced = [each for each in near if abs(bearing_rad(here, each.place_W)) < _FACES_RAD]
     first = next(iter(faced or near if still else faced), None)
@@ -124,8 +124,8 @@ class Target:
         last_W = self.seen.place_W
         return long_enough and all(math.dist(place, last_W) < self._options.still_m for _, place in self._places)
 
-    def stood_s(self, now_s: float) -> float:
-        """Time for which the person has stood still, since they were trusted last."""
+    def standing_s(self, now_s: float) -> float:
+        """Time for which the person has stood still, at most since the robot trusted them."""
         return now_s - self._walked_s
 
     def away_m_s(self, here: Pose2D) -> float:
@@ -218,18 +218,17 @@ def poses_behind(trail: FloatArray, behind_m: float) -> Iterator[tuple[float, fl
 def poses_around(
     person_W: FloatArray, here: Pose2D, away_m: Sequence[float], costmap: FreeSpace
 ) -> Iterator[tuple[float, float, float]]:
-    """Poses at some distances from a person (2,), whom they face with nothing between; the nearest to `here` first."""
-    towards_rad = math.atan2(*(np.array((here.x_m, here.y_m)) - person_W)[::-1])
+    """Poses at some distances from a person (2,) that face them with nothing between; the nearest to `here` first."""
+    angles = math.atan2(*(np.array((here.x_m, here.y_m)) - person_W)[::-1]) + _ROUND
     for distance_m in away_m:
-        for angle in towards_rad + _ROUND:
-            way = np.array([math.cos(angle), math.sin(angle)])
-            between = person_W + np.linspace(_BODY_M, distance_m, 8)[:, None] * way
-            if costmap.clearance_m(between).min() > 0.0:
-                yield float(between[-1, 0]), float(between[-1, 1]), wrap(angle + math.pi)
+        points_W = person_W + distance_m * np.column_stack([np.cos(angles), np.sin(angles)])
+        visible = line_of_sight(costmap, person_W, points_W, beyond_m=_BODY_M)
+        for (x, y), angle in zip(points_W[visible], angles[visible], strict=True):
+            yield float(x), float(y), wrap(float(angle) + math.pi)
 
 
 def poses_beyond(door: Doorway, yaw_rad: float) -> Iterator[tuple[float, float, float]]:
-    """Poses beyond a door in a direction through it; the last one before it, for where somebody stands beyond."""
+    """Poses beyond a door in a direction through it; the last one is before it, where the robot sees into the room."""
     for far_m in (1.0, 1.4, 0.7, -0.8):
         x, y = np.array(door.middle_W) + far_m * np.array([math.cos(yaw_rad), math.sin(yaw_rad)])
         yield float(x), float(y), yaw_rad

@@ -9,7 +9,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from skills.api import Cause, ObjectKind, ObjectObservation, Running, Succeeded
-from skills.geometry import bearing_rad, facing_poses
+from skills.geometry import bearing_rad, facing_poses, line_of_sight
 from skills.manipulation.approach.base_placement import go_to_one
 from skills.navigate.arm_footprint import ArmFootprint
 from skills.navigate.footprint import footprint_clear
@@ -26,7 +26,8 @@ PERSON_SIZE_M: Final = (0.5, 0.5, 1.7)
 _SCAN_AGE_S = 1.0
 _ARM_M = 0.5
 """Distance from a person's axis up to which their own body is in the costmap."""
-_STEP_M, _SHORT_M = 0.1, 0.25
+_SHORT_M = 0.25
+"""Difference between the greatest distance of the inputs and that of the pose to which the robot drives."""
 _POSES_EACH = 2
 """Free poses at each distance from the person to which the robot tries to drive."""
 
@@ -131,9 +132,8 @@ class MeetPerson(MeetPersonPorts, RoutineSkill[MeetPersonInputs]):
 
     def _sees(self, pose: Pose2D, place_W: tuple[float, float]) -> bool:
         """Returns whether no wall or table is between a pose and a person."""
-        from_m = np.arange(_ARM_M, math.dist(place_W, (pose.x_m, pose.y_m)), _STEP_M)[:, None]
-        direction = np.array([math.cos(pose.yaw_rad), math.sin(pose.yaw_rad)])
-        return bool(np.all(self.context.costmap.clearance_m(np.array(place_W) - from_m * direction) > 0.0))
+        at_W = np.array([(pose.x_m, pose.y_m)])
+        return bool(line_of_sight(self.context.costmap, np.array(place_W), at_W, beyond_m=_ARM_M)[0])
 
     def _met(self, inputs: MeetPersonInputs, person: SeenPerson) -> Succeeded:
         x, y = person.place_W

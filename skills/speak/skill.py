@@ -4,20 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
-from skills.api import (
-    Asked,
-    Cause,
-    Failed,
-    InputsT,
-    Job,
-    Part,
-    Question,
-    Running,
-    Skill,
-    SkillContext,
-    Step,
-    Succeeded,
-)
+from skills.api import Cause, Failed, InputsT, Job, Part, Question, Running, Skill, SkillContext, Step, Succeeded
 from skills.quantities import Delay
 from skills.routine import RoutineSkill
 
@@ -114,8 +101,8 @@ class ListeningSkill(RoutineSkill[InputsT]):
         """Words that somebody has said, or nothing so far."""
         return self._heard.result() if self._heard is not None and self._heard.done() else None
 
-    def ask_for_name(self, person: str, answer_s: float) -> Asked:
-        """Asks whether it is this person whom the robot is with; answered by "yes", "no", or "" when nobody answers."""
+    def ask_for_name(self, person: str, answer_s: float) -> Job[str]:
+        """Asks "Are you Robin?"; the answer is "yes", "no", or "" when nobody answers within answer_s."""
         name = f"{self.name} of {self.context.robot.name}"
         return self.context.ask(Question(name, f"Are you {person}?", ("yes", "no"), "", answer_s))
 

@@ -108,9 +108,9 @@ def test_the_time_that_a_person_has_stood_begins_anew_when_they_are_trusted():
     target = walked()
     for n in range(1, 152):
         target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], (), 2.0 + 0.1 * n)
-    assert target.stood_s(17.1) == pytest.approx(10.6, abs=0.2)
+    assert target.standing_s(17.1) == pytest.approx(10.6, abs=0.2)
     target.trust()
-    assert target.stood_s(17.1) == pytest.approx(0.0, abs=0.2)
+    assert target.standing_s(17.1) == pytest.approx(0.0, abs=0.2)
 
 
 AHEAD, BEHIND, FAR = (3.0, 0.0), (-1.0, 0.0), (5.0, 0.0)

@@ -25,6 +25,7 @@ from plant.robots.robot_kind import SensorOptions
 from plant.robots.servos import arm_set_point
 from plant.saved_state import State, Stateful
 from skills.robot import ArmTrajectory, CommandId, CommandState, CommandStatus, FloatArray, Lease, Robot
+from skills.robot_wrapper import RobotWrapper
 
 CONTROL_STEPS = 2
 SLEEP_PERIOD_STEPS = 4
@@ -199,7 +200,6 @@ Background = Callable[[Callable[[], None]], "Future[None]"]
 """Begins work in the background."""
 
 _EXACT_S, _LEAST_S = 1e-9, 1e-6
-_BEGIN_LATER = frozenset({"drive", "stand", "sit", "dock", "undock", "point_head", "set_gripper"})
 
 
 class Pipeline:
@@ -255,7 +255,7 @@ class Pipeline:
             under_way.result()
 
 
-class PipelinedRobot:
+class PipelinedRobot(RobotWrapper):
     """A robot whose commands begin when the step under way is done, and count as running until then.
 
     Verbs of the lease wait for that step, because they are answered at once. The time of an arm's trajectory counts
@@ -263,7 +263,8 @@ class PipelinedRobot:
     """
 
     def __init__(self, robot: Robot, pipeline: Pipeline) -> None:
-        self._robot, self._pipeline = robot, pipeline
+        super().__init__(robot)
+        self._pipeline = pipeline
         self._statuses = CommandStatuses()
         self._commanded: list[tuple[CommandId, Callable[[], CommandId]]] = []
         self._running: dict[CommandId, CommandId] = {}  # by the ids given here, those of the robot
@@ -290,16 +291,9 @@ class PipelinedRobot:
         self.begin_commands()
         return self._robot
 
-    def __getattr__(self, verb: str) -> Any:
-        """Returns a verb of the robot; a verb that moves the robot begins later."""
-        value = getattr(self._robot, verb)
-        if verb in _BEGIN_LATER:
-            value = partial(self._begin_later, value)
-        self.__dict__[verb] = value
-        return value
-
-    def _begin_later(self, verb: Callable[..., CommandId], *given: Any, **named: Any) -> CommandId:
-        return self._later(partial(verb, *given, **named))
+    def _command(self, verb: str, call: Callable[..., CommandId], *arguments: Any, **options: Any) -> CommandId:
+        """Begins the command later."""
+        return self._later(partial(call, *arguments, **options))
 
     def move_arm(self, trajectory: ArmTrajectory, *, until_s: float, lease: Lease) -> CommandId:
         """Follows a joint trajectory; done when its end is reached and the arm is still."""

@@ -172,7 +172,8 @@ class Capabilities:
     the robot walks. `lidar_height_m` is the LiDAR's height over the floor while the robot stands as usual: maps differ
     by it. Joints and gripper give a new reading every `sensor_period_s`. A drive that is renewed at each tick expires
     after `drive_expiry_s`: longer than a tick and the way of a command to the robot, and no longer than is safe. With
-    `docks` the robot drives onto a docking station and off it by itself, and with `opens_doors` it opens doors.
+    `docks` the robot drives onto a docking station and off it by itself, with `opens_doors` it opens doors, and with
+    `localises` it knows its place in a map of its own.
     """
 
     footprint_m: tuple[tuple[float, float], ...]
@@ -193,6 +194,7 @@ class Capabilities:
     drive_expiry_s: float = 0.3
     docks: bool = False
     opens_doors: bool = False
+    localises: bool = False
 
     @property
     def body_cameras(self) -> tuple[CameraCapabilities, ...]:

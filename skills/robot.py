@@ -108,7 +108,7 @@ class Imu:
 
 @dataclass(frozen=True)
 class OwnLocalisation:
-    """Pose of `odom` in the frame S of the robot's own map, from a robot with the verb `own_localisation`."""
+    """Pose of `odom` in the frame S of the robot's own map."""
 
     stamp_s: float
     X_SO: Pose2D
@@ -303,6 +303,9 @@ class Robot(Protocol):
 
     def odometry(self) -> Odometry:
         """Returns the latest dead reckoning."""
+
+    def own_localisation(self) -> OwnLocalisation | None:
+        """Returns the robot's place in its own map, None while it knows none; only where `Capabilities.localises`."""
 
     def imu(self) -> Imu | None:
         """Returns the latest inertial measurement; None if the robot gives none."""

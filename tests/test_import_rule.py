@@ -63,7 +63,7 @@ def breaches(path: Path, source: str) -> list[str]:
     parts = path.relative_to(ROOT).parts
     allowed = {
         "skills": ("skills",),
-        "plant": ("plant", "executive.words", "skills.robot", "skills.files"),
+        "plant": ("plant", "executive.words", "skills.robot", "skills.robot_wrapper", "skills.files"),
         "executive": ("executive", "skills"),
     }[parts[0]]
     if parts[:2] == ("executive", "cli"):

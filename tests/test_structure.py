@@ -27,10 +27,10 @@ LINES = {
     "executive/testing": 849,
     "executive/app": 8332,
     "executive/cli": 4997,
-    "skills": 30174,
+    "skills": 30315,
     "plant": 22156,
 }
-MODULES, ONE_IMPORTER, SAME_NAME = 516, 95, 14
+MODULES, ONE_IMPORTER, SAME_NAME = 517, 95, 14
 """All modules; those that one other imports; file names that stand more than once."""
 LONGEST_FUNCTION, LONGEST_MODULE = 60, 450
 """Lines."""

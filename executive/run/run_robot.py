@@ -7,7 +7,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, replace
-from typing import Any, Final, TypeVar, cast
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,13 +35,14 @@ from skills.robot import (
     Lease,
     LeaseError,
     Odometry,
+    OwnLocalisation,
     Pose2D,
     Robot,
     Scan,
 )
+from skills.robot_wrapper import VERBS, AnswerT, RobotWrapper
 
 Check = Callable[[Any], str | None]
-AnswerT = TypeVar("AnswerT")
 _EMPTY: Final = (0, 0)
 HOLDER: Final = "errand"
 _NO_LEASE: Final = Lease("", "", 0)
@@ -56,8 +57,8 @@ _NEVER_CHANGING = frozenset({"capabilities"})
 _NOTHING_YET: Final = object()
 
 
-class GuardedRobot:
-    """Robot whose verbs are guarded; each verb is wrapped when it is first called.
+class GuardedRobot(RobotWrapper):
+    """Robot whose verbs are guarded.
 
     A verb raises `VerbHung` when it takes too long (see `Watchdog`), and `GarbageError` when its answer has the wrong
     type, numbers that are not finite, or a stamp before the clock's beginning.
@@ -73,8 +74,10 @@ class GuardedRobot:
         limit_s: float = VERB_LIMIT_S,
         image_limit_s: float = IMAGE_LIMIT_S,
     ) -> None:
-        self._robot, self._watchdog = robot, watchdog
-        self._limit_s, self._image_limit_s = limit_s, image_limit_s
+        super().__init__(robot)
+        self._watchdog, self._limit_s, self._image_limit_s = watchdog, limit_s, image_limit_s
+        self._hung = {verb: hung_message(verb, image_limit_s if verb == "image" else limit_s) for verb in VERBS}
+        self._good: dict[str, object] = {}
         self._main = threading.main_thread().ident
         self._holder = ""
         self.token: Lease | None = None
@@ -105,46 +108,30 @@ class GuardedRobot:
 
     def give_lease_back(self) -> None:
         """Returns the lease; the robot stops."""
-        self.return_lease(self._lease)
+        if self._lease is not None:
+            self.return_lease(self._lease)
 
-    def __getattr__(self, verb: str) -> Any:
-        value = getattr(self._robot, verb)
-        if verb.startswith("_") or not callable(value):
-            return value
-        guarded = self._guarded(verb, value)
-        self.__dict__[verb] = guarded
-        return guarded
-
-    def _guarded(self, verb: str, call: Callable[..., Any]) -> Callable[..., Any]:
-        watchdog, main, check, ident = self._watchdog, self._main, garbage_check(verb), threading.get_ident
+    def _call(self, verb: str, call: Callable[..., AnswerT], *arguments: Any, **options: Any) -> AnswerT:
+        """Calls a verb under the watchdog and the present lease, and checks its answer."""
+        if "lease" in options and options["lease"] == self.token:
+            options["lease"] = self._lease
         limit_s = self._image_limit_s if verb == "image" else self._limit_s
-        sentence, now_s = hung_message(verb, limit_s), time.monotonic
-        good: Any = _NOTHING_YET
+        if threading.get_ident() != self._main:
+            answer = self._elsewhere(verb, functools.partial(call, *arguments, **options), limit_s)
+        else:
+            self._watchdog.verb = (time.monotonic() + limit_s, self._hung[verb])
+            try:
+                answer = call(*arguments, **options)
+            finally:
+                self._watchdog.verb = None
+        if answer is not self._good.get(verb, _NOTHING_YET) and (check := garbage_check(verb)) is not None:
+            wrong = check(answer)  # sensors give one snapshot many times
+            if wrong is not None:
+                raise GarbageError(f"the robot answered '{verb}' with garbage: {wrong}")
+            self._good[verb] = answer
+        return answer
 
-        @functools.wraps(call)
-        def guarded_call(*arguments: Any, **options: Any) -> Any:
-            """Calls the verb under the watchdog and the present lease, and checks its answer."""
-            nonlocal good
-            if "lease" in options and options["lease"] == self.token:
-                options["lease"] = self._lease
-            if ident() != main:
-                answer = self._elsewhere(verb, functools.partial(call, *arguments, **options), limit_s)
-            else:
-                watchdog.verb = (now_s() + limit_s, sentence)
-                try:
-                    answer = call(*arguments, **options)
-                finally:
-                    watchdog.verb = None
-            if answer is not good and check is not None:  # sensors give one snapshot many times
-                wrong = check(answer)
-                if wrong is not None:
-                    raise GarbageError(f"the robot answered '{verb}' with garbage: {wrong}")
-                good = answer
-            return answer
-
-        return guarded_call
-
-    def _elsewhere(self, verb: str, call: Callable[[], Any], limit_s: float) -> Any:
+    def _elsewhere(self, verb: str, call: Callable[[], AnswerT], limit_s: float) -> AnswerT:
         """Calls a verb outside the main thread; `image` without a limit, since a renderer is bound to its thread."""
         if in_lock_step_job():
             if verb in _NEVER_CHANGING:
@@ -184,7 +171,7 @@ class RunRobot:
         """Context of the robot's tree, without a lease."""
         name, control, publish = self.name, shared.control, shared.visitors.publish
         return RunContext(
-            robot=cast(Robot, self._guarded),
+            robot=self._guarded,
             lease=_NO_LEASE,
             clock=shared.clock,
             worker=shared.worker,
@@ -328,7 +315,8 @@ _LEASE: Final = _typed(Lease)
 _CHECKS: Final[Mapping[str, Check]] = {
     "capabilities": _typed(Capabilities),
     "odometry": _reading(Odometry),
-    "imu": _reading(Imu),
+    "own_localisation": _or_none(_reading(OwnLocalisation)),
+    "imu": _or_none(_reading(Imu)),
     "scan": _or_none(_reading(Scan, _scan)),
     "image": _reading(Image, _image),
     "joints": _reading(Joints),

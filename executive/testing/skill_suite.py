@@ -32,10 +32,11 @@ from executive.testing.skill_test import (
     scripted_maker,
 )
 from skills.api import Cause, Skill
-from skills.faults.fault_kinds import SENSE_VERBS, STANDARD_FAULTS, VERBS, Call, Effect, FaultKind, InjectedFault
+from skills.faults.fault_kinds import SENSE_VERBS, STANDARD_FAULTS, Call, Effect, FaultKind, InjectedFault
 from skills.faults.faulty_robot import Fault
 from skills.files.errors import InputError
 from skills.robot import Capabilities
+from skills.robot_wrapper import VERBS
 from skills.testing.robot import ScriptedRobot
 
 STILL_WITHIN_S = 0.2
@@ -124,7 +125,6 @@ def exception_in_every_verb(case: SuiteCase) -> Iterator[str]:
 def _raising(case: SuiteCase, verb: str, calls: int) -> Iterator[str]:
     bench, robot = case.bench()
     met: list[str] = []
-
     left = calls
 
     def act(call: Call) -> Any:

@@ -114,6 +114,9 @@ class CommandedRobot(Stateful, ABC, saved=("_arm", "_gripper", "_sensors")):
         """Latest dead reckoning."""
         return self._sensors.odometry
 
+    def own_localisation(self) -> None:
+        """Returns None: a simulated robot has no map of its own."""
+
     def imu(self) -> Imu:
         """Latest inertial measurement."""
         return self._sensors.imu

@@ -50,11 +50,10 @@ class OwnLocaliser:
 
     def update(self, robot: Robot) -> None:
         """Reads the robot's place. Raises InputError for a robot that does not localise itself."""
-        ask = getattr(robot, "own_localisation", None)
-        if ask is None:
+        if not robot.capabilities().localises:
             hint = "leave localiser out of the stack file, or run with --robot spot://HOST"
             raise InputError(f"{robot.name} has no GraphNav, which the stack's localiser needs", hint=hint)
-        place: OwnLocalisation | None = ask()
+        place = robot.own_localisation()
         self._last = place or self._last
         old_s = robot.odometry().stamp_s - self._last.stamp_s
         self._localised = place is not None and old_s <= self._options.max_age_s

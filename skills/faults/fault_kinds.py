@@ -23,15 +23,11 @@ from skills.robot import (
     NoImageError,
     Robot,
 )
+from skills.robot_wrapper import VERBS
 
 THIEF: Final = "the tablet"
 """Name of the holder in "lease taken"."""
 
-VERBS: Final = (
-    "capabilities", "odometry", "imu", "scan", "image", "joints", "gripper", "battery", "faults",
-    "drive", "stand", "sit", "dock", "undock", "move_arm", "point_head", "set_gripper", "carry", "stop",
-    "command_status", "acquire_lease", "take_lease", "return_lease", "lease_holder",
-)  # fmt: skip
 SENSE_VERBS: Final = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
 MOTION_VERBS: Final = ("drive", "stand", "sit", "move_arm", "point_head", "set_gripper")
 
@@ -47,18 +43,22 @@ _OTHER_WORDS: Final[Mapping[str, str]] = {
 
 @dataclass
 class Call:
-    """One call of a verb: `proceed` makes it; the fault's own `memory` lasts from call to call."""
+    """One call of a verb: `proceed` makes it; the fault's own `memory` lasts from call to call.
+
+    `arguments` are those by position, `options` those by name.
+    """
 
     robot: Robot
     verb: str
     proceed: Callable[[], Any]
     arguments: tuple[Any, ...]
+    options: Mapping[str, Any]
     memory: dict[Any, Any]
 
     @property
     def asked(self) -> tuple[Any, ...]:
         """Key of the reading: the verb, and for pictures the camera and the wanted parts of the picture."""
-        return (self.verb, *self.arguments) if self.verb == "image" else (self.verb,)
+        return (self.verb, *self.arguments, *self.options.values())
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def _answer(match: re.Match[str], status: CommandStatus) -> Effect:
         made_up = call.memory.setdefault("ids", set())
         if call.verb == "command_status":
             return status if call.arguments[0] in made_up else call.proceed()
-        command = call.robot.stop(lease=call.arguments[-1], only=_NO_COMMAND)
+        command = call.robot.stop(lease=call.options["lease"], only=_NO_COMMAND)
         made_up.add(command)
         return command
 
@@ -261,8 +261,7 @@ def _loses(_: re.Match[str]) -> Effect:
             memory["until_s"] = reading.stamp_s + _WEAK_S
             call.robot.set_gripper(0.0, _WEAK_N, until_s=memory["until_s"], lease=lease)
         if call.verb == "set_gripper" and reading.stamp_s < memory.get("until_s", 0.0):
-            opening, _, until_s, owned = call.arguments
-            return call.robot.set_gripper(opening, _WEAK_N, until_s=until_s, lease=owned)
+            return call.robot.set_gripper(call.arguments[0], _WEAK_N, **call.options)
         return call.proceed()
 
     return Effect(frozenset(("gripper", "set_gripper")), act, once=True)

@@ -6,19 +6,19 @@ A fault is `SENSOR[.SOURCE]: WORDS`, or the words with the sensor or verb at the
 """
 
 import difflib
-import inspect
 import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 
 from skills.durations import seconds_in
-from skills.faults.fault_kinds import STANDARD_FAULTS, VERBS, Call, Effect, FaultKind
+from skills.faults.fault_kinds import STANDARD_FAULTS, Call, Effect, FaultKind
 from skills.robot import Clock, Robot
+from skills.robot_wrapper import AnswerT, RobotWrapper
 
 __all__ = ["Fault", "parse_fault", "random_faults"]
 
@@ -170,11 +170,12 @@ class _Armed:
         return verb in self.fault.effect.verbs | self.fault.effect.always
 
 
-class FaultyRobot:
+class FaultyRobot(RobotWrapper):
     """Robot whose verbs fail by its faults, with times that count from `since_s`. `inject_faults` makes one."""
 
     def __init__(self, robot: Robot, clock: Clock, faults: Sequence[Fault], since_s: float) -> None:
-        self._robot, self._clock, self._since_s = robot, clock, since_s
+        super().__init__(robot)
+        self._clock, self._since_s = clock, since_s
         self._armed = [_Armed(fault) for fault in faults]
 
     def faults_at_work(self) -> tuple[str, ...]:
@@ -182,29 +183,14 @@ class FaultyRobot:
         now_s = self._clock.now() - self._since_s
         return tuple(each.fault.words for each in self._armed if each.on(now_s) and each.seen >= each.fault.calls)
 
-    def __getattr__(self, name: str) -> Any:
-        value = getattr(self._robot, name)
-        if name not in VERBS:
-            return value
-
-        bind = inspect.signature(value).bind
-
-        def faulty(*arguments: Any, **options: Any) -> Any:
-            """Calls the verb through the faults."""
-            bound = bind(*arguments, **options)
-            bound.apply_defaults()
-            return self._call(name, lambda: value(*arguments, **options), tuple(bound.arguments.values()))
-
-        self.__dict__[name] = faulty
-        return faulty
-
-    def _call(self, verb: str, proceed: Callable[[], Any], arguments: tuple[Any, ...]) -> Any:
+    def _call(self, verb: str, call: Callable[..., AnswerT], *arguments: Any, **options: Any) -> AnswerT:
         """Makes a call through all faults that concern the verb, the first one outermost."""
+        proceed: Callable[[], AnswerT] = partial(call, *arguments, **options)
         now_s = self._clock.now() - self._since_s
         for armed in reversed(self._armed):
             if armed.concerns(verb, arguments):
-                call = Call(self._robot, verb, proceed, arguments, armed.memory)
-                proceed = partial(armed.through, call, now_s)
+                through = Call(self._robot, verb, proceed, arguments, options, armed.memory)
+                proceed = partial(armed.through, through, now_s)
         return proceed()
 
 
@@ -217,4 +203,4 @@ def inject_faults(robot: Robot, clock: Clock, faults: Sequence[Fault | str], *, 
     cameras = [camera.source for camera in robot.capabilities().cameras] if named else []
     parsed = [parse_fault(fault, cameras=cameras) if isinstance(fault, str) else fault for fault in faults]
     begun_s = clock.now() if since_s is None else since_s
-    return cast(Robot, FaultyRobot(robot, clock, parsed, begun_s)) if parsed else robot
+    return FaultyRobot(robot, clock, parsed, begun_s) if parsed else robot

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RotationMatrix
 
 from skills.faults.fault_kinds import joints_under_pull
 from skills.geometry import compose
@@ -110,7 +110,8 @@ class ScriptedRobot:
         self.velocity: FloatArray = np.zeros(3)
         self.odometry_scale, self.yaw_drift_rad_per_m = 1.0, 0.0
         self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
-        self.q_rad = self._first_angles(start)
+        arm = capabilities.arm
+        self.q_rad = np.array([] if arm is None else start.arm_rad or arm.stowed_rad[: len(arm.joint_names)])
         self.head_rad = (0.0, 0.0)
         self.opening = (start.in_gripper_rad or 0.3) if start.holding else 0.0
         self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
@@ -129,12 +130,6 @@ class ScriptedRobot:
         self._scan: Scan | None = None
         self._rng = np.random.default_rng(seed)
         clock.attach(self._pass_time)
-
-    def _first_angles(self, start: Start) -> FloatArray:
-        arm = self._capabilities.arm
-        if arm is None:
-            return np.zeros(0)
-        return np.array(start.arm_rad or arm.stowed_rad[: len(arm.joint_names)], dtype=np.float64)
 
     @property
     def name(self) -> str:
@@ -161,6 +156,10 @@ class ScriptedRobot:
         self.calls.append("odometry")
         vx, vy, wz = (float(v) for v in self.velocity)
         return Odometry(self._clock.now(), self._X_OB(), (vx, vy, wz))
+
+    def own_localisation(self) -> None:
+        """Returns None: the robot has no map of its own."""
+        self.calls.append("own_localisation")
 
     def imu(self) -> Imu:
         """Latest inertial measurement: at rest but for the turn rate."""
@@ -341,13 +340,13 @@ class ScriptedRobot:
         return self._commands.begin(part, goal, self._clock.now(), until_s)
 
     def _X_WB(self) -> RigidTransform:
-        return self.pose.transform(self.height_m) @ self._tilt()
+        return self._tilted(self.pose)
 
     def _X_OB(self) -> RigidTransform:
-        return self.odometry_pose.transform(self.height_m) @ self._tilt()
+        return self._tilted(self.odometry_pose)
 
-    def _tilt(self) -> RigidTransform:
-        return RigidTransform(RollPitchYaw(0.0, self.pitch_rad, 0.0), [0.0, 0.0, 0.0])
+    def _tilted(self, pose: Pose2D) -> RigidTransform:
+        return pose.transform(self.height_m) @ RigidTransform(RotationMatrix.MakeYRotation(self.pitch_rad))
 
     def _pass_time(self, dt_s: float) -> None:
         self._commands.expire(self._clock.now())

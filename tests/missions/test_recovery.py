@@ -27,6 +27,7 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.description import HAND_LINK
 from plant.simulation import Simulation
 from skills.faults.faulty_robot import inject_faults
+from skills.robot_wrapper import RobotWrapper
 from tests.visitors import OnMessage, OnTick
 
 FETCH = (
@@ -115,14 +116,12 @@ def test_a_blocked_doorway_is_gone_around(tmp_path):
     assert verdict.collisions == 0
 
 
-class WeakGripper:
+class WeakGripper(RobotWrapper):
     """A robot whose gripper closes too weakly at first."""
 
     def __init__(self, robot, weak_times, force_n):
-        self._robot, self._left, self._force_n = robot, weak_times, force_n
-
-    def __getattr__(self, name):
-        return getattr(self._robot, name)
+        super().__init__(robot)
+        self._left, self._force_n = weak_times, force_n
 
     def set_gripper(self, opening, force_n, *, until_s, lease):
         if opening == 0.0 and force_n > 30.0 and self._left > 0:
@@ -141,21 +140,18 @@ def test_a_thing_that_slips_is_taken_again():
     assert result.outcome is Outcome.SUCCESS, result.message
 
 
-class LosesHalfway:
+class LosesHalfway(RobotWrapper):
     """A robot whose gripper loses what it holds, once it has brought it for 3 s; `lost_s` is when that was by truth."""
 
     BRINGS_S, OUT_M = 3.0, 0.03
 
     def __init__(self, mission, thing):
         engine = mission.simulation.engine
-        self._robot, self._clock, self._context = mission.entry.robot, engine, engine.context
+        super().__init__(mission.entry.robot)
+        self._clock, self._context = engine, engine.context
         self._hand = engine.world.plant.GetBodyByName(HAND_LINK, engine.world.robots["Alice"].instance)
         self._thing = engine.world.plant.GetBodyByName(thing)
         self._begun_s = self._apart_m = self.lost_s = None
-
-    def __getattr__(self, name):
-        value = getattr(self._robot, name)
-        return (lambda *given, **options: getattr(self._robot, name)(*given, **options)) if callable(value) else value
 
     def observe(self, progress):
         """Look how far the mission is, and where the object is."""

@@ -69,7 +69,9 @@ class ApiRobot:
         self._name, self._connection, self._clock = name, connection, clock
         docks, doors = connection.has("docking"), connection.has("door") and capabilities.arm is not None
         self._padding_m = padding_m
-        self._capabilities = replace(capabilities, drive_expiry_s=DRIVE_EXPIRY_S, docks=docks, opens_doors=doors)
+        self._capabilities = replace(
+            capabilities, drive_expiry_s=DRIVE_EXPIRY_S, docks=docks, opens_doors=doors, localises=True
+        )
         self.sensors, self.heartbeat = Sensors(connection, clock, capabilities), Heartbeat(connection)
         self._sent = SentCommands()
         self._unsure: set[str | None] = set()

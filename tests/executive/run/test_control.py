@@ -477,7 +477,7 @@ def test_an_untouched_control_changes_no_log(compiled, run_tree, make, robot, cl
 def test_a_lease_of_another_program_is_passed_on_unchanged(robot):
     guarded = GuardedRobot(robot, Watchdog())
     token, foreign, shown = guarded.claim("errand"), Lease("Alice", "tablet", 99), []
-    robot.stop = lambda *, lease: shown.append(lease) or 1
+    robot.stop = lambda *, lease, only: shown.append(lease) or 1
     guarded.stop(lease=foreign)
     robot.lease = None
     guarded.regain_lease()

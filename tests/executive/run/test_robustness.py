@@ -21,9 +21,10 @@ from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
-from skills.faults.fault_kinds import VERBS, Effect
+from skills.faults.fault_kinds import Effect
 from skills.faults.faulty_robot import Fault, inject_faults
 from skills.robot import ArmTrajectory, DoorHandle
+from skills.robot_wrapper import VERBS
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
@@ -32,6 +33,8 @@ from tests.visitors import OnMessage
 CAPABILITIES = spot_capabilities()
 SENSES = ("odometry", "imu", "scan", "image", "joints", "gripper", "battery")
 USED = tuple(verb for verb in VERBS if verb != "take_lease")
+SEEN = ("capabilities", "odometry", "own_localisation", "imu", "scan", "joints", "gripper", "battery", "faults")
+MAYBE_NONE = {"own_localisation", "imu", "scan", "lease_holder"}
 ANSWERING = set(USED) - {"return_lease", "carry"}
 HANG_LIMITS = {"verb_limit_s": 0.2, "image_limit_s": 0.2}
 HANGS_S = 0.7
@@ -71,7 +74,7 @@ class UseAll(Skill):
 
     def look(self):
         robot = self.context.robot
-        for verb in ("capabilities", "odometry", "imu", "scan", "joints", "gripper", "battery", "faults"):
+        for verb in SEEN:
             getattr(robot, verb)()
         if self.picture is None:
             self.picture = self.context.worker.sense(
@@ -136,7 +139,7 @@ def hanging(call):
 KINDS = {
     "raises": (raising, USED),
     "hangs": (hanging, USED),
-    "gives None": (lambda call: (call.proceed(), None)[1], ANSWERING - {"scan", "lease_holder"}),
+    "gives None": (lambda call: (call.proceed(), None)[1], ANSWERING - MAYBE_NONE),
     "gives text": (lambda call: (call.proceed(), "41")[1], ANSWERING),
     "gives NaN": (lambda call: (call.proceed(), float("nan"))[1], ANSWERING),
     "gives a truth value": (lambda call: (call.proceed(), True)[1], ANSWERING),

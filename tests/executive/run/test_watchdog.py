@@ -9,21 +9,23 @@ import pytest
 from executive.run.outcome import Outcome
 from executive.run.run_robot import GuardedRobot
 from executive.run.watchdog import VerbHung, Watchdog
+from skills.robot import Lease
 
 LIMIT_S = 0.05
+NO_LEASE = Lease("", "")
 
 
 class Hanging:
     name = "Alice"
 
-    def drive(self, *_arguments):
+    def drive(self, vx, vy, wz, *, until_s, lease):
         time.sleep(5.0)
 
-    def image(self, source):
+    def image(self, source, *, visual, depth):
         time.sleep(0.1)
         return source
 
-    def stop(self):
+    def stop(self, *, lease, only):
         return 3
 
 
@@ -41,18 +43,18 @@ def hanging(watchdog):
 def test_a_hanging_verb_raises_soon(hanging):
     began = time.perf_counter()
     with pytest.raises(VerbHung, match=r"'drive' within 0\.05 s"):
-        hanging.drive(1.0)
+        hanging.drive(1.0, 0.0, 0.0, until_s=1.0, lease=NO_LEASE)
     assert time.perf_counter() - began < 1.0
 
 
 def test_other_verbs_pass_and_nothing_is_overdue_afterwards(hanging):
-    assert (hanging.stop(), hanging.name) == (3, "Alice")
+    assert (hanging.stop(lease=NO_LEASE), hanging.name) == (3, "Alice")
     time.sleep(3 * LIMIT_S)
 
 
 def test_a_tick_that_hangs_is_named_before_the_verb_in_it(watchdog, hanging):
     with pytest.raises(VerbHung, match="a tick of Alice"), watchdog.over_tick("Alice", 0.03):
-        hanging.drive(1.0)
+        hanging.drive(1.0, 0.0, 0.0, until_s=1.0, lease=NO_LEASE)
     time.sleep(3 * LIMIT_S)
 
 
@@ -77,9 +79,9 @@ def test_calls_from_other_threads_are_passed_on_and_abandoned_when_they_hang(han
     results = []
 
     def call():
-        results.append(hanging.stop())
+        results.append(hanging.stop(lease=NO_LEASE))
         with pytest.raises(VerbHung, match="'drive'"):
-            hanging.drive(1.0)
+            hanging.drive(1.0, 0.0, 0.0, until_s=1.0, lease=NO_LEASE)
         results.append("given up")
 
     thread = threading.Thread(target=call)

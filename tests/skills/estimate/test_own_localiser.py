@@ -1,6 +1,7 @@
 """The localiser of robots that localise themselves."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -16,6 +17,9 @@ class Localised(ScriptedRobot):
     """Robot that says where it is; `place` None while it does not know."""
 
     place = None
+
+    def capabilities(self):
+        return replace(super().capabilities(), localises=True)
 
     def own_localisation(self):
         return self.place

@@ -21,11 +21,17 @@ def clock():
 
 
 @pytest.fixture
-def faulty(clock, spot):
+def inner(clock, spot):
+    """The robot without its faults."""
+    return ScriptedRobot(clock, capabilities=spot, blocks=ROOM)
+
+
+@pytest.fixture
+def faulty(clock, inner):
     """A robot with the given faults, and its lease."""
 
     def make(*faults):
-        robot = inject_faults(ScriptedRobot(clock, capabilities=spot, blocks=ROOM), clock, faults)
+        robot = inject_faults(inner, clock, faults)
         return robot, robot.acquire_lease("test")
 
     return make
@@ -95,7 +101,7 @@ def test_a_verb_raises_from_its_nth_call_on(faulty):
         robot.joints()
 
 
-def test_a_refused_command_says_why_and_nothing_moves(faulty, clock):
+def test_a_refused_command_says_why_and_nothing_moves(faulty, clock, inner):
     robot, lease = faulty("drive refuses from 1 s")
     fine = robot.drive(0.1, 0.0, 0.0, until_s=0.5, lease=lease)
     clock.advance(1.0)
@@ -103,7 +109,7 @@ def test_a_refused_command_says_why_and_nothing_moves(faulty, clock):
     assert robot.command_status(fine).state is CommandState.DONE
     assert robot.command_status(refused).state is CommandState.REFUSED
     assert "out of order" in robot.command_status(refused).reason
-    assert robot.moving_parts == ()
+    assert inner.moving_parts == ()
 
 
 def test_a_command_that_never_ends_stays_under_way(faulty, clock):
@@ -126,13 +132,13 @@ def test_garbage_spoils_numbers_and_keeps_the_stamp(faulty, clock):
     assert robot.joints().stamp_s == 1.0
 
 
-def test_the_lease_is_taken_once_and_motion_ends(faulty, clock):
+def test_the_lease_is_taken_once_and_motion_ends(faulty, clock, inner):
     robot, lease = faulty("lease taken at 1 s")
     robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
     clock.advance(1.0)
     robot.odometry()
     clock.advance(0.2)
-    assert robot.moving_parts == ()
+    assert inner.moving_parts == ()
     assert robot.command_status(robot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)).state is CommandState.REFUSED
     assert robot.lease_holder().holder == "the tablet"
 

@@ -10,6 +10,7 @@ from skills.faults.faulty_robot import inject_faults
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, WatchOptions, low_points
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
+from skills.robot_wrapper import RobotWrapper
 
 START = Pose2D(1.5, 5.4, 0.0)
 SHOE_BOX = Box(2.8, 5.2, 3.1, 5.6, 0.0, 0.15)
@@ -54,14 +55,12 @@ def test_the_costmap_shows_the_object():
 DRIVE_START, GOAL = Pose2D(1.2, 5.4, 0.0), Pose2D(4.0, 5.4, 0.0)
 
 
-class Repeating:
+class Repeating(RobotWrapper):
     """A robot whose LiDAR repeats the scan of a moment with new stamps."""
 
     def __init__(self, robot, clock, from_s):
-        self._robot, self._clock, self._from_s, self._kept = robot, clock, from_s, None
-
-    def __getattr__(self, name):
-        return getattr(self._robot, name)
+        super().__init__(robot)
+        self._clock, self._from_s, self._kept = clock, from_s, None
 
     def scan(self):
         scan = self._robot.scan()
@@ -74,14 +73,15 @@ class Repeating:
 def drive(*faults, wrap=None, seconds=20.0):
     """How a drive ends, where the robot stood when the LiDAR failed for half a second, and where at the end."""
     bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
-    bench.robot = wrap(bench) if wrap else inject_faults(bench.robot, bench.clock, faults)
+    base = bench.robot
+    bench.robot = wrap(bench) if wrap else inject_faults(base, bench.clock, faults)
     bench.tick()
     skill = Navigate(bench.context())
     skill.begin(NavigateInputs(GOAL))
     step, places = skill.step(), []
     while isinstance(step, Running) and bench.clock.now() < seconds:
         bench.tick()
-        places.append((bench.clock.now(), bench.robot.pose.x_m))
+        places.append((bench.clock.now(), base.pose.x_m))
         step = skill.step()
     skill.end()
     return step, places

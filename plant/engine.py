@@ -7,7 +7,7 @@ calls give the same run, whether a thread does the steps or `advance` itself.
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from functools import partial
 from typing import Any
 
@@ -250,8 +250,9 @@ class Pipeline:
 
     def settle(self) -> None:
         """Waits until no step is under way. Raises the exception of that step."""
-        under_way, self._under_way = self._under_way, None
-        if under_way is not None:
+        if (under_way := self._under_way) is not None:
+            wait([under_way])  # an alarm may interrupt this: the step is still under way then
+            self._under_way = None
             under_way.result()
 
 
@@ -344,8 +345,7 @@ def _at_once(work: Callable[[], None]) -> Future[None]:
     done: Future[None] = Future()
     try:
         work()
+        done.set_result(None)
     except Exception as error:
         done.set_exception(error)
-    else:
-        done.set_result(None)
     return done

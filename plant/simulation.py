@@ -156,8 +156,9 @@ class Simulation:
 
     def save_recording(self, path: Path) -> None:
         """Writes the recording as one HTML file. Raises LookupError without a recording."""
-        if self.recorder is None or not self.recorder.frames:
-            raise LookupError("nothing was recorded: build the simulation with record=True and advance its clock")
+        if self.recorder is None:
+            raise LookupError("nothing was recorded: build the simulation with record=True")
+        self.recorder(self.engine.now())  # the only frame of a run that ends before its first step
         save_html(self.engine.world, self.recorder.frames, path, self._overview())
 
     def _overview(self) -> View:

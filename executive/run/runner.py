@@ -122,7 +122,7 @@ class _Run:
             ending: Ending | None = None
             try:
                 for entry in spare:
-                    self._resting.rest(RunRobot(entry, self._shared))
+                    self._rest_apart(entry)
                 while self._has_work():
                     self._cycle()
             except (Exception, VerbHung, KeyboardInterrupt) as stop:
@@ -151,6 +151,15 @@ class _Run:
                 self._assigned.pop(0)
             self._report_ends()
         return bool(self._live)
+
+    def _rest_apart(self, entry: RunEntry) -> None:
+        """Lets a robot without a mission rest; leaves it alone if its verbs fail."""
+        try:
+            self._resting.rest(RunRobot(entry, self._shared))
+        except (Exception, VerbHung) as stop:
+            if disk_is_full(stop):
+                raise
+            ending_of(stop, self._visitors.publish)
 
     def _begin(self, entry: RunEntry) -> None:
         """Begins a mission of a robot that may be resting. Raises OSError when the disk is full."""

@@ -2,38 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 import pytest
 from py_trees.common import Status
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from executive.app.goal_conditions import verdict_of
-from executive.app.simulated import run_entry
-from executive.app.worlds import knowledge_of, open_world
+from executive.app.worlds import open_world
 from executive.run.outcome import Outcome
-from executive.run.runner import run
-from executive.run.visitor import RunSettings
-from executive.run.worker import LockStepWorker
-from executive.tree.compiler import compile_mission
-from executive.tree.registry import built_in_skills
-from executive.words.command import parse_command
-from executive.words.leaf_steps import Do
-from executive.words.mission import Mission
 from plant.diagram import LooseModel
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.description import HAND_LINK
-from plant.simulation import Simulation
 from skills.faults.faulty_robot import inject_faults
 from skills.robot_wrapper import RobotWrapper
-from tests.visitors import OnMessage, OnTick
+from tests.missions.flat_mission import FETCH, FlatMission, honest
 
-FETCH = (
-    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
-    "Take [drink] to [start] and do [Nothing] to [Nothing]",
-)
 BEER = (
     "Take [Nothing] to [kitchen] and do [grasp] to [beer]",
     "Take [beer] to [start] and do [Nothing] to [Nothing]",
@@ -47,49 +29,6 @@ BOX_PART = (
 pytestmark = pytest.mark.mission
 
 
-class FlatMission:
-    """A mission in the flat, with what happened in it."""
-
-    def __init__(self, texts, *, seed=1, **plant: Any) -> None:
-        self.world = open_world("flat")
-        self.knowledge = knowledge_of(self.world)
-        steps = [Do.from_command(parse_command(text)) for text in texts]
-        self.tree = compile_mission(
-            Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
-        )
-        self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
-        self.entry = run_entry(
-            self.simulation.robots[self.tree.robot_name],
-            self.world,
-            self.tree,
-            start=self.simulation.starts[self.tree.robot_name],
-        )
-        self.transitions: list[dict[str, Any]] = []
-        self.seed = seed
-
-    def _publish(self, topic, message):
-        if topic == "transitions":
-            self.transitions.append(message)
-
-    def run(self, robot=None, observer=None):
-        """Run it to its end; the robot's result and the referee's verdict."""
-        entry = self.entry if robot is None else replace(self.entry, robot=robot)
-        clock = self.simulation.clock
-        result = run(
-            [entry],
-            clock=clock,
-            worker=LockStepWorker(clock),
-            settings=RunSettings(seed=self.seed),
-            visitors=[OnMessage(self._publish), *([] if observer is None else [OnTick(observer)])],
-        ).worst
-        return result, verdict_of(self.tree, result, self.simulation.referee.judge)
-
-    def ended(self, part: str) -> list[str]:
-        """How the nodes with `part` in their path ids ended, in order."""
-        done = ("SUCCESS", "FAILURE")
-        return [t["to"] for t in self.transitions if part in t["node"] and t["to"] in done]
-
-
 def box_at(folder, x_m, y_m, size_m):
     """A box that stands somewhere and that no map knows."""
     size = " ".join(map(str, size_m))
@@ -97,13 +36,6 @@ def box_at(folder, x_m, y_m, size_m):
     parts = "".join(BOX_PART.format(kind=kind, size=size) for kind in ("collision", "visual"))
     path.write_text(BOX.format(parts=parts), encoding="utf-8")
     return LooseModel("box", path, RigidTransform([x_m, y_m, 0.0]), fixed=True)
-
-
-def honest(result, verdict):
-    """The claim is true; a failure carries a cause and a sentence."""
-    claimed = result.outcome is Outcome.SUCCESS
-    assert not claimed or verdict.success, verdict.why
-    assert claimed or (result.cause is not None and result.message)
 
 
 @pytest.mark.nightly

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import signal
+from concurrent.futures import Future
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
@@ -181,3 +185,35 @@ def _drive_about(pipeline: Pipeline) -> list[str]:
             robot.return_lease(lease)
             lease = robot.acquire_lease("again")
     return readings
+
+
+def test_an_alarm_while_it_waits_does_not_forget_the_step_under_way(engine):
+    under_way = Future()
+    pipeline = Pipeline(engine, lambda step: under_way)
+    pipeline.advance(TICK_S)
+    with pytest.raises(AlarmError), alarm_after(0.02):
+        pipeline.settle()
+    under_way.set_exception(RuntimeError("the step failed"))
+    with pytest.raises(RuntimeError, match="the step failed"):
+        pipeline.settle()
+    pipeline.settle()
+
+
+class AlarmError(Exception):
+    """Raised by the alarm."""
+
+
+@contextmanager
+def alarm_after(time_s):
+    """Raises AlarmError in the main thread after a time on the wall's clock."""
+
+    def ring(number, frame):
+        raise AlarmError
+
+    before = signal.signal(signal.SIGALRM, ring)
+    signal.setitimer(signal.ITIMER_REAL, time_s)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)

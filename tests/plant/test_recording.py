@@ -3,10 +3,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from executive.testing.bench import write_small_room
 from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
 from plant.recording import Frame, Recorder, save_html, thin_out
 from plant.robots.robot_kind import PlacedRobot
+from plant.simulation import Simulation
+from plant.worlds.world import load_world
 from skills.robot import Pose2D
 
 
@@ -30,6 +33,13 @@ def test_frames_come_at_the_recorders_rate_and_are_found_by_time(engine):
 def test_an_empty_recording_says_so(engine):
     with pytest.raises(LookupError, match="nothing was recorded"):
         Recorder(engine.world, engine.context).frame_at(0.0)
+
+
+def test_a_run_that_ends_before_its_first_step_is_recorded_as_it_began(tmp_path):
+    simulation = Simulation(load_world(write_small_room(tmp_path, can=False)), seed=1, record=True, visuals=False)
+    simulation.save_recording(tmp_path / "recording.html")
+    assert [frame.time_s for frame in simulation.recorder.frames] == [0.0]
+    assert "<html" in (tmp_path / "recording.html").read_text()
 
 
 def test_the_animation_is_one_html_file_with_the_robot_in_it(engine, tmp_path):

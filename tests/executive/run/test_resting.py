@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import pytest
@@ -17,6 +17,7 @@ from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
 from skills.api import Running, Skill, Step, Succeeded
+from skills.faults.faulty_robot import inject_faults, parse_fault
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Imu, Pose2D
 from skills.testing.blocks import Block
@@ -189,3 +190,11 @@ def test_a_robot_without_a_mission_clears_a_reserved_path(lane: Lane) -> None:
     result = lane.run(lane.entry("Alice", Drives, 0.0), spare=(bob,))
     assert [(each.robot_name, each.outcome) for each in result.robots] == [("Alice", Outcome.SUCCESS)]
     assert bob.robot.odometry().pose.x_m + 2.0 > 3.7 and bob.robot.lease_holder() is None
+
+
+def test_a_robot_without_a_mission_that_does_not_answer_is_left_alone(lane: Lane) -> None:
+    """Bob is dead from the beginning; Alice arrives."""
+    bob = lane.entry("Bob", Finishes, -1.4)
+    dead = replace(bob, robot=inject_faults(bob.robot, lane.clock, [parse_fault("robot dies")]))
+    assert lane.run(lane.entry("Alice", Drives, 0.0), spare=(dead,)).outcome is Outcome.SUCCESS
+    assert "capabilities does not answer" in str([message for topic, message in lane.published if topic == "errors"])

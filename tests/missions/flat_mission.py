@@ -1,0 +1,83 @@
+"""Missions in the flat, without a command line and visual meshes, with robots in the pipeline as in `errand run`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from executive.app.goal_conditions import verdict_of
+from executive.app.simulated import run_entry
+from executive.app.worlds import knowledge_of, open_world
+from executive.run.outcome import Outcome
+from executive.run.runner import run
+from executive.run.visitor import RunSettings
+from executive.run.worker import LockStepWorker
+from executive.tree.compiler import compile_mission
+from executive.tree.registry import built_in_skills
+from executive.words.command import parse_command
+from executive.words.leaf_steps import Do
+from executive.words.mission import Mission
+from plant.engine import Pipeline
+from plant.simulation import Simulation
+from skills.faults.faulty_robot import inject_faults
+from tests.visitors import OnMessage, OnTick
+
+FETCH = (
+    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
+    "Take [drink] to [start] and do [Nothing] to [Nothing]",
+)
+
+
+class FlatMission:
+    """A mission in the flat, with what happened in it."""
+
+    def __init__(self, texts, *, seed=1, **plant: Any) -> None:
+        self.world = open_world("flat")
+        self.knowledge = knowledge_of(self.world)
+        steps = [Do.from_command(parse_command(text)) for text in texts]
+        self.tree = compile_mission(
+            Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
+        )
+        self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
+        self.clock = Pipeline(self.simulation.engine)
+        self.entry = run_entry(
+            self.clock.robots[self.tree.robot_name],
+            self.world,
+            self.tree,
+            start=self.simulation.starts[self.tree.robot_name],
+        )
+        self.transitions: list[dict[str, Any]] = []
+        self.seed = seed
+
+    def _publish(self, topic, message):
+        if topic == "transitions":
+            self.transitions.append(message)
+
+    def run(self, robot=None, observer=None, faults=()):
+        """Run it to its end; the robot's result and the referee's verdict."""
+        robot = inject_faults(robot or self.entry.robot, self.clock, faults)
+        result = run(
+            [replace(self.entry, robot=robot)],
+            clock=self.clock,
+            worker=LockStepWorker(self.clock),
+            settings=RunSettings(seed=self.seed),
+            visitors=[OnMessage(self._publish), *([] if observer is None else [OnTick(observer)])],
+        ).worst
+        return result, verdict_of(self.tree, result, self.simulation.referee.judge)
+
+    def running(self) -> set[str]:
+        """Names of the leaves that work now."""
+        last = {t["node"]: t["to"] for t in self.transitions}
+        return {node.rsplit("/", 1)[-1].replace("-", "_") for node, status in last.items() if status == "RUNNING"}
+
+    def ended(self, part: str) -> list[str]:
+        """How the nodes with `part` in their path ids ended, in order."""
+        done = ("SUCCESS", "FAILURE")
+        return [t["to"] for t in self.transitions if part in t["node"] and t["to"] in done]
+
+
+def honest(result, verdict):
+    """The claim is true; a failure carries a cause and a sentence."""
+    claimed = result.outcome is Outcome.SUCCESS
+    assert not claimed or verdict.success, verdict.why
+    assert claimed or (result.cause is not None and result.message)

@@ -1,0 +1,100 @@
+"""Faults by name in the plant: no kind of fault is a defect of the run, and no claim becomes false by one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import pytest
+
+from executive.run.outcome import Outcome
+from skills.faults.fault_kinds import STANDARD_FAULTS
+from skills.faults.faulty_robot import parse_fault
+from tests.missions.flat_mission import FETCH, FlatMission, honest
+
+pytestmark = pytest.mark.mission
+
+SHORT_FAULTS = (
+    ("base is stopped", "navigate", 0.5),
+    ("lidar: dropout", "navigate", 0.5),
+    ("odometry jumps 0.05 m", "navigate", 2.0),
+    ("camera.frontleft: is black", "navigate", 2.0),
+    ("battery falls to 60 %", "navigate", math.inf),
+    ("arm refuses", "detect", 0.5),
+    ("camera.hand: returns no depth", "detect", 1.0),
+    ("drive never ends", "approach", 0.5),
+    ("gripper is stopped", "grasp", 0.5),
+    ("gripper reports holding nothing", "grasp", 0.2),
+)
+"""Ten faults of a fetch: words, the skill in which they begin, and how long they last (s)."""
+
+MISSIONS = {
+    "navigate": (FETCH[0].replace("grasp", "Nothing").replace("drink", "Nothing"),),
+    "detect": (FETCH[0].replace("grasp", "find"),),
+    "grasp": FETCH[:1],
+    "hand_over": FETCH,
+}
+"""For each skill a mission that ends with it."""
+
+SENSED = {"odometry", "scan", "joints", "battery", "faults"}
+CALLED = {
+    "navigate": SENSED | {"image", "drive", "lease_holder"},
+    "detect": SENSED | {"image", "move_arm", "set_gripper"},
+    "grasp": SENSED | {"image", "move_arm", "set_gripper", "gripper", "stand", "lease_holder"},
+    "hand_over": SENSED | {"image", "move_arm", "set_gripper", "gripper", "stand"},
+}
+"""Verbs that are called while a skill works: by itself, and by the estimators."""
+RAISING = ("drive raises at 2 s", "joints returns garbage", "robot dies at 20 s")
+"""Kinds of faults that are defects of the robot's driver: ERROR is the right outcome."""
+
+
+@dataclass
+class FaultInSkill:
+    """A fault that begins with the first call of its verbs while a skill works, and counts its effects."""
+
+    mission: FlatMission
+    words: str
+    skill: str
+    lasts_s: float
+    effects: int = 0
+    begun_s: float = field(default=math.inf)
+
+    def fault(self):
+        parsed = parse_fault(self.words)
+        return replace(parsed, effect=replace(parsed.effect, act=self.acts(parsed.effect)))
+
+    def acts(self, effect):
+        def act(call):
+            now_s = self.mission.clock.now()
+            if math.isinf(self.begun_s) and self.skill in self.mission.running() and call.verb in effect.verbs:
+                self.begun_s = now_s
+            on = self.begun_s <= now_s < self.begun_s + self.lasts_s
+            self.effects += on and call.verb in effect.verbs
+            return effect.act(call) if on or call.verb in effect.always else call.proceed()
+
+        return act
+
+
+def test_a_fetch_survives_short_faults_of_ten_kinds():
+    mission = FlatMission(FETCH[:1])
+    faults = [FaultInSkill(mission, *each) for each in SHORT_FAULTS]
+    result, verdict = mission.run(faults=[each.fault() for each in faults])
+    assert [each.words for each in faults if not each.effects] == []
+    assert result.outcome is Outcome.SUCCESS, result.message
+    honest(result, verdict)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("words", "skill"),
+    [(kind.example, skill) for kind in STANDARD_FAULTS for skill in MISSIONS
+     if parse_fault(kind.example).effect.verbs & CALLED[skill]],
+)  # fmt: skip
+def test_no_fault_of_a_skill_is_a_defect_of_the_run_or_makes_a_claim_false(words, skill):
+    mission = FlatMission(MISSIONS[skill])
+    timeless = words.partition(" at ")[0].partition(" from ")[0].replace("camera.hand: dropout 5 s", "camera: dropout")
+    fault = FaultInSkill(mission, timeless, skill, 30.0)
+    result, verdict = mission.run(faults=[fault.fault()])
+    assert fault.effects
+    assert (result.outcome is Outcome.ERROR) == (words in RAISING), result.message
+    honest(result, verdict)

@@ -1,6 +1,8 @@
 # make env    the virtual environment .venv with all but torch
 # make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
 # make test   a test of everything, and one mission of each kind; those that train networks only after `make train`
+# make affected  the tests that the changes since HEAD touch (since another revision: make affected SINCE=main)
+# make fast   in a minute or two: all tests but missions and those that are known to be slow
 # make train  adds torch to it, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
@@ -17,6 +19,8 @@ DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 VOICES := flite espeak-ng
 # One more than there are processors, since tests of pages and of processes wait.
 JOBS ?= $(shell expr $$(nproc) + 1)
+SINCE ?= HEAD
+PYTEST = $(BIN)/pytest -n $(JOBS) --dist worksteal --ignore-glob='*_benchmarks.py'
 # Tests start many processes; compiled modules are kept even where an environment would have none written.
 unexport PYTHONDONTWRITEBYTECODE
 
@@ -27,7 +31,7 @@ define install
 	$$run apt-get update -qq && $$run apt-get install -y -qq --no-install-recommends $(1) >/dev/null; }
 endef
 
-.PHONY: env train demo test fast nightly check bench docs wheels format debian voices clean
+.PHONY: env train demo test affected fast nightly check bench docs wheels format debian voices clean
 
 env: $(VENV)/.ready
 
@@ -65,13 +69,16 @@ demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env voices
-	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore-glob='*_benchmarks.py'
+	$(PYTEST) --durations-file out/tests/durations.json
+
+affected: env
+	$(PYTEST) --affected $(SINCE)
 
 fast: env
-	$(BIN)/pytest -n $(JOBS) --ignore-glob='*_benchmarks.py' -m "not mission and not nightly"
+	$(PYTEST) -m "not mission and not nightly and not slow"
 
 nightly: env voices
-	$(BIN)/pytest -n $(JOBS) --dist worksteal --ignore-glob='*_benchmarks.py' -m nightly
+	$(PYTEST) -m nightly --durations-file out/tests/nightly.json
 
 check: env
 	$(BIN)/ruff check .

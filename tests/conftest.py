@@ -11,10 +11,22 @@ from pathlib import Path
 
 import pytest
 
+from tests import affected, durations
+
 TRAINING = Path(__file__).parents[1] / "training"
 
 
+def pytest_addoption(parser):
+    durations.add_option(parser)
+    affected.add_option(parser)
+
+
 def pytest_configure(config):
+    file, revision = config.getoption("durations_file"), config.getoption("affected")
+    if file and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(durations.Durations(file))
+    if revision:
+        config.pluginmanager.register(affected.Affected(revision))
     try:
         distribution("errand-train")
     except PackageNotFoundError:

@@ -150,16 +150,19 @@ class Control:
         self._note("step", "until a node changes" if ticks is None else f"for {ticks} ticks")
 
     def cancel(self, reason: str = "cancelled by the operator", *, robot: str | None = None) -> None:
-        """Ends the run, or one robot's mission; of several reasons the first counts.
+        """Ends the run, or one robot's mission, and its pause; of several reasons the first counts.
 
         A second call ends them at once, without the steps under `always`. Raises ValueError when the run has no such
         robot.
         """
         if robot is not None:
             self._refuse_stranger(robot)
+            self._holds.pop((robot, Mode.PAUSED), None)
             self._ask_for(cancels=(*self._requests.cancels, (robot, reason)))
             self._note("cancel", f"{robot}: {reason}")
         elif self._requests.cancel is None and not self._ended:
+            self._holds.pop((None, Mode.PAUSED), None)
+            self._stride = None
             self._ask_for(cancel=reason)
             self._note("cancel", reason)
         elif not self._requests.insists and not self._ended:

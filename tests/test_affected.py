@@ -1,0 +1,23 @@
+"""A change touches the tests of its folder and those that import it within two steps; a data file its modules' folder."""
+
+import pytest
+
+from tests.affected import ROOT, touched
+
+
+@pytest.mark.parametrize(
+    ("test", "changed", "expected"),
+    [
+        ("tests/executive/words/test_command.py", "tests/executive/words/test_command.py", True),
+        ("tests/executive/words/test_command.py", "executive/words/command.py", True),
+        ("tests/executive/words/test_zone.py", "executive/words/command.py", True),  # its folder mirrors the module's
+        ("tests/missions/test_faults.py", "executive/app/simulated.py", True),  # by tests/missions/flat_mission.py
+        ("tests/plant/worlds/test_shipped_worlds.py", "plant/worlds/flat/objects.yaml", True),
+        ("tests/executive/words/test_command.py", "plant/worlds/flat/objects.yaml", False),
+        ("tests/executive/words/test_command.py", "skills/navigate/mppi.py", False),
+        ("tests/executive/words/test_command.py", "README.md", False),
+        ("tests/executive/words/test_command.py", "tests/conftest.py", True),
+    ],
+)
+def test_a_change_touches(test, changed, expected):
+    assert touched(ROOT / test, frozenset([changed])) is expected

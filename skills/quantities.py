@@ -312,7 +312,7 @@ def bounds(hint: Any) -> dict[str, Any]:
 def _marks(hint: Any) -> Iterator[Any]:
     """Yields the marks of an annotated type one by one; an interval and pydantic's `Field` hold several."""
     for mark in getattr(hint, "__metadata__", ()):
-        if isinstance(mark, GroupedMetadata):
+        if not isinstance(mark, Quantity) and isinstance(mark, GroupedMetadata):
             yield from mark
         else:
             yield from getattr(mark, "metadata", (mark,))

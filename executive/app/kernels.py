@@ -130,12 +130,12 @@ def _survey() -> None:
 def _see_blocks() -> None:
     """Takes a scan and a picture with the scripted robot: threads of the tests of skills would all compile at once."""
     from plant.robots.robot_kind import robot_kind
-    from skills.testing.blocks import Block
+    from skills.testing.blocks import Block, block_array, distances_from
     from skills.testing.clock import VirtualClock
     from skills.testing.robot import ScriptedRobot
 
-    clock = VirtualClock()
-    robot = ScriptedRobot(clock, capabilities=robot_kind("spot").capabilities(), blocks=[Block(1.0, -1.0, 1.2, 1.0)])
-    clock.advance(0.2)
+    spot, blocks = robot_kind("spot").capabilities(), [Block(1.0, -1.0, 1.2, 1.0)]
+    robot = ScriptedRobot(VirtualClock(), capabilities=spot, blocks=blocks)
     robot.scan()
     robot.image("hand")
+    distances_from(block_array(robot.blocks), np.zeros((1, 2)))

@@ -149,12 +149,8 @@ class Row:
 
     def match(self, phrases: Container[tuple[str, ...]]) -> tuple[str, ...] | None:
         """Longest of the phrases that stands here."""
-        for length in range(LONGEST, 0, -1):
-            piece = self.tokens[self.at : self.at + length]
-            spoken = tuple(t.word for t in piece)
-            if len(piece) == length and spoken in phrases:
-                return spoken
-        return None
+        spoken = tuple(t.word for t in self.tokens[self.at : self.at + LONGEST])
+        return next((spoken[:length] for length in range(len(spoken), 0, -1) if spoken[:length] in phrases), None)
 
     def phrase_at(self, start: int) -> Phrase | None:
         """Noun phrase that begins at `start`, also when its first words were taken."""

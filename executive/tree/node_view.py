@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -174,7 +174,7 @@ def _structure(node: NodeView, above: NodeView | None, rows: Mapping[str, NodeVi
         "name": node.name,
         "title": node.title(above),
         "source": _place(node.source),
-        "ports": [asdict(port) for port in node.ports],
+        "ports": [{**vars(port)} for port in node.ports],
         **({"step": True} if node.step else {}),
         "row": None if row is None else {"kind": row.kind, "name": row.name, "policy": row.policy, "step": row.step},
         "children": [_structure(child, node, rows) for child in node.children],

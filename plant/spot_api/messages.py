@@ -70,13 +70,11 @@ def vec3(values: Iterable[float]) -> geometry_pb2.Vec3:
 
 def transform(message: geometry_pb2.SE3Pose, field: str) -> RigidTransform:
     """Returns the transform of a pose; a rotation that was left out is none. Raises InvalidRequestError."""
-    q = message.rotation
-    wxyz = np.array([finite(getattr(q, name), f"{field}.rotation.{name}") for name in "wxyz"])
-    if (largest := float(np.abs(wxyz).max())) < 1e-6:
-        wxyz, largest = np.array([1.0, 0.0, 0.0, 0.0]), 1.0
-    wxyz = wxyz / largest
-    length = float(np.linalg.norm(wxyz))
-    return RigidTransform(RotationMatrix(Quaternion(wxyz / length)), vector(message.position, f"{field}.position"))
+    wxyz = [finite(getattr(message.rotation, name), f"{field}.rotation.{name}") for name in "wxyz"]
+    length = math.hypot(*wxyz)
+    unit = [each / length for each in wxyz] if length > 1e-6 else [1.0, 0.0, 0.0, 0.0]
+    p = np.array(vector(message.position, f"{field}.position"))  # Drake takes three times as long for a tuple
+    return RigidTransform(RotationMatrix(Quaternion(*unit)), p)
 
 
 def pose(X_AB: RigidTransform) -> geometry_pb2.SE3Pose:

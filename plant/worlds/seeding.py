@@ -199,7 +199,7 @@ def place_one(
         top = shapely.Polygon(surface.polygon_W).buffer(-rules.rim_m)
         for centre, yaw in candidates(world, surface, rng):
             outline = outline_W(form, centre, yaw)
-            covered = shapely.Polygon(outline)
+            covered = shapely.polygons(outline)
             if top.covers(covered) and bool(np.all(shapely.distance(covered, obstacles) >= rules.clear_m)):
                 z = surface.height_m + form.rest_height_m + rules.drop_m
                 X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, yaw), np.array([*centre, z], dtype=np.float64))
@@ -209,13 +209,14 @@ def place_one(
 
 def candidates(world: World, surface: SurfaceTop, rng: np.random.Generator) -> Iterator[tuple[Point, float]]:
     """Random centres along the front edges of a surface, with random yaws."""
-    fronts = world.seed_rules.fronts[surface.name]
-    middle = np.mean(surface.polygon_W, axis=0)
-    for _ in range(ATTEMPTS):
-        a, b = (np.array(end) for end in fronts[int(rng.integers(len(fronts)))])
+    middle, fronts = np.mean(surface.polygon_W, axis=0), []
+    for ends in world.seed_rules.fronts[surface.name]:
+        a, b = (np.array(end) for end in ends)
         inward = np.array([a[1] - b[1], b[0] - a[0]]) / np.linalg.norm(b - a)
-        inward *= np.sign(inward @ (middle - a))
-        centre = a + rng.uniform() * (b - a) + rng.uniform(*world.seed_rules.rules.from_edge_m) * inward
+        fronts.append((a, b - a, inward * np.sign(inward @ (middle - a))))
+    for _ in range(ATTEMPTS):
+        a, along, inward = fronts[int(rng.integers(len(fronts)))]
+        centre = a + rng.uniform() * along + rng.uniform(*world.seed_rules.rules.from_edge_m) * inward
         yield (float(centre[0]), float(centre[1])), float(rng.uniform(-np.pi, np.pi))
 
 

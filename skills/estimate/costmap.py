@@ -81,7 +81,7 @@ class LayeredCostmap:
 
     def obstacle_cells(self) -> FloatArray:
         """Centres (x, y) of the blocked cells of the obstacle layer."""
-        return self._layer.centres(np.argwhere(self._until_s > self._now_s))
+        return self._layer.centres(self._active())
 
     def unexplained_returns(self) -> tuple[float, FloatArray]:
         """The last scan's stamp, and its returns (N, 3) that the surveyed grid does not explain."""

@@ -210,7 +210,7 @@ class _Reader:
         if node.tag not in _PLAIN_TAGS and node.tag not in self.tags:
             what = f"the tag '{node.tag.replace(_TAG, '!!')[:40]}' cannot be used here"
             raise self._error(node, what, "remove it")
-        if any(node is each for each in self.above):
+        if node in self.above:
             raise self._error(node, "an alias stands inside of what it repeats", "write it out")
         if len(self.above) > MOST_NESTED:
             raise self._error(node, f"it is nested more than {MOST_NESTED} deep", "write it flatter")

@@ -54,13 +54,13 @@ class CollisionGuard:
         self._options = options or GuardOptions()
         self._watch = MovingWatch(self._options.moving)
         self._danger_s, self._place_W = -math.inf, (0.0, 0.0)
+        self._costmap = context.costmap if isinstance(context.costmap, ReturnsView) else None
 
     def danger(self, here: Pose2D, follower: LocalController, most_m_s: float) -> Place | None:
         """Position (x, y) of the obstacle that the robot would hit at most_m_s at most; None when it may go on."""
-        costmap, now_s = self._context.costmap, self._context.clock.now()
-        if not isinstance(costmap, ReturnsView):
+        if self._costmap is None:
             return None
-        stamp_s, returns_W = costmap.unexplained_returns()
+        now_s, (stamp_s, returns_W) = self._context.clock.now(), self._costmap.unexplained_returns()
         moving = self._watch.update(stamp_s, returns_W)
         found = self._suddenly_ahead(here, returns_W) or self._crossing(here, follower, most_m_s, moving, now_s)
         if found is not None:
@@ -112,10 +112,8 @@ class CollisionGuard:
             return False
         towards = shift / np.linalg.norm(shift)
         behind = float((np.array(one.place_W) - (here.x_m, here.y_m)) @ towards) < -0.5 * self.footprint.width_m
-        aligned = float(np.array(one.velocity_W) @ towards) > math.cos(self._options.follows_rad) * math.hypot(
-            *one.velocity_W
-        )
-        return behind and aligned
+        along, speed = float(np.array(one.velocity_W) @ towards), math.hypot(*one.velocity_W)
+        return behind and along > math.cos(self._options.follows_rad) * speed
 
     def _on_path(self, follower: LocalController, speed: float, most_m_s: float, times: FloatArray) -> FloatArray:
         """Poses (N, 3) on the path at these times."""
@@ -127,8 +125,8 @@ class CollisionGuard:
     def _apart_m(self, poses: FloatArray, points_W: FloatArray) -> FloatArray:
         """Distances (N, points) from the outline at poses to points."""
         centres = disc_centres(self.footprint.discs, poses)
-        offsets = np.linalg.norm(centres[:, :, None] - points_W[None, None], axis=3)
-        return np.asarray(np.min(offsets - self.footprint.discs[None, :, 2:3], axis=1))
+        x, y = (centres[:, :, None, axis] - points_W[:, axis] for axis in (0, 1))
+        return np.asarray(np.min(np.sqrt(x * x + y * y) - self.footprint.discs[None, :, 2:3], axis=1))
 
     def _velocity_W(self, here: Pose2D) -> FloatArray:
         """The body's velocity (vx, vy, wz) in the world's axes."""

@@ -114,14 +114,9 @@ def _lone_people(scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m
     level = points_B @ scan.X_OB.rotation().matrix().T
     height = level[:, 2] + scan.X_OB.translation()[2]
     distance = np.hypot(points_B[:, 0], points_B[:, 1])
-    own = _is_own(points_B, own_m)
     planar = len(scan.elevations_rad) == 1
-    near = (
-        (height > (_LEGS_LOWEST_M if planar else _LOWEST_M))
-        & (height < _HIGHEST_M)
-        & (distance < furthest_m + 0.5)
-        & ~own
-    )
+    tall = (height > (_LEGS_LOWEST_M if planar else _LOWEST_M)) & (height < _HIGHEST_M)
+    near = tall & (distance < furthest_m + 0.5) & ~_is_own(points_B, own_m)
     clusters = _clusters(points_B[near], _LEGS_CELL_M if planar else _CELL_M)
     is_sized = _is_leg_sized if planar else _is_person_sized
     return [
@@ -133,7 +128,8 @@ def _lone_people(scan: Scan, X_WB: RigidTransform, own_m: FloatArray, furthest_m
 
 def _is_own(points_B: FloatArray, own_m: FloatArray) -> NDArray[np.bool_]:
     """Mask of the points in the robot's own rectangle, given by its least and greatest x and y (2, 2)."""
-    return np.asarray(np.all((points_B[:, :2] > own_m[0]) & (points_B[:, :2] < own_m[1]), axis=1))
+    (x, y), (low, high) = points_B[:, :2].T, own_m
+    return np.asarray((x > low[0]) & (x < high[0]) & (y > low[1]) & (y < high[1]))
 
 
 def _clusters(points_B: FloatArray, cell_m: float) -> list[FloatArray]:
@@ -146,10 +142,9 @@ def _clusters(points_B: FloatArray, cell_m: float) -> list[FloatArray]:
 
 
 def _is_person_sized(points_B: FloatArray) -> bool:
-    spans = np.ptp(points_B[:, :2] - points_B[:, :2].mean(axis=0), axis=0)
-    width = float(np.hypot(*spans))
-    tall = float(np.ptp(points_B[:, 2])) > 0.1
-    return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and tall
+    spans = np.ptp(points_B, axis=0)
+    width, is_tall = float(np.hypot(spans[0], spans[1])), float(spans[2]) > 0.1
+    return len(points_B) >= _FEWEST_POINTS and _WIDTH_M[0] < width < _WIDTH_M[1] and is_tall
 
 
 def _is_body_sized(points: FloatArray) -> bool:
@@ -166,9 +161,9 @@ def _is_leg_sized(points_B: FloatArray) -> bool:
 
 def _is_alone(points_B: FloatArray, others: list[FloatArray]) -> bool:
     """Returns whether no other cluster is close; walls and cupboards seldom stand alone."""
-    centre = points_B[:, :2].mean(axis=0)
-    reach = float(np.max(np.linalg.norm(points_B[:, :2] - centre, axis=1))) + _ALONE_M
-    return all(float(np.min(np.linalg.norm(other[:, :2] - centre, axis=1))) > reach for other in others)
+    x, y, _ = points_B.mean(axis=0)
+    reach = float(np.max(np.hypot(points_B[:, 0] - x, points_B[:, 1] - y))) + _ALONE_M
+    return all(float(np.min(np.hypot(other[:, 0] - x, other[:, 1] - y))) > reach for other in others)
 
 
 def _person(stamp_s: float, X_WB: RigidTransform, points_B: FloatArray) -> SeenPerson:

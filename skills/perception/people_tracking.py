@@ -246,7 +246,9 @@ class PeopleWatch:
         self._soon = self._suspected = False
         self._job: Job[_Look] | None = None
         self._tracker = PeopleTracker(self._options.same_m)
-        self._scan_s = -math.inf
+        self._scan_s, costmap = -math.inf, context.costmap
+        self._survey = costmap if isinstance(costmap, SurveyView) else None
+        self._obstacles = costmap if isinstance(costmap, ObstacleLayerView) else None
 
     def people(self) -> tuple[SeenPerson, ...]:
         """People who count now."""
@@ -293,7 +295,7 @@ class PeopleWatch:
             self._context.localiser.estimate().X_WO @ scan.X_OB,
             robot.capabilities().footprint_m,
             options.track_m or options.reach_m,
-            costmap if isinstance(costmap := self._context.costmap, SurveyView) else None,
+            self._survey,
             ahead_m=ARM_AHEAD_M if robot.gripper().holding else STOWED_AHEAD_M,
         )
         self._tracker.update(found, by_scan=True, apart_m=SCAN_APART_M, births=tracks_all)
@@ -319,10 +321,10 @@ class PeopleWatch:
 
     def _may_show_person(self, cameras: Sequence[CameraCapabilities]) -> Sequence[CameraCapabilities]:
         """Cameras with a known person or an unexplained obstacle in view; all of them without a layered costmap."""
-        costmap, here = self._context.costmap, self._context.pose()
-        if not isinstance(costmap, ObstacleLayerView):
+        if self._obstacles is None:
             return cameras
-        places_W = np.vstack([costmap.obstacle_cells(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)])
+        here, seen_W = self._context.pose(), np.array([one.place_W for one in self._seen]).reshape(-1, 2)
+        places_W = np.vstack([self._obstacles.obstacle_cells(), seen_W])
         off_W = places_W - (here.x_m, here.y_m)
         near_W = off_W[np.linalg.norm(off_W, axis=1) < self._options.near_m]
         bearings_rad = np.arctan2(near_W[:, 1], near_W[:, 0]) - here.yaw_rad
@@ -332,10 +334,9 @@ class PeopleWatch:
     def _look(self, images: Sequence[Image], X_WO: RigidTransform, here_W: Pose2D, with_depth: bool) -> _Look:
         """Detects people in one picture of each camera; without depth, only whether there are any."""
         detector, options = self._context.detector, self._options
-        if not with_depth:
-            suspected = bool(people_detections(detector, images, options.least_score))
-            return _Look((), tuple(images), X_WO, here_W, suspected=suspected)
         detected = people_detections(detector, images, options.least_score)
+        if not with_depth:
+            return _Look((), tuple(images), X_WO, here_W, suspected=bool(detected))
         found = tuple(
             located_people([each for each in detected if each[0] is image], X_WO, here_W, options.reach_m)
             for image in images

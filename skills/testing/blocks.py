@@ -83,32 +83,48 @@ def cast_rays(
     A miss within the limit gives NaN and -1, and the floor at height 0 the number -2. Distances are multiples of the
     direction's length, so that directions with z = 1 in a camera give depth.
     """
-    ranges = np.empty(directions.shape[0])
-    hits = np.empty(directions.shape[0], dtype=np.int64)
-    for n in range(directions.shape[0]):
+    low, high = blocks[:, :3] - origin, blocks[:, 3:] - origin
+    inverse = 1.0 / np.where(np.abs(directions) > 1e-12, directions, 1e-12)
+    ranges, hits = np.empty(len(directions)), np.empty(len(directions), dtype=np.int64)
+    for n in range(len(directions)):
         best, hit = limit, -1
-        if directions[n, 2] < 0.0 and -origin[2] / directions[n, 2] < best:
-            best, hit = -origin[2] / directions[n, 2], -2
-        for b in range(blocks.shape[0]):
-            near, far = 0.0, best
-            for axis in range(3):
-                d = directions[n, axis]
-                d = d if abs(d) > 1e-12 else 1e-12
-                t0 = (blocks[b, axis] - origin[axis]) / d
-                t1 = (blocks[b, axis + 3] - origin[axis]) / d
-                near, far = max(near, min(t0, t1)), min(far, max(t0, t1))
+        x, y, z = inverse[n, 0], inverse[n, 1], inverse[n, 2]
+        if z < 0.0 and -origin[2] * z < best:
+            best, hit = -origin[2] * z, -2
+        for b in range(len(blocks)):
+            one, other = low[b, 0] * x, high[b, 0] * x
+            near, far = max(0.0, min(one, other)), min(best, max(one, other))
+            if near >= far:
+                continue
+            one, other = low[b, 1] * y, high[b, 1] * y
+            near, far = max(near, min(one, other)), min(far, max(one, other))
+            if near >= far:
+                continue
+            one, other = low[b, 2] * z, high[b, 2] * z
+            near, far = max(near, min(one, other)), min(far, max(one, other))
             if 0.0 < near < far:
                 best, hit = near, b
-        ranges[n] = best if hit != -1 else np.nan
-        hits[n] = hit
+        ranges[n], hits[n] = best if hit != -1 else np.nan, hit
     return ranges, hits
 
 
+@compiled
+def distances_from(blocks: FloatArray, points: FloatArray) -> FloatArray:
+    """Distance of each point (x, y) from the nearest block, seen from above (m); negative within one."""
+    distances = np.empty(len(points))
+    for n in range(len(points)):
+        nearest, x, y = np.inf, points[n, 0], points[n, 1]
+        for b in range(len(blocks)):
+            dx, dy = max(blocks[b, 0] - x, x - blocks[b, 3]), max(blocks[b, 1] - y, y - blocks[b, 4])
+            nearest = min(nearest, math.sqrt(dx * dx + dy * dy) if dx > 0.0 and dy > 0.0 else max(dx, dy))
+        distances[n] = nearest
+    return distances
+
+
 def colours_of(blocks: Sequence[Block], hits: NDArray[np.int64]) -> NDArray[np.uint8]:
-    """Colours RGB (N, 3) of the hits of rays."""
+    """Colours RGB (N, 3) of the hits of rays; -1 stands for nothing, -2 for the floor."""
     palette = np.array([*(b.colour for b in blocks), FLOOR_COLOUR, NOTHING_COLOUR], dtype=np.uint8)
-    index = np.where(hits == -2, len(blocks), np.where(hits == -1, len(blocks) + 1, hits))
-    return np.asarray(palette[index])
+    return np.asarray(palette[hits])
 
 
 def grid_of(blocks: Sequence[Block], band_m: tuple[float, float], resolution_m: float = 0.05) -> GridMap:
@@ -162,7 +178,6 @@ def take_scan(
     X_OB: RigidTransform,
     stamp_s: float,
     rng: np.random.Generator,
-    *,
     azimuths: int = 360,
     noise_m: float = 0.01,
 ) -> Scan:
@@ -196,9 +211,8 @@ def take_picture(
     X_WC = X_WF @ mount.X_FC
     rays_W = np.ascontiguousarray(rays_C.reshape(-1, 3) @ X_WC.rotation().matrix().T)
     depth, hits = cast_rays(X_WC.translation(), rays_W, block_array(blocks), mount.reach_m)
-    depth = np.nan_to_num(depth + noise_m * rng.standard_normal(depth.shape), nan=0.0)
     colour = colours_of(blocks, hits).reshape(lens.height, lens.width, 3)
-    grey = np.ascontiguousarray(colour.mean(axis=2).astype(np.uint8))
+    grey = ((colour[..., 0].astype(np.uint16) + colour[..., 1] + colour[..., 2]) // 3).astype(np.uint8)
     edges = {**frames.edges, f"{source}_camera": (mount.frame, mount.X_FC)}
-    depth_m = depth.reshape(grey.shape).astype(np.float32)
+    depth_m = np.nan_to_num(depth + noise_m * rng.standard_normal(depth.shape)).reshape(grey.shape).astype(np.float32)
     return Image(stamp_s, source, f"{source}_camera", lens, lens, colour, grey, depth_m, FrameTree(edges))

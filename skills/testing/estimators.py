@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from skills.api import LocalisationEstimate
 from skills.detection import Detection
 from skills.robot import Pose2D, Robot, Scan
-from skills.testing.blocks import TABLE_CAN, Block, Colour
+from skills.testing.blocks import TABLE_CAN, Block, Colour, block_array, distances_from
 
 OPEN_M = 9.0
+_COVARIANCE = np.eye(3) * 1e-4
 
 
 class KnownPlace:
@@ -30,7 +31,7 @@ class KnownPlace:
 
     def estimate(self) -> LocalisationEstimate:
         """Latest estimate."""
-        return LocalisationEstimate(self._stamp_s, self._X_WO, np.eye(3) * 1e-4, self.localised)
+        return LocalisationEstimate(self._stamp_s, self._X_WO, _COVARIANCE, self.localised)
 
     def update(self, robot: Robot) -> None:
         """Reads the stamp of the odometry."""
@@ -38,7 +39,7 @@ class KnownPlace:
 
     def search(self, scan: Scan, belief: LocalisationEstimate, radius_m: float | None) -> LocalisationEstimate | None:
         """Returns the true pose, as a search of the whole map would."""
-        return LocalisationEstimate(scan.stamp_s, self._X_WO, np.eye(3) * 1e-4, True)
+        return LocalisationEstimate(scan.stamp_s, self._X_WO, _COVARIANCE, True)
 
     def accept(self, estimate: LocalisationEstimate) -> None:
         """Accepts an estimate; the robot is no longer lost."""
@@ -52,18 +53,13 @@ class BlockCostmap:
     """
 
     def __init__(self, blocks: Sequence[Block] = ()) -> None:
-        rows = [(b.x0, b.y0, b.x1, b.y1) for b in blocks if b.z0 < 1.0 and b.z1 > 0.05]
-        self._boxes = np.array(rows, dtype=np.float64).reshape(-1, 4)
+        self._blocks = block_array([block for block in blocks if block.z0 < 1.0 and block.z1 > 0.05])
 
     def clearance_m(self, points_W: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance of each point (x, y) from the nearest block (m), negative within one."""
-        if not len(self._boxes):
+        if not len(self._blocks):
             return np.full(len(points_W), OPEN_M)
-        x, y = np.asarray(points_W)[:, 0:1], np.asarray(points_W)[:, 1:2]
-        dx = np.maximum(self._boxes[:, 0] - x, x - self._boxes[:, 2])
-        dy = np.maximum(self._boxes[:, 1] - y, y - self._boxes[:, 3])
-        outside = np.hypot(np.maximum(dx, 0.0), np.maximum(dy, 0.0))
-        return np.asarray(np.min(np.where(outside > 0.0, outside, np.maximum(dx, dy)), axis=1))
+        return distances_from(self._blocks, np.ascontiguousarray(points_W, dtype=np.float64))
 
     def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
         """Does nothing: the blocks are known."""

@@ -36,7 +36,7 @@ from skills.robot import (
 )
 from skills.testing.blocks import FRONT_CAMERAS, Block, can_at, mount_of, take_picture, take_scan
 from skills.testing.clock import VirtualClock
-from skills.testing.part_commands import Commands
+from skills.testing.part_commands import ActiveCommand, Commands
 
 _ACCELERATION_M_S2 = 2.5
 _BRAKING_M_S2 = 8.0
@@ -50,7 +50,6 @@ _CHARGING_S = 600.0
 _FINGER_M = 0.03
 _LEAST_CLAMP_N = 2.0
 _LACKS = "there is no "
-_EPOCH = "scripted"
 
 BASE_ONLY = Capabilities(
     footprint_m=((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25)),
@@ -89,8 +88,8 @@ class ScriptedRobot:
     """Robot that moves exactly as commanded, without a real robot's precautions; `calls` records the verbs used.
 
     It drives through the `blocks` of its world, but can pick and place loose ones. A grip of less than 2 N drops the
-    object. Odometry is exact but for `odometry_scale` and `yaw_drift_rad_per_m`. Its clock moves it. Implements
-    `skills.robot.Robot`.
+    object. Odometry is exact but for `odometry_scale` and `yaw_drift_rad_per_m`; `lidar` is the number of azimuths and
+    the noise (m), `fine_camera` the one with a fine lens. Its clock moves it. Implements `skills.robot.Robot`.
     """
 
     def __init__(
@@ -108,7 +107,8 @@ class ScriptedRobot:
         self.blocks = list(blocks)
         self.pose, self.odometry_pose = start.pose, Pose2D(0.0, 0.0, 0.0)
         self.velocity: FloatArray = np.zeros(3)
-        self.odometry_scale, self.yaw_drift_rad_per_m = 1.0, 0.0
+        self.odometry_scale, self.yaw_drift_rad_per_m, self.lidar = 1.0, 0.0, (360, 0.01)
+        self.fine_camera = capabilities.object_camera
         self.height_m, self.pitch_rad = capabilities.standing_height_m, 0.0
         arm = capabilities.arm
         self.q_rad = np.array([] if arm is None else start.arm_rad or arm.stowed_rad[: len(arm.joint_names)])
@@ -117,7 +117,7 @@ class ScriptedRobot:
         self.in_gripper_rad = self.opening if start.holding else start.in_gripper_rad
         self.clamp_force_n = 20.0 if start.holding else 0.0
         self.held: Block | None = can_at(0.0, 0.0, 0.0) if start.holding else None
-        self.carries = False
+        self.carries, self._lease_number = False, 0
         self._hangs_down_m = 0.057  # of the held object, below the fingers' middle
         self.charge, self.docked, self._pulled_at_s = start.charge, start.docked, start.pulled_at_s
         self.present_faults: tuple[str, ...] = ()
@@ -125,7 +125,6 @@ class ScriptedRobot:
         self.refusal_cause = CommandCause.REFUSED
         self.calls: list[str] = []
         self._commands = Commands()
-        self._lease_number = 0
         self._lease: Lease | None = None
         self._scan: Scan | None = None
         self._rng = np.random.default_rng(seed)
@@ -171,17 +170,16 @@ class ScriptedRobot:
         self.calls.append("scan")
         now_s = self._clock.now()
         if self._scan is None or now_s - self._scan.stamp_s > _SCAN_PERIOD_S - 1e-9:
-            self._scan = take_scan(self.blocks, self._X_WB(), self._X_OB(), now_s, self._rng)
+            self._scan = take_scan(self.blocks, self._X_WB(), self._X_OB(), now_s, self._rng, *self.lidar)
         return self._scan
 
     def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
         """Takes a picture with colour and depth, whatever is asked for. Raises ValueError for an unknown source."""
         self.calls.append("image")
         cameras = {each.source: each for each in self._capabilities.cameras}
-        camera = cameras.get(source)
-        if camera is None:
+        if (camera := cameras.get(source)) is None:
             raise ValueError(f"{self._name} has no camera '{source}'; it has {', '.join(cameras)}")
-        mount = mount_of(camera, fine=camera is self._capabilities.object_camera)
+        mount = mount_of(camera, fine=camera is self.fine_camera)
         edges = {"body": ("odom", self._X_OB())}
         if self._capabilities.arm is not None:
             edges["hand"] = ("body", self.arm.X_BH(self.q_rad))
@@ -306,7 +304,7 @@ class ScriptedRobot:
         """Takes the lease from any holder; the robot stops."""
         self._commands.stop(None, CommandCause.NO_LEASE)
         self._lease_number += 1
-        self._lease = Lease(self._name, holder, self._lease_number, _EPOCH)
+        self._lease = Lease(self._name, holder, self._lease_number, "scripted")
         return self._lease
 
     def return_lease(self, lease: Lease) -> None:
@@ -346,63 +344,60 @@ class ScriptedRobot:
         return self._tilted(self.odometry_pose)
 
     def _tilted(self, pose: Pose2D) -> RigidTransform:
-        return pose.transform(self.height_m) @ RigidTransform(RotationMatrix.MakeYRotation(self.pitch_rad))
+        level = pose.transform(self.height_m)
+        return level @ RigidTransform(RotationMatrix.MakeYRotation(self.pitch_rad)) if self.pitch_rad else level
 
     def _pass_time(self, dt_s: float) -> None:
         self._commands.expire(self._clock.now())
-        self._move_base(dt_s)
-        self._move_body(dt_s)
-        self._move_arm()
-        if (head := self._commands.active("point_head")) is not None:
-            self.head_rad = head.goal
-            self._commands.finish("point_head", CommandState.DONE)
-        self._move_gripper(dt_s)
+        if "drive" in self._commands.moving_parts or self.velocity.any():
+            self._move_base(dt_s)
+        moves = self._move_body, self._move_arm, self._move_head, self._move_gripper
+        for part, move in zip(("stand", "move_arm", "point_head", "set_gripper"), moves, strict=True):
+            if (active := self._commands.active(part)) is not None:
+                move(active, dt_s)
         used = -dt_s / _CHARGING_S if self.docked else dt_s / _BATTERY_RUNTIME_S
         self.charge = min(1.0, max(0.0, self.charge - used))
 
-    def _move_base(self, dt_s: float) -> None:
+    def _accelerate(self, dt_s: float) -> None:
         """Accelerates towards the commanded velocity; brakes harder without a command."""
         active = self._commands.active("drive")
-        wanted = np.zeros(3) if active is None else active.goal
+        wanted = 0.0 if active is None else active.goal
         most = (_BRAKING_M_S2 if active is None else _ACCELERATION_M_S2) * dt_s
-        self.velocity = self.velocity + np.clip(wanted - self.velocity, -most, most)
-        step = self.velocity * dt_s
-        path_m = math.hypot(step[0], step[1])
-        if path_m == 0.0 and step[2] == 0.0:
-            return
-        self.pose = compose(self.pose, Pose2D(*step.tolist()))
-        scale, turn = self.odometry_scale, step[2] + self.yaw_drift_rad_per_m * path_m
-        self.odometry_pose = compose(self.odometry_pose, Pose2D(scale * step[0], scale * step[1], turn))
+        self.velocity = self.velocity + (wanted - self.velocity).clip(-most, most)
 
-    def _move_body(self, dt_s: float) -> None:
-        active = self._commands.active("stand")
-        if active is None:
-            return
+    def _move_base(self, dt_s: float) -> None:
+        self._accelerate(dt_s)
+        x, y, turn = (self.velocity * dt_s).tolist()
+        self.pose = compose(self.pose, Pose2D(x, y, turn))
+        scale, drift = self.odometry_scale, self.yaw_drift_rad_per_m * math.hypot(x, y)
+        self.odometry_pose = compose(self.odometry_pose, Pose2D(scale * x, scale * y, turn + drift))
+
+    def _move_body(self, active: ActiveCommand, dt_s: float) -> None:
         height_m, self.pitch_rad = active.goal
         off = height_m - self.height_m
         self.height_m += max(-_RISE_M_S * dt_s, min(_RISE_M_S * dt_s, off))
         if abs(height_m - self.height_m) < 1e-6:
             self._commands.finish("stand", CommandState.DONE)
 
-    def _move_arm(self) -> None:
-        active = self._commands.active("move_arm")
-        if active is None:
-            return
+    def _move_head(self, active: ActiveCommand, dt_s: float) -> None:
+        self.head_rad = active.goal
+        self._commands.finish("point_head", CommandState.DONE)
+
+    def _move_arm(self, active: ActiveCommand, dt_s: float) -> None:
         trajectory, q_before = active.goal
         times, positions = trajectory.times_s, trajectory.positions_rad
         if times[0] > 0.0:
             times, positions = np.concatenate([[0.0], times]), np.vstack([q_before, positions])
         t, before = self._clock.now() - active.since_s, self.q_rad
-        self.q_rad = np.array([np.interp(t, times, positions[:, j]) for j in range(positions.shape[1])])
+        along = float(np.interp(t, times, np.arange(len(times))))
+        here, there = positions[math.floor(along)], positions[math.ceil(along)]
+        self.q_rad = here + (along % 1.0) * (there - here)
         if self.held is not None and self._below_fingers_m() < self._hangs_down_m:
             self.q_rad = before  # the held object stands already
         if t >= times[-1]:
             self._commands.finish("move_arm", CommandState.DONE)
 
-    def _move_gripper(self, dt_s: float) -> None:
-        active = self._commands.active("set_gripper")
-        if active is None:
-            return
+    def _move_gripper(self, active: ActiveCommand, dt_s: float) -> None:
         opening, self.clamp_force_n = active.goal
         if opening < self.opening and self.in_gripper_rad is None and self.clamp_force_n >= _LEAST_CLAMP_N:
             self._grasp()

@@ -10,6 +10,7 @@ import queue
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
 from threading import Event
@@ -258,7 +259,8 @@ class Computer:
     def serve(self, stopping: Event) -> None:
         """Does the work of clients until `stopping` is set; one of them steps the clock, by `do(step)`."""
         while not stopping.is_set():
-            self._work_until(time.monotonic() + _LATE_S)
+            with suppress(queue.Empty):
+                self._work.get(timeout=_LATE_S)()
 
     def step(self) -> None:
         """Does the waiting work, steps the clock and goes on with all motions."""

@@ -170,7 +170,7 @@ def _spots(
             for quarter in range(4):
                 moved = replace(piece, pose=Pose2D(float(x), float(y), quarter * math.pi / 2))
                 back = [moved.point(-depth / 2 - _BEHIND_M, side * width / 3) for side in (-1, 0, 1)]
-                inner = [moved.point(0.0, side * (width / 2 + _BESIDE_M)) for side in np.linspace(-1.0, 1.0, 9)]
+                inner = (moved.point(0.0, side * (width / 2 + _BESIDE_M)) for side in np.linspace(-1.0, 1.0, 9))
                 if (
                     max(_free(grid, clearance, at) for at in back)
                     <= 0.0

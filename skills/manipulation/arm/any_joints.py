@@ -30,11 +30,11 @@ _SAME_RAD = 0.02
 
 @dataclass(frozen=True)
 class AnyJoints:
-    """Joints of an arm: X_PF as R_PF (J, 3, 3) and p_PF (J, 3), axes (J, 3) in F, limits (J,) in rad."""
+    """Joints of an arm: axes (J, 3) in F, X_PF as R_PF (J, 3, 3) and p_PF (J, 3), limits (J,) in rad."""
 
+    axes: FloatArray
     R_PF: FloatArray
     p_PF: FloatArray
-    axes: FloatArray
     lower_rad: FloatArray
     upper_rad: FloatArray
 

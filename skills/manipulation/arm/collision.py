@@ -7,7 +7,9 @@ import operator
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations, groupby
 from typing import TYPE_CHECKING, Any, Final
 
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 from pydrake.math import RigidTransform
 
 from skills.manipulation.arm.clearance import FIXED, Kind, box_gaps, touching
-from skills.manipulation.arm.kinematics import ArmModel
+from skills.manipulation.arm.kinematics import ArmModel, arm_model
 from skills.robot import Capabilities, FloatArray
 from skills.world_model import NO_WORK_COUNTER, WorkCounter
 
@@ -93,9 +95,7 @@ class ArmScene:
         """Builds the scene; `work` counts the checks."""
         self.model, self._work = model, work
         self._capabilities, self._gripper = capabilities, capabilities.gripper
-        fingers = () if self._gripper is None else tuple(self._gripper.finger_positions(0.0))
-        without_visuals = re.sub(r"<visual\b.*?</visual>", "", capabilities.description, flags=re.DOTALL)
-        self._robot = _Robot(without_visuals, model, fingers)
+        self._robot = _robot_of(capabilities).copy()
         self._padding_m, self._opening = padding_m, 0.0
         self._boxes: tuple[Box, ...] = ()
         self._X_BF = RigidTransform()
@@ -247,14 +247,11 @@ class _Obstacles:
         padding_m: float,
     ) -> None:
         """Stores boxes as half extents (N, 3), rotations (N, 3, 3) and centres (N, 3) in the body frame."""
-        X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in model.joints])
-        axes = np.array([joint.axis for joint in model.joints], dtype=float)
-        self._padding_m, self._boxes = padding_m, boxes
-        self._chain = axes, np.ascontiguousarray(X_PF[:, :, :3]), np.ascontiguousarray(X_PF[:, :, 3])
+        self._padding_m, self._boxes, self._frames = padding_m, boxes, model.frames
         self._moved = [shape for shape in shapes if shape.joint != FIXED]
         self._fixed = [shape for shape in shapes if shape.joint == FIXED]
         self._moved_rows = _rows(self._moved)
-        self._any_fixed = self._touch(_ALL_OR_NONE, np.zeros((1, len(axes))), _rows(self._fixed))
+        self._any_fixed = self._touch(_ALL_OR_NONE, np.zeros((1, len(model.joints))), _rows(self._fixed))
 
     def meet(self, path_rad: FloatArray) -> bool:
         """Returns whether the robot comes within the padding of a box at any of the arm's configurations (K, J)."""
@@ -271,7 +268,7 @@ class _Obstacles:
 
     def _touch(self, found: NDArray[np.bool_], path_rad: FloatArray, rows: _Arrays) -> bool:
         path_rad = np.ascontiguousarray(path_rad, dtype=float)
-        return bool(touching(found, self._padding_m, path_rad, *self._chain, *rows, *self._boxes))
+        return bool(touching(found, self._padding_m, path_rad, *self._frames, *rows, *self._boxes))
 
 
 def _rows(shapes: Sequence[_Shape]) -> _Arrays:
@@ -295,6 +292,14 @@ def _rows(shapes: Sequence[_Shape]) -> _Arrays:
         np.ascontiguousarray(X_LS[:, :, :3]),
         np.ascontiguousarray(X_LS[:, :, 3]),
     )
+
+
+@lru_cache(maxsize=4)
+def _robot_of(capabilities: Capabilities) -> _Robot:
+    """The robot as described. To be copied before it changes, since it takes a while to build."""
+    fingers = () if capabilities.gripper is None else tuple(capabilities.gripper.finger_positions(0.0))
+    without_visuals = re.sub(r"<visual\b.*?</visual>", "", capabilities.description, flags=re.DOTALL)
+    return _Robot(without_visuals, arm_model(capabilities), fingers)
 
 
 class _Robot:
@@ -325,6 +330,12 @@ class _Robot:
         closing = [joints[name].child_body() for name in fingers]  # fingers meet when they close
         for one, other in (*combinations(standing, 2), *combinations(closing, 2)):
             self.checker.SetCollisionFilteredBetween(one, other, True)
+
+    def copy(self) -> _Robot:
+        """Returns a copy that changes by itself; the plant is common to both."""
+        other = copy(self)
+        other.checker, other._q = self.checker.Clone(), self._q.copy()
+        return other
 
     def set_joints(self, joint_positions: Mapping[str, float]) -> None:
         """Sets all joints that are not given with each check; 0 for joints without a position."""

@@ -10,17 +10,15 @@ from skills.manipulation.arm.kinematics import ArmModel
 from skills.robot import FloatArray
 
 _GRAVITY_M_S2 = 9.81
-_STEP_RAD = 1e-4
-"""Step of the numerical derivative."""
 _DAMPING_M = 0.12
 """Damping of the least squares: a stretched arm hardly feels a pull along itself, so its short levers count little."""
 
 
 def levers_m(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray) -> FloatArray:
     """Translational Jacobian (3, J) of the point p_HO of the hand, in the body frame (m/rad)."""
-    steps = _STEP_RAD * np.eye(len(q_rad))
-    shifts = [model.X_BH(q_rad + step) @ p_HO - model.X_BH(q_rad - step) @ p_HO for step in steps]
-    return np.asarray(np.array(shifts).T / (2.0 * _STEP_RAD))
+    R_BL, p_BL = model.links(q_rad)
+    axes_B = np.einsum("jab,jb->ja", R_BL[1:], model.frames[0])
+    return np.cross(axes_B, p_BL[-1] + R_BL[-1] @ p_HO - p_BL[1:]).T
 
 
 def held_mass_kg(model: ArmModel, q_rad: FloatArray, p_HO: FloatArray, extra_nm: FloatArray) -> float:

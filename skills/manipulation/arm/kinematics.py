@@ -21,6 +21,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from skills.geometry import wrap
 from skills.manipulation.arm.any_joints import AnyJoints
+from skills.manipulation.arm.clearance import place_links
 from skills.manipulation.arm.seven_joints import AXES, JOINTS, SevenJoints
 from skills.robot import Capabilities, FloatArray, InverseKinematics
 
@@ -83,21 +84,25 @@ class ArmModel:
 
     def X_BH(self, q_rad: FloatArray) -> RigidTransform:
         """Pose of the hand for joint angles q_rad (J,)."""
-        rotation, positions = self._chain(q_rad)
-        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(rotation), positions[-1])
+        R_BL, p_BL = self.links(q_rad)
+        return RigidTransform(RotationMatrix.ProjectToRotationMatrix(R_BL[-1]), p_BL[-1])
 
     def points_B(self, q_rad: FloatArray) -> FloatArray:
         """Positions (J, 3) of the joints in the body frame, from the shoulder on."""
-        return np.array(self._chain(q_rad)[1])
+        return self.links(q_rad)[1][1:]
 
-    def _chain(self, q_rad: FloatArray) -> tuple[NDArray[np.float64], list[FloatArray]]:
-        """Rotation of the hand, and the position of each joint."""
-        rotation, position, positions = np.eye(3), np.zeros(3), []
-        for joint, angle in zip(self.joints, q_rad, strict=True):
-            position = position + rotation @ joint.X_PF.translation()
-            rotation = rotation @ joint.X_PF.rotation().matrix() @ _axis_rotation(joint.axis, float(angle))
-            positions.append(position)
-        return rotation, positions
+    @cached_property
+    def frames(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Axes (J, 3) of the joints, and their frames in the links before them: R_PF (J, 3, 3) and p_PF (J, 3)."""
+        X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in self.joints])
+        axes = np.array([joint.axis for joint in self.joints], dtype=float)
+        return axes, np.ascontiguousarray(X_PF[:, :, :3]), np.ascontiguousarray(X_PF[:, :, 3])
+
+    def links(self, q_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Poses of the body and of the links in the body frame: R_BL (J + 1, 3, 3) and p_BL (J + 1, 3)."""
+        R_BL, p_BL = np.empty((len(self.joints) + 1, 3, 3)), np.empty((len(self.joints) + 1, 3))
+        place_links(R_BL, p_BL, np.ascontiguousarray(q_rad, dtype=float).reshape(len(self.joints)), *self.frames)
+        return R_BL, p_BL
 
     def within_limits(self, q_rad: FloatArray, margin_rad: float = 0.0) -> bool:
         """Returns whether q_rad keeps margin_rad from every limit."""
@@ -139,10 +144,7 @@ class ArmModel:
         if self.solver is not None or (self.closed_form and len(self.joints) != JOINTS):
             return None
         if not self.closed_form:
-            X_PF = np.array([joint.X_PF.GetAsMatrix34() for joint in self.joints])
-            R_PF, p_PF = np.ascontiguousarray(X_PF[:, :, :3]), np.ascontiguousarray(X_PF[:, :, 3])
-            axes = np.array([joint.axis for joint in self.joints], dtype=float)
-            return AnyJoints(R_PF, p_PF, axes, self.lower_rad, self.upper_rad)
+            return AnyJoints(*self.frames, self.lower_rad, self.upper_rad)
         x, _, z = np.array([joint.X_PF.translation() for joint in self.joints]).T
         return SevenJoints(
             self.p_BS,
@@ -160,8 +162,8 @@ class ArmModel:
         for q_arm in self._arm_branches(p_SW):
             if not _all_between(lower, map(wrap, q_arm), upper):
                 continue
-            R_BE = _axis_rotation((0, 0, 1), q_arm[0]) @ _axis_rotation((0, 1, 0), q_arm[1] + q_arm[2])
-            for q_wrist in _wrist_branches(R_BE.T @ R_BH):
+            R_BE = RotationMatrix.MakeZRotation(q_arm[0]) @ RotationMatrix.MakeYRotation(q_arm[1] + q_arm[2])
+            for q_wrist in _wrist_branches(R_BE.matrix().T @ R_BH):
                 q_rad = [wrap(angle) for angle in (*q_arm, *q_wrist)]
                 if _all_between(lower, q_rad, upper):
                     yield np.array(q_rad)
@@ -192,20 +194,6 @@ class ArmModel:
             )
             branches.append((yaw + turn, -pitch, bend - fold))
         return branches
-
-
-def _axis_rotation(axis: tuple[float, ...], angle_rad: float) -> NDArray[np.float64]:
-    """Rotation matrix about a unit axis."""
-    c, s = math.cos(angle_rad), math.sin(angle_rad)
-    if axis == (0, 0, 1):
-        return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
-    if axis == (0, 1, 0):
-        return np.array([[c, 0, s], [0, 1.0, 0], [-s, 0, c]])
-    if axis == (1, 0, 0):
-        return np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
-    x, y, z = axis
-    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.asarray(np.eye(3) + s * across + (1.0 - c) * across @ across)
 
 
 def _all_between(lower: Iterable[float], values: Iterable[float], upper: Iterable[float]) -> bool:

@@ -42,7 +42,9 @@ def rasterise(
     cells = np.where(inside, FREE, UNKNOWN).astype(np.uint8)
     for placed in shapes:
         if _reaches(placed.shape, band_m):
-            cells[covers(placed, points)] = OCCUPIED
+            low, high = _bounds(placed)
+            rows, columns = (slice(*np.searchsorted(axis, (low[k], high[k]))) for k, axis in ((1, y), (0, x)))
+            cells[rows, columns][covers(placed, points[rows, columns])] = OCCUPIED
     return Grid(cells, (-margin_m, -margin_m), resolution_m)
 
 
@@ -59,6 +61,15 @@ def _reaches(shape: Shape, band_m: tuple[float, float]) -> bool:
         raise ValueError(f"{shape} does not stand upright")
     half = _half_height(shape)
     return shape.p[2] + half > band_m[0] and shape.p[2] - half < band_m[1]
+
+
+def _bounds(placed: Placement) -> tuple[FloatArray, FloatArray]:
+    """Corners (x, y) of a square that holds the shape seen from above."""
+    shape = placed.shape
+    assert isinstance(shape, Box | Cylinder)
+    half = shape.radius if isinstance(shape, Cylinder) else np.hypot(*shape.size[:2]) / 2
+    centre = _turn(np.array(shape.p[:2]), placed.yaw_rad) + np.array([placed.x, placed.y])
+    return centre - half, centre + half
 
 
 def covers(placed: Placement, points: FloatArray) -> Bools:

@@ -1,22 +1,16 @@
 """How well the robot gets through narrow places that it has no map of: worlds in BARN's format; prints JSON.
 
-    python -m tests.benchmarks.barn DIR [--worlds 3,9] [--jobs 2] [--stack FILE] [--json]
+    python -m tests.benchmarks.barn DIR [--worlds 3,9] [--stack FILE] [--seed 1] [--jobs 2] [--out FOLDER] [--json]
 
 Each world is made of its cylinders; the robot is given no map, only the goal relative to its start. A run is a success
 when the robot ends within 1 m of the goal and touched nothing on its way. As in the BARN challenge, its time runs from
 when the robot has left the start by 0.1 m until it is within 1 m of the goal; `stood_s` is until it stands there.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
 import math
-import multiprocessing
-import sys
-import tempfile
-import time
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +22,11 @@ from skills.estimate.grid_map import GridMap
 from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
 from tests.benchmarks.driving import TICK_S, Driver
+from tests.benchmarks.harness import benchmark, quantile, share
 
 NEAR_M, LEFT_M, LIMIT_S, OPTIMAL_M_S = 1.0, 0.1, 100.0, 2.0
 NO_MAP_STACK = Path(__file__).parents[2] / "skills" / "no_map_stack.yaml"
+NOTHING = GridMap(np.zeros((2, 2), dtype=bool), 1.0, (0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -45,80 +41,55 @@ class Run:
     score: float
     stood_s: float
     plans: int
-    control_ms_median: float
-    control_ms_p99: float
-    planning_ms_max: float
+    control_ms_median: float | None
+    control_ms_p99: float | None
+    planning_ms_max: float | None
     message: str
 
 
-def drive(file: Path, stack_file: Path, seed: int) -> Run:
-    """Drive through one world."""
+def cases(
+    folder: Path, worlds: tuple[int, ...] = (), stack: Path = NO_MAP_STACK, seed: int = 1
+) -> Iterator[tuple[int, Path, Path, int]]:
+    """Numbers and files of the worlds, of all unless some are named, with the stack and the seed."""
+    for number, file in sorted((int(file.stem.split("_")[1]), file) for file in folder.glob("world_*.json")):
+        if number in worlds or not worlds:
+            yield number, file, stack, seed
+
+
+def run_case(number: int, file: Path, stack: Path, seed: int, folder: Path) -> Run:
+    """Drives through one world."""
     told = json.loads(file.read_text())
     start, goal = Pose2D(*told["start"]), told["goal"]
-    nothing = GridMap(np.zeros((2, 2), dtype=bool), 1.0, (0.0, 0.0))
-    with tempfile.TemporaryDirectory() as folder:
-        world_from_cylinders(Path(folder), told["cylinders"], start=start, around=[(start.x_m, start.y_m), tuple(goal)])
-        driver = Driver(load_world(folder), load_stack(stack_file), (nothing, nothing), seed=seed)
-        trip = driver.go(NavigateInputs(Pose2D(*goal, start.yaw_rad), 0.5, 3.0, 1.6), limit_s=LIMIT_S)
+    world_from_cylinders(folder, told["cylinders"], start=start, around=[(start.x_m, start.y_m), tuple(goal)])
+    driver = Driver(load_world(str(folder)), load_stack(stack), (NOTHING, NOTHING), seed=seed)
+    trip = driver.go(NavigateInputs(Pose2D(*goal, start.yaw_rad), 0.5, 3.0, 1.6), limit_s=LIMIT_S)
     off_m = np.hypot(*(trip.poses[:, :2] - goal).T)
     left = np.hypot(*(trip.poses[:, :2] - trip.poses[0, :2]).T) > LEFT_M
     arrived = np.flatnonzero(off_m < NEAR_M)
-    took_s = TICK_S * (arrived[0] - int(np.argmax(left))) if len(arrived) and left.any() else LIMIT_S
-    collided, success = bool(trip.hits), bool(len(arrived)) and not trip.hits and bool(off_m[-1] < NEAR_M)
+    took_s = TICK_S * float(arrived[0] - int(np.argmax(left))) if len(arrived) and left.any() else LIMIT_S
+    success = bool(len(arrived)) and not trip.hits and bool(off_m[-1] < NEAR_M)
     optimal_s = told["optimal_path_len"] / OPTIMAL_M_S
-    score = success * optimal_s / float(np.clip(took_s, 2.0 * optimal_s, 8.0 * optimal_s))
-    control = trip.control_ms or (0.0,)
     return Run(
         told["world"],
         success,
-        collided,
-        round(float(took_s), 2),
+        bool(trip.hits),
+        round(took_s, 2),
         round(trip.path_m, 2),
-        round(score, 3),
+        round(success * optimal_s / float(np.clip(took_s, 2.0 * optimal_s, 8.0 * optimal_s)), 3),
         round(trip.time_s, 2),
         len(trip.planning_ms),
-        round(float(np.median(control)), 2),
-        round(float(np.percentile(control, 99)), 2),
-        round(max(trip.planning_ms, default=0.0), 1),
+        quantile(trip.control_ms),
+        quantile(trip.control_ms, 0.99),
+        quantile(trip.planning_ms, 1.0, 1),
         "; ".join((trip.message, *trip.hits)),
     )
 
 
-def _drive(job: tuple[Path, Path, int]) -> Run:
-    begun = time.perf_counter()
-    run = drive(*job)
-    wall_s = time.perf_counter() - begun
-    told = f"world {run.world}: {run.score:.3f} {run.time_s:.1f} s, {run.path_m:.1f} m, {run.message} ({wall_s:.0f} s)"
-    print(told, file=sys.stderr, flush=True)
-    return run
-
-
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--worlds", help="such as 3,9,15; all that there are unless said")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--stack", type=Path, default=NO_MAP_STACK)
-    parser.add_argument("--json", action="store_true", help="one line of JSON at the end, and nothing else")
-    options = parser.parse_args()
-    files = sorted(options.folder.glob("world_*.json"), key=lambda file: int(file.stem.split("_")[1]))
-    if options.worlds:
-        chosen = {int(each) for each in options.worlds.split(",")}
-        files = [file for file in files if int(file.stem.split("_")[1]) in chosen]
-    jobs = [(file, options.stack, options.seed) for file in files]
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        runs = pool.map(_drive, jobs, chunksize=1)
-    if not runs:
-        sys.exit("there are no such worlds")
-    result = {
-        "runs": [asdict(run) for run in runs],
-        "success_rate": round(sum(run.success for run in runs) / len(runs), 4),
-        "mean_score": round(math.fsum(run.score for run in runs) / len(runs), 4),
-    }
-    print(json.dumps(result, indent=None if options.json else 1))
+def summary(runs: Sequence[Run]) -> dict[str, object]:
+    """Runs, their share of success and mean score."""
+    mean_score = round(math.fsum(run.score for run in runs) / len(runs), 4)
+    return {"runs": runs, "success_rate": share([run.success for run in runs], 4), "mean_score": mean_score}
 
 
 if __name__ == "__main__":
-    main()
+    benchmark(cases, run_case, summary)

@@ -3,10 +3,9 @@
 Shared by the benchmarks of navigation: tick by tick as the runner does it, with the truth at hand to judge by.
 """
 
-from __future__ import annotations
-
 import math
 import time
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,12 +14,14 @@ import numpy as np
 
 from executive.run.worker import LockStepWorker
 from plant.robots.robot_kind import PlacedRobot
+from plant.robots.spot.kind import spot_capabilities
 from plant.simulation import Simulation
 from plant.worlds.world import World
 from skills.api import Failed, PlanningError, Running, SkillContext
-from skills.estimate.grid_map import GridMap
+from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.grid_map import GridMap, load_grid_map
 from skills.geometry import relative_pose
-from skills.navigate.footprint import Footprint
+from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.planner import plan_path
 from skills.navigate.sensor_watch import WatchOptions
 from skills.navigate.skill import Navigate, NavigateInputs
@@ -28,13 +29,39 @@ from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D
 from skills.stack import RobotStack
 
-TICK_S = 0.05
-ROBOT = "Alice"
+TICK_S, ROBOT = 0.05, "Alice"
+SPOT = Footprint.of(spot_capabilities())
+Maps = tuple[GridMap, GridMap]
+"""Scan and keep-out grid."""
+
+
+def maps_of(world: World) -> Maps:
+    """The grids of a world that its robot is given."""
+    return load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path).with_unknown_blocked()
+
+
+def free_poses(
+    grid: GridMap, footprint: Footprint, seed: int, accept: Callable[[Pose2D], bool] = lambda pose: True
+) -> Iterator[Pose2D]:
+    """Random poses that the footprint fits at with 8 cm around it."""
+    rng, costmap = np.random.default_rng([seed, 27]), LayeredCostmap(grid)
+    free = grid.centres(np.argwhere(grid.distance > footprint.inscribed_m))
+    while True:
+        x, y = (float(value) for value in free[rng.integers(len(free))])
+        pose = Pose2D(x, y, float(rng.uniform(-math.pi, math.pi)))
+        if footprint_clear(costmap, footprint, pose, 0.08) and accept(pose):
+            yield pose
+
+
+def within(goal: Pose2D, pose: Pose2D, limits: tuple[float, float]) -> bool:
+    """True if a pose is that near (m, rad) to a goal."""
+    off = relative_pose(goal, pose)
+    return math.hypot(off.x_m, off.y_m) <= limits[0] and abs(off.yaw_rad) <= limits[1]
 
 
 @dataclass(frozen=True)
 class Trip:
-    """One drive: its end as the skill tells it, when (s) it stood, the true poses (N, 3) a tick apart, what it hit.
+    """One drive: its end as the skill reports it, when it stood (s), the true poses (N, 3) a tick apart, what it hit.
 
     `planning_ms` and `control_ms` are wall times of single plans and control steps.
     """
@@ -50,62 +77,57 @@ class Trip:
 
     @property
     def path_m(self) -> float:
-        """The way really gone."""
+        """Length of the path that the robot really went."""
         return float(np.sum(np.hypot(*np.diff(self.poses[:, :2], axis=0).T)))
 
     @property
     def pose(self) -> Pose2D:
-        """Where it really stands."""
+        """Pose at which the robot really stands."""
         return Pose2D(*self.poses[-1].tolist())
 
 
 @dataclass
-class Clocked:
-    """Times the calls that it passes on."""
+class Timed:
+    """A planner, controller or follower whose plans or commands are timed (ms)."""
 
     component: Any
-    name: str
     took_ms: list[float] = field(default_factory=list)
 
     def __getattr__(self, name: str) -> Any:
-        value = getattr(self.component, name)
-        if name not in ("problem", "build", "command"):
-            return value
+        return getattr(self.component, name)
 
-        def timed(*arguments: Any, **named: Any) -> Any:
+    def problem(self, *arguments: Any, **named: Any) -> Callable[[], Any]:
+        begun = time.perf_counter()
+        plan = self.component.problem(*arguments, **named)
+        return self._timed(plan, time.perf_counter() - begun)
+
+    def build(self, *arguments: Any, **named: Any) -> "Timed":
+        return Timed(self.component.build(*arguments, **named), self.took_ms)
+
+    def command(self, *arguments: Any, **named: Any) -> Any:
+        return self._timed(lambda: self.component.command(*arguments, **named), 0.0)()
+
+    def _timed(self, work: Callable[[], Any], before_s: float) -> Callable[[], Any]:
+        def timed() -> Any:
             begun = time.perf_counter()
-            answer = value(*arguments, **named)
-            took = 1000.0 * (time.perf_counter() - begun)
-            if name == "command":
-                self.took_ms.append(took)
-                return answer
-            if name == "build":
-                return Clocked(answer, "command", self.took_ms)
-            return lambda: self._second(answer, took)
+            try:
+                return work()
+            finally:
+                self.took_ms.append(1000.0 * (before_s + time.perf_counter() - begun))
 
         return timed
 
-    def _second(self, plan: Any, took: float) -> Any:
-        """Time the planning that follows the sampling."""
-        begun = time.perf_counter()
-        try:
-            return plan()
-        finally:
-            self.took_ms.append(took + 1000.0 * (time.perf_counter() - begun))
-
 
 class Driver:
-    """One Spot at the start of a world. `maps` are the scan and the keep-out grid that it is given."""
+    """One Spot at the start of a world, which is given maps."""
 
-    def __init__(self, world: World, stack: RobotStack, maps: tuple[GridMap, GridMap], *, seed: int) -> None:
+    def __init__(self, world: World, stack: RobotStack, maps: Maps, *, seed: int) -> None:
         robots = [PlacedRobot(ROBOT, "spot", world.start, world.dock)]
         self.simulation = Simulation(world, seed=seed, visuals=False, robots=robots)
-        self.planner, self.controller = Clocked(stack.planner, "problem"), Clocked(stack.controller, "build")
+        self.planner, self.controller = Timed(stack.planner), Timed(stack.controller)
         options = stack.skills.get("navigate") or NavigateOptions()
-        blind = replace(options, low_obstacles=WatchOptions(period_s=86_400.0))
-        stack = replace(
-            stack, planner=self.planner, controller=self.controller, skills={**stack.skills, "navigate": blind}
-        )
+        blind = {**stack.skills, "navigate": replace(options, low_obstacles=WatchOptions(period_s=86_400.0))}
+        stack = replace(stack, planner=self.planner, controller=self.controller, skills=blind)
         robot = self.simulation.robots[ROBOT]
         self.context = SkillContext(
             robot,
@@ -120,49 +142,40 @@ class Driver:
         )
         for _ in range(8):
             self.tick()
-        here = self.context.pose()
         with suppress(PlanningError):
-            plan_path(self.context.costmap, Footprint.of(robot.capabilities()), here, here)
+            plan_path(self.context.costmap, SPOT, self.context.pose(), self.context.pose())
 
     def tick(self) -> None:
-        """A tick's time passes, and the estimators see."""
+        """Lets a tick's time pass, and updates the estimators."""
         self.simulation.clock.advance(TICK_S)
         self.context.localiser.update(self.context.robot)
         self.context.costmap.update(self.context.robot, self.context.localiser.estimate())
 
-    def true_pose(self) -> Pose2D:
-        """Where the robot really is."""
-        engine = self.simulation.engine
-        body = engine.world.robots[ROBOT].body
-        return Pose2D.from_transform(engine.world.plant.EvalBodyPoseInWorld(engine.context, body))
-
     def go(self, inputs: NavigateInputs, *, limit_s: float = 120.0, cancel_at_s: float = math.inf) -> Trip:
-        """Go to a pose; `cancel_at_s` ends the skill so long after its begin, and the trip once the robot stands."""
+        """Goes to a pose; `cancel_at_s` ends the skill so long after its begin, and the trip once the robot stands."""
         clock, collisions = self.simulation.clock, len(self.simulation.referee.collisions)
         planned, controlled = len(self.planner.took_ms), len(self.controller.took_ms)
-        skill, begun_s, poses = Navigate(self.context), clock.now(), [self.true_pose()]
+        skill, begun_s, poses = Navigate(self.context), clock.now(), [self.simulation.true_pose(ROBOT)]
         skill.begin(inputs)
         step: Any = Running("begins")
         while isinstance(step, Running) and clock.now() - begun_s < min(limit_s, cancel_at_s):
             self.tick()
-            poses.append(self.true_pose())
+            poses.append(self.simulation.true_pose(ROBOT))
             step = skill.step()
         skill.end()
         ended_s = clock.now()
         while cancel_at_s < math.inf and clock.now() - ended_s < 3.0:
-            off = relative_pose(poses[-2], poses[-1])
-            if math.hypot(off.x_m, off.y_m) < 0.02 * TICK_S and abs(off.yaw_rad) < 0.03 * TICK_S:
+            if within(poses[-2], poses[-1], (0.02 * TICK_S, 0.03 * TICK_S)):
                 break
             self.tick()
-            poses.append(self.true_pose())
-        bumps = self.simulation.referee.collisions[collisions:]
+            poses.append(self.simulation.true_pose(ROBOT))
         return Trip(
             message=getattr(step, "message", "") or str(step),
             succeeded=not isinstance(step, Running | Failed),
             time_s=clock.now() - begun_s,
             poses=np.array([(p.x_m, p.y_m, p.yaw_rad) for p in poses]),
             estimate=self.context.pose(),
-            hits=tuple(bump.sentence for bump in bumps),
+            hits=tuple(bump.sentence for bump in self.simulation.referee.collisions[collisions:]),
             planning_ms=tuple(self.planner.took_ms[planned:]),
             control_ms=tuple(self.controller.took_ms[controlled:]),
         )

@@ -8,14 +8,10 @@ time.
 `compare` does the runs again, prints `equal` or the first differences of each, and ends with 1 where one differs.
 """
 
-from __future__ import annotations
-
-import argparse
 import hashlib
 import json
 import lzma
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -23,14 +19,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 from executive.record.history import Event, read_events
-from tests.benchmarks.kill_and_resume import kill_at
+from tests.benchmarks.errand_process import ROOT, errand, kill_at, run_errand
+from tests.benchmarks.harness import command, tell
 
 MOST_DIFFERENCES: Final = 5
 RESUMED_AT_S: Final = 50.0
-ROOT: Final = Path(__file__).parents[2]
 VOLATILE: Final = frozenset({"versions", "wall_time_s", "real_time_factor", "bytes_logged", "log", "report", "page"})
 """What a result or a message tells that is not the same in two equal runs."""
 LEFT_OUT: Final = frozenset({"wall", "map"})
@@ -79,36 +75,29 @@ CASES: Final[Mapping[str, Case]] = {
 
 
 def run_case(case: Case, out: Path) -> dict[str, Any]:
-    """Run a case in an empty folder; return its exit code, result and events."""
-    for words in case.queued:
-        ended = _errand(words, out)
+    """Runs a case in an empty folder; returns its exit code, result and events."""
+
+    def words(*given: str) -> list[str]:
+        return [word.format(out=out) for word in given]
+
+    for each in case.queued:
+        ended = run_errand(*words(*each))
         if ended.returncode != 0:
             raise RuntimeError(ended.stderr)
     fixed = ("--quiet", "--json", "--no-record")
-    told = (*fixed, "--out", str(out / "fleet" if case.queued else out))
+    run = words(*case.run, *fixed, "--out", str(out / "fleet" if case.queued else out))
     if not case.resumed:
-        ended = _errand((*case.run, *told), out)
+        ended = run_errand(*run)
     else:
-        process = subprocess.Popen(
-            _command((*case.run, *told), out), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        if not kill_at(process, out / ".errand" / "missions.plant", RESUMED_AT_S):
+        process = subprocess.Popen(errand(*run), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        if not kill_at(process, out, RESUMED_AT_S):
             raise RuntimeError(f"it was over before {RESUMED_AT_S} s")
-        ended = _errand(("resume", "--out", str(out), *fixed[:2]), out)
-    logs = sorted(out.rglob("log*.mcap"))
+        ended = run_errand("resume", "--out", out, *fixed[:2])
     return {
         "exit": ended.returncode,
         "result": steady(json.loads(ended.stdout.splitlines()[-1])) if ended.stdout.strip() else ended.stderr,
-        "logs": [list(lines(read_events(log), str(out))) for log in logs],
+        "logs": [list(lines(read_events(log), str(out))) for log in sorted(out.rglob("log*.mcap"))],
     }
-
-
-def _errand(words: Words, out: Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(_command(words, out), cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-def _command(words: Words, out: Path) -> list[str]:
-    return [sys.executable, "-m", "executive.cli", *(word.format(out=out) for word in words)]
 
 
 def steady(value: Any) -> Any:
@@ -161,27 +150,20 @@ def _timed(name: str) -> dict[str, Any]:
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="errand-equal-") as folder:
         found = run_case(CASES[name], Path(folder))
-    sys.stderr.write(f"{name}: {time.perf_counter() - begun:.0f} s\n")
+    tell(f"{name}: {time.perf_counter() - begun:.0f} s")
     return found
 
 
-def main() -> int:
-    """Keep or compare runs."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=("keep", "compare"))
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--only", default=",".join(CASES))
-    parser.add_argument("--jobs", type=int, default=1)
-    options = parser.parse_args()
-    work: Callable[[Path, str], str] = keep if options.what == "keep" else compare
+def main(what: Literal["keep", "compare"], folder: Path, only: tuple[str, ...] = tuple(CASES), jobs: int = 1) -> int:
+    """Keeps or compares runs; returns 1 when one differs."""
+    work: Callable[[Path, str], str] = keep if what == "keep" else compare
     all_equal = True
-    with ThreadPoolExecutor(options.jobs) as threads:
-        for line in threads.map(lambda name: work(options.folder, name), options.only.split(",")):
-            sys.stdout.write(f"{line}\n")
-            sys.stdout.flush()
+    with ThreadPoolExecutor(jobs) as threads:
+        for line in threads.map(lambda name: work(folder, name), only):
+            print(line, flush=True)
             all_equal = all_equal and "differences" not in line.partition("\n")[0]
     return 0 if all_equal else 1
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    command(main)

@@ -9,20 +9,14 @@ With `--foreign FOLDER` they are objects that others modelled (`foreign_models.p
 and with `--scans STL_FOLDER` those that others scanned (`scanned_models.py`), too.
 """
 
-from __future__ import annotations
-
-import argparse
 import json
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
-from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_train.dataset.coco import document
@@ -42,34 +36,25 @@ from errand_train.dataset.views import (
     roll_deg,
 )
 from executive.app.worlds import knowledge_of, open_world
-from plant.diagram import DiagramConfig, LooseModel, WorldDiagram, build_diagram
-from plant.rendering import RENDERER, render_parameters
 from plant.scene_pictures import look_at
-from plant.sensors.camera_spec import colour_render_camera
 from plant.sensors.noise import PictureDegrader, PictureNoise
-from plant.worlds.world import World
-from skills.api import Surface
 from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.robot import Pose2D
+from skills.robot import FloatArray, Picture
 from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
+from tests.benchmarks.flat_scene import FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, supplied
+from tests.benchmarks.harness import command, tell
 from tests.benchmarks.scanned_models import scanned
 
-VIEWS = 8
-SURFACES_IN_USE = 4
-ROOM_FOR_FEET_M, ROOM_FOR_PEOPLE_M = 0.45, 0.3
-HAND_HEIGHTS_M = (0.3, 1.5)
-REACH_M = 0.9
+VIEWS, SURFACES_IN_USE, TRIES = 8, 4, 100
+ROOM_FOR_FEET_M, ROOM_FOR_PEOPLE_M, APART_M = 0.45, 0.3, 0.8
+HAND_HEIGHTS_M, REACH_M = (0.3, 1.5), 0.9
 LEAST_SHOWN_PX = 40
-TRIES = 100
-
-FloatArray = NDArray[np.float64]
-Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
 class Supply:
-    """Where objects come from: the categories that may lie about, those of no class, and a random one of a category."""
+    """Source of objects: the categories that may lie about, those of no class, and a random one of a category."""
 
     lying_about: Sequence[str]
     others: Sequence[str]
@@ -79,8 +64,8 @@ class Supply:
 HELD_OUT = Supply(LYING_ABOUT, DISTRACTORS, held_out_instance)
 
 
-def foreign(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
-    """Objects that others modelled, and where told to be those that others scanned, written to a folder."""
+def foreign_supply(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
+    """Objects that others modelled, and with a folder of `scans` those that others scanned, written to a folder."""
     models = supplied(folder, catalogues)
     for category, more in (scanned(folder, scans) if scans is not None else {}).items():
         models[category] = [*models.get(category, ()), *more]
@@ -91,55 +76,24 @@ def foreign(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
     return Supply([name for name in LYING_ABOUT if name in models], (OTHERS,), take)
 
 
-@dataclass(frozen=True)
-class Stage:
-    """The flat with objects in it, by their labels in Drake's label images."""
+class Stage(FlatScene):
+    """The flat with objects in it, by their labels in Drake's label images; `of_classes` are of the nine classes."""
 
-    built: WorldDiagram
-    query: QueryObject
-    objects: Mapping[int, Placed]
-
-    @property
-    def of_classes(self) -> dict[int, Placed]:
-        """Those that are of the nine classes."""
-        return {label: thing for label, thing in self.objects.items() if thing.model.class_id}
-
-    def take(self, view: View) -> tuple[Picture, NDArray[np.int16]]:
-        """Clean picture (H, W, 3) and labels (H, W)."""
-        camera = colour_render_camera(view.intrinsics, RENDERER)
-        world = self.built.scene_graph.world_frame_id()
-        colour = self.query.RenderColorImage(camera, world, view.X_WC)
-        labels = self.query.RenderLabelImage(camera, world, view.X_WC)
-        return np.ascontiguousarray(colour.data[..., :3]), np.array(labels.data[..., 0], dtype=np.int16)
+    def __init__(self, objects: Sequence[Placed]) -> None:
+        super().__init__([(each.model.path, each.X_WO) for each in objects])
+        self.objects = dict(zip(self.bodies, objects, strict=True))
+        self.of_classes = {label: each for label, each in self.objects.items() if each.model.class_id}
 
 
-def furnished(rng: np.random.Generator, world: World, free: GridMap, supply: Supply, *, bare: bool) -> Stage:
+def furnished(rng: np.random.Generator, free: GridMap, supply: Supply, *, bare: bool) -> Stage:
     """The flat with objects on some surfaces and on the floor; of no class if `bare`."""
-    objects = [*_on_surfaces(rng, world, supply, bare=bare), *(() if bare else _on_the_floor(rng, free, supply))]
-    loose = [LooseModel(f"thing{k}", thing.model.path, thing.X_WO, fixed=True) for k, thing in enumerate(objects)]
-    built = build_diagram(
-        DiagramConfig(
-            directives=world.directives_path,
-            models=loose,
-            visuals=False,
-            renderer_parameters=render_parameters(),
-        )
-    )
-    assert built.scene is not None
-    query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))
-    bodies = [built.plant.GetBodyIndices(built.models[each.name])[0] for each in loose]
-    return Stage(built, query, {int(body): thing for body, thing in zip(bodies, objects, strict=True)})
-
-
-def _on_surfaces(rng: np.random.Generator, world: World, supply: Supply, *, bare: bool) -> Iterator[Placed]:
-    facts = knowledge_of(world).surfaces
-    for name in rng.choice(sorted(facts), min(SURFACES_IN_USE, len(facts)), replace=False):
-        fact = facts[str(name)]
-        surface = Surface(str(name), tuple((float(x), float(y)) for x, y in fact.polygon), fact.height)
-        seen_from = fact.viewpoints[int(rng.integers(len(fact.viewpoints)))]
+    objects, names = list[Placed](), sorted(knowledge_of(open_world("flat")).surfaces)
+    for name in map(str, rng.choice(names, min(SURFACES_IN_USE, len(names)), replace=False)):
+        pose = viewpoint_of(rng, name)
         classes = [] if bare else [str(each) for each in rng.choice(supply.lying_about, 3)]
         models = [supply.take(rng, str(each)) for each in (*classes, *rng.choice(supply.others, 2 + 3 * bare))]
-        yield from scattered(rng, models, surface, Pose2D(seen_from.x, seen_from.y, seen_from.yaw))
+        objects += scattered(rng, models, surface_of(name), pose)
+    return Stage([*objects, *(() if bare else _on_the_floor(rng, free, supply))])
 
 
 def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> Iterator[Placed]:
@@ -148,16 +102,12 @@ def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> It
         model = supply.take(rng, category)
         rest = choose_pose(rng, model, resting_poses(model))
         places = rng.permutation(_floor_points(free, ROOM_FOR_PEOPLE_M))
-        xy = next((p for p in places if _clear_of(p, taken)), None)
+        xy = next((p for p in places if all(np.linalg.norm(p - other) > APART_M for other in taken)), None)
         if xy is None or model.kind == "sitting":
             continue
         taken.append(xy)
         turned = RotationMatrix.MakeZRotation(float(rng.uniform(0, 2 * np.pi))).matrix() @ rest.R
         yield Placed(model, RigidTransform(RotationMatrix.ProjectToRotationMatrix(turned), [*xy, rest.height_m]))
-
-
-def _clear_of(p: FloatArray, taken: list[FloatArray]) -> bool:
-    return all(float(np.linalg.norm(p - other)) > 0.8 for other in taken)
 
 
 def _floor_points(free: GridMap, room_m: float) -> FloatArray:
@@ -188,7 +138,7 @@ def _shows(stage: Stage, view: View, label: int) -> bool:
     u, v = project(np.asarray(aim)[None], view.intrinsics)[0]
     if aim[2] < 0.15 or not (0 <= u < view.intrinsics.width and 0 <= v < view.intrinsics.height):
         return False
-    return not thing.model.class_id or int((stage.take(view)[1] == label).sum()) >= LEAST_SHOWN_PX
+    return not thing.model.class_id or int((stage.labels(view.X_WC, view.intrinsics) == label).sum()) >= LEAST_SHOWN_PX
 
 
 def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View | None:
@@ -221,23 +171,21 @@ def _body_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> Vi
 
 def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, list[dict[str, Any]]]:
     """The picture (H, W, 3) RGB or (H, W) grey as the plant's camera gives it, and its labels."""
-    clean, labels = stage.take(view)
-    spec = camera_specs()[view.camera]
-    noise = PictureDegrader(rng, view.intrinsics.height, view.intrinsics.width, PictureNoise(), spec.picture_shrink)
-    colour = noise.colour(clean)
+    lens, shrink = view.intrinsics, camera_specs()[view.camera].picture_shrink
+    clean, labels = stage.colour(view.X_WC, lens), stage.labels(view.X_WC, lens)
+    colour = PictureDegrader(rng, lens.height, lens.width, PictureNoise(), shrink).colour(clean)
     picture = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8) if view.grey else colour
-    labelled = {label: (thing.model, thing.X_WO, False) for label, thing in stage.of_classes.items()}
+    labelled = {label: (each.model, each.X_WO, False) for label, each in stage.of_classes.items()}
     return picture, label_view(labelled, labels, view, RigidTransform(), picture)
 
 
 def shots(out: Path, seed: int, scenes: int, supply: Supply) -> Iterator[dict[str, Any]]:
     """Pictures written to a folder, with their entries; the same for the same seed."""
-    world = open_world("flat")
-    free = load_grid_map(world.surveyed.keepout_map_path)
+    free = load_grid_map(open_world("flat").surveyed.keepout_map_path)
     for index in range(scenes):
         rng = np.random.default_rng([seed, index, 17])
         bare = index % ONLY_DISTRACTORS_EVERY == ONLY_DISTRACTORS_EVERY - 1
-        here = furnished(rng, world, free, supply, bare=bare)
+        here = furnished(rng, free, supply, bare=bare)
         for number, view in enumerate(list(views(rng, here, free))):
             picture, labels = taken(rng, here, view)
             name = f"{index:04d}_{number}.png"
@@ -246,29 +194,28 @@ def shots(out: Path, seed: int, scenes: int, supply: Supply) -> Iterator[dict[st
             facts = {"file_name": name, "width": view.intrinsics.width, "height": view.intrinsics.height}
             facts |= {"camera": view.camera, "grey": view.grey, "roll_deg": round(roll_deg(view.X_WC), 1)}
             yield {"image": {**facts, "scene": index, "split": "val"}, "annotations": labels}
-        sys.stderr.write(f"scene {index + 1} of {scenes}\n")
+        tell(f"scene {index + 1} of {scenes}")
 
 
-def main() -> None:
-    """Write the pictures and their labels."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("out", type=Path)
-    parser.add_argument("--scenes", type=int, default=40)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--foreign", type=Path)
-    parser.add_argument("--catalogues", type=Path, default=CATALOGUES)
-    parser.add_argument("--scans", type=Path)
-    args = parser.parse_args()
-    if args.scans is not None and args.foreign is None:
-        parser.error("--scans goes with --foreign FOLDER, which models are written to")
-    args.out.mkdir(parents=True, exist_ok=True)
-    supply = HELD_OUT if args.foreign is None else foreign(args.foreign, args.catalogues, args.scans)
-    every = list(shots(args.out, args.seed, args.scenes, supply))
-    told = document({"description": "Errand: things in the flat", "seed": args.seed, "split": "val"}, every)
-    (args.out / "val.json").write_text(json.dumps(told), encoding="utf-8")
+def write(
+    out: Path,
+    scenes: int = 40,
+    seed: int = 1,
+    foreign: Path | None = None,
+    catalogues: Path = CATALOGUES,
+    scans: Path | None = None,
+) -> dict[str, object]:
+    """Writes the pictures and their labels; counts them."""
+    if scans is not None and foreign is None:
+        raise SystemExit("--scans goes with --foreign FOLDER, which models are written to")
+    out.mkdir(parents=True, exist_ok=True)
+    supply = HELD_OUT if foreign is None else foreign_supply(foreign, catalogues, scans)
+    every = list(shots(out, seed, scenes, supply))
+    told = document({"description": "Errand: things in the flat", "seed": seed, "split": "val"}, every)
+    (out / "val.json").write_text(json.dumps(told), encoding="utf-8")
     counted = sum(not label["ignore"] for shot in every for label in shot["annotations"])
-    sys.stdout.write(f"{args.out / 'val.json'}: {len(every)} pictures, {counted} labels that count\n")
+    return {"pictures": len(every), "labels_that_count": counted}
 
 
 if __name__ == "__main__":
-    main()
+    command(write)

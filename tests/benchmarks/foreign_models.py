@@ -4,8 +4,6 @@ The catalogues are those of Debian's package `sweethome3d-furniture`: ZIP files 
 the size of each. They stay where they are; nothing of them is part of the project.
 """
 
-from __future__ import annotations
-
 import re
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,14 +12,12 @@ from pathlib import Path, PurePosixPath
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from errand_train.dataset.objects import CLASSES
 from errand_train.dataset.objects.draft import Draft
 from errand_train.dataset.objects.model import ObjectModel, read_model, write_model
 from plant.models.catalogue import load_catalogue
-
-FloatArray = NDArray[np.float64]
+from skills.robot import FloatArray
 
 CATALOGUES = Path("/usr/share/sweethome3d/furniture")
 OTHERS = "other"
@@ -88,7 +84,7 @@ def entries(catalogue: Path) -> Iterator[Entry]:
 
 @dataclass
 class Wavefront:
-    """What an OBJ file holds: points, texture coordinates, normals, and corners (three each) by material."""
+    """Content of an OBJ file: points, texture coordinates, normals, and corners (three each) by material."""
 
     points: list[list[float]] = field(default_factory=list)
     textures: list[list[float]] = field(default_factory=list)
@@ -98,7 +94,7 @@ class Wavefront:
 
 
 def read_wavefront(text: str) -> Wavefront:
-    """An OBJ file's triangles; faces of more corners become fans."""
+    """Triangles of an OBJ file; faces of more corners become fans."""
     made, material = Wavefront(), ""
     rows = {"v": (made.points, 3), "vt": (made.textures, 2), "vn": (made.normals, 3)}
     for line in text.replace("\\\n", " ").splitlines():
@@ -111,18 +107,19 @@ def read_wavefront(text: str) -> Wavefront:
         elif word == "mtllib":
             made.libraries.append(" ".join(rest))
         elif word == "f":
-            face = [_corner(each, made) for each in rest]
+            counts = [len(into) for into, _ in rows.values()]
+            face = [_corner(each, counts) for each in rest]
             fan = [face[k] for j in range(1, len(face) - 1) for k in (0, j, j + 1)]
             made.corners.setdefault(material, []).extend(fan)
     return made
 
 
-def _corner(text: str, made: Wavefront) -> Corner:
-    counts = (len(made.points), len(made.textures), len(made.normals))
-    told = [*text.split("/"), "", ""][:3]
+def _corner(text: str, counts: Sequence[int]) -> Corner:
+    """Indices of a corner such as `3/1/2` or `-1//-1`; negative numbers count from the last of so many."""
+    numbers = [int(each) if each else None for each in [*text.split("/"), "", ""][:3]]
     point, texture, normal = (
-        None if not each else int(each) - 1 if int(each) > 0 else count + int(each)
-        for each, count in zip(told, counts, strict=True)
+        None if number is None else number - 1 if number > 0 else count + number
+        for number, count in zip(numbers, counts, strict=True)
     )
     if point is None:
         raise ValueError(f"a face's corner without a point: {text!r}")
@@ -130,24 +127,22 @@ def _corner(text: str, made: Wavefront) -> Corner:
 
 
 def read_materials(text: str) -> dict[str, dict[str, list[str]]]:
-    """The materials of an MTL file, each by its keys."""
-    made: dict[str, dict[str, list[str]]] = {}
-    current: dict[str, list[str]] = {}
+    """Materials of an MTL file, each by its keys."""
+    made, name = dict[str, dict[str, list[str]]](), ""
     for line in text.splitlines():
         word, *rest = line.split() or [""]
         if word == "newmtl":
-            current = made.setdefault(" ".join(rest), {})
+            name = " ".join(rest)
         elif word:
-            current[word] = rest
+            made.setdefault(name, {})[word] = rest
     return made
 
 
 def written(entry: Entry, number: int, category: str, folder: Path) -> ObjectModel:
-    """The model of an entry in a folder of its own, of the size that its catalogue tells."""
-    draft = Draft(np.random.default_rng(0))
+    """Writes the model of an entry to a folder of its own, in the size that its catalogue tells."""
+    draft, materials = Draft(np.random.default_rng(0)), dict[str, dict[str, list[str]]]()
     with zipfile.ZipFile(entry.catalogue) as archive:
         source = read_wavefront(archive.read(str(entry.path)).decode("latin-1"))
-        materials: dict[str, dict[str, list[str]]] = {}
         for library in source.libraries:
             inside = str(entry.path.parent / library)
             if inside in archive.namelist():
@@ -160,21 +155,31 @@ def written(entry: Entry, number: int, category: str, folder: Path) -> ObjectMod
     to_normal = np.diag(1.0 / scale) @ entry.R
     part = draft.part()
     for material, corners in source.corners.items():
-        at = (turned * scale)[[point for point, _, _ in corners]]
-        faces = at.reshape(-1, 3, 3)
+        points, textures, normals = zip(*corners, strict=True)
+        faces = (turned * scale)[list(points)].reshape(-1, 3, 3)
         across = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
-        keep = np.repeat(np.linalg.norm(across, axis=1) > 1e-12, 3)
-        normals = _normals(source, corners, np.repeat(across, 3, axis=0), to_normal)
-        uvs = _texture(source, corners)
+        keep = np.linalg.norm(across, axis=1) > 1e-12
+        told = _chosen(source.normals, normals, 3) @ to_normal.T
+        own = np.linalg.norm(told, axis=2, keepdims=True) > 1e-9
+        unit = np.where(own, told, across[:, None])
+        unit /= np.maximum(np.linalg.norm(unit, axis=2, keepdims=True), 1e-12)
+        uvs = _chosen(source.textures, textures, 2)
+        uvs -= np.floor(uvs.min(axis=1, keepdims=True) + 1e-6)  # each triangle begins within the first texture
         if keep.any():
-            placed = (at[keep] @ Y_UP_TO_Z_UP.T, normals[keep] @ Y_UP_TO_Z_UP.T, uvs[keep])
-            part.add_triangles(names[material], *placed)
+            placed = (faces[keep].reshape(-1, 3) @ Y_UP_TO_Z_UP.T, unit[keep].reshape(-1, 3) @ Y_UP_TO_Z_UP.T)
+            part.add_triangles(names[material], *placed, uvs[keep].reshape(-1, 2))
     draft.shell(part, 1.0)
     return kept_model(draft, category, number, entry.name, folder)
 
 
+def _chosen(values: Sequence[Sequence[float]], indices: Sequence[int | None], width: int) -> FloatArray:
+    """Values of the corners (N, 3, width) of triangles, zero where there is none."""
+    every = np.array([*values, [0.0] * width])
+    return every[[-1 if k is None else k for k in indices]].reshape(-1, 3, width)
+
+
 def kept_model(draft: Draft, category: str, number: int, name: str, folder: Path) -> ObjectModel:
-    """The model of a draft, written to a folder of its own; of no class where its category is none of the nine."""
+    """Writes the model of a draft to a folder of its own; of no class where its category is none of the nine."""
     made = draft.finish(MASS_KG, on_floor=category == "person")
     x, y, z = (float(value) for value in made.mass.com)
     class_id = load_catalogue()[category].id if category in CLASSES else 0
@@ -184,24 +189,10 @@ def kept_model(draft: Draft, category: str, number: int, name: str, folder: Path
     return read_model(folder)
 
 
-def _normals(source: Wavefront, corners: Sequence[Corner], across: FloatArray, to_normal: FloatArray) -> FloatArray:
-    """Unit normals (N, 3) of corners: as told, else those of the faces, which are `across` (N, 3)."""
-    told = np.array([*source.normals, [0.0, 0.0, 0.0]])[[-1 if k is None else k for _, _, k in corners]] @ to_normal.T
-    lengths = np.linalg.norm(told, axis=1, keepdims=True)
-    made = np.where(lengths > 1e-9, told, across)
-    return np.asarray(made / np.maximum(np.linalg.norm(made, axis=1, keepdims=True), 1e-12))
-
-
-def _texture(source: Wavefront, corners: Sequence[Corner]) -> FloatArray:
-    """Texture coordinates (N, 2), each triangle's moved by whole textures to begin within the first one."""
-    told = np.array([*source.textures, [0.0, 0.0]])[[-1 if k is None else k for _, k, _ in corners]].reshape(-1, 3, 2)
-    return np.asarray((told - np.floor(told.min(axis=1, keepdims=True) + 1e-6)).reshape(-1, 2))
-
-
 def _paint(
     draft: Draft, name: str, material: Mapping[str, Sequence[str]], archive: zipfile.ZipFile, folder: PurePosixPath
 ) -> None:
-    """The material by its picture where the archive has it, else by its colour."""
+    """Paints a material by its picture where the archive has it, else by its colour."""
     inside = str(folder / " ".join(material.get("map_Kd", [])))
     if "map_Kd" in material and inside in archive.namelist():
         picture = cv2.imdecode(np.frombuffer(archive.read(inside), np.uint8), cv2.IMREAD_COLOR)
@@ -215,7 +206,7 @@ def _paint(
 
 
 def supplied(folder: Path, catalogues: Path = CATALOGUES) -> dict[str, list[ObjectModel]]:
-    """All models by category, written to a folder. Raises FileNotFoundError without the catalogues."""
+    """Writes all models to a folder; returns them by category. Raises FileNotFoundError without the catalogues."""
     files = sorted(catalogues.glob("*.sh3f"))
     if not files:
         raise FileNotFoundError(f"{catalogues}: no catalogue *.sh3f; install Debian's sweethome3d-furniture")

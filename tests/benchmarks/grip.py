@@ -1,6 +1,6 @@
 """Holds, twists, pulls and shakes objects in Spot's gripper alone, with three models of its pads; prints JSON lines.
 
-    python -m tests.benchmarks.grip [--pads dots grid hydroelastic] [--things NAME ...] [--force-n 40 100] [--step-s S]
+    python -m tests.benchmarks.grip [--pads dots,grid,hydroelastic] [--things NAME,NAME] [--force-n 40,100] [--step-s S]
 
 The hand points down, as above a table, or ahead, as beside a bottle. It closes with a force; then the object gets its
 weight within half a second, which acts beside the grip by a lever.
@@ -12,15 +12,10 @@ fingers at which it slides by 5 mm, as a part of friction times force for both. 
 solver gave up.
 """
 
-from __future__ import annotations
-
-import argparse
 import itertools
-import json
 import math
-import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 from xml.etree import ElementTree
@@ -49,6 +44,7 @@ from plant.models import urdf
 from plant.robots.servos import gripper_set_point
 from plant.robots.spot.description import FINGER_LINK, GRIPPER_JOINT, HAND_LINK, spot_facts
 from skills.robot import FloatArray
+from tests.benchmarks.harness import command, show
 
 DOTS = {
     HAND_LINK: [[0.155, -0.046], [0.180, -0.046], [0.205, -0.046], [0.219, -0.045], [0.231, -0.044]],
@@ -284,23 +280,28 @@ def held(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str,
 def twisted(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, float]:
     """Twists an object about the closing axis."""
     bench = Bench(pads, replace(thing, lever_m=0.0), step_s)
-    bench.close(force_n)
-    most_W = MOST_LOAD * 2.0 * thing.pad_friction * force_n * thing.patch_m() * bench.R_WH.matrix()[:, 2]
-    loads = bench.steps(PULLING_S, load_W=np.array([*most_W, 0.0, 0.0, 0.0]))
-    return {"twist": round(MOST_LOAD * next((at for at in loads if bench.turned_deg(2) > TURNED_DEG), 1.0), 2)}
+    torque_W = 2.0 * thing.pad_friction * force_n * thing.patch_m() * bench.R_WH.matrix()[:, 2]
+    load = np.array([*torque_W, 0.0, 0.0, 0.0])
+    return {"twist": _resisted(bench, force_n, load, lambda: bench.turned_deg(2) > TURNED_DEG)}
 
 
 def pulled(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, float]:
     """Pulls an object out along the fingers."""
     bench = Bench(pads, replace(thing, lever_m=0.0), step_s)
+    force_W = 2.0 * thing.pad_friction * force_n * bench.R_WH.matrix()[:, 0]
+    load = np.array([0.0, 0.0, 0.0, *force_W])
+    return {"pull": _resisted(bench, force_n, load, lambda: bench.slid_m() > SLID_M)}
+
+
+def _resisted(bench: Bench, force_n: float, load: FloatArray, moved: Callable[[], bool]) -> float:
+    """Part of a load at which the clamped object moves; the load grows to `MOST_LOAD` times itself."""
     bench.close(force_n)
-    most_W = MOST_LOAD * 2.0 * thing.pad_friction * force_n * bench.R_WH.matrix()[:, 0]
-    loads = bench.steps(PULLING_S, load_W=np.array([0.0, 0.0, 0.0, *most_W]))
-    return {"pull": round(MOST_LOAD * next((at for at in loads if bench.slid_m() > SLID_M), 1.0), 2)}
+    parts = bench.steps(PULLING_S, load_W=MOST_LOAD * load)
+    return round(MOST_LOAD * next((part for part in parts if moved()), 1.0), 2)
 
 
 def measure(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, Any]:
-    """All tests of one object with one force."""
+    """Runs all tests of one object with one force."""
     result: dict[str, Any] = {"pads": pads, "thing": thing.name, "force_n": force_n, "failed": 0}
     began_s = time.process_time()
     for test in (held, twisted, pulled):
@@ -311,21 +312,17 @@ def measure(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[s
     return result | {"cpu_s": round(time.process_time() - began_s, 2)}
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(
+    pads: tuple[str, ...] = ("dots", "grid", "hydroelastic"),
+    things: tuple[str, ...] = tuple(thing.name for thing in THINGS),
+    force_n: tuple[float, ...] = (40.0, 100.0),
+    step_s: float = TIME_STEP_S,
+) -> None:
     """Prints a line of JSON for each model, object and force."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    names = [thing.name for thing in THINGS]
-    models = ["dots", "grid", "hydroelastic"]
-    parser.add_argument("--pads", nargs="+", choices=models, default=models)
-    parser.add_argument("--things", nargs="+", choices=names, default=names)
-    parser.add_argument("--force-n", nargs="+", type=float, default=[40.0, 100.0])
-    parser.add_argument("--step-s", type=float, default=TIME_STEP_S)
-    given = parser.parse_args(arguments)
-    things = [thing for thing in THINGS if thing.name in given.things]
-    for pads, thing, force_n in itertools.product(given.pads, things, given.force_n):
-        print(json.dumps(measure(pads, thing, force_n, given.step_s)), flush=True)
-    return 0
+    chosen = [thing for thing in THINGS if thing.name in things]
+    for case in itertools.product(pads, chosen, force_n):
+        show(measure(*case, step_s))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command(main)

@@ -1,88 +1,62 @@
 """How surely the robot hands over single objects: it takes one from a table and gives it to a person. Prints JSON.
 
-    python -m tests.benchmarks.hand_over [--classes a,b] [--trials N] [--seed S] [--jobs 2] [--json]
+    python -m tests.benchmarks.hand_over [--classes a,b] [--trials N] [--seed S] [--jobs 1] [--out FOLDER] [--json]
 
 Each trial is a room of `tests.benchmarks.manipulation` with one object of the class on a table of random height, and a
 person who takes what is offered. The plant's truth judges: `taken` when the object was lifted, `given` when it rests on
 the person's tray at the end, `false_claim` when the robot says otherwise.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
-import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
-from typing import Any
 
-from executive.app.placed_robots import only_robot
-from executive.app.simulated import simulate
-from executive.run.outcome import Outcome
-from tests.benchmarks.manipulation import CLASSES, ROBOT, TARGET, attempts, run_texts
-from tests.benchmarks.manipulation_room import PERSON, TAKEN, room
+from tests.benchmarks.harness import benchmark, totals
+from tests.benchmarks.manipulation_room import CLASSES, PERSON, ROBOT, TAKEN, TARGET, room
+from tests.benchmarks.plant_mission import Ended, PlantMission
 
 
-def attempt(chosen: tuple[str, int]) -> dict[str, Any]:
-    """Take an object of a class and hand it over; what the plant's truth says of it."""
-    class_name, seed = chosen
-    with tempfile.TemporaryDirectory() as folder:
-        world = room(Path(folder), class_name, (), "table", seed, person=True)
-        simulation = simulate(world, {ROBOT: only_robot(ROBOT, world)}, seed=seed, record=False)
-        texts = (
-            f"Take [Nothing] to [{TAKEN}] and do [grasp] to [{class_name}]",
-            f"Take [{class_name}] to [{PERSON}] and do [Nothing] to [Nothing]",
-        )
-        result = run_texts(simulation, world, texts, seed).result
-    target = simulation.referee.objects[TARGET]
-    given, claimed = target.on_tray_of == PERSON, result.outcome is Outcome.SUCCESS
-    return {
-        "class": class_name,
-        "seed": seed,
-        "taken": bool(target.lifts),
-        "given": given,
-        "false_claim": claimed != given,
-        "drops": target.drops,
-        "collisions": len(simulation.referee.collisions),
-        "cause": "" if claimed else f"{result.cause}: {result.message}",
-        "sim_time_s": round(simulation.clock.now(), 1),
-    }
+@dataclass(frozen=True)
+class Trial:
+    """Result of a trial, by the plant's truth."""
+
+    ended: Ended
+    taken: bool
+    given: bool
+    false_claim: bool
 
 
-def trial_line(run: Mapping[str, Any]) -> str:
-    """One line of a trial."""
-    ended = "given" if run["given"] else "not given" if run["taken"] else "not taken"
-    false = ", false claim" if run["false_claim"] else ""
-    return (
-        f"{run['class']:12} seed {run['seed']:3} {ended:9} drops {run['drops']} bumps {run['collisions']} "
-        f"{run['sim_time_s']:5.0f} s{false}  {run['cause']}"
+def cases(classes: tuple[str, ...] = CLASSES, trials: int = 5, seed: int = 1) -> Iterable[tuple[str, int]]:
+    """Classes with the seeds of their trials."""
+    return product(classes, range(seed, seed + trials))
+
+
+def run_case(class_name: str, seed: int, folder: Path) -> Trial:
+    """Takes an object of a class and hands it over."""
+    commands = (
+        f"Take [Nothing] to [{TAKEN}] and do [grasp] to [{class_name}]",
+        f"Take [{class_name}] to [{PERSON}] and do [Nothing] to [Nothing]",
     )
+    world = room(folder / "room", class_name, (), "table", seed, person=True)
+    asked = {"commands": commands, "robot": ROBOT, "time_limit_s": 600.0}
+    mission = PlantMission(folder, seed, world=str(world.folder), **asked)
+    ended, target = mission.end(class_name), mission.simulation.referee.objects[TARGET]
+    given = target.on_tray_of == PERSON
+    return Trial(ended, bool(target.lifts), given, ended.claimed != given)
 
 
-def summary(runs: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """How many were taken and given, by class as well, and how many claims were false."""
-    classes = sorted({run["class"] for run in runs})
+def summary(trials: Sequence[Trial]) -> dict[str, object]:
+    """Figures of all trials."""
+    classes = sorted({each.ended.what for each in trials})
+    of_class = {name: [each for each in trials if each.ended.what == name] for name in classes}
     return {
-        "taken": sum(run["taken"] for run in runs),
-        "given": sum(run["given"] for run in runs),
-        "false_claims": sum(run["false_claim"] for run in runs),
-        "given_by_class": {name: sum(run["given"] for run in runs if run["class"] == name) for name in classes},
+        "runs": trials,
+        **totals(trials, "taken", "given"),
+        "false_claims": sum(each.false_claim for each in trials),
+        "given_by_class": {name: sum(each.given for each in own) for name, own in of_class.items()},
     }
-
-
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--classes", default=",".join(CLASSES))
-    parser.add_argument("--trials", type=int, default=5, help="of each class, one by each seed")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--json", action="store_true", help="one line of JSON at the end")
-    options = parser.parse_args()
-    chosen = [(name, options.seed + n) for name in options.classes.split(",") for n in range(options.trials)]
-    runs = list(attempts(attempt, chosen, options.jobs, trial_line))
-    print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
 
 
 if __name__ == "__main__":
-    main()
+    benchmark(cases, run_case, summary)

@@ -1,24 +1,19 @@
 """What a long run writes and remembers: a robot that waits, drives and looks for simulated hours; prints JSON lines.
 
-    python -m tests.benchmarks.long_run [--minutes 120] [--every 10] [--no-record] [--world flat] [--top 10]
+    python -m tests.benchmarks.long_run [--minutes 120] [--every 10] [--wait 60] [--no-record] [--world flat] [--top 10]
 
 One line for each ten minutes of the robot's clock: what the process has written since the last one, its memory, and how
 much faster than real time it was. The last line has the slope of the memory over the second half, the bytes written per
-minute at the beginning and at the end, and the size of the recording. `--top` adds the lines of code that hold what was
-allocated since the first report (tracemalloc; slow).
+minute at the beginning and at the end, and the size of the recording. `--wait` is how long it waits at each place (s).
+`--top` adds the lines of code that hold what was allocated since the first report (tracemalloc; slow).
 """
 
-from __future__ import annotations
-
-import argparse
-import json
-import sys
 import tempfile
 import time
 import tracemalloc
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +23,7 @@ from executive.app.runs import new_run
 from executive.mission.request import Request
 from executive.run.visitor import Progress, RunVisitor
 from executive.store.missions import STORE, MissionStore
+from tests.benchmarks.harness import command, show
 
 MISSION = """name: long round
 world: {world}
@@ -56,7 +52,7 @@ class Report:
 
 
 class Watch(RunVisitor):
-    """Reports the process every so many seconds of the robot's clock."""
+    """Reporter of the process, every so many seconds of the robot's clock."""
 
     def __init__(self, period_s: float, *, top: int = 0) -> None:
         self.reports: list[Report] = []
@@ -65,16 +61,12 @@ class Watch(RunVisitor):
         self._first: tracemalloc.Snapshot | None = None
 
     def tick(self, progress: Progress) -> None:
-        """Report when it is time again."""
-        if progress.now_s - self._at_s >= self._period_s:
-            self._report(progress.now_s)
-
-    def _report(self, now_s: float) -> None:
-        written, wall_s, took_s = written_bytes(), time.monotonic(), now_s - self._at_s
-        per_minute = (written - self._written) / 1e3 / (took_s / 60.0)
-        report = Report(now_s / 60.0, memory_mb(), per_minute, took_s / (wall_s - self._wall_s))
-        self.reports.append(report)
-        show({key: round(value, 2) for key, value in asdict(report).items()})
+        took_s, now_s = progress.now_s - self._at_s, progress.now_s
+        if took_s < self._period_s:
+            return
+        per_minute = (written_bytes() - self._written) / 1e3 / (took_s / 60.0)
+        self.reports.append(Report(now_s / 60.0, memory_mb(), per_minute, took_s / (time.monotonic() - self._wall_s)))
+        show({key: round(value, 2) for key, value in vars(self.reports[-1]).items()})
         if self._top:
             self._show_growth()
         self._at_s, self._wall_s, self._written = now_s, time.monotonic(), written_bytes()
@@ -83,51 +75,46 @@ class Watch(RunVisitor):
         now = tracemalloc.take_snapshot()
         self._first = self._first or now
         for each in now.compare_to(self._first, "lineno")[: self._top]:
-            frame = each.traceback[0]
-            show(
-                {
-                    "grown_kb": round(each.size_diff / 1e3),
-                    "count": each.count_diff,
-                    "at": f"{frame.filename}:{frame.lineno}",
-                }
-            )
+            at = f"{each.traceback[0].filename}:{each.traceback[0].lineno}"
+            show({"grown_kb": round(each.size_diff / 1e3), "count": each.count_diff, "at": at})
 
 
 def written_bytes() -> int:
-    """What this process has written to files so far."""
+    """Bytes that this process has written to files so far."""
     told = dict(line.split(": ") for line in Path("/proc/self/io").read_text().splitlines())
     return int(told["wchar"])
 
 
 def memory_mb() -> float:
-    """What this process has in memory."""
+    """Memory of this process."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_BYTES / MB
 
 
-def run(
-    minutes: float,
-    out: Path,
-    *,
-    world: str = "flat",
+def measure(
+    minutes: float = 120.0,
+    every: float = 10.0,
+    wait: float = 60.0,
     record: bool = True,
-    every_s: float = 600.0,
-    wait_s: float = 60.0,
+    world: str = "flat",
     top: int = 0,
-) -> dict[str, Any]:
-    """Run the mission; the summary."""
-    file = out / "long.yaml"
-    file.write_text(MISSION.format(world=world, seconds=60.0 * minutes, wait=wait_s), encoding="utf-8")
-    asked = Request(file=file, out=out, record=record, time_limit_s=2.0 * 60.0 * minutes + 600.0)
-    prepared, watch = prepare(asked, ask=None), Watch(every_s, top=top)
-    with MissionStore(out / STORE) as store:
-        mission = store.add(prepared.request.from_anywhere(), queued=False)
-        store.begin(mission.id)
-        finished = run_request(prepared, visitors=[watch], durable=new_run(store, mission, prepared))
-    return summary(watch.reports, finished.report.outcome, out)
+) -> None:
+    """Runs the mission for so many minutes, and shows the summary."""
+    if top:
+        tracemalloc.start()
+    with tempfile.TemporaryDirectory(prefix="errand-long-") as made:
+        out, watch = Path(made), Watch(60.0 * every, top=top)
+        (out / "long.yaml").write_text(MISSION.format(world=world, seconds=60.0 * minutes, wait=wait))
+        asked = Request(file=out / "long.yaml", out=out, record=record, time_limit_s=120.0 * minutes + 600.0)
+        prepared = prepare(asked)
+        with MissionStore(out / STORE) as store:
+            mission = store.add(prepared.request.from_anywhere(), queued=False)
+            store.begin(mission.id)
+            finished = run_request(prepared, visitors=[watch], durable=new_run(store, mission, prepared))
+        show(summary(watch.reports, finished.report.outcome, out))
 
 
-def summary(reports: list[Report], outcome: str, out: Path) -> dict[str, Any]:
-    """What the reports say together."""
+def summary(reports: Sequence[Report], outcome: str, out: Path) -> dict[str, object]:
+    """Figures of the whole run."""
     later = reports[len(reports) // 2 :]
     times = [each.until_min for each in later]
     slope = float(np.polyfit(times, [each.memory_mb for each in later], 1)[0]) if len(later) > 1 else 0.0
@@ -143,37 +130,5 @@ def summary(reports: list[Report], outcome: str, out: Path) -> dict[str, Any]:
     }
 
 
-def show(line: dict[str, Any]) -> None:
-    """One line of JSON."""
-    sys.stdout.write(json.dumps(line) + "\n")
-    sys.stdout.flush()
-
-
-def main() -> None:
-    """Run it, and print the reports."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--minutes", type=float, default=120.0)
-    parser.add_argument("--every", type=float, default=10.0, help="minutes between two reports")
-    parser.add_argument("--wait", type=float, default=60.0, help="how long it waits at each place (s)")
-    parser.add_argument("--world", default="flat")
-    parser.add_argument("--no-record", action="store_true")
-    parser.add_argument("--top", type=int, default=0)
-    options = parser.parse_args()
-    if options.top:
-        tracemalloc.start()
-    with tempfile.TemporaryDirectory(prefix="errand-long-") as folder:
-        every_s, record = 60.0 * options.every, not options.no_record
-        told = run(
-            options.minutes,
-            Path(folder),
-            world=options.world,
-            record=record,
-            every_s=every_s,
-            wait_s=options.wait,
-            top=options.top,
-        )
-        show(told)
-
-
 if __name__ == "__main__":
-    main()
+    command(measure)

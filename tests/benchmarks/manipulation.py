@@ -1,7 +1,7 @@
 """How well the robot takes, holds and puts down single objects among others; prints a line a trial, JSON at the end.
 
     python -m tests.benchmarks.manipulation [--classes a,b] [--surfaces table,shelf,floor] [--trials N] [--clutter 0-4]
-        [--seed S] [--models DIR | --shapes N] [--jobs 2] [--sheet FILE.png] [--json]
+        [--seed S] [--models DIR | --shapes N] [--jobs 1] [--sheet FILE.png] [--out FOLDER] [--json]
 
 Each trial is a room of its own: a table of random height, an open shelf or the floor with one object of the class and
 others around it, all set by the seed, and a second table. The robot goes to the object, takes it, holds it for ten
@@ -20,23 +20,16 @@ around.
 `--sheet` writes a picture of how each failed trial ended. A table of failures by class and cause goes to stderr.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import math
-import multiprocessing
-import sys
-import tempfile
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any
 
+import cv2
 import numpy as np
-from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
 from errand_train.commands.worst_sheet import Shown, contact_sheet
@@ -44,39 +37,32 @@ from errand_train.detector.scoring import Judged
 from executive.app.placed_robots import only_robot
 from executive.app.simulated import run_entry, simulate
 from executive.app.worlds import knowledge_of
-from executive.run.outcome import Outcome, RobotResult
+from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import Progress, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
 from executive.words.command import parse_command
-from executive.words.leaf_steps import Do
+from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
 from plant.models.catalogue import FACTS_FILE, read_imported
 from plant.scene_pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
-from plant.worlds.world import SurfaceTop, World
+from plant.worlds.world import SurfaceTop
 from skills.api import Job, Worker
 from skills.files.errors import InputError
 from skills.perception.class_forms import ANY_OBJECT
-from skills.robot import FloatArray, Picture
-from tests.benchmarks.manipulation_room import SECOND, SURFACES, TAKEN, room
+from skills.robot import FloatArray
+from tests.benchmarks.harness import benchmark, quantile, share, tell
+from tests.benchmarks.manipulation_room import CLASSES, LOOK_S, ROBOT, SECOND, SURFACES, TAKEN, TARGET, room
 from tests.benchmarks.shapes import written_shape
-from tests.visitors import OnMessage
 
-ResultT = TypeVar("ResultT")
-JobT = TypeVar("JobT")
-ReadT = TypeVar("ReadT")
-
-TARGET: Final = "target"
-CLASSES: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
-ROBOT: Final = "Alice"
-HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, LOOK_S, MOVED_M = 10.0, 0.26, 0.05, 0.35, 0.1, 0.02
+HELD_S, UPRIGHT_RAD, DISTURBED_M, DISTURBED_RAD, MOVED_M = 10.0, 0.26, 0.05, 0.35, 0.02
 MOTION_WORK, GRASP_WORK = "plan arm motion", "plan grasp"
-NEAR_SPOT_M: Final = 0.05
-OUTCOMES: Final = {
+NEAR_SPOT_M = 0.05
+OUTCOMES = {
     "lifted": "never lifted",
     "held_10s": "not held for ten seconds",
     "placed": "not on the second table",
@@ -86,301 +72,195 @@ OUTCOMES: Final = {
 
 @dataclass(frozen=True)
 class Trial:
-    """What is tried: with an object of the catalogue, or the imported one in the folder `model`."""
+    """Result of a trial; `model` is the form's file, `ending` the picture of how a failed trial ended."""
 
-    class_name: str
+    name: str
+    model: str
     surface: str
     clutter: int
     seed: int
-    model: Path | None = None
-    pictured: bool = False
+    lifted: bool
+    held_10s: bool
+    placed: bool
+    placed_upright: bool | None
+    place_error_m: float | None
+    others_disturbed: int
+    false_claim: bool
+    collisions: int
+    cause: str
+    sim_time_s: float
+    pick_s: float | None
+    planning_s: tuple[float, ...] = ()
+    grasp_planning_s: tuple[float, ...] = ()
+    ending: Path | None = None
 
     @property
-    def name(self) -> str:
-        """That of the class, or of the model."""
-        return self.class_name if self.model is None else self.model.name
+    def failure(self) -> str:
+        """Why the trial failed: the mission's cause, else what the truth denies; empty for a good one."""
+        return self.cause or next((words for key, words in OUTCOMES.items() if not getattr(self, key)), "")
+
+    @property
+    def near_upright(self) -> bool:
+        """True if the object stands upright within 5 cm of the spot."""
+        return bool(self.placed_upright and self.place_error_m is not None and self.place_error_m <= NEAR_SPOT_M)
 
 
 @dataclass
-class Watch:
-    """What the truth shows of one object: how long it was off its support without a break (s).
+class Watch(RunVisitor):
+    """Observer of the target: time off its support without a break, and from when the robot stood to the lift (s).
 
-    `pick_s` is from when the robot stood still before it to when it was lifted first.
+    As a visitor it stores where the place skill lowers the target last (m), and whether a grasp succeeds.
     """
 
     simulation: Simulation
-    pick_s: float = math.nan
+    pick_s: float | None = None
     lifted_since_s: float | None = None
     longest_s: float = 0.0
-    lifted: bool = False
+    spot_W: tuple[float, float] | None = None
+    claimed: bool = False
     _due_s: float = 0.0
     _stands_since_s: float = 0.0
-    _base_W: FloatArray = field(default_factory=lambda: np.zeros(2))
+    _base_W: tuple[float, float] = (0.0, 0.0)
 
     def __call__(self, now_s: float) -> None:
-        """Look, ten times a second."""
         if now_s < self._due_s:
             return
         self._due_s = now_s + LOOK_S
-        history, base_W = self.simulation.referee.objects[TARGET], base_xy_W(self.simulation)
-        if float(np.linalg.norm(base_W - self._base_W)) > MOVED_M:
-            self._stands_since_s, self._base_W = now_s, base_W
-        if not history.in_the_air:
+        pose = self.simulation.true_pose(ROBOT)
+        if math.dist((pose.x_m, pose.y_m), self._base_W) > MOVED_M:
+            self._stands_since_s, self._base_W = now_s, (pose.x_m, pose.y_m)
+        if not self.simulation.referee.objects[TARGET].in_the_air:
             self.lifted_since_s = None
             return
-        if not self.lifted:
-            self.lifted, self.pick_s = True, round(now_s - self._stands_since_s, 1)
+        self.pick_s = round(now_s - self._stands_since_s, 1) if self.pick_s is None else self.pick_s
         self.lifted_since_s = now_s if self.lifted_since_s is None else self.lifted_since_s
         self.longest_s = max(self.longest_s, now_s - self.lifted_since_s)
+
+    def tick(self, progress: Progress) -> None:
+        for checkpoint in (each for note in progress.notes.values() for each in note.checkpoints.values()):
+            self.spot_W = checkpoint.get("spot_W", self.spot_W)
+
+    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+        grasps = topic == "transitions" and "grasp" in message["node"].rsplit("/", 1)[-1]
+        self.claimed = self.claimed or (grasps and message["to"] == "SUCCESS")
+        return message
 
 
 @dataclass(frozen=True)
 class TimedWorker:
-    """A worker that notes the wall time (s) of each piece of work by its name, also of work that fails."""
+    """Worker that notes the wall time (s) of each piece of work by its name, also of work that fails."""
 
     within: Worker
-    spent_s: dict[str, list[float]] = field(default_factory=dict)
+    spent_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
-    def submit(self, work: Callable[[], ResultT], *, latency_s: float, name: str) -> Job[ResultT]:
-        """As the worker within."""
+    def submit(self, work: Callable[[], Any], *, latency_s: float, name: str) -> Job[Any]:
         return self.within.submit(lambda: self._timed(name, work), latency_s=latency_s, name=name)
 
-    def sense(
-        self, read: Callable[[], ReadT], work: Callable[[ReadT], ResultT], *, latency_s: float, name: str
-    ) -> Job[ResultT]:
-        """As the worker within; reading is not timed."""
-        return self.within.sense(
-            read, lambda given: self._timed(name, lambda: work(given)), latency_s=latency_s, name=name
-        )
+    def sense(self, read: Callable[[], Any], work: Callable[[Any], Any], *, latency_s: float, name: str) -> Job[Any]:
+        def timed(given: Any) -> Any:
+            return self._timed(name, lambda: work(given))
 
-    def _timed(self, name: str, work: Callable[[], ResultT]) -> ResultT:
+        return self.within.sense(read, timed, latency_s=latency_s, name=name)
+
+    def _timed(self, name: str, work: Callable[[], Any]) -> Any:
         begun_s = time.perf_counter()
         try:
             return work()
         finally:
-            self.spent_s.setdefault(name, []).append(round(time.perf_counter() - begun_s, 4))
-
-
-@dataclass
-class LastSpot(RunVisitor):
-    """Keeps where the place skill last lowered something: x and y (m) in the world, None for nowhere."""
-
-    spot_W: tuple[float, float] | None = None
-
-    def tick(self, progress: Progress) -> None:
-        """Keep the spot of a running skill's checkpoint."""
-        for checkpoint in (each for note in progress.notes.values() for each in note.checkpoints.values()):
-            if "spot_W" in checkpoint:
-                x, y = checkpoint["spot_W"]
-                self.spot_W = (x, y)
-
-
-@dataclass(frozen=True)
-class Ran:
-    """A mission that was run: result, log notes by time (s), last spot, seconds that each piece of work took."""
-
-    result: RobotResult
-    notes: Sequence[tuple[float, Mapping[str, Any]]]
-    spot_W: tuple[float, float] | None
-    spent_s: Mapping[str, Sequence[float]]
-
-
-def run_texts(simulation: Simulation, world: World, texts: Sequence[str], seed: int) -> Ran:
-    """Run a mission of commands in their text form, timed and noted."""
-    steps = tuple(Do.from_command(parse_command(text)) for text in texts)
-    mission = Mission(name="trial", world=str(world.folder), robot=ROBOT, steps=steps)
-    tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
-    spot = LastSpot()
-    entry = run_entry(simulation.robots[tree.robot_name], world, tree, start=simulation.starts[tree.robot_name])
-    clock, notes = simulation.clock, list[tuple[float, Mapping[str, Any]]]()
-
-    def note(topic: str, message: Mapping[str, Any]) -> None:
-        if topic == "transitions":
-            notes.append((clock.now(), message))
-
-    with LockStepWorker(clock) as lock_step:
-        worker = TimedWorker(lock_step)
-        result = run(
-            [entry],
-            clock=clock,
-            worker=worker,
-            visitors=[spot, OnMessage(note)],
-            settings=RunSettings(seed=seed, time_limit_s=600.0),
-        ).worst
-    return Ran(result, notes, spot.spot_W, worker.spent_s)
+            self.spent_s[name].append(round(time.perf_counter() - begun_s, 4))
 
 
 def poses(simulation: Simulation) -> dict[str, RigidTransform]:
-    """The true pose of each loose object."""
-    engine = simulation.engine
-    plant = engine.world.plant
-    return {
-        name: plant.EvalBodyPoseInWorld(
-            engine.context, plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(name))[0])
-        )
-        for name in simulation.referee.objects
-    }
-
-
-def base_xy_W(simulation: Simulation) -> FloatArray:
-    """Where the robot's body is (2,)."""
-    (robot,) = simulation.engine.world.robots.values()
-    return np.array(
-        simulation.engine.world.plant.EvalBodyPoseInWorld(simulation.engine.context, robot.body).translation()[:2]
-    )
+    """True pose of each loose object."""
+    plant, context = simulation.engine.world.plant, simulation.engine.context
+    models = {name: plant.GetModelInstanceByName(name) for name in simulation.referee.objects}
+    bodies = {name: plant.get_body(plant.GetBodyIndices(model)[0]) for name, model in models.items()}
+    return {name: plant.EvalBodyPoseInWorld(context, body) for name, body in bodies.items()}
 
 
 def tilt_rad(before: RigidTransform, after: RigidTransform) -> float:
-    """How far a body leans against how it stood."""
+    """Angle by which a body leans against how it stood."""
     up = after.rotation().matrix() @ before.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
     return float(np.arccos(np.clip(up[2], -1.0, 1.0)))
 
 
-def others_of(trial: Trial) -> tuple[str, ...]:
-    """The classes of what stands around: not that of the target, so that its name is clear."""
-    rng = np.random.default_rng([trial.seed, 5])
-    return tuple(str(each) for each in rng.choice([c for c in CLASSES if c != trial.class_name], trial.clutter))
-
-
-def attempt(trial: Trial) -> tuple[dict[str, Any], Picture | None]:
-    """Take, hold, put down; what the plant's truth says of it, and how it ended where it failed, if pictured."""
-    with tempfile.TemporaryDirectory() as folder:
-        world = room(Path(folder), trial.class_name, others_of(trial), trial.surface, trial.seed, trial.model)
-        simulation = simulate(world, {ROBOT: only_robot(ROBOT, world)}, seed=trial.seed, record=False)
-        watch, before = Watch(simulation), poses(simulation)
-        simulation.engine.observe(watch)
-        texts = (
-            f"Take [Nothing] to [{TAKEN}] and do [grasp] to [{trial.class_name}]",
-            "Take [Nothing] to [Nothing] and do [wait] to [12 second]",
-            f"Take [{trial.class_name}] to [{SECOND}] and do [Nothing] to [Nothing]",
-        )
-        ran = run_texts(simulation, world, texts, trial.seed)
-        after, middle_W = poses(simulation), middle(simulation)
-        target = simulation.referee.objects[TARGET]
-        put = target.resting and within(world.surfaces[SECOND], after[TARGET])
-        upright = tilt_rad(before[TARGET], after[TARGET]) < UPRIGHT_RAD
-        claimed, succeeded = has_grasped(ran.notes), ran.result.outcome is Outcome.SUCCESS
-        judged = {
-            "class": trial.class_name,
-            "name": trial.name,
-            "model": str(place_objects(world, trial.seed)[0].form.file),
-            "surface": trial.surface,
-            "clutter": len(before) - 1,
-            "seed": trial.seed,
-            "lifted": watch.lifted,
-            "held_10s": watch.longest_s >= HELD_S,
-            "placed": put,
-            "placed_upright": upright if put else None,
-            "place_error_m": place_error_m(ran.spot_W, middle_W) if put else None,
-            "others_disturbed": sum(disturbed(before[name], after[name]) for name in before if name != TARGET),
-            "claimed": claimed,
-            "false_claim": is_false_claim(claimed, lifted=watch.lifted, held_s=watch.longest_s),
-            "collisions": len(simulation.referee.collisions),
-            "cause": "" if succeeded else f"{ran.result.cause}: {ran.result.message}",
-            "sim_time_s": round(simulation.clock.now(), 1),
-            "pick_s": watch.pick_s,
-            "planning_s": list(ran.spent_s.get(MOTION_WORK, ())),
-            "grasp_planning_s": list(ran.spent_s.get(GRASP_WORK, ())),
-        }
-        pictured = trial.pictured and failure(judged)
-        return judged, ending_picture(simulation, middle_W) if pictured else None
-
-
-def is_false_claim(claimed: bool, *, lifted: bool, held_s: float) -> bool:
-    """Whether "holding" was claimed of what was never lifted, or never of what was held for long.
-
-    What falls as it is lifted, and is not claimed, is reported rightly.
-    """
-    return (claimed and not lifted) or (not claimed and held_s >= HELD_S)
-
-
-def has_grasped(notes: Sequence[tuple[float, Mapping[str, Any]]]) -> bool:
-    """Whether the grasp skill ever succeeded."""
-    return any("grasp" in note["node"].rsplit("/", 1)[-1] and note["to"] == "SUCCESS" for _, note in notes)
-
-
-def middle(simulation: Simulation) -> FloatArray:
-    """The middle (3,) of the target's bounding box in its own frame, where it is in the world now."""
-    engine = simulation.engine
-    world = engine.world
-    plant = world.plant
-    body = plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(TARGET))[0])
-    inspector = simulation_query(simulation).inspector()
-    boxes = [
-        (inspector.GetPoseInFrame(each), found)
-        for each in plant.GetCollisionGeometriesForBody(body)
-        if (found := inspector.GetObbInGeometryFrame(each)) is not None
-    ]
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1)
-    corners_O = np.hstack([X_OG @ box.pose() @ (signs * box.half_width()[:, None]) for X_OG, box in boxes])
-    p_O = (corners_O.min(axis=1) + corners_O.max(axis=1)) / 2.0
-    return np.asarray(plant.EvalBodyPoseInWorld(engine.context, body) @ p_O)
-
-
-def simulation_query(simulation: Simulation) -> QueryObject:
-    """The scene as it is now."""
-    engine = simulation.engine
-    scene = engine.world.scene
-    assert scene is not None
-    return scene.query_at(engine.world.plant.GetPositions(engine.context))
-
-
-def place_error_m(spot_W: Sequence[float] | None, p_W: FloatArray) -> float | None:
-    """How far (m) along the surface something is from the spot it was lowered on; None where it never was."""
-    return None if spot_W is None else round(float(np.linalg.norm(np.asarray(spot_W) - p_W[:2])), 4)
-
-
-def ending_picture(simulation: Simulation, p_W: FloatArray) -> Picture:
-    """What is about a point now, from a side where nothing hides it."""
-    query = simulation_query(simulation)
-    return render_view(query, best_view(query, p_W), (800, 600))
+def disturbed(before: RigidTransform, after: RigidTransform) -> bool:
+    """True if something else was pushed well away or knocked over."""
+    moved = float(np.linalg.norm(after.translation() - before.translation()))
+    return moved > DISTURBED_M or tilt_rad(before, after) > DISTURBED_RAD
 
 
 def within(surface: SurfaceTop, X_WO: RigidTransform) -> bool:
-    """Whether an object lies on a surface."""
+    """True if an object lies on a surface."""
     x, y, z = X_WO.translation()
     corners = np.array(surface.polygon_W)
     inside = np.all(corners.min(axis=0) <= [x, y]) and np.all([x, y] <= corners.max(axis=0))
     return bool(inside and surface.height_m - 0.02 < z < surface.height_m + 0.4)
 
 
-def disturbed(before: RigidTransform, after: RigidTransform) -> bool:
-    """Whether something else was pushed well away or knocked over."""
-    moved = float(np.linalg.norm(after.translation() - before.translation()))
-    return moved > DISTURBED_M or tilt_rad(before, after) > DISTURBED_RAD
+def middle_W(simulation: Simulation, X_WO: RigidTransform) -> FloatArray:
+    """Middle (3,) of the target's bounding box in its own frame, in the world."""
+    plant = simulation.engine.world.plant
+    body = plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(TARGET))[0])
+    inspector = query_of(simulation).inspector()
+    geometries = plant.GetCollisionGeometriesForBody(body)
+    boxes = [(inspector.GetPoseInFrame(each), inspector.GetObbInGeometryFrame(each)) for each in geometries]
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1)
+    corners = [X_OG @ box.pose() @ (signs * box.half_width()[:, None]) for X_OG, box in boxes if box is not None]
+    corners_O = np.hstack(corners)
+    return np.asarray(X_WO @ ((corners_O.min(axis=1) + corners_O.max(axis=1)) / 2.0))
 
 
-def trials(options: argparse.Namespace) -> Iterator[Trial]:
-    """`--trials` of each class, over the surfaces in turn; the seed chooses the clutter."""
-    low, _, high = options.clutter.partition("-")
-    targets = [(name, None) for name in options.classes.split(",")] if options.models is None else own(options.models)
-    surfaces, pictured = options.surfaces.split(","), options.sheet is not None
-    for class_name, model in targets:
-        for number in range(options.trials):
-            seed = options.seed + number
-            clutter = int(np.random.default_rng([seed, 3]).integers(int(low), int(high or low) + 1))
-            yield Trial(class_name, surfaces[number % len(surfaces)], clutter, seed, model, pictured)
+def query_of(simulation: Simulation) -> Any:
+    """Scene as it is now."""
+    engine = simulation.engine
+    return engine.world.scene.query_at(engine.world.plant.GetPositions(engine.context))
 
 
-def shape_trials(options: argparse.Namespace, folder: Path) -> Iterator[Trial]:
-    """`--trials` of each shape, one by each seed, over the surfaces in turn; they are written to a folder."""
-    surfaces, pictured = options.surfaces.split(","), options.sheet is not None
-    for index in range(options.shapes):
-        seed = options.seed + index
-        model = written_shape(seed, folder)
-        for number in range(options.trials):
-            yield Trial(
-                ANY_OBJECT, surfaces[(index + number) % len(surfaces)], 0, seed + 1000 * number, model, pictured
-            )
+def place_error_m(spot_W: Sequence[float] | None, p_W: FloatArray) -> float | None:
+    """Distance (m) along the surface from the spot that something was lowered on; None where it never was."""
+    return None if spot_W is None else round(float(np.linalg.norm(np.asarray(spot_W) - p_W[:2])), 4)
 
 
-def own(folder: Path) -> list[tuple[str, Path | None]]:
+def is_false_claim(claimed: bool, *, lifted: bool, held_s: float) -> bool:
+    """True if "holding" was claimed of what was never lifted, or never of what was held for long.
+
+    What falls as it is lifted, and is not claimed, is reported rightly.
+    """
+    return (claimed and not lifted) or (not claimed and held_s >= HELD_S)
+
+
+def cases(
+    classes: tuple[str, ...] = CLASSES,
+    models: Path | None = None,
+    shapes: int = 0,
+    surfaces: tuple[str, ...] = SURFACES,
+    trials: int = 3,
+    clutter: str = "0-4",
+    seed: int = 1,
+) -> Iterator[tuple[str, str, int, int, str]]:
+    """Class, surface, number of others, seed, and the folder of a model or the number of a shape.
+
+    `trials` of each class over the surfaces in turn; the seed chooses the clutter.
+    """
+    for index in range(shapes):
+        for number in range(trials):
+            surface = surfaces[(index + number) % len(surfaces)]
+            yield ANY_OBJECT, surface, 0, seed + index + 1000 * number, f"shape {seed + index}"
+    low, _, high = clutter.partition("-")
+    targets = [(name, "") for name in classes] if models is None else own(models)
+    for class_name, model in targets if not shapes else ():
+        for number in range(trials):
+            others = int(np.random.default_rng([seed + number, 3]).integers(int(low), int(high or low) + 1))
+            yield class_name, surfaces[number % len(surfaces)], others, seed + number, model
+
+
+def own(folder: Path) -> list[tuple[str, str]]:
     """Class and folder of each imported object in a folder, or of the one that it is. Raises SystemExit."""
-    folders = (
-        [folder] if (folder / FACTS_FILE).exists() else sorted(path.parent for path in folder.glob(f"*/{FACTS_FILE}"))
-    )
+    folders = sorted(path.parent for path in folder.glob(f"*/{FACTS_FILE}"))
+    folders = [folder] if (folder / FACTS_FILE).exists() else folders
     try:
-        found = [(read_imported(each).class_name, each.resolve()) for each in folders]
+        found = [(read_imported(each).class_name, str(each.resolve())) for each in folders]
     except InputError as error:
         raise SystemExit(str(error)) from error
     if not found:
@@ -388,125 +268,114 @@ def own(folder: Path) -> list[tuple[str, Path | None]]:
     for class_name, each in found:
         if class_name not in CLASSES:
             raise SystemExit(f"{each}: no detector knows it; import it with --class, one of {', '.join(CLASSES)}")
-    return list(found)
+    return found
 
 
-def failure(run: Mapping[str, Any]) -> str:
-    """Why a trial failed: the mission's cause, else what the truth denies; empty for a good one."""
-    return str(run["cause"]) or next((words for key, words in OUTCOMES.items() if not run[key]), "")
+def run_case(class_name: str, surface: str, clutter: int, seed: int, source: str, folder: Path) -> Trial:
+    """Takes, holds and puts down; judges by the plant's truth."""
+    others = np.random.default_rng([seed, 5]).choice([each for each in CLASSES if each != class_name], clutter)
+    shape = source.startswith("shape ")
+    model = written_shape(int(source.split()[1]), folder) if shape else Path(source) if source else None
+    world = room(folder / "room", class_name, [str(each) for each in others], surface, seed, model)
+    simulation = simulate(world, {ROBOT: only_robot(ROBOT, world)}, seed=seed, record=False)
+    watch, before = Watch(simulation), poses(simulation)
+    simulation.engine.observe(watch)
+    commands = (
+        f"Take [Nothing] to [{TAKEN}] and do [grasp] to [{class_name}]",
+        "Take [Nothing] to [Nothing] and do [wait] to [12 second]",
+        f"Take [{class_name}] to [{SECOND}] and do [Nothing] to [Nothing]",
+    )
+    steps = steps_of_commands([parse_command(each) for each in commands])
+    mission = Mission(name="trial", world=str(world.folder), robot=ROBOT, steps=steps)
+    tree = compile_mission(mission, knowledge=knowledge_of(world), registry=built_in_skills())
+    entry = run_entry(simulation.robots[ROBOT], world, tree, start=simulation.starts[ROBOT])
+    with LockStepWorker(simulation.clock) as lock_step:
+        worker, settings = TimedWorker(lock_step), RunSettings(seed=seed, time_limit_s=600.0)
+        clock = simulation.clock
+        result = run([entry], clock=clock, worker=worker, visitors=[watch], settings=settings).worst
+    after, target = poses(simulation), simulation.referee.objects[TARGET]
+    p_W, lifted = middle_W(simulation, after[TARGET]), watch.pick_s is not None
+    placed = target.resting and within(world.surfaces[SECOND], after[TARGET])
+    trial = Trial(
+        name=class_name if model is None else model.name,
+        model=str(place_objects(world, seed)[0].form.file),
+        surface=surface,
+        clutter=len(before) - 1,
+        seed=seed,
+        lifted=lifted,
+        held_10s=watch.longest_s >= HELD_S,
+        placed=placed,
+        placed_upright=tilt_rad(before[TARGET], after[TARGET]) < UPRIGHT_RAD if placed else None,
+        place_error_m=place_error_m(watch.spot_W, p_W) if placed else None,
+        others_disturbed=sum(disturbed(before[name], after[name]) for name in before if name != TARGET),
+        false_claim=is_false_claim(watch.claimed, lifted=lifted, held_s=watch.longest_s),
+        collisions=len(simulation.referee.collisions),
+        cause="" if result.outcome is Outcome.SUCCESS else f"{result.cause}: {result.message}",
+        sim_time_s=round(simulation.clock.now(), 1),
+        pick_s=watch.pick_s,
+        planning_s=tuple(worker.spent_s[MOTION_WORK]),
+        grasp_planning_s=tuple(worker.spent_s[GRASP_WORK]),
+    )
+    if not trial.failure:
+        return trial
+    query = query_of(simulation)
+    save_png(folder / "ending.png", render_view(query, best_view(query, p_W), (800, 600)))
+    return replace(trial, ending=folder / "ending.png")
 
 
-def failures(runs: Sequence[Mapping[str, Any]]) -> list[str]:
+def failures(trials: Sequence[Trial]) -> list[str]:
     """A line for each class and cause with its number of failures, the commonest first."""
-    counted = Counter((str(run["name"]), failure(run)) for run in runs if failure(run))
+    counted = Counter((each.name, each.failure) for each in trials if each.failure)
     return [f"{number:4}  {name:14} {cause}" for (name, cause), number in counted.most_common()]
 
 
-def caption(run: Mapping[str, Any]) -> str:
-    """A trial in a few words below its picture."""
-    return f"{run['name']} {run['surface']} {run['seed']}: {failure(run)}"[:55]
-
-
-def write_sheet(path: Path, shown: Sequence[tuple[Mapping[str, Any], Picture]]) -> str:
-    """Write a sheet of failed trials; what was written, in a line. Raises OSError when it cannot be."""
+def write_sheet(path: Path, trials: Sequence[Trial]) -> str:
+    """Writes a sheet of failed trials; returns a line about it. Raises OSError when it cannot be written."""
+    shown = []
+    for each in (each for each in trials if each.ending is not None):
+        picture = cv2.cvtColor(cv2.imread(str(each.ending)), cv2.COLOR_BGR2RGB)
+        caption = f"{each.name} {each.surface} {each.seed}: {each.failure}"[:55]
+        shown.append(Shown(caption, picture, Judged((), (), ())))
     if not shown:
         return f"no trial failed: {path} is not written"
-    save_png(path, contact_sheet([Shown(caption(each), picture, Judged((), (), ())) for each, picture in shown]))
+    save_png(path, contact_sheet(shown))
     return f"{path}: {len(shown)} failed trials"
 
 
-def attempts(
-    attempt: Callable[[JobT], ResultT], jobs: Sequence[JobT], processes: int, line: Callable[[ResultT], str]
-) -> Iterator[ResultT]:
-    """The results of jobs in processes of their own, each shown in a line with the time left."""
-    begun_s = time.monotonic()
-    with multiprocessing.get_context("spawn").Pool(processes) as pool:
-        for done, each in enumerate(pool.imap_unordered(attempt, jobs), start=1):
-            left_s = (time.monotonic() - begun_s) / done * (len(jobs) - done)
-            print(f"{line(each)}  [{done} of {len(jobs)}, {left_s:.0f} s left]", file=sys.stderr, flush=True)
-            yield each
+def summary(trials: Sequence[Trial], sheet: Path | None = None) -> dict[str, object]:
+    """Rates over all trials; tells the failures, and writes a sheet of them."""
+    for line in [*failures(trials), *([] if sheet is None else [write_sheet(sheet, trials)])]:
+        tell(line)
 
+    def held_by(key: str) -> dict[str, float | None]:
+        groups = sorted({getattr(each, key) for each in trials})
+        return {name: share([e.held_10s for e in trials if getattr(e, key) == name]) for name in groups}
 
-def trial_line(run: dict[str, Any]) -> str:
-    """One line of a trial."""
-    marks = " ".join(
-        name if run[name] else "-" * len(name) for name in ("lifted", "held_10s", "placed", "placed_upright")
-    )
-    return (
-        f"{run['name']:12} {run['surface']:6} clutter {run['clutter']} seed {run['seed']:3} {marks} "
-        f"others {run['others_disturbed']} bumps {run['collisions']} {run['sim_time_s']:5.0f} s  {run['cause']}"
-    )
-
-
-def summary(runs: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Rates over all trials."""
-    put = [run["placed_upright"] for run in runs if run["placed_upright"] is not None]
-    timed = [run["pick_s"] for run in runs if not math.isnan(run["pick_s"])]
-    off = [run["place_error_m"] for run in runs if run["place_error_m"] is not None]
-
-    def rate(key: str, chosen: Sequence[dict[str, Any]]) -> float:
-        return round(float(np.mean([run[key] for run in chosen])), 3) if chosen else math.nan
-
+    planning_s = [spent_s for each in trials for spent_s in each.planning_s]
+    grasp_planning_s = [spent_s for each in trials for spent_s in each.grasp_planning_s]
     return {
-        "lifted_rate": rate("lifted", runs),
-        "held_rate": rate("held_10s", runs),
-        "placed_rate": rate("placed", runs),
-        "upright_rate": round(float(np.mean(put)), 3) if put else math.nan,
-        "placed_near_upright_rate": round(float(np.mean([near_upright(run) for run in runs])), 3),
-        "place_error_m_median": round(float(np.median(off or [math.nan])), 4),
-        "planning_s": spread([spent_s for run in runs for spent_s in run["planning_s"]]),
-        "grasp_planning_s": spread([spent_s for run in runs for spent_s in run["grasp_planning_s"]]),
-        "disturbed_rate": round(float(np.mean([run["others_disturbed"] > 0 for run in runs])), 3),
-        "false_claims": sum(run["false_claim"] for run in runs),
-        "by_class": {c: rate("held_10s", [r for r in runs if r["name"] == c]) for c in {r["name"] for r in runs}},
-        "by_surface": {
-            s: rate("held_10s", [r for r in runs if r["surface"] == s]) for s in {r["surface"] for r in runs}
-        },
-        "causes": dict(Counter(run["cause"] for run in runs if run["cause"]).most_common()),
-        "pick_s_median": float(np.median(timed or [math.nan])),
+        "runs": trials,
+        "lifted_rate": share([each.lifted for each in trials]),
+        "held_rate": share([each.held_10s for each in trials]),
+        "placed_rate": share([each.placed for each in trials]),
+        "upright_rate": share([each.placed_upright for each in trials if each.placed_upright is not None]),
+        "placed_near_upright_rate": share([each.near_upright for each in trials]),
+        "place_error_m_median": quantile([e.place_error_m for e in trials if e.place_error_m is not None], digits=4),
+        "planning_s": spread(planning_s),
+        "grasp_planning_s": spread(grasp_planning_s),
+        "disturbed_rate": share([each.others_disturbed > 0 for each in trials]),
+        "false_claims": sum(each.false_claim for each in trials),
+        "by_class": held_by("name"),
+        "by_surface": held_by("surface"),
+        "causes": dict(Counter(each.cause for each in trials if each.cause).most_common()),
+        "pick_s_median": quantile([each.pick_s for each in trials if each.pick_s is not None]),
     }
 
 
-def spread(values: Sequence[float]) -> dict[str, float]:
-    """Their median and 95th percentile, nan without any."""
-    median, p95 = np.percentile(values or [math.nan], [50, 95])
-    return {"median": round(float(median), 3), "p95": round(float(p95), 3)}
-
-
-def near_upright(run: Mapping[str, Any]) -> bool:
-    """Whether it stands upright within 5 cm of the spot."""
-    error_m = run["place_error_m"]
-    return bool(run["placed_upright"] and error_m is not None and error_m <= NEAR_SPOT_M)
-
-
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--classes", default=",".join(CLASSES))
-    own_objects = parser.add_mutually_exclusive_group()
-    own_objects.add_argument("--models", type=Path, help="objects of your own, in the place of the classes")
-    own_objects.add_argument("--shapes", type=int, help="so many random shapes, in the place of the classes")
-    parser.add_argument("--surfaces", default=",".join(SURFACES))
-    parser.add_argument("--trials", type=int, default=3, help="of each class")
-    parser.add_argument("--clutter", help="how many others stand around, as LOW-HIGH (0-4)")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--sheet", type=Path, help="a PNG file with a picture of how each failed trial ended")
-    parser.add_argument("--json", action="store_true", help="one line of JSON at the end, and nothing else")
-    options = parser.parse_args()
-    if options.shapes is not None and (options.shapes < 1 or options.clutter not in (None, "0")):
-        parser.error("--shapes takes at least one, as any object, alone on its surface: leave --clutter out")
-    options.clutter = options.clutter or "0-4"
-    with tempfile.TemporaryDirectory() as folder:
-        chosen = list(trials(options) if options.shapes is None else shape_trials(options, Path(folder)))
-        ended = list(attempts(attempt, chosen, options.jobs, lambda each: trial_line(each[0])))
-    runs, shown = [run for run, _ in ended], [(run, picture) for run, picture in ended if picture is not None]
-    for line in failures(runs):
-        print(line, file=sys.stderr)
-    if options.sheet is not None:
-        print(write_sheet(options.sheet, shown), file=sys.stderr)
-    print(json.dumps({"runs": runs, **summary(runs)}, indent=None if options.json else 1))
+def spread(values: Sequence[float]) -> dict[str, float | None]:
+    """Median and 95th percentile."""
+    return {"median": quantile(values, digits=3), "p95": quantile(values, 0.95, 3)}
 
 
 if __name__ == "__main__":
-    main()
+    benchmark(cases, run_case, summary)

@@ -16,13 +16,14 @@ from plant.models.catalogue import read_imported
 from plant.worlds.seeding import place_objects
 from plant.worlds.world import World, WorldError, load_world
 
+CLASSES: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 SURFACES: Final = ("table", "shelf", "floor")
+ROBOT, TARGET, LOOK_S = "Alice", "target", 0.1
 TAKEN, SECOND, PERSON = "bench", "side table", "Robin"
 _BACK_Y, _SECOND_X = 4.35, 0.13
 _WIDTH_M, _BOARD_M, _BOARDS, _SHELF_DEPTH_M, _SHELF_M = 1.2, 0.025, 3, 0.36, 1.285
 _SECOND_M: Final = (1.0, 0.7, 0.72)  # width, depth, height
 _PERSON_RANGES: Final = {"distance_m": [1.4, 1.6], "bearing_rad": [-1.9, -1.2], "turned_rad": [-0.2, 0.2]}
-_THINGS: Final = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
 
 
 def room(
@@ -88,7 +89,7 @@ def room(
                                  [_SECOND_X, second[2]]],
                      "viewpoints": [{"x": second[0] + 0.92, "y": 1.6, "yaw": 3.1416}]},
         },
-        "things": {name: {"aliases": [], "categories": [], "usual": [TAKEN]} for name in _THINGS},
+        "things": {name: {"aliases": [], "categories": [], "usual": [TAKEN]} for name in CLASSES},
         "people": {PERSON: {"aliases": [], "at": "room"}} if person else {},
     }  # fmt: skip
     (folder / "knowledge.yaml").write_text(yaml.safe_dump(knowledge, sort_keys=False), encoding="utf-8")

@@ -3,36 +3,31 @@
     python -m tests.benchmarks.mission_speed [--repeat 3] [--seed 1] [--world flat]
 
 Each round measures all three on the same machine one after the other, so that their ratios hold on a busy one, too.
-`errand run --profile` tells where the time goes.
+Prints JSON. `errand run --profile` tells where the time goes.
 """
 
-import argparse
-import json
-import statistics
-import subprocess
-import sys
 import tempfile
 import time
 
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
+from tests.benchmarks.errand_process import report_of, run_errand
+from tests.benchmarks.harness import command, quantile, tell
 
 SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 DRIVING_S, TICK_S = 30.0, 0.05
 
 
-def mission_factor(world, seed, *options):
+def mission_factor(world: str, seed: int, *options: str) -> float:
     """Simulated seconds in a second of wall time of `errand run`."""
     with tempfile.TemporaryDirectory() as out:
-        common = ["--say", SENTENCE, "--world", world, "--seed", str(seed), "--quiet", "--json", "--out", out]
-        command = [sys.executable, "-m", "executive.cli.entry", "run", *common, *options]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-    report = json.loads(done.stdout.splitlines()[-1])
+        common = ["--world", world, "--seed", seed, "--quiet", "--json", "--out", out]
+        report = report_of(run_errand("run", "--say", SENTENCE, *common, *options).stdout)
     assert report["outcome"] == "success", report["message"]
     return report["real_time_factor"]
 
 
-def plant_factor(world, seed):
+def plant_factor(world: str, seed: int) -> float:
     """The same of the plant while the robot drives in a small circle and nothing else is done, pictures included."""
     simulation = Simulation(load_world(world), seed=seed)
     clock, robot = simulation.clock, simulation.robots["Alice"]
@@ -45,22 +40,16 @@ def plant_factor(world, seed):
     return DRIVING_S / (time.perf_counter() - begin)
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--repeat", type=int, default=3)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--world", default="flat")
-    options = parser.parse_args()
-    rounds = []
-    for number in range(options.repeat):
-        stack = mission_factor(options.world, options.seed, "--no-record")
-        shown = mission_factor(options.world, options.seed, "--view", "--view-for", "0")
-        plant = plant_factor(options.world, options.seed)
-        rounds.append((stack, shown, plant, stack / plant))
-        print(f"round {number + 1}: mission {stack:.2f}, recorded and shown {shown:.2f}, plant alone {plant:.2f}")
-    stack, shown, plant, ratio = (statistics.median(column) for column in zip(*rounds, strict=True))
-    print(f"median: mission {stack:.2f}, recorded and shown {shown:.2f}, plant alone {plant:.2f}, ratio {ratio:.2f}")
+def measure(repeat: int = 3, seed: int = 1, world: str = "flat") -> dict[str, object]:
+    """Medians of the rounds."""
+    rounds: list[dict[str, float]] = []
+    for _ in range(repeat):
+        mission, plant = mission_factor(world, seed, "--no-record"), plant_factor(world, seed)
+        shown = mission_factor(world, seed, "--view", "--view-for", "0")
+        rounds.append({"mission": mission, "recorded_and_shown": shown, "plant": plant, "ratio": mission / plant})
+        tell(rounds[-1])
+    return {name: quantile([each[name] for each in rounds]) for name in rounds[0]}
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

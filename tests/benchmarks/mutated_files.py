@@ -5,11 +5,7 @@
 Tells for each kind how many were refused and how many were read, how much memory came on top, and what was wrong.
 """
 
-from __future__ import annotations
-
-import argparse
 import shutil
-import sys
 import tempfile
 import time
 import traceback
@@ -37,51 +33,15 @@ from plant.models.catalogue import read_imported
 from plant.worlds.world import WORLDS_FOLDER, load_world
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
+from tests.benchmarks.errand_process import ROOT
+from tests.benchmarks.harness import command
 from tests.executive.mission.mutations import mutated_files, some_bytes
 from tests.hostile_values import FILES
+from tests.plant.models.builder.importing.mesh_forms import collada
 
-ROOT = Path(__file__).parents[2]
 MOST_S, MOST_MB = 3.0, 300.0
 FLAT = WORLDS_FOLDER / "flat"
 CAMERAS = ("hand", "frontleft", "frontright", "left", "right", "back")
-MODEL = """<sdf version="1.9"><model name="walls"><link name="walls">
-<visual name="v"><geometry><mesh><uri>walls.obj</uri></mesh></geometry></visual>
-</link></model></sdf>
-"""
-DIRECTIVES = """directives:
-- add_model: {name: walls, file: package://world/walls.sdf}
-- add_weld: {parent: world, child: "walls::walls", X_PC: {translation: [0, 0, 0], rotation: !Rpy {deg: [0, 0, 9]}}}
-"""
-IMPORTED = """name: tool
-class: hammer
-mass_kg: 0.5
-size_m: [0.1, 0.2, 0.03]
-com_m: [0, 0, 0]
-inertia_kg_m2: [0.1, 0.1, 0.1, 0, 0, 0]
-collision_parts: 1
-triangles: 12
-round: false
-"""
-EVALUATION = """missions: [go_living_room.yaml]
-worlds: [flat, shop]
-seeds: 1-3
-time_limit: 10 min
-variations:
-  light: [dim]
-  clutter: [0, 2]
-  faults: [none, {name: blind, faults: ["camera.hand: dropout 5 s at 20 s"]}]
-"""
-MAP = "image: m.pgm\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
-MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
-CORNERS = "0 0 0 1 0 0 0 1 0 0 0 1"
-COLLADA = f"""<COLLADA><asset><unit meter="0.01"/><up_axis>Z_UP</up_axis></asset>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="a" count="12">{CORNERS}</float_array></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 1 2 3 2 0 3</p></triangles>
-</mesh></geometry></library_geometries><library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/>
-</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>
-"""
 
 
 @dataclass(frozen=True)
@@ -98,7 +58,7 @@ class Kind:
 
 
 def missions() -> Callable[[Path], None]:
-    """What loads and compiles a mission; the world, the skills and the parser are loaded once."""
+    """Reader that loads and compiles a mission; the world, the skills and the parser are loaded once."""
     flat, skills, parser = load_knowledge(FLAT / "knowledge.yaml"), installed_skills(), load_parser()
 
     def compile_path(path: Path) -> None:
@@ -111,20 +71,16 @@ def missions() -> Callable[[Path], None]:
     return compile_path
 
 
-def scenarios() -> Callable[[Path], None]:
-    """What reads a scenario of the flat."""
+def scenarios() -> Callable[[Path], object]:
+    """Reader of a scenario of the flat."""
     knowledge, rules = load_knowledge(FLAT / "knowledge.yaml"), load_world("flat").seed_rules
     objects = {rule.name: rule.model for rule in rules.objects}
     people = {rule.name: rule.route is not None for rule in rules.people}
-
-    def read(path: Path) -> None:
-        read_scenario(path, knowledge, cameras=CAMERAS, objects=objects, people=people)
-
-    return read
+    return lambda path: read_scenario(path, knowledge, cameras=CAMERAS, objects=objects, people=people)
 
 
 def read_body(path: Path) -> None:
-    """Read a mesh file as far as its solid. Raises InputError, which names the file."""
+    """Reads a mesh file as far as its solid. Raises InputError, which names the file."""
     try:
         solid_of(np.concatenate([patch.triangles for patch in read_mesh(path).patches]))
     except ObjectImportError as error:
@@ -137,7 +93,7 @@ def contents(*files: Path) -> dict[str, bytes]:
 
 
 def pictures() -> dict[str, bytes]:
-    """A small map in two forms."""
+    """A small map in three forms."""
     grey = np.full((12, 16), 254, np.uint8)
     grey[0] = 0
     pgm, png = (cv2.imencode(ending, grey)[1].tobytes() for ending in (".pgm", ".png"))
@@ -146,70 +102,57 @@ def pictures() -> dict[str, bytes]:
 
 def kinds(folder: Path) -> dict[str, Kind]:
     """All kinds; the files that go with a changed one are put into the folder."""
-    home = folder / "home"
-    home.mkdir()
-    for name in ("knowledge.yaml", "objects.yaml"):
-        shutil.copy(FLAT / name, home)
-    (home / "world.dmd.yaml").write_text(DIRECTIVES)
-    (home / "walls.sdf").write_text(MODEL)
-    (home / "walls.obj").write_text(MESH)
-    for name, content in {"m.pgm": pictures()["pgm"], "m.yaml": MAP.encode(), "tool.sdf": MODEL.encode()}.items():
-        (folder / name).write_bytes(content)
+    shutil.copytree(Path(__file__).with_name("good_files"), folder, dirs_exist_ok=True)
     good = [*sorted((ROOT / "missions").glob("*.yaml")), ROOT / "tests/executive/mission/every_block.yaml"]
     for each in good:
         shutil.copy(each, folder)
-
-    def beside(path: Path) -> Path:
-        return folder / path.name
-
-    skills = installed_skills()
+    home, skills = folder / "home", installed_skills()
+    for each in (FLAT / "knowledge.yaml", FLAT / "objects.yaml"):
+        shutil.copy(each, home)
+    (folder / "m.pgm").write_bytes(pictures()["pgm"])
+    knowledge, stacks = contents(FLAT / "knowledge.yaml"), contents(*sorted((ROOT / "skills").glob("*_stack.yaml")))
+    suites, walls = contents(*(ROOT / "tests/skills").rglob("*.skilltest.yaml")), contents(home / "walls.obj")
 
     def world(_: Path) -> object:
         return load_world(home)
 
+    def tests(path: Path) -> object:
+        return load_skill_tests(path, skills)
+
     return {
         "mission": Kind(contents(*good), "mission.yaml", missions()),
-        "knowledge": Kind(contents(FLAT / "knowledge.yaml"), "knowledge.yaml", load_knowledge),
-        "world": Kind(contents(FLAT / "knowledge.yaml"), "home/knowledge.yaml", world),
+        "knowledge": Kind(knowledge, "knowledge.yaml", load_knowledge),
+        "world": Kind(knowledge, "home/knowledge.yaml", world),
         "objects": Kind(contents(FLAT / "objects.yaml"), "home/objects.yaml", world),
-        "directives": Kind({"d": DIRECTIVES.encode()}, "home/world.dmd.yaml", world),
-        "model": Kind({"m": MODEL.encode()}, "home/walls.sdf", world, raw=True),
-        "map": Kind({"m": MAP.encode()}, "map.yaml", load_grid_map),
+        "directives": Kind(contents(home / "world.dmd.yaml"), "home/world.dmd.yaml", world),
+        "model": Kind(contents(home / "walls.sdf"), "home/walls.sdf", world, raw=True),
+        "map": Kind(contents(folder / "m.yaml"), "map.yaml", load_grid_map),
         "picture": Kind(pictures(), "m.pgm", lambda _: load_grid_map(folder / "m.yaml"), raw=True),
-        "stack": Kind(contents(*sorted((ROOT / "skills").glob("*_stack.yaml"))), "stack.yaml", load_stack),
+        "stack": Kind(stacks, "stack.yaml", load_stack),
         "scenario": Kind(contents(*(ROOT / "missions/scenarios").glob("*.yaml")), "scenario.yaml", scenarios()),
-        "evaluation": Kind(
-            {"e": EVALUATION.encode()},
-            "evaluation.yaml",
-            lambda path: load_evaluation(path),
-        ),
-        "skill test": Kind(
-            contents(*(ROOT / "tests/skills").rglob("*.skilltest.yaml")),
-            "test.yaml",
-            lambda path: load_skill_tests(path, skills),
-        ),
-        "object": Kind({"o": IMPORTED.encode()}, "object.yaml", lambda path: read_imported(path.parent)),
-        "obj": Kind({"m": MESH.encode()}, "m.obj", read_body, raw=True),
-        "dae": Kind({"m": COLLADA.encode()}, "m.dae", read_body, raw=True),
+        "evaluation": Kind(contents(folder / "evaluation.yaml"), "evaluation.yaml", load_evaluation),
+        "skill test": Kind(suites, "test.yaml", tests),
+        "object": Kind(contents(folder / "object.yaml"), "object.yaml", lambda path: read_imported(path.parent)),
+        "obj": Kind(walls, "m.obj", read_body, raw=True),
+        "dae": Kind({"m": collada().encode()}, "m.dae", read_body, raw=True),
     }
 
 
 def changed(kind: Kind, count: int, seed: int, folder: Path) -> Sequence[tuple[str, bytes]]:
     """So many changed files of a kind; every tenth is none of that kind at all."""
-    good = [folder / f"good-{number}" for number in range(len(kind.good))]
-    for file, content in zip(good, kind.good.values(), strict=True):
-        file.write_bytes(content)
-    rng = np.random.default_rng(seed)
     hostile = [(f"hostile-{number}", FILES[(seed + number) % len(FILES)]) for number in range(-(-count // 10))]
-    if not kind.raw:
-        return [*hostile, *mutated_files(good, count - len(hostile), seed)]
-    texts = list(kind.good.values())
-    drawn = (texts[int(rng.integers(len(texts)))] for _ in range(count - len(hostile)))
-    return [*hostile, *((f"bytes-{number}", some_bytes(text, rng)) for number, text in enumerate(drawn))]
+    texts, left = list(kind.good.values()), count - len(hostile)
+    if kind.raw:
+        rng = np.random.default_rng(seed)
+        drawn = [texts[int(rng.integers(len(texts)))] for _ in range(left)]
+        return [*hostile, *((f"bytes-{number}", some_bytes(text, rng)) for number, text in enumerate(drawn))]
+    for number, content in enumerate(texts):
+        (folder / f"good-{number}").write_bytes(content)
+    return [*hostile, *mutated_files([folder / f"good-{number}" for number in range(len(texts))], left, seed)]
 
 
 def fault(path: Path, read: Callable[[Path], object], most_s: float = MOST_S) -> tuple[str, str]:
-    """How a file ends ("read", "refused"), and what is wrong with that."""
+    """End of a file ("read", "refused", "traceback"), and what is wrong with that."""
     begun = time.process_time()
     try:
         read(path)
@@ -235,7 +178,7 @@ def _told_badly(error: InputError) -> str:
 
 
 def benchmark(files: int, seed: int, chosen: Sequence[str], tell: Callable[[str], None], most_s: float = MOST_S) -> int:
-    """Try so many; the number of those with something wrong."""
+    """Tries so many; returns the number of those with something wrong."""
     bad, begun = 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -273,15 +216,10 @@ def _memory_mb() -> float:
     return int(pages.read_text().split()[1]) * 4096 / 1e6 if pages.exists() else 0.0
 
 
-def main() -> int:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--files", type=int, default=5000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--kinds", type=lambda text: text.split(","), default=[])
-    options = parser.parse_args()
-    return int(benchmark(options.files, options.seed, options.kinds, lambda text: print(text, flush=True)) > 0)
+def measure(files: int = 5000, seed: int = 1, kinds: tuple[str, ...] = ()) -> int:
+    """Tries files of some kinds, or of all; returns 1 when something is wrong."""
+    return int(benchmark(files, seed, kinds, lambda text: print(text, flush=True)) > 0)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command(measure)

@@ -1,22 +1,19 @@
-"""How often the robot finds an own object by its model, and how often it takes another object for it.
+"""How often the robot finds an own object by its model, and how often it takes another object for it; prints JSON.
 
-Run it by hand: `python -m tests.benchmarks.own_objects --half 0 --scenes 5 --seed 1`. Ten objects are imported, as
-`errand object import` does it. In each scene one of them lies on a surface of the flat among four others: two that are
-imported, too, and two that are not. The robot is asked for the one, and for one that is absent. An arm that moves as it
-is told carries a camera that renders the flat with the plant's noise. Half of the objects are generated here, the
-others are models of Debian's package `sweethome3d-furniture`; `--half` names which half of both is used. Prints JSON.
+    python -m tests.benchmarks.own_objects [--half 0] [--scenes 5] [--seed 1] [--photographs]
+
+Ten objects are imported, as `errand object import` does it. In each scene one of them lies on a surface of the flat
+among four others: two that are imported, too, and two that are not. The robot is asked for the one, and for one that is
+absent. An arm that moves as it is told carries a camera that renders the flat with the plant's noise. Half of the
+objects are generated here, the others are models of Debian's package `sweethome3d-furniture`; `--half` names which half
+of both is used. With `--photographs` the robot knows the objects by photographs, not by meshes.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
-import sys
 import tempfile
 import time
 import zipfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -24,7 +21,7 @@ from unittest import mock
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+import trimesh
 from pydrake.geometry import (
     FramePoseVector,
     GeometryFrame,
@@ -37,11 +34,9 @@ from pydrake.geometry import (
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
+from trimesh import creation
 
 from errand_train.dataset.views import View
-from executive.app.worlds import knowledge_of, open_world
-from executive.testing.bench import SkillBench
-from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.models.builder.importing import (
     ImportOptions,
     ImportReports,
@@ -50,10 +45,8 @@ from plant.models.builder.importing import (
     import_photographs,
 )
 from plant.models.builder.importing.solid import Solid
-from plant.rendering import RENDERER, lights, render_parameters
+from plant.rendering import lights
 from plant.scene_pictures import look_at, render_view
-from plant.sensors.camera_spec import colour_render_camera, depth_render_camera
-from plant.worlds.world import World
 from skills.api import Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.detection import NoDetector
@@ -61,40 +54,36 @@ from skills.files.errors import InputError
 from skills.files.object_model import ObjectModel, read_model
 from skills.geometry import inside_polygon
 from skills.perception.model_detector import ModelDetector
-from skills.robot import Pose2D
-from skills.testing.clock import VirtualClock
-from skills.testing.estimators import BlockCostmap, KnownPlace
-from tests.benchmarks.find_things import RoomRobot, TrueBoxes
+from skills.robot import FloatArray, Pose2D
+from tests.benchmarks.find_things import room_bench
+from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, entries
+from tests.benchmarks.harness import command, share, tell
 
-SURFACES = ("coffee table", "sideboard", "dresser", "bathroom cabinet", "desk", "workbench", "kitchen counter")
 OBJECTS, FOREIGN, OTHERS_AROUND, IMPORTED_OTHERS = 10, 10, 4, 2
-UPRIGHT_SHARE = 0.75
-RIM_M, CLEAR_M, REACH_M = 0.04, 0.04, 1.7
-RIGHT_WITHIN_M = 0.05
+UPRIGHT_SHARE, TRIES = 0.75, 300
+RIM_M, CLEAR_M, REACH_M, RIGHT_WITHIN_M = 0.04, 0.04, 1.7, 0.05
 SIZES_M = (0.05, 0.32)
-
-FloatArray = NDArray[np.float64]
+PHOTO_PX, PHOTO_FOV_RAD = 480, 0.5
+PHOTO_ELEVATIONS_DEG = (25.0, 50.0)
+PHOTO_GROUND = (0.30, 0.45, 0.50)
+PHOTO_NOISE, PHOTO_EXPOSURE, PHOTO_TINT = 3.0, 0.15, 0.04
+STANDING, LYING, SIDES = 12, 6, 3
+"""Numbers of photographs of an object as it stands, and on each other side; number of other sides."""
 
 
 def revolved(*profile: tuple[float, float]) -> Any:
     """Body of revolution from a closed profile of (radius, height) in mm."""
-    import trimesh
-
-    return trimesh.creation.revolve(np.array(profile, dtype=float), sections=40)
+    return creation.revolve(np.array(profile, dtype=float), sections=40)
 
 
 def block(low: Sequence[float], high: Sequence[float]) -> Any:
     """Box between two corners (mm)."""
-    import trimesh
-
-    return trimesh.creation.box(bounds=[low, high])
+    return creation.box(bounds=[low, high])
 
 
 def turned(mesh: Any, axis: Sequence[float], degrees: float, by: Sequence[float] = (0, 0, 0)) -> Any:
     """The mesh, turned about an axis and moved."""
-    import trimesh
-
     mesh.apply_transform(trimesh.transformations.rotation_matrix(np.radians(degrees), axis))
     mesh.apply_translation(by)
     return mesh
@@ -102,16 +91,24 @@ def turned(mesh: Any, axis: Sequence[float], degrees: float, by: Sequence[float]
 
 def ring(radius: float, thick: float, by: Sequence[float]) -> Any:
     """Standing ring of a handle."""
-    import trimesh
-
-    return turned(trimesh.creation.torus(radius, thick), (1, 0, 0), 90, by)
+    return turned(creation.torus(radius, thick), (1, 0, 0), 90, by)
 
 
 def rod(radius: float, length: float) -> Any:
     """Cylinder along z."""
-    import trimesh
+    return creation.cylinder(radius, length, sections=32)
 
-    return trimesh.creation.cylinder(radius, length, sections=32)
+
+def cup(radius: float, height: float, wall: float) -> Any:
+    """Hollow cylinder with a bottom."""
+    inner = radius - wall
+    return revolved((0, 0), (radius, 0), (radius, height), (inner, height), (inner, wall), (0, wall))
+
+
+def roof(half_x: float, half_y: float, low: float, high: float) -> Any:
+    """Prism of a gable roof."""
+    points = [[x, y, low] for x in (-half_x, half_x) for y in (-half_y, half_y)]
+    return trimesh.convex.convex_hull(np.array([*points, [-half_x, 0, high], [half_x, 0, high]]))
 
 
 def shapes() -> Mapping[str, Sequence[tuple[Any, tuple[int, int, int]]]]:
@@ -155,82 +152,54 @@ def shapes() -> Mapping[str, Sequence[tuple[Any, tuple[int, int, int]]]]:
     }
 
 
-def cup(radius: float, height: float, wall: float) -> Any:
-    """Hollow cylinder with a bottom."""
-    inner = radius - wall
-    return revolved((0, 0), (radius, 0), (radius, height), (inner, height), (inner, wall), (0, wall))
-
-
-def roof(half_x: float, half_y: float, low: float, high: float) -> Any:
-    """Prism of a gable roof."""
-    import trimesh
-
-    points = [[x, y, low] for x in (-half_x, half_x) for y in (-half_y, half_y)]
-    return trimesh.convex.convex_hull(np.array([*points, [-half_x, 0, high], [half_x, 0, high]]))
-
-
-def generated(folder: Path, half: int) -> Iterator[Path]:
-    """Files of every second generated object."""
-    import trimesh
-
+def generated(folder: Path, half: int) -> Iterator[tuple[Path, ImportOptions]]:
+    """Files of every second generated object, with the options of their import."""
     for name, parts in list(shapes().items())[half::2]:
         for mesh, colour in parts:
             mesh.visual.face_colors = [*colour, 255]
         whole = trimesh.util.concatenate([mesh for mesh, _ in parts])
         whole.apply_scale(0.001)
-        file = folder / f"{name}.ply"
-        whole.export(file)
-        yield file
+        whole.export(folder / f"{name}.ply")
+        yield folder / f"{name}.ply", ImportOptions(name, None, None, 1.0, "z", close_holes=False)
 
 
-def foreign(folder: Path, half: int, catalogues: Path = CATALOGUES) -> Iterator[tuple[Path, float, str]]:
-    """Files of every second model of others that has a usual size, its scale and upward axis."""
-    fitting = [
-        entry
-        for file in sorted(catalogues.glob("*.sh3f"))
-        for entry in entries(file)
-        if entry.category == OTHERS and SIZES_M[0] <= entry.size_m.max() <= SIZES_M[1]
-    ]
-    for number, entry in enumerate(fitting[half::2]):
+def foreign(folder: Path, half: int, catalogues: Path = CATALOGUES) -> Iterator[tuple[Path, ImportOptions]]:
+    """Files of every second model of others that has a usual size, with the options of their import."""
+    every = [entry for file in sorted(catalogues.glob("*.sh3f")) for entry in entries(file)]
+    sized = [entry for entry in every if SIZES_M[0] <= entry.size_m.max() <= SIZES_M[1]]
+    for number, entry in enumerate([entry for entry in sized if entry.category == OTHERS][half::2]):
+        own = folder / f"foreign_{number:02d}"
         with zipfile.ZipFile(entry.catalogue) as archive:
-            inside = [name for name in archive.namelist() if Path(name).parent == Path(str(entry.path.parent))]
-            own = folder / f"foreign_{number:02d}"
-            for name in inside:
-                archive.extract(name, own)
-        file = own / str(entry.path)
-        points = [line.split()[1:4] for line in file.read_text("latin-1").splitlines() if line.startswith("v ")]
-        longest = float(np.ptp(np.array(points, dtype=float) @ entry.R.T, axis=0).max())
-        yield file, float(entry.size_m.max()) / max(longest, 1e-9), "y"
+            inside = [name for name in archive.namelist() if Path(name).parent == Path(entry.path.parent)]
+            archive.extractall(own, inside)
+        lines = (own / entry.path).read_text("latin-1").splitlines()
+        points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=float)
+        longest = float(np.ptp(points @ entry.R.T, axis=0).max())
+        scale = float(entry.size_m.max()) / max(longest, 1e-9)
+        yield own / entry.path, ImportOptions(f"other{number}", None, None, scale, "y", close_holes=True)
 
 
 def imported(folder: Path, half: int) -> list[ObjectModel]:
     """Imports the objects of one half, up to `FOREIGN` of others; leaves out those that no import takes."""
     folder.mkdir(parents=True, exist_ok=True)
-    files = [(file, 1.0, "z", file.stem) for file in generated(folder, half)]
-    files += [(file, scale, up, f"other{k}") for k, (file, scale, up) in enumerate(foreign(folder, half))]
     models = list[ObjectModel]()
     with mock.patch("plant.models.builder.importing.import_object.convex_parts", _bounding_box):  # they lie still
-        for file, scale, up, name in files:
-            options = ImportOptions(name, None, None, scale, up, close_holes=name.startswith("other"))
-            out = folder / name
-            out.mkdir(exist_ok=True)
-            try:
-                import_object(file, options, out)
-            except ObjectImportError as error:
-                sys.stderr.write(f"{file.name}: {error}\n")
-                continue
-            models.append(read_model(out))
+        for file, options in (*generated(folder, half), *foreign(folder, half)):
             if sum(model.name.startswith("other") for model in models) == FOREIGN:
                 break
+            (folder / options.name).mkdir(exist_ok=True)
+            try:
+                import_object(file, options, folder / options.name)
+            except ObjectImportError as error:
+                tell(f"{file.name}: {error}")
+                continue
+            models.append(read_model(folder / options.name))
     return models
 
 
-PHOTO_PX, PHOTO_FOV_RAD = 480, 0.5
-PHOTO_ELEVATIONS_DEG = (25.0, 50.0)
-PHOTO_GROUND = (0.30, 0.45, 0.50)
-PHOTO_NOISE, PHOTO_EXPOSURE, PHOTO_TINT = 3.0, 0.15, 0.04
-STANDING, LYING, SIDES = 12, 6, 3
-"""Numbers of photographs of an object as it stands, and on each other side; number of other sides."""
+def _bounding_box(solid: Solid) -> tuple[FloatArray, ...]:
+    low, high = solid.points.min(axis=0), solid.points.max(axis=0)
+    return (np.array(list(product(*zip(low, high, strict=True)))),)
 
 
 def photographed(folder: Path, model: ObjectModel, pictures: Path, seed: int = 0) -> Path:
@@ -278,15 +247,10 @@ def by_photographs(folder: Path, models: Sequence[ObjectModel]) -> list[ObjectMo
             pictures = photographed(folder, model, folder / f"{model.name}_photographs")
             import_photographs(pictures, ImportOptions(model.name), out, ImportReports(), (x, y, z))
         except InputError as error:
-            sys.stderr.write(f"{model.name}: {error}\n")
+            tell(f"{model.name}: {error}")
             continue
         found.append(read_model(out))
     return found
-
-
-def _bounding_box(solid: Solid) -> tuple[FloatArray, ...]:
-    low, high = solid.points.min(axis=0), solid.points.max(axis=0)
-    return (np.array(list(product(*zip(low, high, strict=True)))),)
 
 
 @dataclass(frozen=True)
@@ -305,10 +269,9 @@ class Lying:
 
 def laid(rng: np.random.Generator, models: Sequence[ObjectModel], surface: Surface, pose: Pose2D) -> Iterator[Lying]:
     """Objects laid on a surface where they fit; a quarter of them on another side."""
-    corners = np.asarray(surface.polygon_W)
-    taken: list[tuple[FloatArray, float]] = []
+    corners, taken = np.asarray(surface.polygon_W), list[tuple[FloatArray, float]]()
     for model in models:
-        for _ in range(300):
+        for _ in range(TRIES):
             rest = 0 if rng.random() < UPRIGHT_SHARE else int(rng.integers(min(4, len(model.rests))))
             yaw = float(rng.uniform(0, 2 * np.pi))
             R = RotationMatrix.MakeZRotation(yaw).matrix() @ model.rests[rest]
@@ -323,43 +286,20 @@ def laid(rng: np.random.Generator, models: Sequence[ObjectModel], surface: Surfa
                 break
 
 
-class FlatStage:
-    """The flat with objects in it, rendered in colour and depth."""
+class FlatStage(FlatScene):
+    """The flat with objects, as the robot of a rendered room sees it."""
 
     labelled: Mapping[int, Any] = {}
 
-    def __init__(self, world: World, objects: Sequence[Lying], folder: Path) -> None:
-        """Builds the flat with the objects, whose models are in a folder."""
-        loose = [
-            LooseModel(f"thing{k}", folder / each.model.name / f"{each.model.name}.sdf", each.X_WM, fixed=True)
-            for k, each in enumerate(objects)
-        ]
-        built = build_diagram(
-            DiagramConfig(
-                directives=world.directives_path, models=loose, visuals=False, renderer_parameters=render_parameters()
-            )
-        )
-        assert built.scene is not None
-        self._built = built
-        self._query = built.scene.query_at(built.plant.GetPositions(built.plant.CreateDefaultContext()))
-        self.bodies = [int(built.plant.GetBodyIndices(built.models[each.name])[0]) for each in loose]
-
-    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[Any, Any, Any]:
+    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, FloatArray]:
         """Clean picture, labels and depth (m)."""
-        camera, frame = colour_render_camera(view.intrinsics, RENDERER), self._built.scene_graph.world_frame_id()
-        colour = self._query.RenderColorImage(camera, frame, view.X_WC)
-        labels = self._query.RenderLabelImage(camera, frame, view.X_WC)
-        depth = self._query.RenderDepthImage(depth_render_camera(view.intrinsics, RENDERER, range_m), frame, view.X_WC)
-        return (
-            np.ascontiguousarray(colour.data[..., :3]),
-            np.array(labels.data[..., 0], dtype=np.int16),
-            np.asarray(depth.data[..., 0], dtype=np.float32),
-        )
+        lens = view.intrinsics
+        return self.colour(view.X_WC, lens), self.labels(view.X_WC, lens), self.depth_m(view.X_WC, lens, range_m)
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Objects on one surface of the flat, and where the robot stands."""
+    """Objects on one surface of the flat, where the robot stands, and an object that is absent."""
 
     objects: Sequence[Lying]
     surface: Surface
@@ -367,13 +307,10 @@ class Scene:
     absent: str
 
 
-def scene(rng: np.random.Generator, world: World, target: ObjectModel, pool: Sequence[ObjectModel]) -> Scene | None:
+def scene(rng: np.random.Generator, target: ObjectModel, pool: Sequence[ObjectModel]) -> Scene | None:
     """Lays an object and four others; None where the object finds no place."""
-    facts = knowledge_of(world).surfaces
-    name = str(rng.choice(SURFACES))
-    surface = Surface(name, tuple((float(x), float(y)) for x, y in facts[name].polygon), facts[name].height)
-    view = facts[name].viewpoints[int(rng.integers(len(facts[name].viewpoints)))]
-    pose = Pose2D(view.x, view.y, view.yaw)
+    surface = surface_of(str(rng.choice(SURFACES)))
+    pose = viewpoint_of(rng, surface.name)
     known = [pool[k] for k in rng.permutation(OBJECTS) if pool[k] is not target]
     unknown = [pool[k] for k in OBJECTS + rng.permutation(len(pool) - OBJECTS)]
     around = [*known[:IMPORTED_OTHERS], *unknown[: OTHERS_AROUND - IMPORTED_OTHERS]]
@@ -399,75 +336,49 @@ class Asked:
 def ask(made: Scene, number: int, name: str, detector: ModelDetector, folder: Path, seed: int) -> Asked:
     """Asks for an object by its name."""
     begun = time.perf_counter()
-    clock = VirtualClock()
-    robot = RoomRobot(clock, FlatStage(open_world("flat"), made.objects, folder), made.pose, seed, TrueBoxes())
-    bench = SkillBench(
-        robot, clock, localiser=KnownPlace(made.pose), costmap=BlockCostmap(), detector=detector, seed=seed
-    )
+    files = [(folder / each.model.name / f"{each.model.name}.sdf", each.X_WM) for each in made.objects]
+    bench = room_bench(FlatStage(files), made.pose, detector, seed, seed)
     run = bench.run(Detect, DetectInputs((name,), (made.surface,)))
     places = [each.middle_W for each in made.objects if each.model.name == name]
-    claimed = run.outcome == "success"
-    found = bool(
-        claimed and places and np.linalg.norm(run.outputs["observation"].position_W - places[0]) < RIGHT_WITHIN_M
-    )
+    found = claimed = run.outcome == "success"
+    if claimed:
+        position_W = run.outputs["observation"].position_W
+        found = bool(places) and bool(np.linalg.norm(position_W - places[0]) < RIGHT_WITHIN_M)
     wall_s = round(time.perf_counter() - begun, 1)
     return Asked(name, number, bool(places), found, claimed and not found, run.message, wall_s)
 
 
-def results(
-    folder: Path, half: int, scenes: int, seed: int, tell: Callable[[Asked], None], *, photographs: bool = False
-) -> list[Asked]:
+def measure(half: int = 0, scenes: int = 5, seed: int = 1, photographs: bool = False) -> dict[str, object]:
     """Asks in all scenes of all objects, which the robot knows by their meshes or by photographs."""
-    rng, world = np.random.default_rng([seed, half]), open_world("flat")
-    models = imported(folder, half)
-    pool = [models[k] for k in rng.permutation(len(models))]
-    known = by_photographs(folder, pool[:OBJECTS]) if photographs else pool[:OBJECTS]
-    detector, every = ModelDetector(NoDetector(), known), list[Asked]()
-    for target in pool[:OBJECTS]:
-        for number in range(scenes):
-            made = scene(rng, world, target, pool)
-            for name in () if made is None else (target.name, made.absent):
-                assert made is not None
-                every.append(ask(made, number, name, detector, folder, seed))
+    rng, every = np.random.default_rng([seed, half]), list[Asked]()
+    with tempfile.TemporaryDirectory(prefix="errand-own-") as made:
+        folder = Path(made)
+        models = imported(folder, half)
+        pool = [models[k] for k in rng.permutation(len(models))]
+        known = by_photographs(folder, pool[:OBJECTS]) if photographs else pool[:OBJECTS]
+        detector = ModelDetector(NoDetector(), known)
+        for target, number in product(pool[:OBJECTS], range(scenes)):
+            drawn = scene(rng, target, pool)
+            for name in () if drawn is None else (target.name, drawn.absent):
+                every.append(ask(drawn, number, name, detector, folder, seed))
                 tell(every[-1])
-    return every
+    return summary(every)
 
 
 def summary(every: Sequence[Asked]) -> dict[str, object]:
     """Shares of the objects found, and of questions to which another object was claimed."""
-    there = [each for each in every if each.there]
-    names = list(dict.fromkeys(each.name for each in there))
+    there, absent = ([each for each in every if each.there is so] for so in (True, False))
+    of = {name: [each.found for each in there if each.name == name] for name in dict.fromkeys(e.name for e in there)}
     return {
         "asked": len(there),
-        "found": round(sum(each.found for each in there) / max(len(there), 1), 3),
-        "mistaken_of_there": round(sum(each.mistaken for each in there) / max(len(there), 1), 3),
-        "absent": len(every) - len(there),
-        "mistaken_of_absent": round(
-            sum(each.mistaken for each in every if not each.there) / max(len(every) - len(there), 1), 3
-        ),
-        "by_object": {
-            n: f"{sum(e.found for e in there if e.name == n)}/{sum(e.name == n for e in there)}" for n in names
-        },
+        "found": share([each.found for each in there]),
+        "mistaken_of_there": share([each.mistaken for each in there]),
+        "absent": len(absent),
+        "mistaken_of_absent": share([each.mistaken for each in absent]),
+        "by_object": {name: f"{sum(found)}/{len(found)}" for name, found in of.items()},
         "wall_s": round(sum(each.wall_s for each in every) / max(len(every), 1), 1),
     }
 
 
-def main() -> None:
-    """Measure."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--half", type=int, choices=(0, 1), default=0)
-    parser.add_argument("--scenes", type=int, default=5)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--photographs", action="store_true", help="photographs of each object, no meshes")
-    args = parser.parse_args()
-
-    def tell(one: Asked) -> None:
-        sys.stderr.write(f"{json.dumps(asdict(one))}\n")
-
-    with tempfile.TemporaryDirectory(prefix="errand-own-") as folder:
-        every = results(Path(folder), args.half, args.scenes, args.seed, tell, photographs=args.photographs)
-    sys.stdout.write(json.dumps(summary(every), indent=1) + "\n")
-
-
 if __name__ == "__main__":
-    main()
+    command(measure)

@@ -1,6 +1,6 @@
 """People who step before a driving robot, and people who cross its way; prints JSON.
 
-    python -m tests.benchmarks.people_crossing [--what steps_in,crosses] [--first 0] [--count 10] [--json]
+    python -m tests.benchmarks.people_crossing [--what steps_in,crosses] [--first 0] [--count 10] [--jobs 1] [--json]
 
 The robot drives 9 m along a hall with openings at its sides, at 0.5 to 1.0 m/s. `steps_in`: somebody beside its way,
 or in an opening, walks into the way when the robot's front is 1.2 m before them, and stays. `crosses`: somebody crosses
@@ -9,29 +9,25 @@ drawn from its number. Reported are the contacts that the referee lays to the ro
 it while it stood, goals reached, and the time lost against the same drive without anybody.
 """
 
-from __future__ import annotations
-
-import argparse
 import functools
-import json
 import math
-import statistics
-import sys
 import tempfile
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import groupby, product
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
-from executive.app.mission_run import run_request
-from executive.app.placed_robots import only_robot
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
-from executive.mission.request import Request
+from executive.app.prepared import Prepared
 from executive.words.mission import Route
 from plant.worlds.builder.own import world_from_grid
 from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
+from plant.worlds.world import World
 from skills.robot import Pose2D
+from tests.benchmarks.harness import benchmark, quantile
+from tests.benchmarks.plant_mission import Ended, PlantMission
 
 CELL_M, HALL_M, DEPTH_M = 0.05, (11.0, 4.4), 1.6
 OPENINGS_M = (3.5, 5.5, 7.5)
@@ -41,19 +37,15 @@ START = Pose2D(1.0, WAY_Y_M, 0.0)
 STEP_IN_M, FRONT_M, HALF_SWATH_M = 1.2, 0.55, 0.5
 BODY_M = 0.15
 ASIDE_M = {"steps_in": (0.8, 1.5), "crosses": (1.3, 1.8)}
-NOBODY = "nobody"
+STEPS = "  - skill: navigate\n    timeout: 120\n    with: {{x: {x}, y: {y}, yaw: 0.0, max_speed: {speed:.3f}}}\n"
+STACK = "controller: {use: path_follower, max_speed_m_s: 1.0}\n"
 
 
 @dataclass(frozen=True)
-class Case:
-    """Somebody who sets off from one point to another, once the robot's front is `gap_m` before them there.
+class Walk:
+    """Walk of somebody from one point to another, who sets off once the robot's front is `gap_m` before them there."""
 
-    `speed_m_s` is theirs, `robot_m_s` the most that the robot may drive.
-    """
-
-    what: str
-    number: int
-    robot_m_s: float
+    name: str
     from_W: tuple[float, float]
     to_W: tuple[float, float]
     speed_m_s: float
@@ -62,20 +54,23 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a case."""
+    """Result of a case; `alone_s` is the time of the same drive without anybody."""
 
     what: str
-    number: int
-    people_hit: int
-    hit_by_people: int
-    reached: bool
-    time_s: float
+    ended: Ended
+    alone_s: float
     least_gap_m: float
-    events: tuple[str, ...]
 
 
-def case(what: str, number: int) -> Case:
-    """A case by its number."""
+def cases(
+    what: tuple[str, ...] = ("steps_in", "crosses"), first: int = 0, count: int = 10
+) -> Iterable[tuple[str, int]]:
+    """Kinds of cases with their numbers."""
+    return product(what, range(first, first + count))
+
+
+def draw_walk(what: str, number: int) -> tuple[float, Walk]:
+    """Highest speed of the robot (m/s), and the walk of somebody."""
     rng = np.random.default_rng([number, len(what)])
     side = float(rng.choice([-1.0, 1.0]))
     hidden = rng.random() < 0.5
@@ -85,14 +80,13 @@ def case(what: str, number: int) -> Case:
     start_W = (x, WAY_Y_M + side * aside_m)
     if what == "steps_in":
         to_W = (x, WAY_Y_M + float(rng.uniform(-0.25, 0.25)))
-        return Case(what, number, robot_m_s, start_W, to_W, float(rng.uniform(0.8, 1.4)), STEP_IN_M)
+        return robot_m_s, Walk(what, start_W, to_W, float(rng.uniform(0.8, 1.4)), STEP_IN_M)
     beyond_m = float(rng.uniform(1.2, 1.8))
-    gap_m = float(rng.uniform(-0.8, 1.2))
-    return Case(what, number, robot_m_s, start_W, (x, WAY_Y_M - side * beyond_m), 1.2, gap_m)
+    return robot_m_s, Walk(what, start_W, (x, WAY_Y_M - side * beyond_m), 1.2, float(rng.uniform(-0.8, 1.2)))
 
 
 def make_world(folder: Path) -> None:
-    """A hall with three openings at each side, to small rooms."""
+    """Writes a hall with three openings at each side, to small rooms."""
     rows, columns = (round(length / CELL_M) for length in (HALL_M[1] + 2 * DEPTH_M, HALL_M[0]))
     cells = np.full((rows, columns), OCCUPIED, np.uint8)
     depth = round(DEPTH_M / CELL_M)
@@ -100,124 +94,87 @@ def make_world(folder: Path) -> None:
     for x in OPENINGS_M:
         low, high = (round((x + half) / CELL_M) for half in (-WIDTH_M / 2, WIDTH_M / 2))
         cells[4:-4, low:high] = FREE
-    folder.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True)
     world_from_grid(folder, Grid(cells, (0.0, 0.0), CELL_M), start=START, wall_height_m=2.0)
 
 
 class Trigger:
-    """Lets somebody set off in time to be in the robot's way when its front is so far before them."""
+    """Observer of the plant that lets somebody set off in time to be in the robot's way."""
 
-    def __init__(self, backend: SimulatedBackend, drawn: Case) -> None:
-        engine = backend._simulation.engine
-        self._engine, self._case = engine, drawn
-        self._walk = engine.walkers[drawn.what]
-        self._body = engine.world.robots["Alice"].body
+    def __init__(self, mission: PlantMission, walk: Walk) -> None:
+        self._simulation, self._robot_name, self._walk = mission.simulation, mission.robot_name, walk
+        self._walker = mission.simulation.engine.walkers[walk.name]
+        self._body = mission.simulation.engine.world.robots[mission.robot_name].body
         self._off = False
         self.least_gap_m = math.inf
 
     def __call__(self, now_s: float) -> None:
-        plant, context = self._engine.world.plant, self._engine.context
-        X_WB = plant.EvalBodyPoseInWorld(context, self._body)
-        x, y, _ = X_WB.translation()
+        engine = self._simulation.engine
+        plant, context = engine.world.plant, engine.context
+        x, y, _ = plant.EvalBodyPoseInWorld(context, self._body).translation()
         vx = float(plant.EvalBodySpatialVelocityInWorld(context, self._body).translational()[0])
-        person_x, person_y = self._walk.place_W
+        person_x, person_y = self._walker.place_W
         self.least_gap_m = min(self.least_gap_m, math.dist((x, y), (person_x, person_y)))
         way_m = abs(person_y - y) - HALF_SWATH_M
         gap_m = person_x - BODY_M - x - FRONT_M
-        if not self._off and gap_m <= self._case.gap_m + max(vx, 0.1) * way_m / self._case.speed_m_s:
+        if not self._off and gap_m <= self._walk.gap_m + max(vx, 0.1) * way_m / self._walk.speed_m_s:
             self._off = True
-            self._walk.set_off()
+            self._walker.set_off()
 
 
-def run_case(folder: Path, drawn: Case) -> Outcome:
-    """Drive it."""
-    mission, stack = folder / "drive.yaml", folder / "stack.yaml"
-    mission.write_text(
-        f"name: drive\nsteps:\n  - skill: navigate\n    timeout: 120\n"
-        f"    with: {{x: {GOAL_X_M}, y: {WAY_Y_M}, yaw: 0.0, max_speed: {drawn.robot_m_s:.3f}}}\n"
-    )
-    stack.write_text("controller: {use: path_follower, max_speed_m_s: 1.0}\n")
-    out = Path(tempfile.mkdtemp(dir=folder))
-    request = Request(file=mission, world=str(folder / "hall"), out=out, record=False, stack=stack, seed=drawn.number)
-    prepared = prepare(request, ask=None)
-    world = prepared.world
-    if drawn.what != NOBODY:
-        route = Route(waypoints=(drawn.from_W, drawn.to_W), speed=drawn.speed_m_s, start=86400.0, yields=False)
-        world = world.with_routes({drawn.what: route})
-    name = prepared.mission.robot_name
-    backend = SimulatedBackend(
-        world,
-        {name: only_robot(name, world, seed=drawn.number, stack=stack)},
-        seed=drawn.number,
-        record=False,
-    )
-    trigger = None
-    if drawn.what != NOBODY:
-        trigger = Trigger(backend, drawn)
-        backend._simulation.engine.observe(trigger, every=2)
-    report = run_request(replace(prepared, world=world), backend).report
-    seen = report.seen
-    return Outcome(
-        drawn.what,
-        drawn.number,
-        seen.people_hit,
-        seen.hit_by_people,
-        report.outcome == "success",
-        report.sim_time_s,
-        round(trigger.least_gap_m, 3) if trigger else math.inf,
-        (*seen.events, report.message),
-    )
+def drive(folder: Path, number: int, robot_m_s: float, walk: Walk | None = None) -> tuple[Ended, float]:
+    """Drives along the hall; returns how the mission ended, and the least distance from somebody (m)."""
+    make_world(folder / "hall")
+    stack = folder / "stack.yaml"
+    stack.write_text(STACK)
 
+    def with_walk(prepared: Prepared) -> World:
+        if walk is None:
+            return prepared.world
+        route = Route(waypoints=(walk.from_W, walk.to_W), speed=walk.speed_m_s, start=86400.0, yields=False)
+        return prepared.world.with_routes({walk.name: route})
 
-def summary(outcomes: list[Outcome], alone_s: dict[int, float]) -> dict[str, object]:
-    """The figures of one kind of case."""
-    lost = [each.time_s - alone_s[each.number] for each in outcomes if each.reached and each.number in alone_s]
-    return {
-        "cases": len(outcomes),
-        "cases_with_contact_while_moving": sum(each.people_hit > 0 for each in outcomes),
-        "cases_walked_into_standing_robot": sum(each.hit_by_people > 0 for each in outcomes),
-        "reached": sum(each.reached for each in outcomes),
-        "time_lost_s_median": round(statistics.median(lost), 1) if lost else None,
-        "time_lost_s_max": round(max(lost), 1) if lost else None,
-        "failed": [each.number for each in outcomes if each.people_hit or not each.reached],
-    }
+    steps = STEPS.format(x=GOAL_X_M, y=WAY_Y_M, speed=robot_m_s)
+    mission = PlantMission(folder, number, change=with_walk, steps=steps, world=str(folder / "hall"), stack=stack)
+    trigger = None if walk is None else Trigger(mission, walk)
+    if trigger is not None:
+        mission.simulation.engine.observe(trigger, every=2)
+    return mission.end("drive"), math.inf if trigger is None else round(trigger.least_gap_m, 3)
 
 
 @functools.cache
-def time_alone_s(folder: Path, robot_m_s: float) -> float:
-    """How long the drive takes without anybody."""
-    return run_case(folder, Case(NOBODY, 0, robot_m_s, (0.0, 0.0), (0.0, 0.0), 1.0, 0.0)).time_s
+def time_alone_s(robot_m_s: float) -> float:
+    """Time of the drive without anybody."""
+    with tempfile.TemporaryDirectory() as folder:
+        return drive(Path(folder), 0, robot_m_s)[0].sim_time_s
 
 
-def main() -> None:
-    """Run and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--what", default="steps_in,crosses")
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--count", type=int, default=10)
-    parser.add_argument("--only", help="numbers of cases, in place of --first and --count")
-    parser.add_argument("--json", action="store_true", help="all on one line")
-    options = parser.parse_args()
-    numbers = (
-        [int(each) for each in options.only.split(",")]
-        if options.only
-        else range(options.first, options.first + options.count)
-    )
-    with tempfile.TemporaryDirectory() as made:
-        folder = Path(made)
-        make_world(folder / "hall")
-        found: dict[str, object] = {}
-        for what in options.what.split(","):
-            outcomes, alone_s = [], {}
-            for number in numbers:
-                drawn = case(what, number)
-                outcomes.append(run_case(folder, drawn))
-                alone_s[number] = time_alone_s(folder, round(drawn.robot_m_s, 1))
-                told = asdict(outcomes[-1])
-                print(f"{what} {told} alone {alone_s[number]:.1f} s, {drawn}", file=sys.stderr, flush=True)
-            found[what] = summary(outcomes, alone_s)
-    print(json.dumps(found, indent=None if options.json else 1))
+def run_case(what: str, number: int, folder: Path) -> Outcome:
+    """Drives with somebody, and alone."""
+    robot_m_s, walk = draw_walk(what, number)
+    ended, least_gap_m = drive(folder, number, robot_m_s, walk)
+    return Outcome(what, ended, time_alone_s(round(robot_m_s, 1)), least_gap_m)
+
+
+def summary(outcomes: Sequence[Outcome]) -> dict[str, object]:
+    """Figures of each kind of case."""
+    return {what: figures(list(each)) for what, each in groupby(outcomes, attrgetter("what"))}
+
+
+def figures(outcomes: Sequence[Outcome]) -> dict[str, object]:
+    """Figures of one kind of case."""
+    ends = [each.ended for each in outcomes]
+    lost_s = [each.ended.sim_time_s - each.alone_s for each in outcomes if each.ended.claimed]
+    return {
+        "cases": len(outcomes),
+        "cases_with_contact_while_moving": sum(each.people_hit > 0 for each in ends),
+        "cases_walked_into_standing_robot": sum(each.hit_by_people > 0 for each in ends),
+        "reached": sum(each.claimed for each in ends),
+        "time_lost_s_median": quantile(lost_s, digits=1),
+        "time_lost_s_max": quantile(lost_s, 1.0, digits=1),
+        "failed": [each.seed for each in ends if each.people_hit or not each.claimed],
+    }
 
 
 if __name__ == "__main__":
-    main()
+    benchmark(cases, run_case, summary)

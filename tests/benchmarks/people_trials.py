@@ -1,41 +1,33 @@
 """People whom the robot follows and guides through the flat; prints JSON.
 
-    python -m tests.benchmarks.people_trials [--what follow,crossed,guide] [--first 9740] [--count 40]
+    python -m tests.benchmarks.people_trials [--what follow,crossed,guide] [--first 0] [--count 40] [--jobs 1]
 
 `follow`: the robot is told to follow Robin to a room. Robin walks some 30 m there through three doors or more, by the
 seed, turns round in one room at most, changes the pace and is distracted once. `crossed`: two other people walk the
 same route the other way. `guide`: the robot guides Robin to a room beyond the hall; Robin stops and turns back once.
-The referee judges each run.
+The referee judges each run; a run is `wrong_person` when the robot ended near somebody else and did not say that it
+lost Robin.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import math
-import sys
-import tempfile
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby, product
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from executive.app.mission_run import run_request
-from executive.app.placed_robots import only_robot
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
-from executive.mission.request import Request
 from executive.record.schemas import SPEECH
-from executive.run.visitor import RunVisitor
-from executive.words.knowledge import Knowledge
+from executive.words.knowledge import load_knowledge
 from executive.words.mission import Distraction, Route
 from plant.referee.company import lost_s
 from plant.referee.object_history import TimedPath
 from plant.worlds.world import World, load_world
-from skills.files.schema import validate
-from skills.files.yaml_source import read_yaml
+from tests.benchmarks.harness import benchmark, totals
+from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.visitors import OnMessage
 
 LENGTH_M, LEAST_DOORS = (28.0, 34.0), 3
 START_ROOM, BESIDE_M = "living room", 1.6
@@ -44,32 +36,23 @@ Point = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A sentence for the robot, and the people who walk."""
-
-    sentence: str
-    people: Mapping[str, Route]
-
-
-@dataclass(frozen=True)
 class Outcome:
-    """Result of a trial; `wrong` says that the robot ended near somebody else and did not say that it lost Robin."""
+    """Result of a trial."""
 
     what: str
-    seed: int
-    success: bool
-    claimed: bool
-    contacts: int
-    walked_into: int
+    ended: Ended
     lost_s: float
-    wrong: bool
-    time_s: float
-    why: str
+    wrong_person: bool
+
+
+def cases(what: tuple[str, ...] = ("follow", "crossed", "guide"), first: int = 0, count: int = 40) -> Iterable[Any]:
+    """Kinds of trials with their seeds."""
+    return product(what, range(first, first + count))
 
 
 def walk_through(world: World, rng: np.random.Generator) -> tuple[list[str], list[Point], float]:
     """Rooms, waypoints and length (m) of a walk of the wanted length; its last room is not passed before."""
-    knowledge = validate(Knowledge, read_yaml(world.knowledge_path))
+    knowledge = load_knowledge(world.knowledge_path)
     while True:
         rooms, points, length_m, doors, turned = [START_ROOM], [world.standing[START_ROOM]], 0.0, 0, False
         while length_m < LENGTH_M[0] and len(rooms) < 12:
@@ -87,8 +70,8 @@ def walk_through(world: World, rng: np.random.Generator) -> tuple[list[str], lis
             return rooms, points, length_m
 
 
-def trial(what: str, seed: int, world: World) -> Trial:
-    """The trial of a seed."""
+def draw_trial(what: str, seed: int, world: World) -> tuple[str, Mapping[str, Route]]:
+    """Sentence for the robot, and the people who walk."""
     rng = np.random.default_rng([seed, len(what)])
     start, beside = world.start, np.array([math.cos(world.start.yaw_rad), math.sin(world.start.yaw_rad)]) * BESIDE_M
     ahead = (float(start.x_m + beside[0]), float(start.y_m + beside[1]))
@@ -96,7 +79,7 @@ def trial(what: str, seed: int, world: World) -> Trial:
         room = str(rng.choice([each for each in sorted(world.rooms) if each not in (START_ROOM, "hall")]))
         lapse = Distraction(after=rng.uniform(2.0, 5.0), stop=rng.uniform(2.0, 4.0), back=rng.uniform(1.5, 3.0))
         robin = Route(waypoints=(ahead,), follows="robot", speed=rng.uniform(0.7, 1.1), distractions=(lapse,))
-        return Trial(f"guide Robin to the {room}", {"Robin": robin})
+        return f"guide Robin to the {room}", {"Robin": robin}
     rooms, points, length_m = walk_through(world, rng)
     robin = Route(
         waypoints=(ahead, *points[1:]),
@@ -110,81 +93,47 @@ def trial(what: str, seed: int, world: World) -> Trial:
     for number, name in enumerate(("Kim", "Lee") if what == "crossed" else ()):
         back = [*points[-1 - number : 0 : -1], points[number]]
         others[name] = Route(waypoints=tuple(back), speed=rng.uniform(0.6, 1.0), start=rng.uniform(5, 30), apart=True)
-    return Trial(f"follow Robin to the {rooms[-1]}", {"Robin": robin, **others})
+    return f"follow Robin to the {rooms[-1]}", {"Robin": robin, **others}
 
 
-class SetsOff(RunVisitor):
-    """Lets Robin set off when the robot says that it follows."""
+def run_case(what: str, seed: int, folder: Path) -> Outcome:
+    """Runs the trial of a seed; Robin sets off when the robot says that it follows."""
+    sentence, people = draw_trial(what, seed, load_world("flat"))
+    walking = load_world("flat").without_people().with_routes(people)
+    mission = PlantMission(folder, seed, change=lambda _: walking, sentence=sentence, time_limit_s=LIMIT_S)
 
-    def __init__(self, backend: SimulatedBackend) -> None:
-        self._simulation = backend._settled()
-
-    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Waits for the words."""
+    def set_off(topic: str, message: Mapping[str, Any]) -> None:
         if topic == SPEECH and "follow you" in message["text"]:
-            self._simulation.engine.walkers["Robin"].set_off()
-        return message
+            mission.simulation.engine.walkers["Robin"].set_off()
 
-
-def run_trial(what: str, seed: int, out: Path) -> Outcome:
-    """Runs the trial of a seed."""
-    world = load_world("flat")
-    drawn = trial(what, seed, world)
-    world = world.without_people().with_routes(drawn.people)
-    request = Request(sentence=drawn.sentence, out=out, record=False, seed=seed, time_limit_s=LIMIT_S)
-    prepared = replace(prepare(request, ask=None), world=world)
-    name = prepared.mission.robot_name
-    backend = SimulatedBackend(world, {name: only_robot(name, world, seed=seed)}, seed=seed, record=False)
-    report = run_request(prepared, backend, visitors=[SetsOff(backend)] if what != "guide" else []).report
-    referee, seen = backend.referee, report.seen
-    robot, people = TimedPath(np.array(referee.points(name))), referee._person_paths
-    paths = {each: TimedPath(np.array(points)) for each, points in people.items()}
+    ended = mission.end(sentence, *([] if what == "guide" else [OnMessage(set_off)]))
+    referee = mission.backend.referee
+    robot = TimedPath(np.array(referee.points(mission.robot_name)))
+    paths = {each: TimedPath(np.array(points)) for each, points in referee._person_paths.items()}
     away_m = {each: math.dist(path.points[-1, :2], robot.points[-1, :2]) for each, path in paths.items()}
-    return Outcome(
-        what,
-        seed,
-        bool(seen.success),
-        report.outcome == "success",
-        seen.people_hit,
-        seen.hit_by_people,
-        round(lost_s(robot, paths["Robin"], 0.0, report.sim_time_s), 1),
-        away_m["Robin"] > 3.0 and min(away_m.values()) < 3.0 and "lost" not in report.message,
-        report.sim_time_s,
-        f"{drawn.sentence}: {seen.why} | {report.message} | {' '.join(seen.events)}",
-    )
+    wrong = away_m["Robin"] > 3.0 and min(away_m.values()) < 3.0 and "lost" not in ended.message
+    return Outcome(what, ended, round(lost_s(robot, paths["Robin"], 0.0, ended.sim_time_s), 1), wrong)
 
 
-def summary(outcomes: list[Outcome]) -> dict[str, object]:
-    """The figures of one kind of trial."""
+def summary(outcomes: Sequence[Outcome]) -> dict[str, object]:
+    """Figures of each kind of trial."""
+    return {what: figures(list(each)) for what, each in groupby(outcomes, attrgetter("what"))}
+
+
+def figures(outcomes: Sequence[Outcome]) -> dict[str, object]:
+    """Figures of one kind of trial."""
+    ends = [each.ended for each in outcomes]
     return {
         "runs": len(outcomes),
-        "arrived": sum(each.success for each in outcomes),
-        "false_claims": sum(each.claimed and not each.success for each in outcomes),
-        "contacts": sum(each.contacts for each in outcomes),
-        "walked_into": sum(each.walked_into for each in outcomes),
+        "arrived": sum(bool(each.fulfilled) for each in ends),
+        "false_claims": sum(each.false_claim for each in ends),
+        "contacts": sum(each.people_hit for each in ends),
+        "walked_into": sum(each.hit_by_people for each in ends),
         "lost_over_10_s": sum(each.lost_s > 10.0 for each in outcomes),
-        "wrong_person": sum(each.wrong for each in outcomes),
-        "failed": [each.seed for each in outcomes if not each.success],
+        **totals(outcomes, "wrong_person"),
+        "failed": [each.seed for each in ends if not each.fulfilled],
     }
 
 
-def main() -> None:
-    """Runs and prints."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--what", default="follow,crossed,guide")
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--count", type=int, default=40)
-    options = parser.parse_args()
-    found: dict[str, object] = {}
-    for what in options.what.split(","):
-        outcomes = []
-        for seed in range(options.first, options.first + options.count):
-            with tempfile.TemporaryDirectory() as folder:
-                outcomes.append(run_trial(what, seed, Path(folder)))
-            print(json.dumps(asdict(outcomes[-1])), file=sys.stderr, flush=True)
-        found[what] = summary(outcomes)
-    print(json.dumps(found, indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    benchmark(cases, run_case, summary)

@@ -1,15 +1,13 @@
 """How far from their true middles things are said to be, from the camera at capture; prints JSON.
 
-`python -m tests.benchmarks.position_error --scenes 40 --seed 2` takes true boxes, `--detector` the detector's own. Of
-the things within 2 m that are at least 24 pixels long, 8 wide and 40 % visible; the middle is the bounding box's.
+    python -m tests.benchmarks.position_error [--scenes 10] [--seed 2] [--folder FOLDER] [--detector]
+
+Boxes are the true ones, with `--detector` the detector's own. `--folder` stores the pictures of `position_scenes` for
+further measurements: a folder that holds some is read. Counted are the things within 2 m that are at least 24 pixels
+long, 8 wide and 40 % visible; the middle is the bounding box's.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
-import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,101 +18,70 @@ from executive.app.placed_robots import shared_detector
 from skills.api import Detection, LocalisationEstimate
 from skills.detection import box_overlap
 from skills.perception.detection_3d import detections_3d
-from tests.benchmarks.position_scenes import Shot, Truth, counts, load, shots
+from tests.benchmarks.harness import command, quantile, share
+from tests.benchmarks.position_scenes import Shot, Truth, counts, shots, stored_shots
 
-Boxes = Callable[[Shot], tuple[Detection, ...]]
 HERE = LocalisationEstimate(0.0, RigidTransform(), np.zeros((3, 3)), True)
-SAME_BOX = 0.5
-WHOLE, UNCUT = 0.8, 0.05
+SAME_BOX, WHOLE, UNCUT = 0.5, 0.8, 0.05
+COVERED = 16.3
+"""Quantile of 99.9 % of chi squared with three degrees of freedom."""
 
 
 @dataclass(frozen=True)
 class Miss:
-    """How far off one thing was said to be (m), and how that fits the covariance; None where it got no place."""
+    """Error of one thing's position (m), and how that fits the covariance; None where it got no place."""
 
     truth: Truth
-    off_m: float | None
-    mahalanobis2: float | None
+    off_m: float | None = None
+    mahalanobis2: float = 0.0
 
 
-def true_boxes(shot: Shot) -> tuple[Detection, ...]:
-    """What a perfect detector would find."""
-    return tuple(truth.detection for truth in shot.truths)
-
-
-def detected_boxes(shot: Shot) -> tuple[Detection, ...]:
-    """What the detector finds."""
-    assert shot.image.colour is not None
-    return shared_detector().detect([shot.image.colour])[0]
-
-
-def misses(shot: Shot, boxes: Boxes) -> Iterator[Miss]:
-    """Of each thing that counts and has a box of its class, how far off it is."""
-    found = boxes(shot)
+def misses(shot: Shot, found: Sequence[Detection]) -> Iterator[Miss]:
+    """Error of each thing that counts and has a box of its class."""
     X_OC = shot.image.frames.pose(shot.image.camera_frame)
     placed = {id(each.detection): each for each in detections_3d(shot.image, HERE, found, ())}
     for truth in filter(counts, shot.truths):
         box = next((each for each in found if _same(each, truth.detection)), None)
-        if box is None:
-            continue
         seen = placed.get(id(box))
-        if seen is None:
-            yield Miss(truth, None, None)
-            continue
-        off = seen.position_W - X_OC @ truth.p_CT
-        yield Miss(truth, float(np.linalg.norm(off)), float(off @ np.linalg.solve(seen.covariance, off)))
+        if seen is not None:
+            off = seen.position_W - X_OC @ truth.p_CT
+            yield Miss(truth, float(np.linalg.norm(off)), float(off @ np.linalg.solve(seen.covariance, off)))
+        elif box is not None:
+            yield Miss(truth)
 
 
 def _same(found: Detection, truth: Detection) -> bool:
     return found.class_name == truth.class_name and box_overlap(found.box, truth.box) >= SAME_BOX
 
 
-def summary(found: list[Miss]) -> dict[str, object]:
+def measure(scenes: int = 10, seed: int = 2, folder: Path | None = None, detector: bool = False) -> dict[str, object]:
     """Quantiles (cm) of all, of those that the picture's edge does not cut, of those seen whole, and by class."""
+    found = list[Miss]()
+    for shot in shots(seed, scenes) if folder is None else stored_shots(folder, seed, scenes):
+        true = tuple(truth.detection for truth in shot.truths)
+        found += misses(shot, shared_detector().detect([shot.image.colour])[0] if detector else true)
     uncut = [each for each in found if each.truth.truncation < UNCUT]
     names = sorted({each.truth.detection.class_name for each in found})
     return {
-        "all": _quantiles(found),
-        "uncut": _quantiles(uncut),
-        "whole": _quantiles([each for each in uncut if each.truth.visibility > WHOLE]),
-        "by_class": {n: _quantiles([each for each in found if each.truth.detection.class_name == n]) for n in names},
+        "all": _figures(found),
+        "uncut": _figures(uncut),
+        "whole": _figures([each for each in uncut if each.truth.visibility > WHOLE]),
+        "by_class": {n: _figures([each for each in found if each.truth.detection.class_name == n]) for n in names},
     }
 
 
-def _quantiles(found: list[Miss]) -> dict[str, float | int | None]:
-    offs = [100.0 * each.off_m for each in found if each.off_m is not None]
-    fits = [each.mahalanobis2 < 16.3 for each in found if each.mahalanobis2 is not None]
-    if not offs:
-        return {"things": len(found), "without_place": len(found)}
-    median, p90, p95 = (round(float(value), 2) for value in np.percentile(offs, [50, 90, 95]))
-    covered = round(float(np.mean(fits)), 3)
+def _figures(found: Sequence[Miss]) -> dict[str, object]:
+    placed = [each for each in found if each.off_m is not None]
+    offs_cm = [100.0 * each.off_m for each in placed if each.off_m is not None]
     return {
         "things": len(found),
-        "without_place": len(found) - len(offs),
-        "median_cm": median,
-        "p90_cm": p90,
-        "p95_cm": p95,
-        "within_its_covariance": covered,
+        "without_place": len(found) - len(placed),
+        "median_cm": quantile(offs_cm),
+        "p90_cm": quantile(offs_cm, 0.9),
+        "p95_cm": quantile(offs_cm, 0.95),
+        "within_its_covariance": share([each.mahalanobis2 < COVERED for each in placed]),
     }
-
-
-def pictures(folder: Path | None, seed: int, scenes: int) -> Iterable[Shot]:
-    """Pictures kept in a folder by `position_scenes`, or made now."""
-    return shots(seed, scenes) if folder is None else (load(file) for file in sorted(folder.glob("*.npz")))
-
-
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=2)
-    parser.add_argument("--folder", type=Path, help="pictures kept by position_scenes, in place of new ones")
-    parser.add_argument("--detector", action="store_true", help="boxes of the detector in place of the true ones")
-    args = parser.parse_args()
-    boxes = detected_boxes if args.detector else true_boxes
-    found = [each for shot in pictures(args.folder, args.seed, args.scenes) for each in misses(shot, boxes)]
-    sys.stdout.write(json.dumps(summary(found), indent=1) + "\n")
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

@@ -4,23 +4,17 @@ The rooms, objects and views are those of the data set's held-out part. The expo
 as the hand camera's, which finds none where it is dark.
 """
 
-from __future__ import annotations
-
-import argparse
-import sys
+import gzip
+import pickle
 import tempfile
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import Value
-from pydrake.geometry import FramePoseVector, QueryObject
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.geometry import FramePoseVector
 
 from errand_train.dataset.coco import box_of
 from errand_train.dataset.compose import Placed, Scene, compose
@@ -33,7 +27,7 @@ from plant.models.catalogue import load_catalogue
 from plant.sensors.camera_spec import depth_render_camera
 from plant.sensors.noise import DepthDegrader, DepthNoise
 from skills.api import Detection
-from skills.robot import FrameTree, Image, Intrinsics
+from skills.robot import FloatArray, FrameTree, Image
 
 VIEWS = 8
 FARTHEST_M = 2.0
@@ -47,7 +41,7 @@ class Truth:
 
     detection: Detection
     instance: str
-    p_CT: NDArray[np.float64]
+    p_CT: FloatArray
     size_C: tuple[float, float, float]
     visibility: float
     truncation: float
@@ -62,16 +56,15 @@ class Shot:
 
 
 class DepthStage(Stage):
-    """A stage that gives depth, too."""
+    """A stage of a room that gives depth, too."""
 
-    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[NDArray[np.uint8], Any, NDArray[np.float32]]:
+    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, FloatArray]:
         """Clean picture, labels and depth (m)."""
         colour, labels = self.take(view)
         poses = FramePoseVector()
         poses.set_value(self._hand, self.hand_pose(view))
         self._graph.get_source_pose_port(self._source).FixValue(self._context, Value(poses))
         query = self._graph.get_query_output_port().Eval(self._context)
-        assert isinstance(query, QueryObject)
         camera = depth_render_camera(view.intrinsics, "vtk", range_m)
         depth = query.RenderDepthImage(camera, self._world, view.X_WC)
         return colour, labels, np.asarray(depth.data[..., 0], dtype=np.float32)
@@ -120,13 +113,13 @@ def _shot(rng: np.random.Generator, stage: DepthStage, view: View) -> Shot:
     return Shot(image, truths(stage, labels, view))
 
 
-def truths(stage: DepthStage, labels: NDArray[np.int16], view: View) -> tuple[Truth, ...]:
-    """What a picture shows, from its labels."""
+def truths(stage: DepthStage, labels: np.ndarray, view: View) -> tuple[Truth, ...]:
+    """Objects that a picture shows, from its labels."""
     found = (_truth(stage, int(label), labels == label, view) for label in np.unique(labels) if label in stage.labelled)
     return tuple(truth for truth in found if truth is not None)
 
 
-def _truth(stage: DepthStage, label: int, mask: NDArray[np.bool_], view: View) -> Truth | None:
+def _truth(stage: DepthStage, label: int, mask: np.ndarray, view: View) -> Truth | None:
     model, X_WO, _ = stage.labelled[label]
     if mask.sum() < 20:
         return None
@@ -147,70 +140,25 @@ def _truth(stage: DepthStage, label: int, mask: NDArray[np.bool_], view: View) -
 
 
 def counts(truth: Truth) -> bool:
-    """Whether the floor of position errors speaks of it: near, large and well seen."""
+    """True if an object counts for position errors: near, large and well seen."""
     return float(np.linalg.norm(truth.p_CT)) < FARTHEST_M and well_seen(truth)
 
 
 def well_seen(truth: Truth) -> bool:
-    """Whether it is large in the picture, and little of it hidden or cut off."""
+    """True if an object is large in the picture, and little of it hidden or cut off."""
     u0, v0, u1, v1 = truth.detection.box
     long, short = max(u1 - u0, v1 - v0), min(u1 - u0, v1 - v0)
     seen = truth.visibility * (1.0 - truth.truncation)
     return long >= LEAST_LONG_PX and short >= LEAST_SHORT_PX and seen >= LEAST_VISIBLE
 
 
-def save(shot: Shot, path: Path) -> None:
-    """Keep a shot in a file, for another measurement."""
-    rows = [(t.detection.class_name, t.instance, t.visibility, t.truncation, *t.size_C) for t in shot.truths]
-    assert shot.image.colour is not None
-    lens, X_WC = shot.image.intrinsics, shot.image.frames.pose("hand_camera")
-    np.savez_compressed(
-        path,
-        colour=shot.image.colour,
-        depth_mm=np.rint(shot.image.depth_m * 1000).astype(np.uint16),
-        X_WC=X_WC.GetAsMatrix4(),
-        lens=np.array([lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy]),
-        rows=np.array(rows, dtype=str).reshape(-1, 7),
-        boxes=np.array([t.detection.box for t in shot.truths]).reshape(-1, 4),
-        p_CT=np.array([t.p_CT for t in shot.truths]).reshape(-1, 3),
-    )
-
-
-def load(path: Path) -> Shot:
-    """A shot that `save` has kept."""
-    with np.load(path) as data:
-        width, height, *rest = data["lens"].tolist()
-        lens = Intrinsics(int(width), int(height), *rest)
-        matrix = data["X_WC"]
-        X_WC = RigidTransform(RotationMatrix.ProjectToRotationMatrix(matrix[:3, :3]), matrix[:3, 3])
-        frames, colour = FrameTree({"hand_camera": ("odom", X_WC)}), data["colour"]
-        depth = (data["depth_mm"] / 1000.0).astype(np.float32)
-        grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), dtype=np.uint8)
-        image = Image(0.0, "hand", "hand_camera", lens, lens, colour, grey, depth, frames)
-        rows = zip(data["rows"], data["boxes"], data["p_CT"], strict=True)
-        return Shot(image, tuple(_loaded(row, box, p) for row, box, p in rows))
-
-
-def _loaded(row: NDArray[np.str_], box: NDArray[np.float64], p_CT: NDArray[np.float64]) -> Truth:
-    u0, v0, u1, v1 = (float(v) for v in box)
-    sx, sy, sz = (float(v) for v in row[4:7])
-    return Truth(Detection(str(row[0]), 1.0, (u0, v0, u1, v1)), str(row[1]), p_CT, (sx, sy, sz), *map(float, row[2:4]))
-
-
-def main() -> None:
-    """Render scenes into a folder."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, required=True)
-    args = parser.parse_args()
-    args.out.mkdir(parents=True, exist_ok=True)
-    begun = time.perf_counter()
-    for number, shot in enumerate(shots(args.seed, args.scenes)):
-        save(shot, args.out / f"{number:04d}.npz")
-        sys.stderr.write(f"\r{number + 1} pictures, {time.perf_counter() - begun:.0f} s")
-    sys.stderr.write("\n")
-
-
-if __name__ == "__main__":
-    main()
+def stored_shots(folder: Path, seed: int, scenes: int) -> Iterator[Shot]:
+    """Pictures that a folder stores; an empty one stores new ones first."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if not any(folder.iterdir()):
+        for number, shot in enumerate(shots(seed, scenes)):
+            with gzip.open(folder / f"{number:04d}.pickle.gz", "wb", compresslevel=1) as file:
+                pickle.dump(shot, file)
+    for path in sorted(folder.iterdir()):
+        with gzip.open(path) as file:
+            yield pickle.load(file)

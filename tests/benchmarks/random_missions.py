@@ -1,28 +1,24 @@
 """Random missions over all constructs and nestings, run with scripted skills to an end: what must always hold.
 
-    python -m tests.benchmarks.random_missions --trees 20000 --seed 1
+    python -m tests.benchmarks.random_missions --trees 20000 --seed 1 [--limit 480] [--kill]
     python -m tests.benchmarks.random_missions --trees 5000 --claims
 
 Failures, presses of buttons, answers, pauses, cancels and other missions in between come at random; one seed gives the
-same mission and the same run. Tells how many missions ran, how they ended, and what was found wrong, each with its
-seed.
+same mission and the same run. Prints how many missions ran within the limit (s), how they ended, and what was found
+wrong, each with its seed. With `--kill` each is killed in some tick and taken up again.
 
 With `--claims` the skills act on a small world, and in every other mission some lie. The referee judges by that world's
 history: its verdict must be that of somebody who looked on, and without a lie it must be the tree's claim.
 """
 
-from __future__ import annotations
-
-import argparse
 import contextlib
-import functools
 import random
-import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +42,9 @@ from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Ste
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError
+from tests.benchmarks.harness import command
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
-from tests.executive.conftest import PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
+from tests.executive.conftest import GRIPPER, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
 from tests.executive.conftest import default_end as usual_end
 from tests.visitors import OnMessage
 
@@ -99,32 +96,32 @@ REQUEST = Request("at random", seed=3, name="random", world_name="flat", robot="
 
 
 class MissionMaker:
-    """Makes a random mission of about so many steps."""
+    """Maker of a random mission of about so many steps; those that are `still` use no part of the robot."""
 
     def __init__(self, rng: random.Random, steps: int) -> None:
         self.rng, self.left = rng, steps
 
-    def mission(self, name: str = "random") -> Mission:
-        """The mission."""
+    def mission(self) -> Mission:
+        """Makes the mission."""
         rng = self.rng
         watched = self.watched(2) if rng.random() < 0.4 else {}
         steps = self.steps(0)
         policy = self.policy(whole=True) if rng.random() < 0.2 else Policy()
         values = {"n": rng.choice([0, 1, 2.5]), "word": "tea", "flag": False}
-        return Mission(name=name, robot="Alice", steps=steps, variables=values, **watched).with_policy(policy)
+        return Mission(name="random", robot="Alice", steps=steps, variables=values, **watched).with_policy(policy)
 
-    def steps(self, depth: int, *, still: bool = False) -> tuple[Step, ...]:
-        """Some steps in a row; those that are `still` use no part of the robot."""
+    def steps(self, depth: int, still: bool = False) -> Steps:
+        """Some steps in a row."""
         many = self.rng.choice([1, 1, 2, 2, 3]) if depth else max(1, min(self.left, self.rng.randint(1, 8)))
-        return tuple(self.step(depth, still=still) for _ in range(many))
+        return tuple(self.step(depth, still) for _ in range(many))
 
-    def step(self, depth: int, *, still: bool = False) -> Step:
+    def step(self, depth: int, still: bool = False) -> Step:
         """A step, perhaps under a policy."""
         rng = self.rng
         self.left -= 1
         policy = self.policy(still=still) if rng.random() < 0.35 else Policy()
         if self.left > 0 and depth < 6 and rng.random() < 0.6:
-            made = rng.choice([self.choose, self.repeat, self.try_, self.together, self.framed, self.asking, self.used])
+            made = rng.choice([self.choose, self.repeat, self.try_, self.together, self.group, self.asking, self.used])
             return made(depth + 1, still).with_policy(policy)
         return self.small(still).with_policy(policy)
 
@@ -135,7 +132,9 @@ class MissionMaker:
         if kind > 7:
             return Say(say="get it and bring it").with_commands(tuple(map(parse_command, rng.choice(PAIRS))))
         if kind == 0:
-            return self.set()
+            choice = {"n": NUMBERS, "word": TEXTS, "flag": TRUTHS}
+            names = rng.sample(sorted(choice), rng.choice([1, 1, 2]))
+            return Set(set={name: rng.choice(choice[name]) for name in names})
         if kind == 1:
             return rng.choice([Wait(awaited=Awaited(seconds=rng.choice([0.5, 3.0]))), self.wait(still)])
         if kind == 2:
@@ -151,33 +150,20 @@ class MissionMaker:
             return CallSkill(skill=rng.choice(SKILLS))
         return Do.from_command(parse_command(rng.choice(COMMANDS)))
 
-    def set(self) -> Step:
-        """Values that get others."""
-        choice = {"n": NUMBERS, "word": TEXTS, "flag": TRUTHS}
-        names = self.rng.sample(sorted(choice), self.rng.choice([1, 1, 2]))
-        return Set(set={name: self.rng.choice(choice[name]) for name in names})
-
-    def wait(self, instant: bool) -> Wait:
-        """What is waited for may never come: a time limit stands around some."""
-        rng = self.rng
-        if rng.random() < 0.2:
-            return Wait(awaited=Awaited(until_clock=rng.choice(["08:00", "08:01"])))
-        return Wait(awaited=Awaited(condition=self.condition(instant=instant), every_s=rng.choice([1.0, 15.0])))
+    def wait(self, still: bool) -> Wait:
+        """A wait for what may never come: a time limit stands around some."""
+        if self.rng.random() < 0.2:
+            return Wait(awaited=Awaited(until_clock=self.rng.choice(["08:00", "08:01"])))
+        return Wait(awaited=Awaited(condition=self.condition(instant=still), every_s=self.rng.choice([1.0, 15.0])))
 
     def condition(self, *, instant: bool, depth: int = 0) -> Condition:
         """A condition; an `instant` one takes no look."""
         rng = self.rng
-        kind = rng.randrange(8)
-        if kind == 0 and depth < 3:
-            return AllOf(
-                parts=tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3)))
-            )
-        if kind == 1 and depth < 3:
-            return AnyOf(
-                parts=tuple(self.condition(instant=instant, depth=depth + 1) for _ in range(rng.randint(1, 3)))
-            )
+        kind, deeper = rng.randrange(8), partial(self.condition, instant=instant, depth=depth + 1)
+        if kind < 2 and depth < 3:
+            return (AllOf, AnyOf)[kind](parts=tuple(deeper() for _ in range(rng.randint(1, 3))))
         if kind == 2 and depth < 3:
-            return Not(part=self.condition(instant=instant, depth=depth + 1))
+            return Not(part=deeper())
         if kind == 3:
             return ButtonPressed(button=rng.choice(BUTTONS))
         if kind == 4 and not instant:
@@ -187,94 +173,64 @@ class MissionMaker:
         return ValueIs(text=rng.choice(TRUTHS))
 
     def choose(self, depth: int, still: bool) -> Step:
-        """`if`."""
-        otherwise = self.steps(depth, still=still) if self.rng.random() < 0.6 else ()
-        return Choose(condition=self.condition(instant=still), then=self.steps(depth, still=still), otherwise=otherwise)
+        otherwise = self.steps(depth, still) if self.rng.random() < 0.6 else ()
+        return Choose(condition=self.condition(instant=still), then=self.steps(depth, still), otherwise=otherwise)
 
     def repeat(self, depth: int, still: bool) -> Step:
-        """`repeat`, always with a number of rounds at most."""
-        rng = self.rng
-        kind = rng.randrange(3)
+        """A loop, always with a number of rounds at most."""
+        kind = self.rng.randrange(3)
         until = self.condition(instant=still) if kind == 0 else None
         while_ = self.condition(instant=still) if kind == 1 else None
-        every_s = rng.choice([None, None, 2.0])
-        return Repeat(
-            loop=Loop(times=rng.randint(1, 3), until=until, while_=while_, every_s=every_s),
-            steps=self.steps(depth, still=still),
-        )
+        every_s = self.rng.choice([None, None, 2.0])
+        loop = Loop(times=self.rng.randint(1, 3), until=until, while_=while_, every_s=every_s)
+        return Repeat(loop=loop, steps=self.steps(depth, still))
 
     def try_(self, depth: int, still: bool) -> Step:
-        """`try`."""
-        return Try(steps=self.steps(depth, still=still), otherwise=self.steps(depth, still=still))
+        return Try(steps=self.steps(depth, still), otherwise=self.steps(depth, still))
 
     def together(self, depth: int, still: bool) -> Step:
-        """`together`: one that may move, and some that use no part of the robot."""
-        rng = self.rng
-        steps = [self.step(depth, still=still), *(self.step(depth, still=True) for _ in range(rng.randint(1, 2)))]
-        rng.shuffle(steps)
-        return Together(steps=tuple(steps), done_when=rng.choice([None, 1, 2]))
+        """One step that may move, and some that use no part of the robot."""
+        steps = [self.step(depth, still), *(self.step(depth, True) for _ in range(self.rng.randint(1, 2)))]
+        self.rng.shuffle(steps)
+        return Together(steps=tuple(steps), done_when=self.rng.choice([None, 1, 2]))
 
-    def framed(self, depth: int, still: bool) -> Step:
-        """`group`."""
-        return self.group(self.steps(depth, still=still), depth, still=still)
+    def group(self, depth: int, still: bool) -> Step:
+        steps = self.steps(depth, still)
+        return Group(steps=steps, name=self.rng.choice([None, "a group"]), **self.watched(depth, still))
 
-    def group(self, steps: Steps, depth: int, *, still: bool = False) -> Group:
-        """A group of steps, with some of what it can have."""
-        return Group(steps=steps, name=self.rng.choice([None, "a group"]), **self.watched(depth, still=still))
-
-    def watched(self, depth: int, *, still: bool = False) -> dict[str, Any]:
+    def watched(self, depth: int, still: bool = False) -> dict[str, Any]:
         """Some of what a group or a mission can have around its steps."""
         rng = self.rng
-        always = self.steps(depth + 2, still=still) if rng.random() < 0.6 else ()
+        always = self.steps(depth + 2, still) if rng.random() < 0.6 else ()
         holds = While(holds=self.condition(instant=True)) if rng.random() < 0.2 else None
-        handlers = rng.choice([0, 0, 1, 2])
-        when = tuple(
-            Handler(
-                condition=self.condition(instant=True),
-                steps=self.steps(depth + 2, still=still),
-                times=rng.randint(1, 3),
-            )
-            for _ in range(handlers)
-        )
-        return {"always": always, "while_": holds, "when": when or None}
+        when = list[Handler]()
+        for _ in range(rng.choice([0, 0, 1, 2])):
+            condition, steps = self.condition(instant=True), self.steps(depth + 2, still)
+            when.append(Handler(condition=condition, steps=steps, times=rng.randint(1, 3)))
+        return {"always": always, "while_": holds, "when": tuple(when) or None}
 
     def asking(self, depth: int, still: bool) -> Step:
-        """`ask` with steps for its answers."""
-        choices = {
-            choice: self.steps(depth, still=still) if self.rng.random() < 0.7 else ()
-            for choice in ("tea", "the coffee", "no!")
-        }
-        return self.question(choices)
+        """A question with steps for its answers."""
+        texts = ("tea", "the coffee", "no!")
+        return self.question({text: self.steps(depth, still) if self.rng.random() < 0.7 else () for text in texts})
 
-    def question(self, choices: Mapping[str, tuple[Step, ...]]) -> Ask:
+    def question(self, choices: Mapping[str, Steps]) -> Ask:
         """A question, with choices or without."""
         rng = self.rng
-        text = rng.choice(["which?", "{n} {word}?", "{1 / n}?"])
-        limit_s = rng.choice([2.0, 20.0])
+        asked = {"ask": rng.choice(["which?", "{n} {word}?", "{1 / n}?"]), "limit_s": rng.choice([2.0, 20.0])}
         if choices:
-            return Ask(
-                ask=text,
-                choices=choices,
-                limit_s=limit_s,
-                default=rng.choice([None, "tea"]),
-                gives=rng.choice([None, {"answer": "word"}]),
-            )
-        match, default, gives = rng.choice(
-            [("number", 3, "n"), ("text", "milk", "word"), ("place", "kitchen", "word"), ("number", None, None)]
-        )
-        return Ask(
-            ask=text,
-            match=match,
-            limit_s=limit_s,
-            default=rng.choice([None, default]),
-            gives={"answer": gives} if gives else None,
-        )
+            default, gives = rng.choice([None, "tea"]), rng.choice([None, {"answer": "word"}])
+            return Ask(**asked, choices=choices, default=default, gives=gives)
+        kinds = [("number", 3, "n"), ("text", "milk", "word"), ("place", "kitchen", "word"), ("number", None, None)]
+        match, usual, gives = rng.choice(kinds)
+        answer = {"answer": gives} if gives else None
+        return Ask(**asked, match=match, default=rng.choice([None, usual]), gives=answer)
 
     def used(self, depth: int, still: bool) -> Step:
         """Another mission."""
+        steps = self.steps(depth, still)
+        watched = self.watched(depth, still) if self.rng.random() < 0.4 else {}
         values = {"n": 1, "word": "tea", "flag": True}
-        steps = self.steps(depth, still=still)
-        watched = self.watched(depth, still=still) if self.rng.random() < 0.4 else {}
         used = Mission(name="used", robot="Alice", steps=steps, variables=values, **watched)
         return UseMission(use="used.yaml").with_mission(used)
 
@@ -282,11 +238,8 @@ class MissionMaker:
         """A policy; that of a whole mission skips nothing."""
         rng = self.rng
         ways = [OnFailure.STOP, OnFailure.STOP, OnFailure.RETRY, OnFailure.RETURN, OnFailure.ASK, OnFailure.SKIP]
-        guards = Guards(
-            battery=rng.choice([None, None, None, 0.2]),
-            localised=rng.random() < 0.1,
-            time_s=rng.choice([None, None, None, 60.0]),
-        )
+        battery, localised = rng.choice([None, None, None, 0.2]), rng.random() < 0.1
+        guards = Guards(battery=battery, localised=localised, time_s=rng.choice([None, None, None, 60.0]))
         on_failure = rng.choice(ways[:5] if whole else [*ways[:3], *ways[4:]] if still else ways)
         question = OperatorQuestion(limit_s=rng.choice([2.0, 10.0]), default="stop" if whole else "skip")
         return Policy(
@@ -304,31 +257,24 @@ class Robotics:
 
     rng: random.Random
     robot: ScriptedRobot
-    script: Script = field(default_factory=lambda: Script(steps=2))
-    failing: float = 0.15
+    failing: float
+    world: ScriptedWorld | None = None
     active: list[Any] = field(default_factory=list)
     raised: int = 0
-    world: ScriptedWorld | None = None
 
     def registry(self) -> dict[str, type[Skill[Any]]]:
         """The skills by name."""
-        ports: dict[str, tuple[type, Mapping[str, type]]] = {
-            **PORTS,
-            "check_door": (CheckDoorInputs, {"open": bool}),
-        }
+        ports = {**PORTS, "check_door": (CheckDoorInputs, {"open": bool})}
         return {name: self._skill(name, *both) for name, both in ports.items()}
 
     def _skill(self, skill_name: str, inputs: type, outputs_: Mapping[str, type]) -> type[Skill[Any]]:
         mine = self
-        before, after = {"grasp": (False, True), "place": (True, False), "hand_over": (True, None)}.get(
-            skill_name, (None, None)
-        )
 
         class Scripted(Skill[Any]):
             name = skill_name
             Inputs = inputs
             outputs = outputs_
-            gripper_before, gripper_after = before, after
+            gripper_before, gripper_after = GRIPPER.get(skill_name, (None, None))
             uses = {"speak": frozenset({Part.VOICE})}.get(skill_name, WHOLE_ROBOT)
             default_timeout_s = 30.0
 
@@ -340,9 +286,7 @@ class Robotics:
                 robot, lease = self.context.robot, self.context.lease
                 robot.drive(0.1, 0.0, 0.0, until_s=self.context.clock.now() + 1.0, lease=lease)
                 self.left -= 1
-                if self.left > 0:
-                    return Running(f"{skill_name} goes on")
-                return mine.end_of(self, skill_name)
+                return Running(f"{skill_name} goes on") if self.left > 0 else mine.end_of(self, skill_name)
 
             def end(self) -> None:
                 if self in mine.active:
@@ -352,7 +296,7 @@ class Robotics:
         return Scripted
 
     def end_of(self, skill: Any, name: str) -> Succeeded | Failed:
-        """How an attempt ends."""
+        """End of an attempt."""
         if self.rng.random() < self.failing:
             if self.rng.random() < 0.05:
                 self.raised += 1
@@ -373,30 +317,16 @@ class Robotics:
             return Succeeded("met", {"person": ObjectObservation(0.0, ObjectKind("person"), at, size, 0.0, 0.9)})
         if name in ("place", "hand_over"):
             self.robot.holding = False
-        found: Any = usual_end(self.script, name)(skill)
-        return found  # type: ignore[no-any-return]
+        return usual_end(Script(steps=2), name)(skill)
 
     def _in_world(self, skill: Any, name: str, world: ScriptedWorld) -> Succeeded | Failed | None:
-        """How an attempt ends that acts on the world; None: it does not."""
+        """End of an attempt that acts on the world; None where a skill does not."""
         now_s, inputs = self.robot.clock.now(), skill.inputs
-        acts: Mapping[str, Callable[[float, Any], Succeeded | Failed]] = {
-            "navigate": world.navigate,
-            "detect": world.detect,
-            "find_people": world.find_people,
-            "meet_person": world.meet_person,
-            "charge": world.charge,
-            "check_door": world.check_door,
-            "grasp": world.grasp,
-            "place": lambda t_s, inputs: world.let_go(t_s, inputs.surface.name, name),
-            "hand_over": lambda t_s, inputs: world.let_go(t_s, world.person(inputs.person), name),
-            "approach": lambda t_s, inputs: Succeeded("near", {"observation": inputs.observation}),
-        }
-        if name == "speak" and world.speak(now_s, inputs.text):
+        if name == "speak" and world.says(now_s, inputs.text):
             skill.context.publish("speech", {"robot": self.robot.name, "text": inputs.text, "t": now_s})
-        if name not in acts:
-            return None
-        done = acts[name](now_s, inputs)
-        if isinstance(done, Succeeded) and name in ("grasp", "place", "hand_over"):
+        act = getattr(world, name, None)
+        done = None if act is None else act(now_s, inputs)
+        if isinstance(done, Succeeded) and name in GRIPPER:
             self.robot.holding = name == "grasp"
         return done
 
@@ -469,7 +399,7 @@ class Operator(RunVisitor):
 
 @dataclass(frozen=True)
 class Ran:
-    """One run: how it ended, what it logged, what is wrong with it."""
+    """One run: its result, log and number of nodes, and what is wrong with it."""
 
     result: RunResult
     log: tuple[tuple[str, str], ...]
@@ -489,7 +419,7 @@ class Claimed:
 
     @property
     def wrong(self) -> str:
-        """What is wrong with the verdict; nothing: it is right."""
+        """Defect of the verdict; empty if it is right."""
         if self.verdict is not (self.right if self.claim else False):
             return f"claim {self.claim}, verdict {self.verdict}, right {self.right}: {self.why}"
         denied = self.claim and self.verdict is False
@@ -502,33 +432,88 @@ def made_mission(seed: int) -> Mission:
     return MissionMaker(rng, int(60 ** rng.random())).mission()
 
 
+class Trial:
+    """The mission of a seed, a robot with scripted skills, and another mission that may come in between.
+
+    Raises InputError if the mission cannot be compiled.
+    """
+
+    def __init__(self, seed: int, clock: ManualClock, world: ScriptedWorld | None = None) -> None:
+        self.seed, self.clock, self.robot = seed, clock, ScriptedRobot(clock)
+        rng = random.Random(f"run {seed}")
+        failing = rng.choice([0.0, 0.1, 0.4] if world is None else [0.0, 0.02, 0.1])
+        self.robotics = Robotics(rng, self.robot, failing, world)
+        registry = self.robotics.registry()
+        self.tree = compile_mission(made_mission(seed), knowledge=WORLD, registry=registry)
+        between = Mission(name="between", robot="Alice", steps=(CallSkill(skill="stow"),))
+        self.other = compile_mission(between, knowledge=WORLD, registry=registry)
+
+    def run(self, *visitors: RunVisitor) -> Ran:
+        """Runs the tree to its end."""
+        control = Control(pace=None)
+        operator = Operator(self.robotics.rng, control, self.robot, self.other, calm=self.robotics.world is not None)
+        log: list[tuple[str, str]] = []
+        logging = OnMessage(lambda topic, message: log.append((topic, repr(message))))
+        with LockStepWorker(self.clock) as worker:
+            result = run(
+                [RunEntry(self.tree, self.robot, StillLocaliser(), EmptyCostmap())],
+                clock=self.clock,
+                worker=worker,
+                visitors=[logging, *visitors, operator],
+                settings=RunSettings(
+                    seed=self.seed,
+                    tick_period_s=TICK_S,
+                    time_limit_s=LIMIT_S,
+                    endings_limit_s=ENDINGS_S,
+                    time_of_day_s=8 * 3600.0,
+                ),
+                control=control,
+            )
+        told = tuple(entry for entry in log if entry[0] != "wall")
+        wrong = (*self._wrong(result, told, operator), *self._not_done(result.worst.message, told, operator))
+        return Ran(result, told, wrong, len(self.tree.path_ids))
+
+    def _wrong(self, result: RunResult, log: tuple[tuple[str, str], ...], operator: Operator) -> list[str]:
+        """What must not be so at the end of a run."""
+        robot, worst, active = self.robot, result.worst, self.robotics.active
+        errors = [message for topic, message in log if topic == "errors" and INJECTED not in message]
+        running = [path for path, state in worst.states.items() if state.status.value == "RUNNING"]
+        defect = "divides by zero" in worst.message  # in what is watched, that is a defect of the mission
+        found = {
+            f"an exception: {errors[:1]}": errors,
+            f"ended as {worst.outcome}: {worst.message}": (
+                worst.outcome is Outcome.ERROR and not self.robotics.raised and not defect
+            ),
+            "a lease is held": robot.lease is not None,
+            "the robot drives": robot.driving,
+            f"skills are left: {[skill.name for skill in active]}": active,
+            f"nodes still run: {running[:3]}": running,
+            "a question is open": any(asked.answer is None for asked in operator.asked),
+            "no cause": worst.outcome is not Outcome.SUCCESS and worst.cause is None,
+            "no sentence": not worst.message,
+        }
+        return [what for what, so in found.items() if so]
+
+    def _not_done(self, message: str, log: tuple[tuple[str, str], ...], operator: Operator) -> Iterator[str]:
+        """What is always to be done in the end, and was not begun although its steps were."""
+        if operator.insisted or "in the end, broken off" in message:
+            return
+        moves = [
+            (text.split("'node': '", 1)[1].split("'", 1)[0], text) for topic, text in log if topic == "transitions"
+        ]
+        began = {path for path, text in moves if "'to': 'INVALID'" not in text}
+        # one that came to its end and was reset in the same tick leaves no sentence
+        reset = {path for path, text in dict(moves).items() if "'message': ''" in text}
+        for node in self.tree.root.walk():
+            if node.kind == "always":
+                first, last = (child.path_id for child in node.children)
+                if first in began and last not in began and node.path_id not in reset:
+                    yield f"not done in the end: {node.path_id}"
+
+
 def ran(seed: int) -> Ran:
-    """Make the mission of a seed and run it to its end. Raises InputError: it cannot be compiled."""
-    clock = ManualClock()
-    robotics, tree, other = _compiled(seed, ScriptedRobot(clock))
-    return _run(seed, clock, robotics, tree, other)
-
-
-def resumed(seed: int, folder: Path) -> Ran | None:
-    """The same, killed in some tick and taken up again; None when it ended before. Raises InputError as `ran`."""
-    clock = ManualClock()
-    robotics, tree, other = _compiled(seed, ScriptedRobot(clock))
-    kill_after = int(80 ** robotics.rng.random())
-    with MissionStore(folder / f"{seed}.sqlite") as store:
-        mission = store.add(REQUEST, queued=False)
-        store.begin(mission.id)
-        try:
-            _run(seed, clock, robotics, tree, other, KillingJournal(store.journal(mission.id), kill_after))
-        except KilledError:
-            again, recollection = resumed_tree(tree, store.memory(mission.id))
-        else:
-            return None
-        journal = store.journal(mission.id)
-        journal.use_recollection(recollection)
-        store.begin(mission.id)
-        robotics.active.clear()
-        robotics.robot.holder, robotics.robot.driving = None, False
-        return _run(seed, clock, robotics, again, other, journal)
+    """Makes the mission of a seed and runs it to its end. Raises InputError if it cannot be compiled."""
+    return Trial(seed, ManualClock()).run()
 
 
 class KilledError(BaseException):
@@ -537,212 +522,106 @@ class KilledError(BaseException):
     stops_run = True
 
 
+@dataclass
 class KillingJournal(RunVisitor):
-    """Passes notes on, and kills after some of them."""
+    """Visitor that passes notes on, and kills after some of them."""
 
-    def __init__(self, journal: Any, kill_after: int) -> None:
-        self.journal, self.left = journal, kill_after
+    journal: Any
+    left: int
 
     def tick(self, progress: Progress) -> None:
-        """A tick is over."""
         self.journal.tick(progress)
         self.left -= 1
         if self.left <= 0:
             raise KilledError
 
 
-def claimed(seed: int) -> Claimed:
-    """Make the mission of a seed and run it in the scripted world; in every odd one some skills lie.
+def resumed(seed: int, folder: Path) -> Ran | None:
+    """The same, killed in some tick and taken up again; None when it ended before. Raises InputError as `ran`."""
+    trial = Trial(seed, ManualClock())
+    kill_after = int(80 ** trial.robotics.rng.random())
+    with MissionStore(folder / f"{seed}.sqlite") as store:
+        mission = store.add(REQUEST, queued=False)
+        store.begin(mission.id)
+        try:
+            trial.run(KillingJournal(store.journal(mission.id), kill_after))
+        except KilledError:
+            trial.tree, recollection = resumed_tree(trial.tree, store.memory(mission.id))
+        else:
+            return None
+        journal = store.journal(mission.id)
+        journal.use_recollection(recollection)
+        store.begin(mission.id)
+        trial.robotics.active.clear()
+        trial.robot.holder, trial.robot.driving = None, False
+        return trial.run(journal)
 
-    Raises InputError: it cannot be compiled.
+
+def claimed(seed: int) -> Claimed:
+    """Makes the mission of a seed and runs it in the scripted world; in every odd one some skills lie.
+
+    Raises InputError if it cannot be compiled.
     """
     lying, accidents = (LYING, ACCIDENTS) if seed % 2 else (0.0, 0.0)
     world = ScriptedWorld(random.Random(f"world {seed}"), lying, accidents)
     clock = Clock(world)
-    robotics, tree, other = _compiled(seed, ScriptedRobot(clock), world)
-    heard: list[tuple[str, Mapping[str, Any]]] = []
-    result = _run(seed, clock, robotics, tree, other, heard=heard).result.worst
+    trial, transitions = Trial(seed, clock, world), list[Mapping[str, Any]]()
+    watch = OnMessage(lambda topic, message: transitions.append(message) if topic == "transitions" else None)
+    result = trial.run(watch).result.worst
     clock.over = True
     clock.advance(TICK_S)  # what was let go in the last tick comes to rest
-    verdict = verdict_of(tree, result, lambda conditions: world.judge(conditions, clock.now()))
-    transitions = [message for topic, message in heard if topic == "transitions"]
-    right = expected(tree, result, transitions, world)
+    verdict = verdict_of(trial.tree, result, lambda conditions: world.judge(conditions, clock.now()))
+    right = expected(trial.tree, result, transitions, world)
     return Claimed(result.outcome is Outcome.SUCCESS, verdict.success, right, tuple(world.lies), verdict.why)
 
 
-def _compiled(
-    seed: int, robot: ScriptedRobot, world: ScriptedWorld | None = None
-) -> tuple[Robotics, CompiledTree, CompiledTree]:
-    """What happens to the robot, the mission of a seed, and another that may come in between."""
-    rng = random.Random(f"run {seed}")
-    failing = rng.choice([0.0, 0.1, 0.4] if world is None else [0.0, 0.02, 0.1])
-    robotics = Robotics(rng, robot, failing=failing, world=world)
-    registry = robotics.registry()
-    tree = compile_mission(made_mission(seed), knowledge=WORLD, registry=registry)
-    between = Mission(name="between", robot="Alice", steps=(CallSkill(skill="stow"),))
-    return robotics, tree, compile_mission(between, knowledge=WORLD, registry=registry)
+Judged = tuple[str, str, int, int]
+"""How a mission ended, what is wrong with that, and its nodes and ticks."""
 
 
-def _run(
-    seed: int,
-    clock: ManualClock,
-    robotics: Robotics,
-    tree: CompiledTree,
-    other: CompiledTree,
-    journal: Any = None,
-    heard: list[tuple[str, Mapping[str, Any]]] | None = None,
-) -> Ran:
-    """Run a tree to its end; all messages go to `heard`."""
-    rng, robot = robotics.rng, robotics.robot
-    control = Control(pace=None)
-    operator = Operator(rng, control, robot, other, calm=robotics.world is not None)
-    log: list[tuple[str, str]] = []
-
-    def publish(topic: str, message: Mapping[str, Any]) -> None:
-        log.append((topic, repr(message)))
-        if heard is not None:
-            heard.append((topic, message))
-
-    with LockStepWorker(clock) as worker:
-        result = run(
-            [RunEntry(tree, robot, StillLocaliser(), EmptyCostmap())],  # type: ignore[arg-type]
-            clock=clock,
-            worker=worker,
-            visitors=[OnMessage(publish), *([] if journal is None else [journal]), operator],
-            settings=RunSettings(
-                seed=seed,
-                tick_period_s=TICK_S,
-                time_limit_s=LIMIT_S,
-                endings_limit_s=ENDINGS_S,
-                time_of_day_s=8 * 3600.0,
-            ),
-            control=control,
-        )
-    told = tuple(entry for entry in log if entry[0] != "wall")
-    wrong = tuple(_wrong(result, told, robotics, operator, tree))
-    return Ran(result, told, wrong, len(tree.path_ids))
+def judge_claim(number: int) -> Judged:
+    """Judges a claim and its verdict."""
+    one = claimed(number)
+    words = {True: "fulfilled", False: "denied", None: "not judged"}[one.verdict]
+    ended = f"{words}, {'some lied' if one.lies else 'none lied'}" if one.claim else "not claimed"
+    return ended, one.wrong, 0, 0
 
 
-def _wrong(
-    result: RunResult, log: tuple[tuple[str, str], ...], robotics: Robotics, operator: Operator, tree: CompiledTree
-) -> list[str]:
-    """What must not be so at the end of a run."""
-    robot, worst = robotics.robot, result.worst
-    errors = [message for topic, message in log if topic == "errors" and INJECTED not in message]
-    running = [path for path, state in worst.states.items() if state.status.value == "RUNNING"]
-    found = {
-        f"an exception: {errors[:1]}": bool(errors),
-        f"ended as {worst.outcome}: {worst.message}": worst.outcome is Outcome.ERROR
-        and not robotics.raised
-        and "divides by zero" not in worst.message,  # in what is watched, that is a defect of the mission
-        "a lease is held": robot.lease is not None,
-        "the robot drives": robot.driving,
-        f"skills are left: {[skill.name for skill in robotics.active]}": bool(robotics.active),
-        f"nodes still run: {running[:3]}": bool(running),
-        "a question is open": any(asked.answer is None for asked in operator.asked),
-        "no cause": worst.outcome is not Outcome.SUCCESS and worst.cause is None,
-        "no sentence": not worst.message,
-    }
-    return [what for what, so in found.items() if so] + list(_not_done(log, operator, tree, worst.message))
+def judge_run(number: int, folder: Path | None) -> Judged:
+    """Judges a run, with a folder one that is killed and resumed; every tenth must give the same log again."""
+    one = ran(number) if folder is None else resumed(number, folder)
+    if one is None:
+        return "over before the kill", "", 0, 0
+    wrong = "; ".join(one.wrong)
+    if not wrong and number % 10 == 0 and folder is None and ran(number).log != one.log:
+        wrong = "its log differs the second time"
+    return one.result.outcome.value, wrong, one.nodes, one.result.ticks
 
 
-def _not_done(log: tuple[tuple[str, str], ...], operator: Operator, tree: CompiledTree, message: str) -> list[str]:
-    """What is always to be done in the end, and was not begun although its steps were."""
-    last_of = {topic_path(text): text for topic, text in log if topic == "transitions"}
-    began = {topic_path(text) for topic, text in log if topic == "transitions" and "'to': 'INVALID'" not in text}
-    if operator.insisted or "in the end, broken off" in message:
-        return []
-    lasts = [
-        (node.path_id, *(child.path_id for child in node.children))
-        for node in tree.root.walk()
-        if node.kind == "always"
-    ]
-    # one that came to its end and was reset in the same tick leaves no sentence
-    reset = {path for path, text in last_of.items() if "'message': ''" in text}
-    return [
-        f"not done in the end: {path}"
-        for path, first, last in lasts
-        if first in began and last not in began and path not in reset
-    ]
-
-
-def topic_path(text: str) -> str:
-    """The path id in a logged transition."""
-    return text.split("'node': '", 1)[1].split("'", 1)[0]
-
-
-def benchmark(trees: int, seed: int, limit_s: float, tell: Callable[[str], None], *, kill: bool = False) -> int:
-    """Run so many, or as many as the time (s) allows; the number of those with something wrong.
-
-    With `kill`, each is killed in some tick and taken up again.
-    """
-    begun, outcomes, bad, nodes, ticks, done = time.perf_counter(), Counter[str](), 0, 0, 0, 0
-    folder = tempfile.TemporaryDirectory()
-    for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
-        if time.perf_counter() - begun > limit_s:
-            break
-        done += 1
-        try:
-            one = resumed(number, Path(folder.name)) if kill else ran(number)
-        except InputError as error:
-            outcomes["not compiled: " + error.message.rsplit(": ", 1)[-1].split("'")[0]] += 1
-            continue
-        except Exception as defect:
-            bad += 1
-            tell(f"seed {number}: {type(defect).__name__}: {defect}"[:300])
-            continue
-        if one is None:
-            outcomes["over before the kill"] += 1
-            continue
-        outcomes[one.result.outcome.value] += 1
-        nodes, ticks = nodes + one.nodes, ticks + one.result.ticks
-        if one.wrong:
-            bad += 1
-            tell(f"seed {number}: {'; '.join(one.wrong)}"[:600])
-        elif number % 10 == 0 and not kill and ran(number).log != one.log:
-            bad += 1
-            tell(f"seed {number}: its log differs the second time")
-    tell(f"{done} missions in {time.perf_counter() - begun:.0f} s: {nodes} nodes, {ticks} ticks, {bad} with a defect")
-    tell(", ".join(f"{name} {count}" for name, count in outcomes.most_common(9)))
-    return bad
-
-
-def benchmark_claims(trees: int, seed: int, limit_s: float, tell: Callable[[str], None]) -> int:
-    """Judge so many, or as many as the time (s) allows; the number of verdicts that are wrong."""
-    begun, verdicts, bad, done = time.perf_counter(), Counter[str](), 0, 0
-    for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
-        if time.perf_counter() - begun > limit_s:
-            break
-        done += 1
-        try:
-            one = claimed(number)
-        except InputError:
-            verdicts["not compiled"] += 1
-            continue
-        words = {True: "fulfilled", False: "denied", None: "not judged"}[one.verdict]
-        verdicts[f"{words}, {'some lied' if one.lies else 'none lied'}" if one.claim else "not claimed"] += 1
-        if one.wrong:
-            bad += 1
-            tell(f"seed {number}: {one.wrong}"[:900])
-    tell(f"{done} missions in {time.perf_counter() - begun:.0f} s: {bad} with a wrong verdict")
-    tell(", ".join(f"{name} {count}" for name, count in verdicts.most_common()))
-    return bad
-
-
-def main() -> int:
-    """The command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trees", type=int, default=20_000)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--limit", type=float, default=480.0, help="seconds at most")
-    parser.add_argument("--kill", action="store_true", help="kill each in some tick, and take it up again")
-    parser.add_argument("--claims", action="store_true", help="compare claims with verdicts in the scripted world")
-    options = parser.parse_args()
-    tell = functools.partial(print, flush=True)
-    if options.claims:
-        return int(benchmark_claims(options.trees, options.seed, options.limit, tell) > 0)
-    return int(benchmark(options.trees, options.seed, options.limit, tell, kill=options.kill) > 0)
+def measure(trees: int = 20_000, seed: int = 1, limit: float = 480.0, kill: bool = False, claims: bool = False) -> int:
+    """Judges so many missions, or as many as the time (s) allows; returns 1 when something is wrong."""
+    begun, ends, bad, nodes, ticks = time.perf_counter(), Counter[str](), 0, 0, 0
+    with tempfile.TemporaryDirectory() as folder:
+        judge: Callable[[int], Judged] = partial(judge_run, folder=Path(folder) if kill else None)
+        for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
+            if time.perf_counter() - begun > limit:
+                break
+            try:
+                ended, wrong, *sizes = (judge_claim if claims else judge)(number)
+            except InputError as error:
+                ended, wrong, sizes = f"not compiled: {error.message.rsplit(': ', 1)[-1].split(chr(39))[0]}", "", [0, 0]
+            except Exception as defect:
+                ended, wrong, sizes = "exception", f"{type(defect).__name__}: {defect}", [0, 0]
+            ends[ended] += 1
+            nodes, ticks = nodes + sizes[0], ticks + sizes[1]
+            if wrong:
+                bad += 1
+                print(f"seed {number}: {wrong}"[:900], flush=True)
+    spent_s, found = time.perf_counter() - begun, "with a wrong verdict" if claims else "with a defect"
+    print(f"{ends.total()} missions in {spent_s:.0f} s: {nodes} nodes, {ticks} ticks, {bad} {found}")
+    print(", ".join(f"{name} {count}" for name, count in ends.most_common(9)))
+    return int(bad > 0)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command(measure)

@@ -4,29 +4,26 @@ Source of the forms: Calli et al., "The YCB Object and Model Set" (2015), CC BY 
 brings them as binary STL files without colours. They stay where they are; nothing of them is part of the project.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from errand_train.dataset.objects.draft import Draft
 from errand_train.dataset.objects.model import ObjectModel
 from plant.models.builder.mesh import Colour
-from tests.benchmarks.foreign_models import OTHERS, kept_model
+from skills.robot import FloatArray
+from tests.benchmarks.foreign_models import kept_model
 
-FloatArray = NDArray[np.float64]
-
-_HEADER_BYTES: Final = 80
-_TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
-_SAME_POINT: Final = 1e-5
-STEEL, DARK, BLACK, WOOD = (0.64, 0.64, 0.66), (0.25, 0.25, 0.27), (0.08, 0.08, 0.08), (0.75, 0.55, 0.30)
-RED, BLUE, YELLOW, WHITE = (0.80, 0.10, 0.10), (0.15, 0.30, 0.75), (0.90, 0.72, 0.10), (0.93, 0.93, 0.93)
+_HEADER_BYTES = 80
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
+_SAME_POINT = 1e-5
+FACTS = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+COLOURS = {name: tuple(rgb) for name, rgb in FACTS["colours"].items()}
 
 
 @dataclass(frozen=True)
@@ -39,38 +36,11 @@ class Paint:
 
 
 SCANS: Mapping[str, tuple[str, Sequence[Paint]]] = {
-    "042_adjustable_wrench": ("wrench", (Paint(STEEL), Paint(DARK), Paint(STEEL, RED, 0.5))),
-    "043_phillips_screwdriver": ("screwdriver", (Paint(STEEL, YELLOW, 0.4), Paint(STEEL, BLACK, 0.4))),
-    "044_flat_screwdriver": ("screwdriver", (Paint(STEEL, RED, 0.4), Paint(STEEL, BLUE, 0.4))),
-    "048_hammer": ("hammer", (Paint(WOOD, DARK, 0.7), Paint(BLACK, STEEL, 0.7), Paint(STEEL))),
-    "006_mustard_bottle": (OTHERS, (Paint(YELLOW),)),
-    "011_banana": (OTHERS, (Paint(YELLOW),)),
-    "013_apple": (OTHERS, (Paint(RED),)),
-    "019_pitcher_base": (OTHERS, (Paint(BLUE),)),
-    "021_bleach_cleanser": (OTHERS, (Paint(WHITE),)),
-    "022_windex_bottle": (OTHERS, (Paint(BLUE),)),
-    "024_bowl": (OTHERS, (Paint(RED),)),
-    "025_mug": (OTHERS, (Paint(RED), Paint(WHITE))),
-    "026_sponge": (OTHERS, (Paint(YELLOW),)),
-    "028_skillet_lid": (OTHERS, (Paint(DARK),)),
-    "029_plate": (OTHERS, (Paint(WHITE),)),
-    "030_fork": (OTHERS, (Paint(STEEL),)),
-    "031_spoon": (OTHERS, (Paint(STEEL),)),
-    "032_knife": (OTHERS, (Paint(STEEL, BLACK, 0.5),)),
-    "033_spatula": (OTHERS, (Paint(BLACK),)),
-    "035_power_drill": (OTHERS, (Paint(RED), Paint(DARK))),
-    "037_scissors": (OTHERS, (Paint(STEEL),)),
-    "038_padlock": (OTHERS, (Paint(YELLOW),)),
-    "050_medium_clamp": (OTHERS, (Paint(BLACK),)),
-    "051_large_clamp": (OTHERS, (Paint(BLACK),)),
-    "053_mini_soccer_ball": (OTHERS, (Paint(WHITE),)),
-    "055_baseball": (OTHERS, (Paint(WHITE),)),
-    "059_chain": (OTHERS, (Paint(STEEL),)),
-    "065-f_cups": (OTHERS, (Paint(RED),)),
-    "072-b_toy_airplane": (OTHERS, (Paint(BLUE),)),
-    "073-a_lego_duplo": (OTHERS, (Paint(RED),)),
+    name: (category, [Paint(*(COLOURS.get(each, each) for each in paint)) for paint in paints])
+    for category, files in FACTS["scans"].items()
+    for name, paints in files.items()
 }
-"""Files by name, the class of each, and its paints; what could pass for a can, a cylinder or a cube is left out."""
+"""Files by name, the class of each, and its paints."""
 
 
 def read_stl(data: bytes) -> FloatArray:

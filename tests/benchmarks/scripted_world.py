@@ -1,12 +1,10 @@
 """A small world that scripted skills act on, its history for the referee, and what a person would say of a run."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -22,17 +20,15 @@ from plant.referee.object_history import ObjectHistory, ObjectSample, TimedPath,
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
 from tests.executive.conftest import KNOWLEDGE, ManualClock
 
-__all__ = ["WORLD", "Clock", "ScriptedWorld", "expected"]
-
-SAMPLES: Final = 5
-NEAR_PERSON_M: Final = 2.0
+SAMPLES = 5
+NEAR_PERSON_M = 2.0
 HAND, FLOOR = "hand", "floor"
-NEAR_DOCK_M: Final = 0.1
-DOOR_W: Final = (2.5, 0.0)
-DOOR_STAYS_S: Final = 17.0
+NEAR_DOCK_M = 0.1
+DOOR_W = (2.5, 0.0)
+DOOR_STAYS_S = 17.0
 """The door is open for so long, then closed for so long, and so on."""
-PEOPLE: Final = {"Sam": (0.5, 4.5), "Robin": (0.5, 0.5)}
-OBJECTS: Final = {
+PEOPLE = {"Sam": (0.5, 4.5), "Robin": (0.5, 0.5)}
+OBJECTS = {
     "coke": ("coke", "counter"),
     "coke_2": ("coke", "shelf"),
     "beer": ("beer", "counter"),
@@ -45,22 +41,22 @@ def _square(x: float, y: float, dx: float, dy: float) -> list[list[float]]:
     return [[x - dx, y - dy], [x + dx, y - dy], [x + dx, y + dy], [x - dx, y + dy]]
 
 
-_PLACES: Final = {
+_PLACES = {
     "kitchen": _square(4.5, 0.0, 1.5, 2.0),
     "bedroom": _square(-4.5, 0.0, 1.5, 2.0),
     "hall": _square(0.0, 0.0, 2.0, 2.0),
     "bathroom": _square(0.5, 4.0, 1.0, 1.0),
 }
-_SURFACES: Final = {
+_SURFACES = {
     "shelf": _square(5.5, 1.5, 0.5, 0.5),
     "counter": _square(5.5, -1.5, 0.5, 0.5),
     "bedside table": _square(-5.5, 1.5, 0.5, 0.5),
 }
-WORLD: Final = Knowledge.model_validate(
+WORLD = Knowledge.model_validate(
     {
         **KNOWLEDGE,
-        "places": {name: {**facts, "polygon": _PLACES[name]} for name, facts in KNOWLEDGE["places"].items()},  # type: ignore[attr-defined]
-        "surfaces": {name: {**facts, "polygon": _SURFACES[name]} for name, facts in KNOWLEDGE["surfaces"].items()},  # type: ignore[attr-defined]
+        "places": {name: {**facts, "polygon": _PLACES[name]} for name, facts in KNOWLEDGE["places"].items()},
+        "surfaces": {name: {**facts, "polygon": _SURFACES[name]} for name, facts in KNOWLEDGE["surfaces"].items()},
         "doors": [{"between": ["hall", "kitchen"], "at": DOOR_W, "width": 1.0}],
     }
 )
@@ -134,40 +130,31 @@ class ScriptedWorld:
         extend_path(self.path, np.array([*self.robot_W, 0.5]), now_s)
 
     def detect(self, now_s: float, inputs: Any) -> Succeeded | Failed:
-        """See what is on the surfaces."""
+        """Sees what is on the surfaces."""
         on = [surface.name for surface in inputs.surfaces]
         seen = [name for name, place in self.places.items() if place in on and OBJECTS[name][0] in inputs.classes]
+        found = [self.observation(now_s, name) for name in seen]
         if self.lie(now_s, "detect"):
-            if seen:
-                return Failed(Cause.POSTCONDITION, "not seen")
             x, y, z = self.on_surface(next(iter(OBJECTS)), on[0]) if on[0] in _SURFACES else (0.0, 0.0, 0.0)
-            return _seen(
-                [ObjectObservation(now_s, ObjectKind(inputs.classes[0]), (x, y + 0.07, z), (0.06,) * 3, 0.0, 0.9)]
-            )
-        if not seen:
-            return Failed(Cause.POSTCONDITION, "not seen")
-        return _seen([self.observation(now_s, name) for name in seen])
+            kind = ObjectKind(inputs.classes[0])
+            found = [] if seen else [ObjectObservation(now_s, kind, (x, y + 0.07, z), (0.06,) * 3, 0.0, 0.9)]
+        return _seen(found, "not seen")
 
     def find_people(self, now_s: float, inputs: Any) -> Succeeded | Failed:
-        """See who is in a room."""
+        """Sees who is in a room."""
         wanted = None if inputs.person in (ANYBODY, "person") else inputs.person
         there = [p for name, p in PEOPLE.items() if wanted in (None, name) and inside(inputs.area_W, p)]
         there = [p for p in there if all(math.dist(p, one.position_W[:2]) > 0.9 for one in inputs.avoid)]
         if self.lie(now_s, "find_people"):
             there = [] if there else [(0.0, 0.0)]
-        if not there:
-            return Failed(Cause.POSTCONDITION, "nobody is there")
-        size = (0.5, 0.5, 1.7)
-        return _seen([ObjectObservation(now_s, ObjectKind("person"), (x, y, 0.9), size, 0.0, 0.9) for x, y in there])
+        return _seen([_person(now_s, p) for p in there], "nobody is there")
 
     def meet_person(self, now_s: float, inputs: Any) -> Succeeded | Failed:
-        """Stand beside whoever is at a place."""
+        """Stands beside the person at a place."""
         if not any(math.dist(p, inputs.place_W) < 1.0 for p in PEOPLE.values()):
             return Failed(Cause.POSTCONDITION, "nobody is there")
         self.drive_to(now_s, inputs.place_W)
-        at, size = (*inputs.place_W, 0.9), (0.5, 0.5, 1.7)
-        person = ObjectObservation(now_s, ObjectKind("person"), at, size, 0.0, 0.9, inputs.place)
-        return Succeeded("beside them", {"person": person})
+        return Succeeded("beside them", {"person": _person(now_s, inputs.place_W, inputs.place)})
 
     def charge(self, now_s: float, inputs: Any) -> Succeeded | Failed:
         """Charge, at the dock only."""
@@ -190,23 +177,32 @@ class ScriptedWorld:
             self.move(now_s, near[0], HAND)
         return Succeeded("held", {"tried": (*inputs.avoid, 1)})
 
-    def let_go(self, now_s: float, after: str, what: str) -> Succeeded | Failed:
-        """Let go of what is in the hand; a lie drops it."""
+    def place(self, now_s: float, inputs: Any) -> Succeeded:
+        """Puts what is in the hand on a surface."""
+        return self._let_go(now_s, inputs.surface.name, "place")
+
+    def hand_over(self, now_s: float, inputs: Any) -> Succeeded:
+        """Gives what is in the hand to a person, or to the nearest one."""
+        nearest = min(PEOPLE, key=lambda each: math.dist(PEOPLE[each], self.robot_W))
+        return self._let_go(now_s, inputs.person if inputs.person in PEOPLE else nearest, "hand_over")
+
+    def _let_go(self, now_s: float, after: str, what: str) -> Succeeded:
+        """Lets go of what is in the hand; a lie drops it."""
         name, lies = self.held(), self.lie(now_s, what)
         if name is not None:
             self.move(now_s, name, FLOOR if lies else after)
         return Succeeded("let go")
 
-    def speak(self, now_s: float, text: str) -> bool:
-        """Whether it is said."""
+    def approach(self, now_s: float, inputs: Any) -> Succeeded:
+        """Claims to be near."""
+        return Succeeded("near", {"observation": inputs.observation})
+
+    def says(self, now_s: float, text: str) -> bool:
+        """Says something; True unless that is a lie."""
         if self.lie(now_s, "speak"):
             return False
         self.said.append((round(now_s, 6), text))
         return True
-
-    def person(self, name: str) -> str:
-        """Who takes it."""
-        return name if name in PEOPLE else min(PEOPLE, key=lambda each: math.dist(PEOPLE[each], self.robot_W))
 
     def on_surface(self, name: str, surface: str) -> tuple[float, float, float]:
         """Where an object lies on a surface."""
@@ -268,8 +264,15 @@ class ScriptedWorld:
         return judge(conditions, truth, collisions=())
 
 
-def _seen(observations: list[ObjectObservation]) -> Succeeded:
+def _seen(observations: list[ObjectObservation], otherwise: str) -> Succeeded | Failed:
+    """Observations as outputs; a failure with a sentence without any."""
+    if not observations:
+        return Failed(Cause.POSTCONDITION, otherwise)
     return Succeeded("seen", {"observation": observations[0], "observations": tuple(observations)})
+
+
+def _person(now_s: float, p_W: tuple[float, float], place: str | None = None) -> ObjectObservation:
+    return ObjectObservation(now_s, ObjectKind("person"), (*p_W, 0.9), (0.5, 0.5, 1.7), 0.0, 0.9, place)
 
 
 class Clock(ManualClock):
@@ -297,13 +300,13 @@ def expected(
 
     True: all that was done and counts was so when it was to be so. None: there is nothing to judge by.
     """
-    seen = _Person(tree, transitions, world)
+    seen = _Onlooker(tree, transitions, world)
     found = [holds for part in tree.parts for holds in seen.of(part, result)]
     found += [holds for node in tree.root.walk() if is_speech(node) for holds in seen.speech(node.path_id)]
     return all(found) if found else None
 
 
-class _Person:
+class _Onlooker:
     """Somebody who looks on."""
 
     def __init__(self, tree: CompiledTree, transitions: Sequence[Mapping[str, Any]], world: ScriptedWorld) -> None:

@@ -8,10 +8,6 @@ command asks is read from its message with the SDK's own geometry. It is compare
 command is done; a command that another one replaces before is `cut`, and not compared.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import math
 import os
 import subprocess
@@ -22,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -30,7 +26,7 @@ from bosdyn.api import arm_command_pb2, basic_command_pb2, robot_command_pb2
 from bosdyn.api.spot import robot_command_pb2 as spot_command_pb2
 from bosdyn.client.frame_helpers import get_a_tform_b
 from bosdyn.client.math_helpers import SE2Pose, SE3Pose
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from executive.app.placed_robots import only_robot
 from executive.app.simulated import compile_first, simulate
@@ -42,10 +38,11 @@ from plant.spot_api.server.identity import credentials
 from plant.spot_api.server.server import Options, SpotServer
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import Pose2D
+from tests.benchmarks.harness import command, show
 
-EXAMPLES: Final = "ERRAND_SDK_EXAMPLES"
-OWN: Final = Path(__file__).with_name("sdk_moves.py")
-PROGRAMS: Final = (
+EXAMPLES = "ERRAND_SDK_EXAMPLES"
+OWN = Path(__file__).with_name("sdk_moves.py")
+PROGRAMS = (
     "hello_spot/hello_spot.py",
     "frame_trajectory_command/frame_trajectory_command.py --dx 0.6 --frame odom",
     "frame_trajectory_command/frame_trajectory_command.py --dyaw 0.8 --frame vision",
@@ -59,21 +56,23 @@ PROGRAMS: Final = (
     "arm_gaze/arm_gaze.py",
     "arm_with_body_follow/arm_with_body_follow.py",
 )
-ENDS_WITH_1: Final = ("arm_joint_long_trajectory.py",)
+ENDS_WITH_1 = ("arm_joint_long_trajectory.py",)
 """Examples whose own last line ends them with 1 whatever has happened."""
-MOST_M: Final = 0.1
+MOST_M = 0.1
 """Largest error of a motion; of a gaze in rad."""
-BASE: Final = ("base", "height", "velocity")
-START: Final = Pose2D(8.6, 3.9, 0.0)
+BASE = ("base", "height", "velocity")
+START = Pose2D(8.6, 3.9, 0.0)
 """Place in the living room with free floor around; the world's start has furniture ahead."""
-JOINTS: Final = ("sh0", "sh1", "el0", "el1", "wr0", "wr1")
+HAND_M = 0.19557
+"""Distance of the hand's frame from the wrist's."""
+JOINTS = ("sh0", "sh1", "el0", "el1", "wr0", "wr1")
 Error = Callable[[], float]
-_LIMIT_S: Final = 150.0
+_LIMIT_S = 150.0
 
 
 @dataclass
 class Asked:
-    """One goal of a command: its kind, the error from it, whether it is done, and the error then (m, or rad).
+    """One goal of a command: its kind, the error from it (m, or rad), and the status of a feedback when it is done.
 
     `cut` is the error of one that another command replaces before it is done: from its path at that time, `on_path`,
     where it has one.
@@ -82,7 +81,8 @@ class Asked:
     command: int
     kind: str
     error: Error
-    done: Callable[[Any], bool]
+    feedback: str
+    status: int
     on_path: Error | None = None
     error_then: float | None = None
     cut: float | None = None
@@ -114,109 +114,77 @@ class Judge:
         snapshot = self.server.computer.snapshot
         tree, named = frame_tree(snapshot.frames), command.synchronized_command
         X_WO = self.X_WB() @ snapshot.X_AB("body", "odom")
-        self.asked += [Asked(number, *each) for each in (*self._base(named, tree, X_WO), *self._arm(named, tree, X_WO))]
+        goals = (*self._base(named.mobility_command, tree, X_WO), *self._arm(named.arm_command, tree, X_WO))
+        self.asked += [Asked(number, *each) for each in goals]
 
-    def _base(self, named: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
-        base, part = named.mobility_command, basic_command_pb2
+    def _base(self, base: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
         if base.HasField("se2_trajectory_request"):
             request = base.se2_trajectory_request
             odom = get_a_tform_b(tree, "odom", request.se2_frame_name)
             goal = odom.get_closest_se2_transform() * SE2Pose.from_proto(request.trajectory.points[-1].pose)
-            at_W = (X_WO @ np.array([goal.x, goal.y, 0.0]))[:2]
-            done = part.SE2TrajectoryCommand.Feedback.STATUS_AT_GOAL
-            yield (
-                "base",
-                self._base_error(at_W),
-                lambda told: told.mobility_command_feedback.se2_trajectory_feedback.status == done,
-            )
+            done = basic_command_pb2.SE2TrajectoryCommand.Feedback.STATUS_AT_GOAL
+            yield "base", self._base_error(X_WO @ np.array([goal.x, goal.y, 0.0])), "se2_trajectory_feedback", done
         if base.HasField("stand_request"):
-            params = spot_command_pb2.MobilityParams()
+            params, can = spot_command_pb2.MobilityParams(), self.server.computer.capabilities
             base.params.Unpack(params)
             points = params.body_control.base_offset_rt_footprint.points
-            can = self.server.computer.capabilities
             wanted_m = can.standing_height_m + (points[0].pose.position.z if points else 0.0)
             wanted_m = float(np.clip(wanted_m, *can.height_range_m))
-            done = part.StandCommand.Feedback.STATUS_IS_STANDING
-            yield (
-                "height",
-                lambda: abs(float(self.X_WB().translation()[2]) - wanted_m),
-                lambda told: told.mobility_command_feedback.stand_feedback.status == done,
-            )
+            done = basic_command_pb2.StandCommand.Feedback.STATUS_IS_STANDING
+            yield "height", lambda: abs(float(self.X_WB().translation()[2]) - wanted_m), "stand_feedback", done
         if base.HasField("se2_velocity_request") and base.se2_velocity_request.se2_frame_name in ("body", "flat_body"):
             request = base.se2_velocity_request
             lasts_s = seconds(request.end_time) - self.server.computer.now_s()
-            v, w = np.array([request.velocity.linear.x, request.velocity.linear.y]), request.velocity.angular
+            (x, y), w = (request.velocity.linear.x, request.velocity.linear.y), request.velocity.angular
             turned = w * lasts_s
             along, aside = (math.sin(turned) / w, (1.0 - math.cos(turned)) / w) if abs(w) > 1e-6 else (lasts_s, 0.0)
-            moved = [along * v[0] - aside * v[1], aside * v[0] + along * v[1], 0.0]
-            at_W = (self.X_WB() @ np.array(moved))[:2]
-            done = part.RobotCommandFeedbackStatus.STATUS_COMMAND_TIMED_OUT
-            yield "velocity", self._base_error(at_W), lambda told: told.mobility_command_feedback.status == done
+            moved = np.array([along * x - aside * y, aside * x + along * y, 0.0])
+            done = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_TIMED_OUT
+            yield "velocity", self._base_error(self.X_WB() @ moved), "", done
 
     def _base_error(self, at_W: Any) -> Error:
-        return lambda: float(np.linalg.norm(self.X_WB().translation()[:2] - at_W))
+        return lambda: float(np.linalg.norm(self.X_WB().translation()[:2] - at_W[:2]))
 
-    def _arm(self, named: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
-        arm, part = named.arm_command, arm_command_pb2
-
-        def hand_error(X_FH: RigidTransform, X_WF: Callable[[], RigidTransform], X_HT: RigidTransform) -> Error:
-            return lambda: float(
-                np.linalg.norm((self.X_WH() @ X_HT).translation() - (X_WF() @ X_FH @ X_HT).translation())
-            )
-
+    def _arm(self, arm: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
         if arm.HasField("arm_cartesian_command"):
-            request = arm.arm_cartesian_command
-            tool = SE3Pose(0.19557, 0.0, 0.0, SE3Pose.from_identity().rot)
+            request, one = arm.arm_cartesian_command, SE3Pose.from_identity()
+            tool, task = SE3Pose(HAND_M, 0.0, 0.0, one.rot), one
             if request.HasField("wrist_tform_tool"):
                 tool = SE3Pose.from_proto(request.wrist_tform_tool)
-            stays = request.root_frame_name in ("odom", "vision")
-            root = get_a_tform_b(tree, "odom" if stays else "body", request.root_frame_name)
-            task = SE3Pose.from_proto(request.root_tform_task)
-            if not request.HasField("root_tform_task"):
-                task = SE3Pose.from_identity()
-            points = request.pose_trajectory_in_task.points
-            goal = root * task * SE3Pose.from_proto(points[-1].pose)
+            if request.HasField("root_tform_task"):
+                task = SE3Pose.from_proto(request.root_tform_task)
+            stays, trajectory = request.root_frame_name in ("odom", "vision"), request.pose_trajectory_in_task
+            root = get_a_tform_b(tree, "odom" if stays else "body", request.root_frame_name) * task
             X_HT = transform(tool.to_proto(), "tool")
-            X_FH = transform(goal.to_proto(), "goal") @ X_HT.inverse()
-            done = part.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
-            yield (
-                "hand",
-                hand_error(X_FH, (lambda: X_WO) if stays else self.X_WB, X_HT),
-                lambda told: told.arm_command_feedback.arm_cartesian_feedback.status == done,
-                self._off_path(
-                    request.pose_trajectory_in_task,
-                    [
-                        (X_WO @ transform((root * task * SE3Pose.from_proto(each.pose)).to_proto(), "")).translation()
-                        for each in points
-                    ],
-                    lambda wanted_W: float(np.linalg.norm((self.X_WH() @ X_HT).translation() - wanted_W)),
-                )
-                if stays
-                else None,
-            )
+            X_FT = [transform((root * SE3Pose.from_proto(p.pose)).to_proto(), "goal") for p in trajectory.points]
+            path_W = [(X_WO @ X).translation() for X in X_FT]
+            done = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
+            on_path = self._off_path(trajectory, path_W, lambda p_W: self._hand_error_m(p_W, X_HT)) if stays else None
+
+            def error() -> float:
+                X_WF = X_WO if stays else self.X_WB()
+                return self._hand_error_m((X_WF @ X_FT[-1]).translation(), X_HT)
+
+            yield "hand", error, "arm_cartesian_feedback", done, on_path
         if arm.HasField("arm_joint_move_command"):
             trajectory, model = arm.arm_joint_move_command.trajectory, arm_model(self.server.computer.capabilities)
             q = [np.array([getattr(each.position, name).value for name in JOINTS]) for each in trajectory.points]
-            X_BH = model.X_BH(q[-1])
-            done = part.ArmJointMoveCommand.Feedback.STATUS_COMPLETE
-            yield (
-                "joints",
-                hand_error(X_BH, self.X_WB, RigidTransform()),
-                lambda told: told.arm_command_feedback.arm_joint_move_feedback.status == done,
-                self._off_path(
-                    trajectory, q, lambda wanted: hand_error(model.X_BH(wanted), self.X_WB, RigidTransform())()
-                ),
-            )
+
+            def joint_error(wanted: Any) -> float:
+                return self._hand_error_m((self.X_WB() @ model.X_BH(wanted)).translation())
+
+            done = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_COMPLETE
+            on_path = self._off_path(trajectory, q, joint_error)
+            yield "joints", lambda: joint_error(q[-1]), "arm_joint_move_feedback", done, on_path
         if arm.HasField("arm_gaze_command"):
             request = arm.arm_gaze_command
             point = request.target_trajectory_in_frame1.points[-1].point
-            x, y, z = get_a_tform_b(tree, "odom", request.frame1_name).transform_point(point.x, point.y, point.z)
-            done = part.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
-            yield (
-                "gaze",
-                self._gaze_error(np.asarray(X_WO @ np.array([x, y, z]))),
-                lambda told: told.arm_command_feedback.arm_gaze_feedback.status == done,
-            )
+            target = get_a_tform_b(tree, "odom", request.frame1_name).transform_point(point.x, point.y, point.z)
+            done = arm_command_pb2.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
+            yield "gaze", self._gaze_error(X_WO @ np.array(target)), "arm_gaze_feedback", done
+
+    def _hand_error_m(self, p_W: Any, X_HT: RigidTransform = RigidTransform()) -> float:  # noqa: B008
+        return float(np.linalg.norm((self.X_WH() @ X_HT).translation() - p_W))
 
     def _off_path(self, trajectory: Any, values: Sequence[Any], error: Callable[[Any], float]) -> Error | None:
         """Error from the point of a timed path at the present time; None for a path without times."""
@@ -229,23 +197,21 @@ class Judge:
 
     def _gaze_error(self, target_W: Any) -> Error:
         def error() -> float:
-            X_WHand = self.X_WH() @ RigidTransform(RotationMatrix(), [0.19557, 0.0, 0.0])
-            away = X_WHand.inverse() @ target_W
+            away = (self.X_WH() @ RigidTransform([HAND_M, 0.0, 0.0])).inverse() @ target_W
             return float(math.atan2(math.hypot(away[1], away[2]), away[0]))
 
         return error
 
     def look(self, service: RobotCommandService) -> None:
         """Compares what is done now; called before each step of the plant."""
-        for each in self.asked:
-            if each.error_then is None and each.cut is None:
-                request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=each.command)
-                told = service.RobotCommandFeedback(request, None).feedback.synchronized_feedback  # type: ignore[arg-type]
-                part = told.mobility_command_feedback if each.kind in BASE else told.arm_command_feedback
-                if each.done(told):
-                    each.error_then = each.error()
-                elif part.status == basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN:
-                    each.cut = (each.on_path or each.error)()
+        for each in (each for each in self.asked if each.error_then is None and each.cut is None):
+            request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=each.command)
+            told = service.RobotCommandFeedback(request, None).feedback.synchronized_feedback  # type: ignore[arg-type]
+            part = told.mobility_command_feedback if each.kind in BASE else told.arm_command_feedback
+            if (getattr(part, each.feedback) if each.feedback else part).status == each.status:
+                each.error_then = each.error()
+            elif part.status == basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_OVERRIDDEN:
+                each.cut = (each.on_path or each.error)()
 
 
 @contextmanager
@@ -253,9 +219,8 @@ def judged(seed: int) -> Iterator[Judge]:
     """Serves a simulated Spot whose commands are judged; the caller runs `server.computer`."""
     opened = open_world("flat")
     compile_first()
-    simulation = simulate(
-        opened, {"Alice": only_robot("Alice", opened, seed=seed, start=START)}, seed=seed, record=False
-    )
+    robots = {"Alice": only_robot("Alice", opened, seed=seed, start=START)}
+    simulation = simulate(opened, robots, seed=seed, record=False)
     robot, judges = simulation.robots["Alice"], list[Judge]()
     take = RobotCommandService.RobotCommand
 
@@ -285,12 +250,10 @@ def run(program: str, *, seed: int = 1) -> Mapping[str, Any]:
         launch = [sys.executable, "-m", "plant.spot_api.launch", str(server.certificate), str(server.port), "real"]
 
         def execute() -> None:
+            line, environment = [*launch, script, *arguments, "127.0.0.1"], {**os.environ, **user}
             try:
-                command = [*launch, script, *arguments, "127.0.0.1"]
                 with tempfile.TemporaryDirectory() as folder:
-                    done = subprocess.run(
-                        command, env={**os.environ, **user}, cwd=folder, capture_output=True, timeout=_LIMIT_S
-                    )
+                    done = subprocess.run(line, env=environment, cwd=folder, capture_output=True, timeout=_LIMIT_S)
                 code.append(done.returncode)
             except subprocess.TimeoutExpired:
                 code.append(124)
@@ -316,22 +279,19 @@ def run(program: str, *, seed: int = 1) -> Mapping[str, Any]:
         }
 
 
-def main() -> None:
-    """Runs the programs of the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--examples", type=Path, default=os.environ.get(EXAMPLES))
-    parser.add_argument("--only", default="")
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
-    programs = [str(OWN), *(f"{options.examples}/{each}" for each in PROGRAMS if options.examples)]
+def measure(
+    examples: Path | None = Path(os.environ[EXAMPLES]) if EXAMPLES in os.environ else None,
+    only: str = "",
+    seed: int = 1,
+) -> dict[str, int]:
+    """Runs our program, and those of a folder whose name holds a text."""
+    programs = [str(OWN), *(f"{examples}/{each}" for each in PROGRAMS if examples)]
     results = []
-    for program in programs:
-        if options.only in program:
-            results.append(run(program, seed=options.seed))
-            print(json.dumps(results[-1]), flush=True)
-    right = sum(bool(each["true"] and each["ended"]) for each in results)
-    print(json.dumps({"programs": len(results), "ended and true": right}))
+    for program in (each for each in programs if only in each):
+        results.append(run(program, seed=seed))
+        show(results[-1])
+    return {"programs": len(results), "ended_and_true": sum(each["true"] and each["ended"] for each in results)}
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

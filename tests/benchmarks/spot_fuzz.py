@@ -8,13 +8,8 @@ how many answers had which gRPC code, error and header; calls that failed inside
 whether a new client is served beside all that are idle.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import logging
 import random
-import sys
 import tempfile
 import threading
 import time
@@ -35,6 +30,7 @@ from plant.spot_api.server.calls import service_calls
 from plant.spot_api.server.computer import Computer, Motors
 from plant.spot_api.server.identity import credentials
 from plant.spot_api.server.server import SERVICES
+from tests.benchmarks.harness import command
 from tests.benchmarks.spot_kills import PASSWORD, USER, server_of
 
 LARGE = 100 * 1024**2
@@ -197,33 +193,31 @@ def standing() -> Iterator[tuple[Any, Connection, grpc.Channel]]:
                 stepping.join()
 
 
-def main() -> None:
-    """Sends all, and prints the counts."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--messages", type=int, default=10_000)
-    parser.add_argument("--clients", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1)
-    options = parser.parse_args()
+def measure(messages: int = 10_000, clients: int = 1000, seed: int = 1) -> dict[str, object]:
+    """Sends all, and counts the answers."""
     logging.getLogger().addHandler(errors := Errors())
     with standing() as (server, connection, channel):
         begun_s = time.monotonic()
-        codes, inside = fuzz(server.computer, connection, channel, options.messages, options.seed)
+        codes, inside = fuzz(server.computer, connection, channel, messages, seed)
         took_s = time.monotonic() - begun_s
         large = large_request(channel)
-        idle = idle_clients(server.port, server.certificate, options.clients)
+        idle = idle_clients(server.port, server.certificate, clients)
         begun_s = time.monotonic()
-        new = Connection(Address("127.0.0.1", server.port, server.certificate), USER, PASSWORD)
-        new.state()
+        Connection(Address("127.0.0.1", server.port, server.certificate), USER, PASSWORD).state()
         served_s = time.monotonic() - begun_s
         for each in idle:
             each.close()
-    result = {
-        "messages": sum(codes.values()), "took_s": round(took_s, 1), "codes": dict(codes), "inside": inside[:20],
-        "large": large, "idle_clients": len(idle), "new_client_served_s": round(served_s, 2),
+    return {
+        "messages": sum(codes.values()),
+        "took_s": round(took_s, 1),
+        "codes": codes,
+        "inside": inside[:20],
+        "large": large,
+        "idle_clients": len(idle),
+        "new_client_served_s": round(served_s, 2),
         "logged": [text.splitlines()[-1] for text in errors.texts[:20]],
-    }  # fmt: skip
-    sys.stdout.write(json.dumps(result) + "\n")
+    }
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

@@ -10,30 +10,46 @@ is: from 0.3 s after the end of the last drive the base moves less than 2 cm, as
 lease free within 6 s; the motors off by policy. Prints JSON.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import math
 import multiprocessing
-import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-PRELOADED = ("bosdyn.client.keepalive", "bosdyn.client.util", "plant.spot_api.adapter.robot", "skills.testing.robot")
+from tests.benchmarks.harness import command, tell, totals
+
+PRELOADED = ["bosdyn.client.keepalive", "bosdyn.client.util", "plant.spot_api.adapter.robot", "skills.testing.robot"]
 USER, PASSWORD = "user", "right"
-STILL_S, FREE_S, OFF_AFTER_S = 0.3, 6.0, 2.0
-DRIVE_S = 0.6
-STILL_M = 0.02
+STILL_S, FREE_S, OFF_AFTER_S, WAIT_S = 0.3, 6.0, 2.0, 10.0
+DRIVE_S, STILL_M, DRIVES_M = 0.6, 0.02, 0.005
 ENDINGS = ("killed", "reset", "silenced")
 ARM_RAD = ((0.0, -0.9, 1.8, 0.0, -0.9, 0.0), (0.0, -1.6, 2.3, 0.0, -0.7, 0.0))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Result of a trial; `off` says whether the motors went off by policy, None without one."""
+
+    number: int
+    client: str
+    ending: str
+    driving: bool
+    still: bool
+    moved_m: float
+    free_s: float | None
+    off: bool | None
+
+    @property
+    def free(self) -> bool:
+        """True if the lease was free in time."""
+        return self.free_s is not None and self.free_s < FREE_S
 
 
 def velocity(number: int) -> tuple[float, float, float]:
@@ -103,13 +119,10 @@ def adapter_client(port: int, certificate: str, number: int, end_s: Any) -> None
         clock.advance(0.05)
 
 
-CLIENTS: dict[str, Callable[..., None]] = {"sdk": sdk_client, "adapter": adapter_client}
-
-
-def quiet(client: str, *arguments: Any) -> None:
+def quiet(client: Callable[..., None], *arguments: Any) -> None:
     """Runs a client, whose errors after its connection is cut nobody reads."""
     with Path("/dev/null").open("w") as nowhere, redirect_stdout(nowhere), suppress(Exception):
-        CLIENTS[client](*arguments)
+        client(*arguments)
 
 
 class Trials:
@@ -118,60 +131,47 @@ class Trials:
     def __init__(self, server: Any, certificate: Path, seed: int) -> None:
         self._server, self._certificate = server, str(certificate)
         self._rng, self._context = np.random.default_rng(seed), multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(list(PRELOADED))
+        self._context.set_forkserver_preload(PRELOADED)
 
-    def run(self, number: int) -> dict[str, Any]:
+    def run(self, number: int) -> Trial:
         """Runs one trial."""
         from tests.plant.spot_api.proxy import Proxy
 
-        kind, ending = ("sdk", "adapter")[number % 2], ENDINGS[number % 3]
-        computer, proxy = self._server.computer, Proxy(self._server.port)
-        end_s = self._context.Value("d", 0.0)
-        client = self._context.Process(target=quiet, args=(kind, proxy.port, self._certificate, number, end_s))
-        client.start()
+        client, ending = (sdk_client, adapter_client)[number % 2], ENDINGS[number % 3]
+        computer, proxy, end_s = self._server.computer, Proxy(self._server.port), self._context.Value("d", 0.0)
+        process = self._context.Process(target=quiet, args=(client, proxy.port, self._certificate, number, end_s))
+        process.start()
         early = number % 5 == 4
         if not early:
-            self._waited(lambda: end_s.value > 1.0, 20.0)
+            _waited(lambda: end_s.value > 1.0, 2.0 * WAIT_S)
         time.sleep(float(self._rng.uniform(0.0, 2.0 if early else 3.0)))
         at_s = computer.now_s()
-        if ending == "killed":
-            client.kill()
-        else:
-            proxy.cut() if ending == "reset" else proxy.silence()
+        {"killed": process.kill, "reset": proxy.cut, "silenced": proxy.silence}[ending]()
         last_s = end_s.value
-        driving = self._motion(0.05)
+        driving = self._motion_m(0.05) > DRIVES_M
         time.sleep(max(0.0, last_s + STILL_S - computer.now_s()))
-        still = self._motion(0.3)
-        free = self._waited(lambda: all(claim.stale for claim in list(computer.leases._claims.values())), 10.0)
-        free_s = computer.now_s() - at_s
-        policy = kind == "sdk" and last_s >= 1.0
-        off = self._waited(lambda: computer.motors.value == "off", 10.0) if policy else None
-        later = self._motion(0.3)
-        client.kill()
-        client.join()
+        still_m = self._motion_m(0.3)
+        free = _waited(lambda: all(claim.stale for claim in list(computer.leases._claims.values())))
+        free_s = round(computer.now_s() - at_s, 2) if free else None
+        policy = client is sdk_client and last_s >= 1.0
+        off = _waited(lambda: computer.motors.value == "off") if policy else None
+        moved_m = max(still_m, self._motion_m(0.3))
+        process.kill()
+        process.join()
         proxy.cut()
-        self._recover(number)
-        return {
-            "number": number, "client": kind, "ending": ending, "drives": driving > 0.005,
-            "still": bool(still < STILL_M and later < STILL_M), "moved_m": round(max(still, later), 4),
-            "free_s": round(free_s, 2) if free else None, "off": off,
-        }  # fmt: skip
+        self._recover()
+        kind = client.__name__.removesuffix("_client")
+        return Trial(number, kind, ending, driving, moved_m < STILL_M, round(moved_m, 4), free_s, off)
 
-    def _waited(self, true: Callable[[], bool], most_s: float) -> bool:
-        until_s = time.monotonic() + most_s
-        while not true() and time.monotonic() < until_s:
-            time.sleep(0.02)
-        return true()
-
-    def _motion(self, during_s: float) -> float:
-        """Returns how far the base moves in a while (m, and rad as m)."""
+    def _motion_m(self, during_s: float) -> float:
+        """Motion of the base in a while (m, and rad as m)."""
         before = self._server.computer.snapshot.odometry.pose
         time.sleep(during_s)
         after = self._server.computer.snapshot.odometry.pose
         far_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
         return max(far_m, abs(math.remainder(after.yaw_rad - before.yaw_rad, math.tau)))
 
-    def _recover(self, number: int) -> None:
+    def _recover(self) -> None:
         """Removes what the client has left behind."""
         computer = self._server.computer
         computer.leases.make_stale(["body"])
@@ -180,8 +180,15 @@ class Trials:
                 watch.__self__._live.clear()
 
 
+def _waited(true: Callable[[], bool], most_s: float = WAIT_S) -> bool:
+    until_s = time.monotonic() + most_s
+    while not true() and time.monotonic() < until_s:
+        time.sleep(0.02)
+    return true()
+
+
 def server_of(scripted: bool, credentials: Any) -> Any:
-    """Returns a server of a robot."""
+    """Server of a robot in the plant, or of a scripted one."""
     from plant.robots.spot.kind import spot_capabilities
     from plant.spot_api.server.server import Options, SpotServer
     from skills.manipulation.arm.kinematics import arm_model
@@ -205,42 +212,33 @@ def server_of(scripted: bool, credentials: Any) -> Any:
     return SpotServer(robot, clock, arm_model(robot.capabilities()), credentials, Options({USER: PASSWORD}))
 
 
-def summary(trials: list[dict[str, Any]]) -> dict[str, Any]:
-    """Returns the counts of all trials, and those that went wrong."""
-    policy = [each for each in trials if each["off"] is not None]
-    free = [each["free_s"] for each in trials if each["free_s"] is not None]
+def summary(trials: Sequence[Trial]) -> dict[str, Any]:
+    """Counts of all trials, and those that went wrong."""
+    policy = [each for each in trials if each.off is not None]
     return {
         "trials": len(trials),
-        "driving": sum(each["drives"] for each in trials),
-        "still": sum(each["still"] for each in trials),
-        "free": sum(free_s < FREE_S for free_s in free),
-        "longest_free_s": max(free, default=None),
+        **totals(trials, "driving", "still", "free"),
+        "longest_free_s": max((each.free_s for each in trials if each.free_s is not None), default=None),
         "with_policy": len(policy),
-        "off_by_policy": sum(each["off"] for each in policy),
-        "wrong": [e for e in trials if not e["still"] or e["off"] is False or (e["free_s"] or FREE_S) >= FREE_S],
-    }  # fmt: skip
+        "off_by_policy": sum(bool(each.off) for each in policy),
+        "wrong": [each for each in trials if not each.still or each.off is False or not each.free],
+    }
 
 
-def main() -> None:
-    """Runs all trials, and prints their counts."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=50)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--scripted", action="store_true")
-    options = parser.parse_args()
+def measure(trials: int = 50, seed: int = 1, scripted: bool = False) -> dict[str, Any]:
+    """Runs all trials in a thread, and the robot in this one."""
     from plant.spot_api.server.identity import credentials
 
     with tempfile.TemporaryDirectory() as folder:
         held = credentials(Path(folder))
-        server = server_of(options.scripted, held)
-        trials, stopping = Trials(server, held.certificate, options.seed), threading.Event()
-        done: list[dict[str, Any]] = []
+        server, stopping, done = server_of(scripted, held), threading.Event(), list[Trial]()
+        against = Trials(server, held.certificate, seed)
 
         def run() -> None:
             try:
-                for number in range(options.trials):
-                    done.append(trials.run(number))
-                    sys.stderr.write(f"{done[-1]}\n")
+                for number in range(trials):
+                    done.append(against.run(number))
+                    tell(done[-1])
             finally:
                 stopping.set()
 
@@ -249,8 +247,8 @@ def main() -> None:
             running.start()
             server.computer.run(stopping)
             running.join()
-    sys.stdout.write(json.dumps(summary(done)) + "\n")
+    return summary(done)
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

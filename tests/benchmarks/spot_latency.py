@@ -9,12 +9,7 @@ over wall time, and the most that it was behind (s). Python does not answer whil
 picture. A machine that does other work gives higher numbers.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import multiprocessing
-import sys
 import tempfile
 import threading
 import time
@@ -24,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from tests.benchmarks.harness import command, quantile
 from tests.benchmarks.spot_kills import PASSWORD, USER, server_of
 
 RATES_HZ = {"state": 30.0, "command": 10.0, "cloud": 10.0, "picture": 2.0}
@@ -135,13 +131,13 @@ class Client:
             due_s = max(due_s + period_s, time.monotonic() - period_s)
 
 
-def milliseconds(times_s: list[float]) -> dict[str, float]:
+def milliseconds(times_s: Sequence[float]) -> dict[str, float | None]:
     """Median, 99th percentile and number of times."""
-    median, p99 = np.percentile(times_s, [50, 99]) * 1e3
-    return {"median_ms": round(float(median), 1), "p99_ms": round(float(p99), 1), "count": len(times_s)}
+    times_ms = [1000.0 * each for each in times_s]
+    return {"median_ms": quantile(times_ms, digits=1), "p99_ms": quantile(times_ms, 0.99, 1), "count": len(times_ms)}
 
 
-def in_plant_s(answered_s: list[float], begun_s: list[float], steps_s: list[float]) -> list[float]:
+def in_plant_s(answered_s: Sequence[float], begun_s: Sequence[float], steps_s: Sequence[float]) -> list[float]:
     """Times from each command's answer to the plant's first step after it has begun."""
     steps = np.array(steps_s)
     first = np.searchsorted(steps, np.array(begun_s))
@@ -149,7 +145,7 @@ def in_plant_s(answered_s: list[float], begun_s: list[float], steps_s: list[floa
     return [max(0.0, float(steps[step]) - answer_s) for step, answer_s in pairs]
 
 
-def pace(steps: list[tuple[float, float]], since_s: float, until_s: float) -> dict[str, float]:
+def pace(steps: Sequence[tuple[float, float]], since_s: float, until_s: float) -> dict[str, float]:
     """Robot's time over wall time, and the most that the robot was behind since it was least so."""
     wall, clock = np.array([step for step in steps if since_s <= step[0] <= until_s]).T
     behind = (wall - wall[0]) - (clock - clock[0])
@@ -160,39 +156,35 @@ def pace(steps: list[tuple[float, float]], since_s: float, until_s: float) -> di
     }
 
 
-def main() -> None:
-    """Serves, measures, and prints the numbers."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=120.0)
-    parser.add_argument("--scripted", action="store_true")
-    options = parser.parse_args()
+def measure(seconds: float = 120.0, scripted: bool = False) -> dict[str, object]:
+    """Serves in another process, and measures both phases."""
+    from plant.spot_api.server.identity import credentials
+
     context = multiprocessing.get_context("spawn")
     with tempfile.TemporaryDirectory() as folder:
-        from plant.spot_api.server.identity import credentials
-
         held = credentials(Path(folder))
         port, stopping, results = context.Value("i", 0), context.Event(), context.Queue()
-        server = context.Process(target=serve, args=(options.scripted, folder, port, stopping, results))
+        server = context.Process(target=serve, args=(scripted, folder, port, stopping, results))
         server.start()
         while not port.value and server.is_alive():
             time.sleep(0.1)
-        client, phases = Client(port.value, held.certificate), list[Any]()
+        client, phases = Client(port.value, held.certificate), dict[str, Any]()
         client.stand_up()
-        for kinds in PHASES.values():
-            span_s = client.run(kinds, options.seconds / 2.0)
-            phases.append((span_s, {kind: milliseconds(times) for kind, times in client.took_s.items()}))
+        for name, kinds in PHASES.items():
+            span_s = client.run(kinds, seconds / 2.0)
+            phases[name] = span_s, {kind: milliseconds(times) for kind, times in client.took_s.items()}
         stopping.set()
         begun_s, steps = results.get(timeout=60.0)
         server.join()
-    begun_s = begun_s[-len(client.answered_s) :]
-    result = {}
-    for name, ((since_s, until_s), figures) in zip(PHASES, phases, strict=True):
-        commands = [k for k, at_s in enumerate(client.answered_s) if since_s <= at_s <= until_s]
-        answered, begun = [client.answered_s[k] for k in commands], [begun_s[k] for k in commands]
-        figures["set_point"] = milliseconds(in_plant_s(answered, begun, [step[0] for step in steps]))
-        result[name] = {**figures, **pace(steps, since_s, until_s)}
-    sys.stdout.write(json.dumps(result) + "\n")
+    answered_s, begun_s = client.answered_s, begun_s[-len(client.answered_s) :]
+    figures = dict[str, object]()
+    for name, ((since_s, until_s), times) in phases.items():
+        chosen = [k for k, at_s in enumerate(answered_s) if since_s <= at_s <= until_s]
+        own_s = [answered_s[k] for k in chosen], [begun_s[k] for k in chosen]
+        set_point = milliseconds(in_plant_s(*own_s, [step[0] for step in steps]))
+        figures[name] = {**times, "set_point": set_point, **pace(steps, since_s, until_s)}
+    return figures
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

@@ -7,20 +7,12 @@ shipped missions of one robot run. `same` counts the pairs with equal outcome an
 run in process is left out.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
-import sys
-import tempfile
 import time
-from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 from executive.app.goal_conditions import verdict_of
 from executive.app.mission_run import run_request
@@ -32,11 +24,13 @@ from executive.app.simulated import simulate
 from executive.mission.request import Request
 from plant.simulation import Simulation
 from plant.spot_api.server.identity import credentials
+from tests.benchmarks.errand_process import ROOT
+from tests.benchmarks.harness import benchmark
 from tests.plant.spot_api.lock_step import LockStep
 
-MISSIONS: Final = Path(__file__).parents[2] / "missions"
-SEVERAL: Final = "two_robots"
-TIME_OF_DAY: Final = "08:29"
+MISSIONS = ROOT / "missions"
+SHIPPED = tuple(sorted(file.stem for file in MISSIONS.glob("*.yaml") if file.stem != "two_robots"))
+TIME_OF_DAY = "08:29"
 """Missions that wait for a time begin shortly before it."""
 
 
@@ -45,10 +39,25 @@ class Ended:
     """End of a mission: its outcome, the referee's verdict with its reason, robot time and time of the computer (s)."""
 
     outcome: str
-    verdict: bool
+    verdict: bool | None
     why: str
     robot_s: float
     took_s: float
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The same mission through the API and in process."""
+
+    name: str
+    api: Ended
+    in_process: Ended | None
+
+    @property
+    def same(self) -> bool:
+        """True if both have the same outcome and verdict."""
+        ends = [(each.outcome, each.verdict) for each in (self.api, self.in_process) if each is not None]
+        return len(ends) == 2 and ends[0] == ends[1]
 
 
 class Judged(ApiBackend):
@@ -62,12 +71,6 @@ class Judged(ApiBackend):
     def judge(self, tree, result, *, before=(), since_s=0.0):  # type: ignore[no-untyped-def]
         """Judges the run by the plant."""
         return verdict_of(tree, result, self._simulation.referee.judge, before=before, since_s=since_s)
-
-
-def in_process(request: Request) -> Ended:
-    """Runs a request in the plant."""
-    began_s = time.monotonic()
-    return _ended(run_request(prepare(request)).report, began_s)
 
 
 def through_api(
@@ -94,53 +97,39 @@ def through_api(
 
 
 def _ended(report: Any, began_s: float) -> Ended:
-    seen = report.seen
-    took_s = round(time.monotonic() - began_s, 1)
-    return Ended(
-        str(report.outcome), seen.success, f"{report.message}; {seen.why}", round(report.sim_time_s, 1), took_s
-    )
+    why, took_s = f"{report.message}; {report.seen.why}", round(time.monotonic() - began_s, 1)
+    return Ended(str(report.outcome), report.seen.success, why, round(report.sim_time_s, 1), took_s)
 
 
-def both(name: str, seed: int, *, api_only: bool) -> tuple[Ended, Ended | None]:
+def cases(
+    missions: tuple[str, ...] = SHIPPED, seed: int = 1, seeds: int = 1, api_only: bool = False
+) -> Iterable[tuple[str, int, bool]]:
+    """Names of shipped missions, or sentences, with so many seeds."""
+    return product(missions, range(seed, seed + seeds), [api_only])
+
+
+def run_case(name: str, seed: int, api_only: bool, folder: Path) -> Pair:
     """Runs a mission, or a sentence, through the API and in process."""
-    with tempfile.TemporaryDirectory() as out:
-        what: dict[str, Any] = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
-        request = Request(**what, seed=seed, record=False, time_of_day=TIME_OF_DAY, out=Path(out) / "run")
-        api = through_api(request, Path(out) / "credentials")
-        return api, None if api_only else in_process(replace(request, out=Path(out) / "in_process"))
+    what: dict[str, Any] = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
+    request = Request(**what, seed=seed, record=False, time_of_day=TIME_OF_DAY, out=folder / "run")
+    api, here = through_api(request, folder / "credentials"), None
+    if not api_only:
+        began_s = time.monotonic()
+        here = _ended(run_request(prepare(replace(request, out=folder / "in_process"))).report, began_s)
+    return Pair(f"{name} {seed}", api, here)
 
 
-def compared(names: list[str], seeds: range, *, api_only: bool) -> dict[str, Any]:
-    """Runs each mission with each seed, each in a process of its own: a renderer must end in the thread it began in."""
-    runs: dict[str, Any] = {}
-    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as pool:
-        for name, seed in product(names, seeds):
-            api, here = pool.submit(both, name, seed, api_only=api_only).result()
-            runs[f"{name} {seed}"] = {"api": vars(api), "in_process": None if here is None else vars(here)}
-            sys.stderr.write(f"{name} {seed}: {api} {here or ''}\n")
-    ended = [run["api"] for run in runs.values()]
-    pairs = [(run["api"], run["in_process"]) for run in runs.values() if run["in_process"] is not None]
+def summary(pairs: Sequence[Pair]) -> dict[str, object]:
+    """Figures of all missions."""
+    robot_s, took_s = (sum(getattr(each.api, name) for each in pairs) for name in ("robot_s", "took_s"))
     return {
-        "same": sum(all(api[key] == here[key] for key in ("outcome", "verdict")) for api, here in pairs),
-        "fulfilled": sum(each["verdict"] for each in ended),
-        "of": len(runs),
-        "robot_s_per_s": round(sum(each["robot_s"] for each in ended) / sum(each["took_s"] for each in ended), 2),
-        "runs": runs,
+        "same": sum(each.same for each in pairs),
+        "fulfilled": sum(bool(each.api.verdict) for each in pairs),
+        "of": len(pairs),
+        "robot_s_per_s": round(robot_s / took_s, 2),
+        "runs": {each.name: each for each in pairs},
     }
 
 
-def main() -> None:
-    """Runs the measure from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    shipped = sorted(file.stem for file in MISSIONS.glob("*.yaml") if file.stem != SEVERAL)
-    parser.add_argument("--missions", default=",".join(shipped), help="names of shipped missions, or sentences")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--seeds", type=int, default=1, help="how many, from --seed on")
-    parser.add_argument("--api-only", action="store_true", help="leave out the runs in process")
-    options = parser.parse_args()
-    seeds = range(options.seed, options.seed + options.seeds)
-    print(json.dumps(compared(options.missions.split(","), seeds, api_only=options.api_only), indent=1))
-
-
 if __name__ == "__main__":
-    main()
+    benchmark(cases, run_case, summary, alone=True)  # a renderer must end in the thread it began in

@@ -40,7 +40,7 @@ def bare_ticks(tree):
 
 def whole_run(tree, folder):
     """The CPU time of each cycle of a mission that is done (s)."""
-    result, cycles = ticks_of_a_run(tree, folder)
+    result, cycles = ticks_of_a_run([tree], folder)
     assert result.outcome is Outcome.SUCCESS, result.worst.message
     return cycles
 

@@ -1,9 +1,6 @@
 """Catalogues of models that others made are read as they are told: classes, sizes, faces."""
 
-from __future__ import annotations
-
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +29,7 @@ FACTS = {
 
 
 @pytest.fixture
-def catalogues(tmp_path: Path) -> Path:
+def catalogues(tmp_path):
     folder = tmp_path / "catalogues"
     folder.mkdir()
     lines = []
@@ -46,18 +43,18 @@ def catalogues(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_face_of_four_corners_becomes_two_triangles_and_negative_numbers_count_from_the_end() -> None:
+def test_a_face_of_four_corners_becomes_two_triangles_and_negative_numbers_count_from_the_end():
     corners = [point for point, _, _ in read_wavefront(OBJ).corners["paint"]]
     assert corners[:9] == [0, 1, 2, 0, 2, 3, 4, 0, 1]
 
 
-def test_tools_are_of_their_class_small_things_of_none_and_lamps_and_furniture_are_left_out(catalogues: Path) -> None:
+def test_tools_are_of_their_class_small_things_of_none_and_lamps_and_furniture_are_left_out(catalogues):
     # name: category
     expected = {"Hammer": "hammer", "Mug": "other", "Wall lamp": None, "Wardrobe": None}
     assert {entry.name: entry.category for entry in entries(catalogues / "Some.sh3f")} == expected
 
 
-def test_a_model_has_the_size_that_its_catalogue_tells_with_z_up(catalogues: Path, tmp_path: Path) -> None:
+def test_a_model_has_the_size_that_its_catalogue_tells_with_z_up(catalogues, tmp_path):
     made = supplied(tmp_path / "models", catalogues)
     (hammer,) = made["hammer"]
     assert hammer.size_m == pytest.approx((0.30, 0.12, 0.05))
@@ -65,6 +62,6 @@ def test_a_model_has_the_size_that_its_catalogue_tells_with_z_up(catalogues: Pat
     assert hammer.class_id and not made["other"][0].class_id
 
 
-def test_without_catalogues_the_package_is_named(tmp_path: Path) -> None:
+def test_without_catalogues_the_package_is_named(tmp_path):
     with pytest.raises(FileNotFoundError, match="install Debian's sweethome3d-furniture"):
         supplied(tmp_path / "models", tmp_path)

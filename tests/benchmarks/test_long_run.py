@@ -1,8 +1,6 @@
-"""The benchmark of long runs: its figures, and its smallest case."""
+"""Figures of the benchmark of long runs."""
 
-import pytest
-
-from tests.benchmarks.long_run import Report, memory_mb, run, summary, written_bytes
+from tests.benchmarks.long_run import Report, memory_mb, summary, written_bytes
 
 
 def test_the_slope_of_the_memory_is_that_of_the_second_half(tmp_path):
@@ -17,11 +15,3 @@ def test_memory_and_written_bytes_of_this_process_are_measured(tmp_path):
     (tmp_path / "file").write_bytes(b"x" * 100_000)
     assert written_bytes() - before >= 100_000
     assert memory_mb() > 10.0
-
-
-@pytest.mark.mission
-@pytest.mark.nightly
-def test_a_short_run_is_reported(tmp_path):
-    told = run(0.2, tmp_path, every_s=6.0, wait_s=1.0, record=False)
-    assert told["outcome"] == "success"
-    assert told["written_kb_per_min_last"] > 0

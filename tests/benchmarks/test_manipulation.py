@@ -1,9 +1,6 @@
-"""The manipulation benchmark's figures: spots, failures, sheets, shapes, ways through doors."""
+"""Figures of the manipulation benchmark: spots, failures, sheets, shapes, ways through doors."""
 
-from __future__ import annotations
-
-import math
-from pathlib import Path
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -12,25 +9,13 @@ import pytest
 from plant.models.catalogue import read_imported
 from plant.worlds.seeding import place_objects, place_people
 from tests.benchmarks.carry import doors, entered
-from tests.benchmarks.manipulation import (
-    TimedWorker,
-    failure,
-    failures,
-    is_false_claim,
-    near_upright,
-    place_error_m,
-    spread,
-    write_sheet,
-)
+from tests.benchmarks.manipulation import TimedWorker, Trial, failures, is_false_claim, place_error_m, write_sheet
 from tests.benchmarks.manipulation_room import PERSON, room
 from tests.benchmarks.shapes import DENSITY_KG_M3, SLENDER, random_shape, written_shape
 
-GOOD = {
-    "name": "coke", "surface": "floor", "seed": 7, "cause": "",
-    "lifted": True, "held_10s": True, "placed": True, "placed_upright": True, "place_error_m": 0.02,
-}  # fmt: skip
-FALLEN = {**GOOD, "placed_upright": False}
-UNSEEN = {**GOOD, "cause": "PLANNING: no path", "placed": False, "placed_upright": None, "place_error_m": None}
+GOOD = Trial("coke", "coke.sdf", "floor", 0, 7, True, True, True, True, 0.02, 0, False, 0, "", 60.0, 10.0)
+FALLEN = replace(GOOD, placed_upright=False)
+UNSEEN = replace(GOOD, cause="PLANNING: no path", placed=False, placed_upright=None, place_error_m=None)
 
 
 class DoneAtOnce:
@@ -52,17 +37,17 @@ def test_without_a_spot_there_is_no_place_error():
 
 
 @pytest.mark.parametrize(
-    ("run", "near"), [(GOOD, True), ({**GOOD, "place_error_m": 0.06}, False), (FALLEN, False), (UNSEEN, False)]
+    ("trial", "near"), [(GOOD, True), (replace(GOOD, place_error_m=0.06), False), (FALLEN, False), (UNSEEN, False)]
 )
-def test_only_what_stands_upright_within_5_cm_counts_as_near(run, near):
-    assert near_upright(run) is near
+def test_only_what_stands_upright_within_5_cm_counts_as_near(trial, near):
+    assert trial.near_upright is near
 
 
 @pytest.mark.parametrize(
-    ("run", "why"), [(GOOD, ""), (FALLEN, "fell over on the second table"), (UNSEEN, "PLANNING: no path")]
+    ("trial", "why"), [(GOOD, ""), (FALLEN, "fell over on the second table"), (UNSEEN, "PLANNING: no path")]
 )
-def test_a_failure_is_told_by_the_mission_or_else_by_the_truth(run, why):
-    assert failure(run) == why
+def test_a_failure_is_told_by_the_mission_or_else_by_the_truth(trial, why):
+    assert trial.failure == why
 
 
 # claimed, lifted, held (s) -> a false claim
@@ -85,15 +70,16 @@ def test_failures_are_counted_by_class_and_cause():
     assert [line[:2] for line in lines] == [["2", "coke"], ["1", "coke"]]
 
 
-def test_a_sheet_has_a_picture_for_each_failure(tmp_path: Path):
-    path = tmp_path / "made" / "sheet.png"
-    assert "2 failed trials" in write_sheet(path, [(UNSEEN, np.zeros((60, 80, 3), np.uint8))] * 2)
+def test_a_sheet_has_a_picture_for_each_failure(tmp_path):
+    ending, path = tmp_path / "ending.png", tmp_path / "made" / "sheet.png"
+    cv2.imwrite(str(ending), np.zeros((60, 80, 3), np.uint8))
+    assert "2 failed trials" in write_sheet(path, [GOOD, *[replace(UNSEEN, ending=ending)] * 2])
     assert cv2.imread(str(path)).shape[1] == 2 * 400
 
 
-def test_without_failures_no_sheet_is_written(tmp_path: Path):
+def test_without_failures_no_sheet_is_written(tmp_path):
     path = tmp_path / "sheet.png"
-    assert "no trial failed" in write_sheet(path, [])
+    assert "no trial failed" in write_sheet(path, [GOOD])
     assert not path.exists()
 
 
@@ -104,11 +90,6 @@ def test_work_is_timed_by_name_also_when_it_fails():
     with pytest.raises(ZeroDivisionError):
         worker.submit(lambda: 1 // 0, latency_s=0.1, name="plan")
     assert {name: len(spent_s) for name, spent_s in worker.spent_s.items()} == {"plan": 2, "look": 1}
-
-
-def test_a_spread_without_values_is_not_a_number():
-    assert math.isnan(spread([])["p95"])
-    assert spread([1.0, 2.0, 3.0])["median"] == 2.0
 
 
 def test_shapes_stay_within_what_the_gripper_takes():
@@ -125,7 +106,7 @@ def test_a_seed_gives_the_same_shape_again():
     assert random_shape(501) == random_shape(501) != random_shape(502)
 
 
-def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path: Path):
+def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path):
     pytest.importorskip("coacd")
     made = read_imported(written_shape(502, tmp_path))
     assert made.name == made.class_name == "cylinder_502"
@@ -144,13 +125,13 @@ def test_the_opening_between_hall_and_living_room_is_no_door():
     assert doors(["hall", "living room", "kitchen"]) == 1
 
 
-def test_a_crowded_room_leaves_out_the_objects_that_do_not_fit(tmp_path: Path):
+def test_a_crowded_room_leaves_out_the_objects_that_do_not_fit(tmp_path):
     world = room(tmp_path, "hammer", ["extinguisher"] * 8, "shelf", 22)
     names = [placed.name for placed in place_objects(world, 22)]
     assert names[0] == "target"
     assert len(names) < 9
 
 
-def test_a_person_stands_in_a_room_for_handing_over(tmp_path: Path):
+def test_a_person_stands_in_a_room_for_handing_over(tmp_path):
     (person,) = place_people(room(tmp_path, "coke", (), "table", 3, person=True), 3)
     assert (person.name, person.receiving is not None) == (PERSON, True)

@@ -5,7 +5,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from executive.app.worlds import open_world
+pytest.importorskip("trimesh")
+
 from skills.detection import NoDetector
 from skills.perception.model_detector import ModelDetector
 from tests.benchmarks import own_objects
@@ -13,19 +14,17 @@ from tests.benchmarks.own_objects import Asked, ask, by_photographs, generated, 
 
 
 def test_a_generated_object_is_asked_for_among_others(tmp_path, monkeypatch):
-    pytest.importorskip("trimesh")
     monkeypatch.setattr(own_objects, "foreign", lambda folder, half: [])
     monkeypatch.setattr(own_objects, "OBJECTS", 5)
     pool = imported(tmp_path, 0)
     assert len(pool) == 8
-    made = scene(np.random.default_rng(4802), open_world("flat"), pool[0], pool)
+    made = scene(np.random.default_rng(4802), pool[0], pool)
     assert made is not None and made.absent in {model.name for model in pool[1:5]}
     asked = ask(made, 0, pool[0].name, ModelDetector(NoDetector(), pool[:5]), tmp_path, 4802)
     assert (asked.there, asked.mistaken) == (True, False), asked.message
 
 
 def test_photographs_of_an_object_become_a_model_of_its_size(tmp_path, monkeypatch):
-    pytest.importorskip("trimesh")
     monkeypatch.setattr(own_objects, "foreign", lambda folder, half: [])
     monkeypatch.setattr(own_objects, "generated", lambda folder, half: islice(generated(folder, half), 1))
     monkeypatch.setattr(own_objects, "STANDING", 3)

@@ -1,18 +1,17 @@
 """The executive's own time in a tick: a base, and what each node adds that does nothing.
 
-    python -m tests.benchmarks.tick_time [--more 0 2 5 10 20] [--ticks 300] [--rounds 3]
+    python -m tests.benchmarks.tick_time [--more 0,2,5,10,20] [--ticks 300] [--rounds 3]
 
 Ticks a compiled fetch, whose leaves are scripted and say something new in each tick, with log and journal on; `--more`
 fetches stand behind it and wait. Prints JSON: the median CPU time of a tick by the tree's size, and the line through
 it. A machine that does other work gives higher numbers: compare two versions in turn.
 """
 
-import argparse
 import itertools
-import json
 import statistics
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,91 +19,75 @@ import numpy as np
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.control import Control
+from executive.run.outcome import RunResult
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
-from executive.tree.compiler import compile_mission
+from executive.tree.compiler import CompiledTree, compile_mission
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
-from executive.words.leaf_steps import Do
+from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
-from tests.executive.conftest import (
-    FETCH,
-    KNOWLEDGE,
-    PORTS,
-    EmptyCostmap,
-    ManualClock,
-    Script,
-    ScriptedRobot,
-    StillLocaliser,
-    scripted_skill,
-)
+from tests.benchmarks.harness import command
+from tests.executive import conftest as scripted
 from tests.visitors import OnTick
 
 TICK_S = 0.05
-_FIRST = 5  # ticks in which much begins
+FIRST = 5
+"""Ticks in which much begins."""
 
 
-def fetch(steps_each, more=0):
-    """The tree of a fetch, whose leaves drive for some ticks and say something new in each; `more` follow."""
-    script = Script(steps=steps_each, says=lambda name, left: f"{name}, {left} to go")
-    registry = {name: scripted_skill(script, name, *ports) for name, ports in PORTS.items()}
-    steps = tuple(Do.from_command(parse_command(text)) for text in FETCH * (1 + more))
-    knowledge = Knowledge.model_validate(KNOWLEDGE)
-    return compile_mission(Mission(name="fetch", robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
+def fetch(steps_each: int, more: int = 0, robot: str = "Alice") -> CompiledTree:
+    """Tree of a fetch, whose leaves drive for some ticks and say something new in each; `more` follow."""
+    script = scripted.Script(steps=steps_each, says=lambda name, left: f"{name}, {left} to go")
+    registry = {name: scripted.scripted_skill(script, name, *ports) for name, ports in scripted.PORTS.items()}
+    steps = steps_of_commands([parse_command(text) for text in scripted.FETCH * (1 + more)])
+    mission = Mission(name="fetch", robot=robot, steps=steps)
+    return compile_mission(mission, knowledge=Knowledge.model_validate(scripted.KNOWLEDGE), registry=registry)
 
 
-def ticks_of_a_run(tree, folder, most=None):
-    """Run the mission with its log and journal, for so many ticks at most.
+def ticks_of_a_run(
+    trees: Sequence[CompiledTree], folder: Path, most: int | None = None
+) -> tuple[RunResult, list[float]]:
+    """Runs a mission for each robot with log and journals, for so many ticks at most.
 
-    Returns the result, and the CPU time of each cycle (s): the tree's tick and all around it.
+    Returns the result, and the CPU time of each cycle (s): the trees' ticks and all around them.
     """
-    clock, ends, control = ManualClock(), [], Control(pace=None)
-    log = EventLog(folder / "log.mcap", clock)
-    request = Request(name="fetch", world_name="flat", robot="Alice", out=folder, commands=FETCH)
+    clock, ends, control = scripted.ManualClock(), [], Control(pace=None)
+    log, entries, journals = EventLog(folder / "log.mcap", clock), [], []
 
-    def observe(progress):
+    def observe(_: object) -> None:
         ends.append(time.thread_time())
         if len(ends) == most:
             control.cancel("enough")
 
     with MissionStore(folder / "missions.sqlite") as store, LockStepWorker(clock) as worker:
-        journal = store.journal(store.add(request, queued=False).id)
-        result = run(
-            [RunEntry(tree, ScriptedRobot(clock), StillLocaliser(), EmptyCostmap())],
-            clock=clock,
-            worker=worker,
-            visitors=[log, journal, OnTick(observe)],
-            settings=RunSettings(tick_period_s=TICK_S),
-            control=control,
-        )
+        for tree in trees:
+            name = tree.robot_name
+            request = Request(name="fetch", world_name="flat", robot=name, out=folder, commands=scripted.FETCH)
+            journals.append(store.journal(store.add(request, queued=False).id, name))
+            entries.append(
+                RunEntry(tree, scripted.ScriptedRobot(clock, name), scripted.StillLocaliser(), scripted.EmptyCostmap())
+            )
+        visitors, settings = [log, *journals, OnTick(observe)], RunSettings(tick_period_s=TICK_S)
+        result = run(entries, clock=clock, worker=worker, visitors=visitors, settings=settings, control=control)
     log.close()
     return result, [after - before for before, after in itertools.pairwise(ends)]
 
 
-def median_tick_s(tree, ticks, rounds):
-    """The median tick of the quietest round."""
-    medians = []
-    for _ in range(rounds):
-        with tempfile.TemporaryDirectory() as folder:
-            medians.append(statistics.median(ticks_of_a_run(tree, Path(folder), ticks)[1][_FIRST:]))
-    return min(medians)
-
-
-def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--more", type=int, nargs="+", default=[0, 2, 5, 10, 20])
-    parser.add_argument("--ticks", type=int, default=300)
-    parser.add_argument("--rounds", type=int, default=3)
-    options = parser.parse_args()
-    trees = [fetch(options.ticks + 1, more) for more in options.more]
-    nodes = [len(tree.path_ids) for tree in trees]
-    took_us = [1e6 * median_tick_s(tree, options.ticks, options.rounds) for tree in trees]
-    slope_us, base_us = np.polyfit(nodes, took_us, 1)
-    by_size = {count: round(us, 1) for count, us in zip(nodes, took_us, strict=True)}
-    print(json.dumps({"tick_us": by_size, "base_us": round(base_us, 1), "idle_node_us": round(slope_us, 4)}))
+def measure(more: tuple[int, ...] = (0, 2, 5, 10, 20), ticks: int = 300, rounds: int = 3) -> dict[str, object]:
+    """Times the median tick of the quietest round by the tree's size."""
+    took_us = dict[int, float]()
+    for tree in [fetch(ticks + 1, each) for each in more]:
+        medians = []
+        for _ in range(rounds):
+            with tempfile.TemporaryDirectory() as folder:
+                medians.append(statistics.median(ticks_of_a_run([tree], Path(folder), ticks)[1][FIRST:]))
+        took_us[len(tree.path_ids)] = round(1e6 * min(medians), 1)
+    slope_us, base_us = np.polyfit(list(took_us), list(took_us.values()), 1)
+    return {"tick_us": took_us, "base_us": round(base_us, 1), "idle_node_us": round(slope_us, 4)}
 
 
 if __name__ == "__main__":
-    main()
+    command(measure)

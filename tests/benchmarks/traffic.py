@@ -1,6 +1,6 @@
 """Two robots in each other's way; prints JSON.
 
-    python -m tests.benchmarks.traffic [--what door,missions] [--first 0] [--count 5] [--out FOLDER]
+    python -m tests.benchmarks.traffic [--what door,missions] [--first 0] [--count 5] [--jobs 1] [--out FOLDER]
 
 `door`: the two meet at a door or passage that one fits through, each on its way to the place where the other begins;
 world, door, kinds of robots, starts and delays are drawn from the case's number, and nobody else is about. `missions`:
@@ -9,39 +9,55 @@ denied by the referee), contacts between the two and all collisions by the refer
 still for 60 s, or ran out of time.
 """
 
-from __future__ import annotations
-
-import argparse
-import json
 import math
-import sys
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby, product
+from operator import attrgetter
 from pathlib import Path
 
-from executive.app.mission_run import run_request
-from executive.app.prepare import prepare
-from executive.app.simulated import SimulatedBackend
-from executive.mission.request import Request
-from executive.run.visitor import Progress, RunVisitor
-from executive.words.robot_config import RobotConfig
-from skills.robot import Pose2D
-from tests.benchmarks.traffic_cases import meeting, missions
+import numpy as np
 
-STILL_S, MOVED_M = 60.0, 0.1
-TIME_LIMIT_S = 400.0
+from executive.app.worlds import knowledge_of, open_world
+from executive.run.visitor import Progress, RunVisitor
+from executive.words.knowledge import Door, Knowledge
+from executive.words.robot_config import RobotConfig
+from plant.robots.robot_kind import robot_kind
+from skills.estimate.costmap import LayeredCostmap
+from skills.estimate.grid_map import load_grid_map
+from skills.navigate.footprint import Footprint, footprint_clearance_m
+from skills.robot import Pose2D
+from tests.benchmarks.harness import benchmark, totals
+from tests.benchmarks.plant_mission import PlantMission
+
+STILL_S, MOVED_M, TIME_LIMIT_S = 60.0, 0.1, 400.0
+WORLDS, NAMES = ("flat", "lab"), ("Alice", "Bob")
+PAIRS = (("spot", "spot"), ("spot", "fetch"), ("fetch", "spot"), ("fetch", "fetch"))
+FOR_ONE_M, NEAR_M, FROM_DOOR_M, CLEAR_M, TRIES = 1.0, 9.0, (0.9, 3.0), 0.1, 400
+DELAYS_S = (0, 0, 2, 4, 6)
+GOING = {
+    "flat": ("go to the bedroom", "go to the kitchen", "go to the office", "go to the workshop", "go to the hall"),
+    "lab": ("go to the lounge", "go to the office", "go to the kitchen", "go to the meeting room", "go to the lobby"),
+}
+FETCHING = {
+    "flat": ("fetch me a drink from the kitchen", "bring me a beer"),
+    "lab": ("fetch me a drink from the kitchen", "bring me a drink"),
+}
+FETCHES = 0.3
+"""Share of the missions of a Spot that are to fetch something."""
+Drawn = tuple[str, str, tuple[RobotConfig, ...]]
+"""A world, what is said, and the robots."""
 
 
 @dataclass
 class Standing(RunVisitor):
-    """Sees how long no robot has moved (s)."""
+    """Visitor that measures for how long no robot has moved (s)."""
 
     longest_s: float = 0.0
     _last: dict[str, Pose2D] = field(default_factory=dict)
     _moved_s: float = 0.0
 
     def tick(self, progress: Progress) -> None:
-        """Take in a tick."""
         for name, status in progress.robots.items():
             pose, last = status.pose, self._last.get(name)
             if pose is None:
@@ -53,7 +69,7 @@ class Standing(RunVisitor):
 
 @dataclass(frozen=True)
 class Result:
-    """What came of one run."""
+    """Result of one run."""
 
     what: str
     number: int
@@ -69,30 +85,85 @@ class Result:
     messages: tuple[str, ...]
 
 
-def case(what: str, number: int) -> tuple[str, str, tuple[RobotConfig, ...]]:
-    """A world, what is said, and the robots. Raises KeyError: there is no such kind of case."""
-    met = {"door": meeting, "missions": missions}[what](number)
-    return met if isinstance(met, tuple) else (met.world, met.sentence, met.robots)
+def meeting(number: int) -> Drawn:
+    """Two robots head-on at a door that one fits through, each on its way to the place where the other one begins."""
+    rng = np.random.default_rng([number, 30])
+    world = open_world(WORLDS[number % len(WORLDS)])
+    knowledge = knowledge_of(world)
+    grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
+    doors, costmap = doors_for_one(knowledge), LayeredCostmap(grid)
+
+    def start(kind: str, place: str, door: Door) -> Pose2D | None:
+        """Free pose in a place near a door, about facing it; None where there is none."""
+        footprint = Footprint.of(robot_kind(kind).capabilities())
+        low, high = (bound(knowledge.places[place].polygon, axis=0) for bound in (np.min, np.max))
+        for _ in range(TRIES):
+            away_m, angle = rng.uniform(*FROM_DOOR_M), rng.uniform(-math.pi, math.pi)
+            x, y = door.at[0] + away_m * math.cos(angle), door.at[1] + away_m * math.sin(angle)
+            pose = np.array([[x, y, angle + math.pi + rng.uniform(-0.5, 0.5)]])
+            inside = low[0] < x < high[0] and low[1] < y < high[1]
+            if inside and footprint_clearance_m(costmap, footprint, pose)[0] > CLEAR_M:
+                return Pose2D(round(float(x), 3), round(float(y), 3), round(math.remainder(pose[0, 2], math.tau), 3))
+        return None
+
+    starts: list[Pose2D | None] = [None]
+    while None in starts:
+        door = doors[rng.integers(len(doors))]
+        kinds = PAIRS[rng.integers(len(PAIRS))]
+        sides = list(door.between) if rng.integers(2) else list(reversed(door.between))
+        starts = [start(kind, place, door) for kind, place in zip(kinds, sides, strict=True)]
+    delays = (0, int(rng.choice(DELAYS_S)))
+    asked = []
+    for name, goal, late_s in zip(NAMES, sides[::-1], delays if rng.integers(2) else delays[::-1], strict=True):
+        asked.append(f"{name}, {f'wait {late_s} seconds and then ' if late_s else ''}go to the {goal}")
+    robots = tuple(RobotConfig(*each) for each in zip(NAMES, kinds, starts, strict=True))
+    return world.name, ", and ".join(asked), robots
 
 
-def run_case(what: str, number: int, out: Path) -> Result:
-    """Run one case."""
-    world, sentence, robots = case(what, number)
-    request = Request(
+def doors_for_one(knowledge: Knowledge) -> Sequence[Door]:
+    """Doors that one robot fits through, with both places near."""
+
+    def near(door: Door, place: str) -> bool:
+        pose = knowledge.place_pose(place)
+        return math.dist(door.at, (pose.x, pose.y)) < NEAR_M
+
+    return [d for d in knowledge.doors if d.width < FOR_ONE_M and all(near(d, place) for place in d.between)]
+
+
+def missions(number: int) -> Drawn:
+    """A mission for each of two robots."""
+    rng = np.random.default_rng([number, 31])
+    world = WORLDS[number % len(WORLDS)]
+    kinds = PAIRS[rng.integers(len(PAIRS))]
+    first, second = (str(each) for each in rng.choice(GOING[world], 2, replace=False))
+    fetches = rng.uniform(size=2) < FETCHES
+    if fetches[0] and kinds[0] == "spot":
+        first = str(rng.choice(FETCHING[world]))
+    elif fetches[1] and kinds[1] == "spot":
+        second = str(rng.choice(FETCHING[world]))
+    robots = tuple(RobotConfig(name, kind) for name, kind in zip(NAMES, kinds, strict=True))
+    return world, f"Alice, {first}, and Bob, {second}", robots
+
+
+def cases(what: tuple[str, ...] = ("door",), first: int = 0, count: int = 5) -> Iterable[tuple[str, int]]:
+    """Kinds of cases with their numbers."""
+    return product(what, range(first, first + count))
+
+
+def run_case(what: str, number: int, folder: Path) -> Result:
+    """Runs one case."""
+    world, sentence, robots = {"door": meeting, "missions": missions}[what](number)
+    mission = PlantMission(
+        folder,
+        number,
+        change=lambda prepared: prepared.world if what == "missions" else prepared.world.without_people(),
         sentence=sentence,
         world=world,
-        seed=number,
-        out=out / f"{what}-{number}",
-        record=False,
         time_limit_s=TIME_LIMIT_S,
         robots=robots,
     )
-    request.out.mkdir(parents=True, exist_ok=True)
-    prepared = prepare(request, ask=None)
-    here = prepared.world if what == "missions" else prepared.world.without_people()
-    backend = SimulatedBackend(here, prepared.robots, seed=number, record=False)
     standing = Standing()
-    report = run_request(prepared, backend, visitors=[standing]).report
+    report = mission.run(standing)
     seen = [each.referee for each in report.robots.values() if each.referee is not None]
     return Result(
         what,
@@ -111,33 +182,19 @@ def run_case(what: str, number: int, out: Path) -> Result:
 
 
 def summary(results: Sequence[Result]) -> dict[str, object]:
-    """The figures of some runs."""
+    """Figures of each kind of case."""
+    return {what: figures(list(each)) for what, each in groupby(results, attrgetter("what"))}
+
+
+def figures(results: Sequence[Result]) -> dict[str, object]:
+    """Figures of one kind of case."""
     return {
         "runs": len(results),
-        "resolved": sum(each.resolved for each in results),
-        "contacts": sum(each.contacts for each in results),
-        "collisions": sum(each.collisions for each in results),
+        **totals(results, "resolved", "contacts", "collisions"),
         "deadlocks": sum(each.deadlock for each in results),
         "longest_s": max(each.sim_time_s for each in results),
     }
 
 
-def main() -> int:
-    """Run the cases that the command line asks for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--what", default="door")
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--count", type=int, default=5)
-    parser.add_argument("--out", type=Path, default=Path("out/traffic"))
-    args = parser.parse_args()
-    for what in args.what.split(","):
-        results = []
-        for number in range(args.first, args.first + args.count):
-            results.append(run_case(what, number, args.out))
-            print(json.dumps(asdict(results[-1])), file=sys.stderr, flush=True)
-        print(json.dumps({what: summary(results)}))
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    benchmark(cases, run_case, summary)

@@ -1,16 +1,13 @@
 """Scores speech with synthetic voices: sentences of a world's own vocabulary, clear and in noise, and chatter.
 
-    .venv/bin/python tests/benchmarks/speech/score.py --sentences 200 --chatter 200 --seed 2
+    python -m tests.benchmarks.speech.score --sentences 200 --chatter 200 --seed 2
 
 Voices are those of this machine that did not serve in development (`--voices development` takes those that did, or
 names them); without any it says so and ends with status 3. Sound is made anew each time and thrown away. A sentence
 counts when its commands are right, the robot's name included; chatter counts as a false alarm when the robot feels
-called, whatever it makes of it.
+called, whatever it makes of it. `--show` shows on standard error what went wrong.
 """
 
-import argparse
-import json
-import sys
 import tempfile
 import time
 import wave
@@ -20,15 +17,15 @@ from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 
-import noise
 import numpy as np
-import sentences
-import voices
 
 from executive.cli.listen_command import listener_for
 from executive.speech.sound import RATE_HZ, concatenate, read_wav
 from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
+from tests.benchmarks.harness import command, tell
+from tests.benchmarks.speech.sentences import Spoken, make_chatter, make_requests
+from tests.benchmarks.speech.voices import DEVELOPMENT, Voice, installed
 
 NO_VOICE = 3
 NOISES = ("white", "pink", "babble")
@@ -40,128 +37,107 @@ class Case:
 
     group: str
     voice: str
-    said: sentences.Spoken
+    said: Spoken
     wav: Path
 
 
-def main() -> int:
-    args = _arguments()
-    found = _chosen(args.voices)
+def spoken(group: str, said: Sequence[Spoken], voices: Mapping[str, Voice], folder: Path) -> list[Case]:
+    """Sentences spoken by the voices in turn."""
+    cases = []
+    for number, (each, voice) in enumerate(zip(said, cycle(voices.values()), strict=False)):
+        cases.append(Case(group, voice.name, each, folder / f"{group}-{number}.wav"))
+        voice.speak(each.text, cases[-1].wav)
+    return cases
+
+
+def noise(kind: str, count: int, draw: np.random.Generator, talkers: Sequence[np.ndarray]) -> np.ndarray:
+    """Noise as strong at all frequencies, with a power that falls as one over the frequency, or of several voices."""
+    if kind == "white":
+        return draw.standard_normal(count)
+    if kind == "pink":
+        spectrum = np.fft.rfft(draw.standard_normal(count))
+        return np.fft.irfft(spectrum / np.sqrt(np.maximum(np.arange(len(spectrum)), 1)), count)
+    rolled = [np.roll(np.resize(talker, count), draw.integers(count)) for talker in talkers]
+    return np.sum([sound / max(np.std(sound), 1e-9) for sound in rolled], axis=0)
+
+
+def with_noise(clear: Sequence[Case], folder: Path, ratio_db: float, seed: int) -> list[Case]:
+    """The same sentences in noise, so strong that the mean power of the speech lies `ratio_db` above it."""
+    draw, cases = np.random.default_rng(seed), []
+    for number, (case, kind) in enumerate(zip(clear, cycle(NOISES), strict=False)):
+        speech = concatenate(read_wav(case.wav)).astype(float)
+        talkers = [concatenate(read_wav(clear[n].wav)) for n in draw.integers(len(clear), size=5)]
+        sound = noise(kind, len(speech), draw, talkers)
+        mixed = speech + sound * np.std(speech) / max(np.std(sound), 1e-12) / 10 ** (ratio_db / 20)
+        mixed /= max(1.0, float(np.max(np.abs(mixed))) / 0.99)
+        cases.append(Case("noisy", f"{case.voice} in {kind} noise", case.said, folder / f"noisy-{number}.wav"))
+        with wave.open(str(cases[-1].wav), "wb") as file:
+            file.setnchannels(1)
+            file.setsampwidth(2)
+            file.setframerate(RATE_HZ)
+            file.writeframes((mixed * 32767).astype("<i2").tobytes())
+    return cases
+
+
+def score(
+    world: str = "flat",
+    sentences: int = 200,
+    chatter: int = 100,
+    noise_db: float = 10.0,
+    seed: int = 2,
+    voices: str = "held-out",
+    show: bool = False,
+) -> dict[str, object] | int:
+    """Shares of sentences that are right, by group and voice, with times and memory."""
+    own = {"held-out": lambda name: name not in DEVELOPMENT, "development": DEVELOPMENT.__contains__}
+    takes = own.get(voices, voices.split(",").__contains__)
+    found = {name: voice for name, voice in installed().items() if takes(name)}
     if not found:
-        print("no synthetic voice is installed here: apt-get install flite festival espeak-ng", file=sys.stderr)
+        tell("no synthetic voice is installed here: apt-get install flite festival espeak-ng")
         return NO_VOICE
-    knowledge = load_knowledge(load_world(args.world).knowledge_path)
+    knowledge = load_knowledge(load_world(world).knowledge_path)
     begun = time.perf_counter()
     listener = listener_for(knowledge)
     loading_s = time.perf_counter() - begun
-    with tempfile.TemporaryDirectory() as folder:
-        cases = _cases(knowledge, found, Path(folder), args)
-        counts, heard_s, spent_s = _score(listener, cases, show=args.show)
-    result = _result(counts) | {
+    counts, heard_s, spent_s = Counter[tuple[str, str]](), 0.0, 0.0
+    with tempfile.TemporaryDirectory() as made:
+        folder = Path(made)
+        clear = spoken("clear", make_requests(knowledge, sentences, seed), found, folder)
+        noisy = with_noise(clear, folder, noise_db, seed)
+        for case in [*clear, *noisy, *spoken("chatter", make_chatter(knowledge, chatter, seed), found, folder)]:
+            begun = time.perf_counter()
+            heard = listener.hear_file(case.wav)
+            spent_s += time.perf_counter() - begun
+            heard_s += heard.loudness.count / RATE_HZ
+            right = tuple(map(str, heard.commands)) == case.said.commands
+            for group in (case.group, case.voice):
+                counts.update({(group, "all"): 1, (group, "right"): right, (group, "called"): heard.addressed})
+            if show and (not right or heard.addressed != case.said.addressed):
+                tell(f"{case.group} | {case.voice} | {case.said.text} -> {heard.transcript} | {heard.status.value}")
+    return _figures(counts) | {
         "voices": sorted(found),
         "loading_s": round(loading_s, 2),
         "time_per_second_of_sound": round(spent_s / max(heard_s, 1e-9), 3),
         "peak_memory_mb": _peak_mb(),
     }
-    print(json.dumps(result, indent=None if args.json else 1))
-    return 0
 
 
-def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--world", default="flat")
-    parser.add_argument("--sentences", type=int, default=200)
-    parser.add_argument("--chatter", type=int, default=100)
-    parser.add_argument("--noise-db", type=float, default=10.0)
-    parser.add_argument("--seed", type=int, default=2)
-    parser.add_argument("--voices", default="held-out", help="held-out, development, or names with commas")
-    parser.add_argument("--show", action="store_true", help="what went wrong, on standard error")
-    parser.add_argument("--json", action="store_true", help="one line")
-    return parser.parse_args()
+def _figures(counts: Counter[tuple[str, str]]) -> dict[str, object]:
+    def share(kind: str, *groups: str) -> float | None:
+        every = sum(counts[group, "all"] for group in groups)
+        return round(sum(counts[group, kind] for group in groups) / every, 4) if every else None
 
+    def missed(*groups: str) -> float | None:
+        called = share("called", *groups)
+        return None if called is None else round(1.0 - called, 4)
 
-def _chosen(wanted: str) -> dict[str, voices.Voice]:
-    found = voices.installed()
-    if wanted == "held-out":
-        return voices.held_out(found)
-    if wanted == "development":
-        return voices.of_development(found)
-    return {name: found[name] for name in wanted.split(",") if name in found}
-
-
-def _cases(knowledge, found: Mapping[str, voices.Voice], folder: Path, args: argparse.Namespace) -> list[Case]:
-    asked = sentences.requests(knowledge, args.sentences, args.seed)
-    chat = sentences.chatter(knowledge, args.chatter, args.seed) if args.chatter else []
-    clear = _spoken("clear", asked, found, folder)
-    return [*clear, *_noisy(clear, folder, args), *_spoken("chatter", chat, found, folder)]
-
-
-def _spoken(group: str, said: Sequence[sentences.Spoken], found, folder: Path) -> list[Case]:
-    cases = []
-    for number, (spoken, voice) in enumerate(zip(said, cycle(found.values()), strict=False)):
-        wav = folder / f"{group}-{number}.wav"
-        voice.speak(spoken.text, wav)
-        cases.append(Case(group, voice.name, spoken, wav))
-    return cases
-
-
-def _noisy(clear: Sequence[Case], folder: Path, args: argparse.Namespace) -> list[Case]:
-    draw = np.random.default_rng(args.seed)
-    cases = []
-    for number, (case, kind) in enumerate(zip(clear, cycle(NOISES), strict=False)):
-        speech = concatenate(read_wav(case.wav)).astype(float)
-        talkers = [concatenate(read_wav(clear[n].wav)) for n in draw.integers(len(clear), size=5)]
-        sounds = {
-            "white": lambda count: noise.white(count, draw),
-            "pink": lambda count: noise.pink(count, draw),
-            "babble": lambda count, talkers=talkers: noise.babble(count, draw, talkers),
-        }
-        wav = folder / f"noisy-{number}.wav"
-        _write(wav, noise.mixed(speech, sounds[kind](len(speech)), args.noise_db))
-        cases.append(Case("noisy", f"{case.voice} in {kind} noise", case.said, wav))
-    return cases
-
-
-def _write(wav: Path, sound: np.ndarray) -> None:
-    with wave.open(str(wav), "wb") as file:
-        file.setnchannels(1)
-        file.setsampwidth(2)
-        file.setframerate(RATE_HZ)
-        file.writeframes((sound * 32767).astype("<i2").tobytes())
-
-
-def _score(listener, cases: Sequence[Case], *, show: bool) -> tuple[Counter, float, float]:
-    counts, heard_s, spent_s = Counter(), 0.0, 0.0
-    for case in cases:
-        begun = time.perf_counter()
-        heard = listener.hear_file(case.wav)
-        spent_s += time.perf_counter() - begun
-        heard_s += heard.loudness.count / RATE_HZ
-        right = tuple(map(str, heard.commands)) == case.said.commands
-        counts[case.group, "all"] += 1
-        counts[case.group, "right"] += right
-        counts[case.group, "called"] += heard.addressed
-        counts[case.voice, "all"] += 1
-        counts[case.voice, "right"] += right
-        if show and (not right or heard.addressed != case.said.addressed):
-            told = (case.group, case.voice, case.said.text, "->", heard.transcript, heard.status.value)
-            print(*told, sep=" | ", file=sys.stderr)
-    return counts, heard_s, spent_s
-
-
-def _result(counts: Counter) -> dict[str, object]:
-    def share(group: str, kind: str) -> float | None:
-        return round(counts[group, kind] / counts[group, "all"], 4) if counts[group, "all"] else None
-
-    asked = counts["clear", "all"] + counts["noisy", "all"]
-    called = counts["clear", "called"] + counts["noisy", "called"]
     names = sorted({name for name, _ in counts} - {"clear", "noisy", "chatter"})
     return {
-        "commands_right": {group: share(group, "right") for group in ("clear", "noisy")},
-        "wake_missed": round(1 - called / asked, 4) if asked else None,
-        "wake_missed_clear": round(1 - counts["clear", "called"] / max(counts["clear", "all"], 1), 4),
-        "wake_false": share("chatter", "called"),
-        "by_voice": {name: share(name, "right") for name in names},
+        "commands_right": {group: share("right", group) for group in ("clear", "noisy")},
+        "wake_missed": missed("clear", "noisy"),
+        "wake_missed_clear": missed("clear"),
+        "wake_false": share("called", "chatter"),
+        "by_voice": {name: share("right", name) for name in names},
     }
 
 
@@ -171,4 +147,4 @@ def _peak_mb() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command(score)

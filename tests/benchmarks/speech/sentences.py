@@ -2,47 +2,14 @@
 
 import random
 from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
 
 from executive.words.command import Task
 from executive.words.knowledge import Knowledge
 
-GREETINGS = ("Hey {robot}, ", "Hi {robot}, ", "OK {robot}, ", "{robot}, ")
-POLITE = ("", "", "", "please ", "could you ", "can you please ", "would you ")
-FETCH = ("bring me {article} {thing}{source}", "get me {article} {thing}{source}", "fetch {article} {thing}{source}")
-FETCH_TWO = ("bring me two {things}{source}", "get me two {things}{source}")
-DELIVER = ("take {article} {thing} to {goal}", "bring {article} {thing} to {goal}", "carry {article} {thing} to {goal}")
-MOVE = ("move {article} {thing} from the {source} to the {goal}",)
-PUT = (
-    "take {article} {thing} from the {source} and put it on the {goal}",
-    "get {article} {thing} from the {source} and place it on the {goal}",
-)
-FIND = ("find {article} {thing}{place}", "look for {article} {thing}{place}", "search for {article} {thing}{place}")
-PICK = ("pick up {article} {thing}{source}", "grab {article} {thing}{source}")
-GO = ("go to the {goal}", "drive to the {goal}", "walk to the {goal}")
-GIVE = ("give {article} {thing} to {person}", "go to the {source}, take {article} {thing} and give it to {person}")
-TOLD = ("there is {article} {thing} on the {source}, bring it here",)
-
-NOT_ADDRESSED = (
-    "{thing_a} is better cold than warm",
-    "did you see my {thing} in the {place} yesterday",
-    "{person} left a {thing} on the {surface} this morning",
-    "bring me the {thing} from the {place}",
-    "could you take the {thing} to the {place}",
-    "hey {person}, where did you put the {thing}",
-    "hi {person}, please go to the {place}",
-    "{other}, bring the {thing} to {person}",
-    "hey {other}, get me a {thing} from the {place}",
-    "I think that {person} is in the {place}",
-    "the {thing} belongs on the {surface}",
-    "what a nice {place} you have",
-    "we should buy a new {thing} for the {place}",
-    "okay, let us meet in the {place} at five",
-    "hey, that is my {thing}",
-    "all of us went to the {place} with a {thing}",
-    "hello everybody, dinner is ready in the {place}",
-    "is there any {thing} left in the {place}",
-)
-OTHERS = ("Bob", "Charlie", "Maria", "Oliver", "Susan", "Peter")
+PATTERNS = yaml.safe_load(Path(__file__).with_name("patterns.yaml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True)
@@ -54,13 +21,13 @@ class Spoken:
     addressed: bool = True
 
 
-def requests(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
-    """So many different sentences to the robot."""
+def make_requests(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
+    """Makes different sentences to the robot."""
     return _different(_Maker(knowledge, random.Random(seed)).request, count)
 
 
-def chatter(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
-    """So many different sentences that are not said to the robot, many of them with its words."""
+def make_chatter(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
+    """Makes different sentences that are not said to the robot, many of them with its words."""
     return _different(_Maker(knowledge, random.Random(seed)).chatter, count)
 
 
@@ -82,71 +49,71 @@ class _Maker:
 
     def request(self) -> Spoken:
         text, commands = self.draw.choice(self.kinds)()
-        greeting = self.draw.choice(GREETINGS).format(robot=self.knowledge.robot.name)
-        polite = "" if text.startswith("there") else self.draw.choice(POLITE)
+        greeting = self.draw.choice(PATTERNS["greetings"]).format(robot=self.knowledge.robot.name)
+        polite = "" if text.startswith("there") else self.draw.choice(PATTERNS["polite"])
         return Spoken(f"{greeting}{polite}{text}", tuple(commands))
 
     def chatter(self) -> Spoken:
         thing, _ = self._thing()
-        text = self.draw.choice(NOT_ADDRESSED).format(
+        text = self.draw.choice(PATTERNS["not_addressed"]).format(
             thing=thing,
             thing_a=f"a {thing}".capitalize(),
             place=self._room()[0],
             surface=self._surface()[0],
             person=self._person()[0],
-            other=self.draw.choice(OTHERS),
+            other=self.draw.choice(PATTERNS["others"]),
         )
         return Spoken(text[0].upper() + text[1:], addressed=False)
 
     def _fetch(self):
         (thing, name), (words, source) = self._thing(), self._maybe(" from the {}")
-        text = self._text(FETCH, thing, source=words)
+        text = self._text("fetch", thing, source=words)
         return text, [_take(source or self._usual(name), name), _carry(name, "start")]
 
     def _two(self):
         thing, name = self.draw.choice([("cokes", "coke"), ("beers", "beer"), ("hammers", "hammer"), ("cubes", "cube")])
         words, source = self._maybe(" from the {}")
-        text = self.draw.choice(FETCH_TWO).format(things=thing, source=words)
+        text = self.draw.choice(PATTERNS["fetch_two"]).format(things=thing, source=words)
         return text, [_take(source or self._usual(name), f"2 {name}"), _carry(f"2 {name}", "start")]
 
     def _deliver(self):
         (thing, name), (goal, place) = self._thing(), self._goal()
-        return self._text(DELIVER, thing, goal=goal), [_take(self._usual(name), name), _carry(name, place)]
+        return self._text("deliver", thing, goal=goal), [_take(self._usual(name), name), _carry(name, place)]
 
     def _move(self):
         (thing, name), (source, taken), (goal, place) = self._thing(), self._surface(), self._surface()
-        return self._text(MOVE, thing, source=source, goal=goal), [_take(taken, name), _carry(name, place)]
+        return self._text("move", thing, source=source, goal=goal), [_take(taken, name), _carry(name, place)]
 
     def _put(self):
         (thing, name), (source, taken), (goal, place) = self._thing(), self._surface(), self._surface()
-        text = self._text(PUT, thing, source=source, goal=goal)
+        text = self._text("put", thing, source=source, goal=goal)
         return text, [_take(taken, name), f"Take [{name}] to [{place}] and do [place] to [{name}]"]
 
     def _find(self):
         (thing, name), (words, place) = self._thing(), self._maybe(" in the {}", rooms=True)
         found = place or self._usual(name, Task.FIND)
-        return self._text(FIND, thing, place=words), [f"Take [Nothing] to [{found}] and do [find] to [{name}]"]
+        return self._text("find", thing, place=words), [f"Take [Nothing] to [{found}] and do [find] to [{name}]"]
 
     def _pick(self):
         (thing, name), (words, source) = self._thing(), self._maybe(" from the {}")
-        return self._text(PICK, thing, source=words), [_take(source or self._usual(name), name)]
+        return self._text("pick", thing, source=words), [_take(source or self._usual(name), name)]
 
     def _go(self):
-        goal, place = self._room()
-        return self.draw.choice(GO).format(goal=goal), [f"Take [Nothing] to [{place}] and do [Nothing] to [Nothing]"]
+        (goal, place), pattern = self._room(), self.draw.choice(PATTERNS["go"])
+        return pattern.format(goal=goal), [_carry("Nothing", place)]
 
     def _give(self):
         (thing, name), (person, who), (source, taken) = self._thing(), self._person(), self._surface()
-        text = self._text(GIVE, thing, source=source, person=person)
+        text = self._text("give", thing, source=source, person=person)
         return text, [_take(taken if text.startswith("go") else self._usual(name), name), _carry(name, who)]
 
     def _told(self):
         (thing, name), (source, taken) = self._thing(), self._surface()
-        return self._text(TOLD, thing, source=source), [_take(taken, name), _carry(name, "start")]
+        return self._text("told", thing, source=source), [_take(taken, name), _carry(name, "start")]
 
-    def _text(self, patterns, thing, **words) -> str:
+    def _text(self, kind, thing, **words) -> str:
         article = self.draw.choice(("the", "an" if thing[0] in "aeiou" else "a"))
-        return self.draw.choice(patterns).format(article=article, thing=thing, **words)
+        return self.draw.choice(PATTERNS[kind]).format(article=article, thing=thing, **words)
 
     def _thing(self):
         return self.draw.choice([*_named(self.knowledge.things), *((c, c) for c in self.knowledge.categories())])

@@ -1,0 +1,156 @@
+"""Harness of the benchmarks: options from parameters, cases in processes, a file of results, and figures as JSON.
+
+A benchmark draws cases, runs each of them in a folder of its own, and sums up their results:
+
+    def cases(first: int = 0, count: int = 10, what: tuple[str, ...] = ("door",)) -> Iterable[tuple[str, int]]: ...
+    def run_case(what: str, number: int, folder: Path) -> Result: ...
+    def summary(results: Sequence[Result]) -> dict[str, object]: ...
+
+    if __name__ == "__main__":
+        benchmark(cases, run_case, summary)
+
+The parameters of `cases`, and those of `summary` but the first, are options of the command line. All benchmarks have
+`--jobs` (processes), `--json` (figures on one line) and `--out`, a folder that stores the results and the files of the
+cases: after an interruption the same command goes on there. `command(measure)` does the same for a function without
+cases. What a summary or a measure returns is printed; an integer is the exit code.
+"""
+
+import argparse
+import inspect
+import json
+import re
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Collection, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, is_dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from types import UnionType
+from typing import Any, Literal, get_args, get_origin
+
+import numpy as np
+from pydantic import TypeAdapter
+
+
+def command(*functions: Callable[..., Any]) -> None:
+    """Calls a function with the options of the command line; of several functions the first argument names one."""
+    description, layout = sys.modules["__main__"].__doc__, argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(description=description, formatter_class=layout)
+    parsers = parser.add_subparsers(required=True) if len(functions) > 1 else None
+    for each in functions:
+        own = parser if parsers is None else parsers.add_parser(each.__name__)
+        for parameter in _parameters(each).values():
+            _add_option(own, parameter)
+        own.add_argument("--json", action="store_true", help="figures on one line")
+        own.set_defaults(function=each)
+    options = vars(parser.parse_args())
+    function, on_one_line = options.pop("function"), options.pop("json")
+    figures = function(**options)
+    if isinstance(figures, int):
+        raise SystemExit(figures)
+    if figures is not None:
+        show(figures, indent=None if on_one_line else 1)
+
+
+def benchmark(
+    cases: Callable[..., Iterable[Any]], run: Callable[..., Any], summary: Callable[..., Any], *, alone: bool = False
+) -> None:
+    """Runs the cases that the command line asks for, each in a process of its own if `alone`; shows their summary."""
+
+    def measure(jobs: int = 1, out: Path | None = None, **options: Any) -> Any:
+        drawn = list(cases(**{name: options[name] for name in _parameters(cases)}))
+        with tempfile.TemporaryDirectory(prefix="errand-") as made:
+            results = run_all(run, drawn, out or Path(made), jobs=jobs, alone=alone)
+            return summary(results, **{name: options[name] for name in [*_parameters(summary)][1:]})
+
+    every = _parameters(cases) | dict([*_parameters(summary).items()][1:]) | _parameters(measure)
+    del every["options"]
+    vars(measure)["__signature__"] = inspect.Signature(list(every.values()))
+    command(measure)
+
+
+def _parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """Parameters of a function by name, as keyword arguments."""
+    found = inspect.signature(function, eval_str=True).parameters
+    return {name: each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for name, each in found.items()}
+
+
+def _add_option(parser: argparse.ArgumentParser, parameter: inspect.Parameter) -> None:
+    """Adds the option for a parameter: one without a default is positional, a tuple is a list with commas."""
+    kind, default, name = parameter.annotation, parameter.default, f"--{parameter.name.replace('_', '-')}"
+    if isinstance(kind, UnionType):
+        kind, _ = get_args(kind)
+    read: dict[str, Any] = {"type": kind}
+    if kind is bool:
+        read = {"action": argparse.BooleanOptionalAction}
+    elif get_origin(kind) is tuple:
+        read = {"type": lambda text: tuple(map(get_args(kind)[0], text.split(",")))}
+    elif get_origin(kind) is Literal:
+        read = {"choices": get_args(kind)}
+    if default is parameter.empty:
+        parser.add_argument(parameter.name, **read)
+    else:
+        parser.add_argument(name, default=default, help=f"by default {default}", **read)
+
+
+def run_all(
+    run: Callable[..., Any], cases: Sequence[Any], out: Path, *, jobs: int = 1, alone: bool = False
+) -> list[Any]:
+    """Results of the cases, in their order; a case whose result the folder stores does not run again."""
+    out.mkdir(parents=True, exist_ok=True)
+    file, form = out / "results.jsonl", TypeAdapter(inspect.signature(run, eval_str=True).return_annotation)
+    stored = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    found = {each["case"]: form.validate_python(each["result"]) for each in stored}
+    named = {re.sub(r"[^\w.+-]+", "_", "-".join(map(str, case)))[-120:]: case for case in cases}
+    left, begun_s = {name: case for name, case in named.items() if name not in found}, time.monotonic()
+    once = 1 if alone else None
+    with file.open("a") as lines, ProcessPoolExecutor(jobs, get_context("spawn"), max_tasks_per_child=once) as pool:
+        futures = [pool.submit(_run_one, run, case, out / name) for name, case in left.items()]
+        for done, future in enumerate(as_completed(futures), start=1):
+            if future.exception():
+                pool.shutdown(cancel_futures=True)
+            name, result = future.result()
+            line = json.dumps({"case": name, "result": result}, default=_plain)
+            print(line, file=lines, flush=True)
+            left_s = (time.monotonic() - begun_s) / done * (len(left) - done)
+            tell(f"{done} of {len(left)}, {left_s:.0f} s left: {line}")
+            found[name] = result
+    return [found[name] for name in named]
+
+
+def _run_one(run: Callable[..., Any], case: tuple[Any, ...], folder: Path) -> tuple[str, Any]:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    return folder.name, run(*case, folder)
+
+
+def tell(line: object) -> None:
+    """Prints a line of progress to standard error."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def show(figures: Any, *, indent: int | None = None) -> None:
+    """Prints figures as JSON."""
+    print(json.dumps(figures, indent=indent, default=_plain), flush=True)
+
+
+def _plain(value: Any) -> Any:
+    return asdict(value) if is_dataclass(value) else value.tolist() if hasattr(value, "tolist") else str(value)
+
+
+def totals(results: Collection[Any], *names: str) -> dict[str, Any]:
+    """Sums of fields over all results; a field that is true or false is counted."""
+    return {name: sum(getattr(each, name) for each in results) for name in names}
+
+
+def share(flags: Collection[bool], digits: int = 3) -> float | None:
+    """Share that is true; None without any."""
+    return round(sum(flags) / len(flags), digits) if len(flags) else None
+
+
+def quantile(values: Collection[float], part: float = 0.5, digits: int = 2) -> float | None:
+    """Quantile of values, by default the median; None without any."""
+    return round(float(np.quantile(list(values), part)), digits) if len(values) else None

@@ -2,7 +2,7 @@
 # make demo   one mission, end to end; look into out/ (sets up what missions need, and no more)
 # make test   a test of everything, and one mission of each kind; those that train networks only after `make train`
 # make affected  the tests that the changes since HEAD touch (since another revision: make affected SINCE=main)
-# make fast   in a minute or two: all tests but missions and those that are known to be slow
+# make fast   in a minute or two: all tests but missions and the files of tests/slow.txt
 # make train  adds torch to it, to train the detector and the speech adapter
 # make check  lint, format and strict types
 # make bench  benchmarks, as ratios
@@ -75,7 +75,7 @@ affected: env
 	$(PYTEST) --affected $(SINCE)
 
 fast: env
-	$(PYTEST) -m "not mission and not nightly and not slow"
+	$(PYTEST) --fast -m "not mission and not nightly"
 
 nightly: env voices
 	$(PYTEST) -m nightly --durations-file out/tests/nightly.json

@@ -25,6 +25,8 @@ def pytest_configure(config):
     file, revision = config.getoption("durations_file"), config.getoption("affected")
     if file and not hasattr(config, "workerinput"):
         config.pluginmanager.register(durations.Durations(file))
+    if config.getoption("fast"):
+        config.pluginmanager.register(durations.Fast())
     if revision:
         config.pluginmanager.register(affected.Affected(revision))
     try:

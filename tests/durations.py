@@ -1,4 +1,7 @@
-"""Durations of all tests of a run: a table at its end, and with `--durations-file` the whole list as JSON."""
+"""Durations of all tests of a run: a table at its end, and with `--durations-file` the whole list as JSON.
+
+`python -m tests.durations` writes the slow files of that list into `tests/slow.txt`; `--fast` leaves them out.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,17 @@ import time
 from collections import defaultdict
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parent.parent
+FILE, SLOW = ROOT / "out/tests/durations.json", ROOT / "tests/slow.txt"
 PHASES = ("setup", "call", "teardown")
 SHOWN = 15
+SLOW_S = 2.0
+"""Duration from which a file of tests is slow, with three processes on two cores."""
 
 
 def add_option(parser):
     parser.addoption("--durations-file", type=Path, help="writes the seconds of every test as JSON, and shows a table")
+    parser.addoption("--fast", action="store_true", help="leaves out the files of tests/slow.txt")
 
 
 class Durations:
@@ -31,7 +39,8 @@ class Durations:
         self.pytest_collection_finish()
 
     def pytest_runtest_logreport(self, report):
-        self.seconds[report.nodeid][report.when] += report.duration
+        if report.when in PHASES:  # a worker that crashed reports its test once more, without a phase
+            self.seconds[report.nodeid][report.when] += report.duration
 
     def pytest_terminal_summary(self, terminalreporter):
         measured = self.measured()
@@ -42,9 +51,8 @@ class Durations:
             line(f"slowest {what}:   all  setup   call  (seconds)")
             for row in measured[what][:SHOWN]:
                 line(f"{row['seconds']:21.1f} {row['setup']:6.1f} {row['call']:6.1f}  {row['name']}")
-        line(
-            f"collection {measured['collection_s']:.0f} s; in all {measured['wall_s']:.0f} s, CPU {measured['cpu_s']:.0f} s"
-        )
+        wall_s, cpu_s = measured["wall_s"], measured["cpu_s"]
+        line(f"collection {measured['collection_s']:.0f} s; in all {wall_s:.0f} s, CPU {cpu_s:.0f} s")
 
     def measured(self):
         """Files and tests, the slowest first, and the totals."""
@@ -62,6 +70,28 @@ class Durations:
         }
 
 
+class Fast:
+    """Plugin that collects no tests of slow files."""
+
+    def __init__(self) -> None:
+        self.slow = frozenset(ROOT / line for line in SLOW.read_text().splitlines())
+
+    def pytest_ignore_collect(self, collection_path):
+        return True if collection_path in self.slow else None
+
+    def pytest_terminal_summary(self, terminalreporter):
+        terminalreporter.write_line(f"left out: missions, and the {len(self.slow)} slow files of tests/slow.txt")
+
+
 def rows(seconds):
     found = [{"name": name, "seconds": sum(phases.values()), **phases} for name, phases in seconds.items()]
     return sorted(found, key=lambda row: -row["seconds"])
+
+
+def main():
+    files = json.loads(FILE.read_text())["files"]
+    SLOW.write_text("".join(f"{name}\n" for name in sorted(row["name"] for row in files if row["seconds"] > SLOW_S)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,4 +1,4 @@
-"""A change touches the tests of its folder and those that import it within two steps; a data file its modules' folder."""
+"""A change touches tests of its folder and those that import it within two steps; a data file its modules' folder."""
 
 import pytest
 

@@ -1,17 +1,16 @@
 """Dependencies are ranges, and constraints.txt pins a version in each; the code runs on each declared Python."""
 
-import ast
 import re
 import sys
 import tomllib
 from itertools import chain
-from pathlib import Path
 
 import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.sources import PRODUCT, ROOT, TRAINING, modules, read
+
 VERSIONS = ("3.11", "3.12", "3.13")
 PROJECTS = [
     tomllib.loads((ROOT / name).read_text())["project"] for name in ("pyproject.toml", "training/pyproject.toml")
@@ -52,13 +51,7 @@ def test_the_three_versions_of_python_are_declared_and_no_other():
 
 
 def test_no_module_imports_what_a_later_python_lacks():
-    files = [path for folder in ("executive", "skills", "plant", "training") for path in (ROOT / folder).rglob("*.py")]
-    imported = {
-        alias.name.partition(".")[0]
-        for path in files
-        for node in ast.walk(ast.parse(path.read_text(), feature_version=(3, 11)))
-        if isinstance(node, ast.Import | ast.ImportFrom)
-        for alias in (node.names if isinstance(node, ast.Import) else [ast.alias(node.module or "")])
-    }
-    assert len(files) > 500 and "numpy" in imported
+    sources = modules(*PRODUCT, TRAINING)
+    imported = {name.partition(".")[0] for text in sources.values() for name in read(text).imports}
+    assert len(sources) > 500 and "numpy" in imported
     assert not imported & (GONE - set(sys.builtin_module_names))

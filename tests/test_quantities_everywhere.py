@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from importlib import import_module
-from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin
 
 import pytest
 from pydantic import BaseModel
 
 from skills.quantities import quantity_of
+from tests.sources import PRODUCT, dotted, modules
 
-ROOT = Path(__file__).resolve().parent.parent
 OURS_ALONE = (
     "executive/tree/estimate.py",
     "plant/models/catalogue.py",
     "plant/sensors/camera_spec.py",
     "skills/mapping/map_folder.py",
-    "skills/perception/class_forms.py",
     "skills/perception/class_forms.py",
 )
 """Modules whose models describe files that come with the project, that Errand writes, or that other programs write."""
@@ -26,9 +24,8 @@ OURS_ALONE = (
 
 def files() -> list[str]:
     """The modules with models of files that a user writes."""
-    paths = [path for home in ("executive", "plant", "skills") for path in (ROOT / home).rglob("*.py")]
-    texts = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in paths}
-    return sorted(name for name, text in texts.items() if "BaseModel)" in text and name not in OURS_ALONE)
+    named = {path for path, text in modules(*PRODUCT).items() if "BaseModel)" in text}
+    return sorted(named - set(OURS_ALONE))
 
 
 def bare(hint: Any) -> Iterator[Any]:
@@ -52,7 +49,7 @@ def without_quantity(model: type[BaseModel]) -> list[str]:
 
 @pytest.mark.parametrize("module", files())
 def test_every_number_of_a_file_has_a_quantity(module: str) -> None:
-    name = module.removesuffix(".py").replace("/", ".")
+    name = dotted(module)
     kinds = [each for each in vars(import_module(name)).values() if isinstance(each, type) and each.__module__ == name]
     models = [each for each in kinds if issubclass(each, BaseModel)]
     assert {model.__name__: names for model in models if (names := without_quantity(model))} == {}

@@ -1,5 +1,6 @@
 """The tutorials and three how-to pages do what they say: files are written, commands run, the shown output comes."""
 
+import contextlib
 import os
 import re
 import shlex
@@ -10,11 +11,14 @@ import venv
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "plant/robots/urdf_robot"))
 from documents import DOCS, Block, blocks
 from rover_urdf import write_package
+
+from executive.cli.entry import app
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
 HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md", "own-robot.md")]
@@ -22,12 +26,15 @@ PAGES = [*TUTORIALS, *HOW_TO]
 
 
 class Reader:
-    """Somebody who follows a tutorial in an empty folder, with an environment of their own to install into."""
+    """Somebody who follows a tutorial in an empty folder, with an environment of their own to install into.
 
-    def __init__(self, folder: Path) -> None:
+    `here` the commands run in this process and environment.
+    """
+
+    def __init__(self, folder: Path, *, here: bool = False) -> None:
         self.folder, self.output, self.old = folder / "work", "", ""
         self.folder.mkdir()
-        self.bin = self._environment(folder / "env")
+        self.bin = None if here else self._environment(folder / "env")
 
     def _environment(self, folder: Path) -> Path:
         """A virtual environment that also sees all that this one has."""
@@ -62,13 +69,25 @@ class Reader:
         path.write_text(path.read_text().replace(self.old, block.text))
 
     def run(self, block: Block) -> None:
+        self.output, failed = "", False
+        if self.bin is None:
+            for line in block.text.splitlines():
+                with contextlib.chdir(self.folder):
+                    done = CliRunner().invoke(app, shlex.split(line, comments=True)[1:], env={"COLUMNS": "200"})
+                self.output += done.output
+                failed |= done.exit_code != 0
+        else:
+            failed = self.start(block.text)
+        assert failed == (block.mark == "fails"), f"line {block.line}: {self.output}"
+
+    def start(self, script: str) -> bool:
+        """Runs a script in the reader's environment; returns whether it failed."""
         path = os.pathsep.join([str(self.bin), os.environ["PATH"]])
         environment = {**os.environ, "PATH": path, "COLUMNS": "200", "PIP_NO_INDEX": "1", "PYTHONPATH": ""}
-        shell = ["bash", "-e", "-c", block.text]
+        shell = ["bash", "-e", "-c", script]
         done = subprocess.run(shell, cwd=self.folder, env=environment, capture_output=True, text=True, timeout=600)
-        self.output = done.stdout + done.stderr
-        failed = done.returncode != 0
-        assert failed == (block.mark == "fails"), f"line {block.line}: status {done.returncode}\n{self.output}"
+        self.output = f"status {done.returncode}\n{done.stdout}{done.stderr}"
+        return done.returncode != 0
 
     def compare(self, block: Block) -> None:
         came = squeezed(self.output)
@@ -81,10 +100,9 @@ def squeezed(text):
 
 
 def followed(page):
-    """A page as a case: the first stands for all in `make test`, the others follow nightly."""
+    """A page as a case; the pages follow nightly."""
     slow = any(block.mark == "slow" for block in blocks(page))
-    marks = [pytest.mark.mission] * slow + [pytest.mark.nightly] * (page != PAGES[0])
-    return pytest.param(page, marks=marks, id=page.stem)
+    return pytest.param(page, marks=[pytest.mark.nightly, *[pytest.mark.mission] * slow], id=page.stem)
 
 
 @pytest.mark.parametrize("page", [followed(page) for page in PAGES])
@@ -93,6 +111,14 @@ def test_a_tutorial_does_what_it_says(page, tmp_path):
     if page.name == "own-robot.md":
         write_package(reader.folder, with_head=True)
     for block in blocks(page):
+        reader.follow(block)
+
+
+@pytest.mark.mission
+def test_the_first_tutorial_does_what_it_says_in_this_process(tmp_path):
+    """It stands for all in `make test`."""
+    reader = Reader(tmp_path, here=True)
+    for block in blocks(PAGES[0]):
         reader.follow(block)
 
 

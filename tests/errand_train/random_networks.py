@@ -3,10 +3,10 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from errand_train.detector.network import DetectorNetwork
+    pass
 
 
-def random_network(seed: int, classes: int) -> "DetectorNetwork":
+def random_network(seed, classes):
     """One whose normalisation has statistics unlike the first ones, and whose scores are not all alike. Needs torch."""
     import torch
 

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import gc
 import types
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import count
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from executive.app import prepare, worlds
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
+from executive.store.database import Database
 from executive.tree.board import Board
 from executive.tree.compiler import CompiledTree, compile_mission
 from executive.tree.context import RunContext
 from executive.tree.node import Change, TreeObserver
+from executive.tree.registry import installed_skills
 from executive.words.command import parse_command
-from executive.words.knowledge import Knowledge
+from executive.words.knowledge import Knowledge, load_knowledge
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
+from plant.worlds.world import WORLDS_FOLDER, World, known_worlds, load_world
 from skills.api import (
     Cause,
     Failed,
@@ -412,10 +420,7 @@ KNOWLEDGE = {
         "beer": {"categories": ["drink"], "usual": ["counter"]},
         "hammer": {},
     },
-    "people": {
-        "Sam": {"at": "bathroom", "pose": {"x": 0.5, "y": 4.5}},
-        "Robin": {"at": "hall"},
-    },
+    "people": {"Sam": {"at": "bathroom", "pose": {"x": 0.5, "y": 4.5}}, "Robin": {"at": "hall"}},
 }
 
 FETCH = (
@@ -424,19 +429,80 @@ FETCH = (
 )
 
 
-@pytest.fixture(autouse=True)
-def no_change_is_missed(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """In every run of every test: the nodes that are not looked at after a tick say what they said before."""
-    looked, missed = TreeObserver.changes, list[Change]()
+@pytest.fixture(autouse=True, scope="session")
+def what_is_shipped_is_read_once() -> Iterator[None]:
+    """Worlds of the project, their knowledge, and the installed skills; a world elsewhere is read each time."""
+    world, knowledge = cache(load_world), cache(load_knowledge)
+    names = known_worlds()
+
+    def load(name: str) -> World:
+        return world(name) if name in names else load_world(name)
+
+    def know(path: Path, own: tuple[str, ...] = ()) -> Knowledge:
+        return knowledge(path, own) if path.is_relative_to(WORLDS_FOLDER) else load_knowledge(path, own)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(worlds, "load_world", load)
+        patch.setattr(worlds, "load_knowledge", know)
+        patch.setattr(prepare, "installed_skills", cache(installed_skills))
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def stores_do_not_wait_for_the_disk() -> Iterator[None]:
+    """What a killed process has written stays without that, too; no test here takes the power from the machine."""
+    prepared = Database._prepare
+
+    def unsynchronised(self: Database) -> None:
+        prepared(self)
+        self._connection.execute("PRAGMA synchronous = OFF")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Database, "_prepare", unsynchronised)
+        yield
+
+
+@pytest.fixture(autouse=True, scope="session")
+def missions_collect_no_garbage() -> Iterator[None]:
+    """A collection of all that the tests of a process hold takes longer than most of the missions here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(gc, "get_freeze_count", lambda: 0)
+        patch.setattr("executive.app.runs.return_memory", lambda: None)
+        patch.setattr("executive.app.evaluate.evaluation.return_memory", lambda: None)
+        yield
+
+
+@dataclass
+class ChangesMissed:
+    """Changes of nodes that were not looked at after a tick, while a test wants to know of them."""
+
+    wanted: bool = False
+    found: list[Change] = field(default_factory=list)
+
+
+@pytest.fixture(scope="session")
+def changes_missed() -> Iterator[ChangesMissed]:
+    """Looks at all nodes after every third tick, since a change that is missed stays so."""
+    looked, missed, number = TreeObserver.changes, ChangesMissed(), count()
 
     def checked(self: TreeObserver, *, of_all: bool = False) -> Sequence[Change]:
         found = looked(self, of_all=of_all)
-        missed.extend(looked(self, of_all=True))
+        if missed.wanted and next(number) % 3 == 0:
+            missed.found.extend(looked(self, of_all=True))
         return found
 
-    monkeypatch.setattr(TreeObserver, "changes", checked)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(TreeObserver, "changes", checked)
+        yield missed
+
+
+@pytest.fixture(autouse=True)
+def no_change_is_missed(changes_missed: ChangesMissed) -> Iterator[None]:
+    """In every run of every test: the nodes that are not looked at after a tick say what they said before."""
+    changes_missed.wanted, changes_missed.found = True, []
     yield
-    assert missed == []
+    changes_missed.wanted = False
+    assert changes_missed.found == []
 
 
 @pytest.fixture

@@ -1,7 +1,12 @@
-"""Sliding doors and moved objects in the flat."""
+"""Sliding doors and moved objects in the flat.
+
+door      closes at 1 s, opens at 5 s          beer     onto the kitchen table at 1 s
+called    opens by a call at 0.2 s             hammer   onto the floor at 0.5 s
+others    shut or open at first                coke     onto a stool without a free spot at 0.5 s
+"""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,19 +18,54 @@ from plant.worlds.seeding import place_people
 from plant.worlds.world import DoorRule, MoveRule, SurfaceTop, WorldError, load_world
 from skills.robot import Pose2D
 
+STOOL = SurfaceTop("stool", ((9.0, 2.0), (9.05, 2.0), (9.05, 2.05)), 0.5)
 FLAT = load_world("flat")
-AT = (9.0, 5.40)
-DOOR = DoorRule(name="door", at=AT, yaw=math.pi, width=0.9, closes=1.0, opens=5.0)
+FLAT = replace(FLAT, surfaces={**FLAT.surfaces, "stool": STOOL})
+AT, CALLED_AT, AHEAD = (9.0, 5.40), (6.85, 5.40), (9.0, 6.7)
+FIRST = {
+    "closes at once": ((2.90, 5.40), {"closes": 0.0}, True),
+    "opens": ((5.10, 5.40), {"opens": 9.0}, True),
+    "closes": ((3.30, 3.60), {"closes": 9.0}, False),
+    "opens before it closes": ((5.60, 3.60), {"opens": 8.0, "closes": 9.0}, True),
+}
+"""Doors by name: their place, their times, and whether they are shut at first."""
 
 
-def simulated(*, doors=(DOOR,), moves=(), start=None, seed=1):
-    robots = [PlacedRobot("Alice", "spot", start or FLAT.start, FLAT.dock)]
-    return Simulation(FLAT.with_events(doors, moves), seed=seed, visuals=False, robots=robots)
+def rule(name, at, **times):
+    return DoorRule(name=name, at=at, yaw=math.pi, width=0.9, **times)
 
 
-def panel_W(simulation):
-    engine = simulation.engine
-    return engine.world.plant.GetPositions(engine.context, engine.world.models["door"])[:2]
+DOOR, CALLED = rule("door", AT, closes=1.0, opens=5.0), rule("called", CALLED_AT, opens=900.0)
+DOORS = (DOOR, CALLED, *(rule(name, at, **times) for name, (at, times, _) in FIRST.items()))
+MOVES = (
+    MoveRule(name="beer", at=1.0, to="kitchen table"),
+    MoveRule(name="hammer", at=0.5, to=(9.0, 3.0, 0.0)),
+    MoveRule(name="coke", at=0.5, to="stool"),
+)
+
+
+def simulated(doors=DOORS, moves=MOVES, start=FLAT.start):
+    robots = [PlacedRobot("Alice", "spot", start, FLAT.dock)]
+    return Simulation(FLAT.with_events(doors, moves), seed=1, visuals=False, robots=robots)
+
+
+@dataclass
+class Seen:
+    """The panels' places, the returns in the doorway, the objects' places, and the changes of each door at a time."""
+
+    panels: dict
+    rays: int
+    things: dict
+    history: dict
+
+    @classmethod
+    def of(cls, simulation):
+        engine = simulation.engine
+        names = [name for name in engine.world.models if name in {door.name for door in DOORS}]
+        positions = {name: engine.world.plant.GetPositions(engine.context, engine.world.models[name]) for name in names}
+        things = {name: each.last.p_WO for name, each in simulation.referee.objects.items()}
+        panels = {name: tuple(each[:2]) for name, each in positions.items()}
+        return cls(panels, rays_in_doorway(simulation), things, engine.doors.history())
 
 
 def rays_in_doorway(simulation):
@@ -36,108 +76,97 @@ def rays_in_doorway(simulation):
     return int(near.sum())
 
 
-def thing_W(simulation, name):
-    return simulation.referee.objects[name].last.p_WO
+def slid(at):
+    """The place of the panel of an open door."""
+    return pytest.approx((at[0] - 0.9, at[1]))
 
 
-def test_a_door_closes_and_opens_at_its_times_and_the_lidar_sees_it():
-    simulation = simulated()
-    simulation.clock.advance(0.9)
-    assert panel_W(simulation) == pytest.approx((AT[0] - 0.9, AT[1]))
-    assert rays_in_doorway(simulation) == 0
-    simulation.clock.advance(3.0)
-    assert panel_W(simulation) == pytest.approx(AT)
-    assert rays_in_doorway(simulation) > 500
-    simulation.clock.advance(3.0)
-    assert rays_in_doorway(simulation) == 0
-    assert [sentence for _, sentence in simulation.clock.events] == ["the door closes", "the door opens"]
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Seven seconds of the flat: the simulation, what was seen by time, and another that goes on from 2 s."""
+    simulation, after, file = simulated(), simulated(), tmp_path_factory.mktemp("run") / "flat.plant"
+    seen = {0.0: Seen.of(simulation)}
+    for now_s in (0.2, 0.9, 2.0, 3.9, 6.9):
+        simulation.clock.advance(now_s - simulation.clock.now())
+        seen[now_s] = Seen.of(simulation)
+        if now_s == 0.2:
+            simulation.engine.doors.call(CALLED_AT)
+        if now_s == 2.0:
+            simulation.save_snapshots(file)
+            after.restore(file)
+    return simulation, seen, after
+
+
+def test_a_door_closes_and_opens_at_its_times_and_the_lidar_sees_it(run):
+    simulation, seen, _ = run
+    assert [seen[now_s].panels["door"] for now_s in (0.9, 3.9)] == [slid(AT), pytest.approx(AT)]
+    assert [seen[now_s].rays > 500 for now_s in (0.9, 3.9, 6.9)] == [False, True, False]
+    assert seen[0.9].rays == seen[6.9].rays == 0
+    said = [sentence for _, sentence in simulation.clock.events]
+    assert [sentence for sentence in said if "the door " in sentence] == ["the door closes", "the door opens"]
     changes = simulation.engine.doors.history()[AT]
     assert [share for _, share in changes] == [0.0, 0.5, 1.0, 0.5, 0.0]
     assert [begun_s for begun_s, _ in changes] == pytest.approx([0.0, 1.0, 2.5, 5.0, 6.5], abs=0.05)
 
 
-def test_a_door_that_is_called_opens_and_stays_open():
-    simulation = simulated(doors=(DOOR.model_copy(update={"closes": None, "opens": 900.0}),))
-    simulation.clock.advance(0.2)
-    simulation.engine.doors.call(AT)
-    simulation.clock.advance(2.0)
-    assert panel_W(simulation) == pytest.approx((AT[0] - 0.9, AT[1]))
-    assert [share for _, share in simulation.engine.doors.history()[AT]] == [1.0, 0.5, 0.0]
+def test_a_door_that_is_called_opens_and_stays_open(run):
+    simulation, seen, _ = run
+    assert [seen[now_s].panels["called"] for now_s in (0.2, 2.0, 6.9)] == [
+        pytest.approx(CALLED_AT),
+        *[slid(CALLED_AT)] * 2,
+    ]
+    assert [share for _, share in simulation.engine.doors.history()[CALLED_AT]] == [1.0, 0.5, 0.0]
 
 
-@pytest.mark.parametrize(
-    ("times", "shut"),
-    [({"closes": 0.0}, True), ({"opens": 9.0}, True), ({"closes": 9.0}, False), ({"opens": 2.0, "closes": 9.0}, True)],
-)
-def test_the_earlier_time_says_how_a_door_is_at_first(times, shut):
-    simulation = simulated(doors=(DoorRule(name="door", at=AT, yaw=math.pi, width=0.9, **times),))
-    assert panel_W(simulation)[0] == pytest.approx(AT[0] if shut else AT[0] - 0.9)
+@pytest.mark.parametrize("name", FIRST)
+def test_the_earlier_time_says_how_a_door_is_at_first(run, name):
+    _, seen, _ = run
+    at, _, shut = FIRST[name]
+    assert seen[0.0].panels[name] == (pytest.approx(at) if shut else slid(at))
 
 
-def driven(simulation, seconds):
-    robot = simulation.robots["Alice"]
-    robot.drive(0.5, 0.0, 0.0, until_s=simulation.clock.now() + seconds, lease=robot.acquire_lease("test"))
-    simulation.clock.advance(seconds)
-    return simulation.true_pose("Alice")
-
-
-def test_a_closed_door_blocks_the_body_and_the_referee_sees_the_bump():
-    shut = DoorRule(name="door", at=AT, yaw=math.pi, width=0.9, closes=0.0)
-    simulation = simulated(doors=(shut,), start=Pose2D(9.0, 4.2, math.pi / 2))
-    assert driven(simulation, 4.0).y_m < AT[1]
-    assert any("door" in bump.sentence for bump in simulation.referee.collisions)
-
-
-def test_a_door_waits_for_a_robot_in_the_doorway():
-    simulation = simulated(start=Pose2D(9.0, 5.4, math.pi / 2))
-    simulation.clock.advance(4.0)
-    assert panel_W(simulation)[0] == pytest.approx(AT[0] - 0.9)
-    assert simulation.referee.collisions == ()
-
-
-def test_an_object_is_moved_to_a_free_spot_of_a_surface_and_no_robot_did_it():
-    simulation = simulated(doors=(), moves=(MoveRule(name="beer", at=1.0, to="kitchen table"),))
-    simulation.clock.advance(0.9)
-    before_W = thing_W(simulation, "beer")
-    simulation.clock.advance(2.0)
-    x, y, z = thing_W(simulation, "beer")
-    assert (before_W[0] < 10.0, 11.05 < x < 11.85, 5.95 < y < 7.05, 0.75 < z < 1.0) == (True, True, True, True)
-    others = [thing_W(simulation, name) for name in simulation.referee.objects if name != "beer"]
+def test_an_object_is_moved_to_a_free_spot_of_a_surface_and_no_robot_did_it(run):
+    simulation, seen, _ = run
+    x, y, z = seen[3.9].things["beer"]
+    assert (11.05 < x < 11.85, 5.95 < y < 7.05, 0.75 < z < 1.0) == (True, True, True)
+    assert seen[0.9].things["beer"][0] < 10.0
+    others = [place_W for name, place_W in seen[3.9].things.items() if name != "beer"]
     assert min(math.dist(other[:2], (x, y)) for other in others) > 0.06
-    assert simulation.referee.events == ("Somebody moved the beer at 1.00 s.",)
+    moved = ("Somebody moved the beer at 1.00 s.", "Somebody moved the hammer at 0.50 s.")
+    assert tuple(sorted(simulation.referee.events)) == moved
     assert (simulation.referee.drops, simulation.referee.lifts("Alice")) == (0, ())
 
 
-def test_an_object_is_put_on_the_floor_at_a_point():
-    simulation = simulated(doors=(), moves=(MoveRule(name="hammer", at=0.5, to=(9.0, 3.0, 0.0)),))
-    simulation.clock.advance(2.0)
-    assert thing_W(simulation, "hammer") == pytest.approx((9.0, 3.0, 0.03), abs=0.03)
-    assert simulation.referee.drops == 0
+def test_an_object_is_put_on_the_floor_at_a_point(run):
+    _, seen, _ = run
+    assert seen[2.0].things["hammer"] == pytest.approx((9.0, 3.0, 0.03), abs=0.03)
 
 
-def test_an_object_stays_when_the_goal_surface_has_no_free_spot():
-    stool = SurfaceTop("stool", ((9.0, 3.0), (9.05, 3.0), (9.05, 3.05)), 0.5)
-    world = replace(FLAT, surfaces={**FLAT.surfaces, "stool": stool})
-    world = world.with_events((), (MoveRule(name="beer", at=0.5, to="stool"),))
-    simulation = Simulation(world, seed=1, visuals=False)
-    before_W = thing_W(simulation, "beer")
-    simulation.clock.advance(1.0)
-    assert thing_W(simulation, "beer") == pytest.approx(before_W, abs=0.01)
-    assert simulation.clock.events == [(0.5, "nobody moves the beer, because the stool has no free spot")]
+def test_an_object_stays_when_the_goal_surface_has_no_free_spot(run):
+    simulation, seen, _ = run
+    assert seen[2.0].things["coke"] == pytest.approx(seen[0.0].things["coke"], abs=0.01)
+    assert (0.5, "nobody moves the coke, because the stool has no free spot") in simulation.clock.events
 
 
-def test_doors_and_moves_go_on_after_a_restart(tmp_path):
-    moves = (MoveRule(name="beer", at=1.0, to="kitchen table"),)
-    before = simulated(moves=moves)
-    keep = before.save_snapshots(tmp_path / "flat.plant")
-    before.clock.advance(2.0)
-    keep()
-    after = simulated(moves=moves)
-    after.restore(tmp_path / "flat.plant")
-    assert panel_W(after) == pytest.approx(AT)
+def test_doors_and_moves_go_on_after_a_restart(run):
+    _, seen, after = run
+    before, now = seen[2.0], Seen.of(after)
+    assert now.panels["door"] == pytest.approx(AT)
     assert after.clock.events == []
-    assert after.engine.doors.history()[AT][:2] == before.engine.doors.history()[AT] == ((0.0, 0.0), (1.0, 0.5))
-    assert thing_W(after, "beer") == pytest.approx(thing_W(before, "beer"), abs=0.01)
+    assert now.history[AT][:2] == before.history[AT] == ((0.0, 0.0), (1.0, 0.5))
+    assert now.things["beer"] == pytest.approx(before.things["beer"], abs=0.01)
+
+
+def test_a_door_waits_for_a_robot_in_the_doorway_and_a_closed_one_blocks_it():
+    simulation = simulated((DOOR, rule("gate", AHEAD, closes=0.0)), (), Pose2D(*AT, math.pi / 2))
+    simulation.clock.advance(3.0)
+    assert Seen.of(simulation).panels["door"] == slid(AT)
+    assert simulation.referee.collisions == ()
+    robot = simulation.robots["Alice"]
+    robot.drive(0.5, 0.0, 0.0, until_s=simulation.clock.now() + 2.0, lease=robot.acquire_lease("test"))
+    simulation.clock.advance(2.0)
+    assert AT[1] + 0.3 < simulation.true_pose("Alice").y_m < AHEAD[1] - 0.4
+    assert any("gate" in bump.sentence for bump in simulation.referee.collisions)
 
 
 def test_a_standing_person_sets_off_from_their_place():
@@ -146,7 +175,7 @@ def test_a_standing_person_sets_off_from_their_place():
     simulation = Simulation(world, seed=1, visuals=False, robots=[PlacedRobot("Alice", "spot", Pose2D(4.0, 4.5, 0.0))])
     ((x, y),) = simulation.engine.walkers.places_W()
     assert (x, y) == pytest.approx(tuple(stands.X_WO.translation()[:2]))
-    simulation.clock.advance(4.0)
+    simulation.clock.advance(3.0)
     assert math.dist(next(simulation.engine.walkers.places_W()), (x, y)) > 1.0
 
 

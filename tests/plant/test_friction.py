@@ -1,7 +1,5 @@
 """Friction of moving bodies is multiplied."""
 
-from __future__ import annotations
-
 import pytest
 from pydrake.geometry import Box, SceneGraph
 from pydrake.math import RigidTransform
@@ -12,14 +10,14 @@ from pydrake.systems.framework import DiagramBuilder
 from plant.diagram import multiply_friction
 
 
-def friction_of(plant: MultibodyPlant, scene_graph: SceneGraph, body: str) -> tuple[float, float]:
+def friction_of(plant, scene_graph, body):
     inspector = scene_graph.model_inspector()
     (geometry,) = plant.GetCollisionGeometriesForBody(plant.GetBodyByName(body))
     found = inspector.GetProximityProperties(geometry).GetProperty("material", "coulomb_friction")
     return found.static_friction(), found.dynamic_friction()
 
 
-def test_friction_is_multiplied_for_moving_bodies_only() -> None:
+def test_friction_is_multiplied_for_moving_bodies_only():
     builder = DiagramBuilder()
     plant, scene_graph = MultibodyPlant(0.01), builder.AddSystem(SceneGraph())
     plant.RegisterAsSourceForSceneGraph(scene_graph)

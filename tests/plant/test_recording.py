@@ -11,14 +11,18 @@ from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
+from tests.plant.kept_engine import KeptEngine
+
+
+@pytest.fixture(scope="module")
+def kept():
+    robot = PlacedRobot("Alice", "spot", Pose2D(0, 0, 0))
+    return KeptEngine(Engine(build_diagram(DiagramConfig(robots=[robot], visuals=False, render=False))))
 
 
 @pytest.fixture
-def engine():
-    world = build_diagram(
-        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0, 0, 0))], visuals=False, render=False)
-    )
-    return Engine(world)
+def engine(kept):
+    return kept.again()
 
 
 def test_frames_come_at_the_recorders_rate_and_are_found_by_time(engine):

@@ -1,7 +1,5 @@
 """Light of a world, as it is drawn, and the threads that draw."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -24,18 +22,18 @@ print(sum(each.read_text().startswith("llvmpipe") for each in Path("/proc/self/t
 """
 
 
-def test_a_dim_light_dims_each_beam_and_the_sky() -> None:
+def test_a_dim_light_dims_each_beam_and_the_sky():
     day, dim = lights(DAY_LIGHT), lights(LIGHTS["dim"])
     assert [each.intensity for each in dim] == pytest.approx([0.4 * each.intensity for each in day])
     sky = render_parameters(LIGHTS["dim"]).default_clear_color
     assert np.max(sky) < 0.5
 
 
-def test_a_low_sun_is_one_beam_more() -> None:
+def test_a_low_sun_is_one_beam_more():
     assert len(lights(LIGHTS["low sun"])) == len(lights()) + 1
 
 
-def test_software_renderer_draws_without_threads_of_its_own() -> None:
+def test_software_renderer_draws_without_threads_of_its_own():
     usual = {name: value for name, value in os.environ.items() if name != MESA_THREADS}
     ended = subprocess.run([sys.executable, "-c", RENDERS], env=usual, capture_output=True, text=True, check=True)
     assert ended.stdout.split() == ["0"]

@@ -11,8 +11,8 @@ from skills.robot import LeaseError
 WORLD = load_world("flat")
 
 
-def make(seed=3):
-    return Simulation(WORLD, seed=seed, visuals=False)
+def make():
+    return Simulation(WORLD, seed=3, visuals=False)
 
 
 @pytest.fixture(scope="module")
@@ -74,26 +74,23 @@ def test_the_referees_record_goes_on(kept, restored):
         assert len(before) and np.array_equal(after[: len(before)], before)
 
 
-def test_two_plants_go_on_alike(kept, restored):
+def test_two_plants_go_on_alike_and_another_mission_begins_a_new_chapter(kept, restored):
     other = make()
     other.restore(kept[1], label="7")
     assert np.array_equal(positions(other), positions(restored))
     assert other.robots["Alice"].odometry() is not restored.robots["Alice"].odometry()
     assert str(other.robots["Alice"].odometry().pose) == str(restored.robots["Alice"].odometry().pose)
+    other.restore(kept[1], label=None)
+    assert len(other.referee.path("Alice")) < 20
+    assert other.referee.drops == 0
 
 
-def test_a_state_of_another_simulation_is_refused(kept):
-    with pytest.raises(SnapshotError, match=r"another simulation \(seed\)"):
-        make(seed=4).restore(kept[1], label="7")
+def test_a_state_of_another_simulation_is_refused(kept, restored, monkeypatch):
     with pytest.raises(SnapshotError, match=r"another simulation \(label\)"):
-        make().restore(kept[1], label="8")
-
-
-def test_another_mission_begins_a_new_chapter_in_the_same_world(kept):
-    simulation = make()
-    simulation.restore(kept[1], label=None)
-    assert len(simulation.referee.path("Alice")) < 20
-    assert simulation.referee.drops == 0
+        restored.restore(kept[1], label="8")
+    monkeypatch.setattr(restored, "seed", 4)
+    with pytest.raises(SnapshotError, match=r"another simulation \(seed\)"):
+        restored.restore(kept[1], label="7")
 
 
 def test_a_snapshot_is_written_a_hundred_times_into_one_small_file(kept, tmp_path):

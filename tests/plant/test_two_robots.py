@@ -1,14 +1,12 @@
 """The referee sees robots touch each other."""
 
-from __future__ import annotations
-
 from plant.robots.robot_kind import PlacedRobot
 from plant.simulation import Simulation
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
 
 
-def test_a_crash_of_two_robots_is_one_contact_between_them() -> None:
+def test_a_crash_of_two_robots_is_one_contact_between_them():
     """Alice drives into Bob, who stands, and stays in contact."""
     alice, bob = Pose2D(2.0, 4.5, 0.0), Pose2D(2.95, 4.5, 3.14)
     robots = [PlacedRobot("Alice", "spot", alice), PlacedRobot("Bob", "fetch", bob)]

@@ -25,7 +25,7 @@ class PeopleDetector:
 
     def detect(self, pictures):
         self.pictures.append(len(pictures))
-        found = [self._seen(one) for one in self.people if one in self.bench.robot.boxes]
+        found = [self._seen(one) for one in self.people if one in self.bench.robot.blocks]
         return [tuple(one for one in found if one is not None) for _ in pictures]
 
     def _seen(self, person):

@@ -1,6 +1,7 @@
 """Analytic scenes: a table top with upright cylinders, ray-cast into colour and depth."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,49 +28,57 @@ class Can:
     base: float = TABLE.height_m
 
 
-def _rays(X_WC):
-    u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))
-    rays_C = np.stack([(u - LENS.cx) / LENS.fx, (v - LENS.cy) / LENS.fy, np.ones_like(u, dtype=float)], axis=-1)
-    return rays_C @ X_WC.rotation().matrix().T
+U, V = np.meshgrid((np.arange(LENS.width) - LENS.cx) / LENS.fx, (np.arange(LENS.height) - LENS.cy) / LENS.fy)
+RAYS_C = np.stack([U.ravel(), V.ravel(), np.ones(U.size)])
+NOISE = np.random.default_rng(7).standard_normal(U.shape)
 
 
-def _level(rays, eye, height_m):
-    """Depth along the optical axis to a level plane; rays have unit length along it."""
+def _level(z, eye, height_m):
+    """Depth along the optical axis to a level plane; z is that of the rays, which have unit length along it."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        depth = (height_m - eye[2]) / rays[..., 2]
+        depth = (height_m - eye[2]) / z
     return np.where(depth > 0, depth, np.inf)
 
 
-def _can_depth(rays, eye, can):
+def _can_depth(x, y, z, eye, can):
     """Depth to the side or the lid of an upright can."""
     base, top = can.base, can.base + can.height
-    p = eye[:2] - [can.x, can.y]
-    a = np.sum(rays[..., :2] ** 2, axis=-1)
-    b = rays[..., 0] * p[0] + rays[..., 1] * p[1]
-    root = b**2 - a * (p @ p - can.radius**2)
-    side = np.where(root >= 0, (-b - np.sqrt(np.maximum(root, 0))) / a, np.inf)
-    z = eye[2] + side * rays[..., 2]
-    side = np.where((z >= base) & (z <= top) & (side > 0), side, np.inf)
-    lid = _level(rays, eye, top)
-    at = eye[:2] + np.where(np.isfinite(lid), lid, 0.0)[..., None] * rays[..., :2]
-    lid = np.where(np.linalg.norm(at - [can.x, can.y], axis=-1) <= can.radius, lid, np.inf)
-    return np.minimum(side, lid)
+    dx, dy = eye[0] - can.x, eye[1] - can.y
+    a, b = x * x + y * y, x * dx + y * dy
+    root = b * b - a * (dx * dx + dy * dy - can.radius**2)
+    meets = root >= 0
+    x, y, z, a, b = x[meets], y[meets], z[meets], a[meets], b[meets]
+    side = (-b - np.sqrt(root[meets])) / a
+    at = eye[2] + side * z
+    lid = np.minimum(_level(z, eye, top), 99.0)
+    on_lid = np.hypot(dx + lid * x, dy + lid * y) <= can.radius
+    depth = np.full(meets.shape, np.inf)
+    depth[meets] = np.minimum(
+        np.where((at >= base) & (at <= top) & (side > 0), side, np.inf), np.where(on_lid, lid, np.inf)
+    )
+    return depth
 
 
 def taken(X_WC, things, noise_m=0.0015):
     """Colour and depth of the table with things on it, seen from X_WC, depth noise included."""
-    rays, eye = _rays(X_WC), X_WC.translation()
+    colour, depth = _taken(X_WC.GetAsMatrix34().tobytes(), tuple(things), noise_m)
+    return colour.copy(), depth.copy()
+
+
+@lru_cache(maxsize=32)
+def _taken(pose, things, noise_m):
+    pose = np.frombuffer(pose).reshape(3, 4)
+    (x, y, z), eye = (pose[:, :3] @ RAYS_C).reshape(3, *U.shape), pose[:, 3]
     colour = np.full((LENS.height, LENS.width, 3), GREY, dtype=np.uint8)
-    table = _level(rays, eye, TABLE.height_m)
-    at = eye[:2] + np.where(np.isfinite(table), table, 0.0)[..., None] * rays[..., :2]
-    on_table = (at[..., 0] > 0.8) & (at[..., 0] < 1.4) & (np.abs(at[..., 1]) < 0.6)
-    depth = np.where(on_table, table, np.minimum(_level(rays, eye, 0.0), 3.9))
+    table = np.minimum(_level(z, eye, TABLE.height_m), 99.0)
+    at_x, at_y = eye[0] + table * x, eye[1] + table * y
+    on_table = (at_x > 0.8) & (at_x < 1.4) & (np.abs(at_y) < 0.6)
+    depth = np.where(on_table, table, np.minimum(_level(z, eye, 0.0), 3.9))
     for thing in things:
-        nearer = _can_depth(rays, eye, thing)
+        nearer = _can_depth(x, y, z, eye, thing)
         colour[nearer < depth] = thing.colour
         depth = np.minimum(depth, nearer)
-    depth = depth + np.random.default_rng(7).normal(0.0, noise_m, depth.shape)
-    return colour, depth.astype(np.float32)
+    return colour, (depth + noise_m * NOISE).astype(np.float32)
 
 
 def scene(things, noise_m=0.0015, X_WC=None):

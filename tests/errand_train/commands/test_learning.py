@@ -1,25 +1,21 @@
-from pathlib import Path
-
 import pytest
-from typer.testing import CliRunner, Result
+from typer.testing import CliRunner
 
 from errand_train import libraries
 from executive.cli.entry import app
 
 
 @pytest.fixture(params=["train", "refine"])
-def command(request: pytest.FixtureRequest) -> str:
+def command(request):
     """Each of the commands that train a network."""
     return str(request.param)
 
 
-def run(*words: str) -> Result:
+def run(*words):
     return CliRunner().invoke(app, ["dataset", *words])
 
 
-def test_without_torch_the_extra_is_named(
-    command: str, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_torch_the_extra_is_named(command, data, tmp_path, monkeypatch):
     monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda _name: None)
     result = run(command, "--data", str(data), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
@@ -27,20 +23,20 @@ def test_without_torch_the_extra_is_named(
     assert "make train" in result.stderr
 
 
-def test_a_folder_that_is_no_data_set_is_named(command: str, tmp_path: Path) -> None:
+def test_a_folder_that_is_no_data_set_is_named(command, tmp_path):
     result = run(command, "--data", str(tmp_path), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2
     assert "train.json" in result.stderr
     assert "errand dataset render" in result.stderr
 
 
-def test_minutes_and_epochs_together_are_refused(command: str, data: Path, tmp_path: Path) -> None:
+def test_minutes_and_epochs_together_are_refused(command, data, tmp_path):
     result = run(command, "--data", str(data), "--out", str(tmp_path / "out"), "--minutes", "1", "--epochs", "1")
     assert result.exit_code == 2
     assert "--minutes and --epochs" in result.stderr
 
 
-def test_a_training_that_is_there_already_is_not_overwritten(command: str, data: Path, tmp_path: Path) -> None:
+def test_a_training_that_is_there_already_is_not_overwritten(command, data, tmp_path):
     (tmp_path / "checkpoint.pt").write_bytes(b"kept")
     result = run(command, "--data", str(data), "--out", str(tmp_path))
     assert result.exit_code == 2
@@ -48,9 +44,7 @@ def test_a_training_that_is_there_already_is_not_overwritten(command: str, data:
     assert (tmp_path / "checkpoint.pt").read_bytes() == b"kept"
 
 
-def test_a_proposal_network_that_is_not_there_is_named(
-    data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_proposal_network_that_is_not_there_is_named(data, tmp_path, monkeypatch):
     monkeypatch.setattr(libraries.importlib.util, "find_spec", lambda _name: object())
     missing = tmp_path / "missing.onnx"
     result = run("refine", "--data", str(data), "--out", str(tmp_path / "out"), "--model", str(missing))

@@ -1,10 +1,7 @@
 """Scenes: objects rest stably where they are, nothing overlaps, training and validation share nothing."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial import ConvexHull
 
-from errand_train.dataset.compose import Placed, compose
+from errand_train.dataset.compose import compose
 from errand_train.dataset.degrade import Degradation, degrade
 from errand_train.dataset.objects import instance
 from errand_train.dataset.render import is_validation
@@ -28,14 +25,14 @@ from plant.worlds.seeding import polygon_distance
 
 
 @pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory: pytest.TempPathFactory) -> None:
+def cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ERRAND_MODEL_CACHE", str(tmp_path_factory.mktemp("models")))
         yield
 
 
 @pytest.mark.parametrize("category", ["hammer", "screwdriver", "wrench", "beer", "cube", "extinguisher", "kettle"])
-def test_an_object_rests_on_three_points_under_its_centre_of_mass(category: str) -> None:
+def test_an_object_rests_on_three_points_under_its_centre_of_mass(category):
     model = instance(category, 1)
     for pose in resting_poses(model):
         points = model.surface.points @ pose.R.T
@@ -48,13 +45,13 @@ def test_an_object_rests_on_three_points_under_its_centre_of_mass(category: str)
         assert np.all(com <= low.max(axis=0))
 
 
-def test_a_bottle_stands_or_lies_and_a_person_only_stands() -> None:
+def test_a_bottle_stands_or_lies_and_a_person_only_stands():
     bottle, rng = instance("beer", 0), np.random.default_rng(1)
     upright = [choose_pose(rng, bottle, resting_poses(bottle)).upright for _ in range(60)]
     assert 0.5 < np.mean(upright) < 0.9
 
 
-def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not() -> None:
+def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not():
     # Of 400 by chance: an extinguisher stands 0.9 of the time, toppled 0.675.
     thing, person, rng = instance("extinguisher", 0), instance("person", 48), np.random.default_rng(1)
     standing = [choose_pose(rng, thing, resting_poses(thing), toppled=True).upright for _ in range(400)]
@@ -63,7 +60,7 @@ def test_things_to_learn_from_lie_more_often_than_is_usual_and_people_do_not() -
 
 
 @pytest.mark.parametrize("category", ["cube", "cylinder", "coke"])
-def test_an_object_in_a_stable_pose_stays_there_in_drake(category: str) -> None:
+def test_an_object_in_a_stable_pose_stays_there_in_drake(category):
     model = instance(category, 1)
     pose = resting_poses(model)[0]
     builder = DiagramBuilder()
@@ -84,7 +81,7 @@ def test_an_object_in_a_stable_pose_stays_there_in_drake(category: str) -> None:
     np.testing.assert_allclose(X_WE.translation(), X_WO.translation(), atol=0.006)
 
 
-def test_rooms_for_validation_share_no_texture_with_those_for_training() -> None:
+def test_rooms_for_validation_share_no_texture_with_those_for_training():
     assert not set(numbers(for_training=True)) & set(numbers(for_training=False))
     for seed in range(3):
         for training in (True, False):
@@ -92,18 +89,18 @@ def test_rooms_for_validation_share_no_texture_with_those_for_training() -> None
             assert {number for _, number in room.textures} <= set(numbers(for_training=training))
 
 
-def test_a_sixth_of_the_scenes_is_for_validation() -> None:
+def test_a_sixth_of_the_scenes_is_for_validation():
     assert sum(is_validation(index) for index in range(60)) == 10
 
 
 @pytest.mark.parametrize("role", ROLES)
-def test_a_texture_is_the_same_for_its_number_and_another_for_another(role: str) -> None:
+def test_a_texture_is_the_same_for_its_number_and_another_for_another(role):
     assert np.array_equal(texture(role, 3), texture(role, 3))
     assert not np.array_equal(texture(role, 3), texture(role, 4))
     assert texture(role, 3).std() >= 0.0
 
 
-def test_supports_lie_inside_the_room_and_obstacles_do_not_overlap() -> None:
+def test_supports_lie_inside_the_room_and_obstacles_do_not_overlap():
     for seed in range(4):
         room = random_room(np.random.default_rng(seed), for_training=True)
         width, depth, _ = room.size_m
@@ -113,7 +110,7 @@ def test_supports_lie_inside_the_room_and_obstacles_do_not_overlap() -> None:
             assert 0.0 <= support.height_m < 2.2
 
 
-def test_cameras_are_in_the_room_and_out_of_furniture() -> None:
+def test_cameras_are_in_the_room_and_out_of_furniture():
     rng = np.random.default_rng(5)
     room = random_room(rng, for_training=True)
     for _ in range(20):
@@ -122,21 +119,21 @@ def test_cameras_are_in_the_room_and_out_of_furniture() -> None:
         assert np.all(eye[:2] < room.size_m[:2])
 
 
-def test_a_degraded_picture_keeps_its_size_and_grey_has_one_channel(tmp_path: Path) -> None:
+def test_a_degraded_picture_keeps_its_size_and_grey_has_one_channel(tmp_path):
     clean = np.full((48, 64, 3), 90, dtype=np.uint8)
     how = Degradation.draw(np.random.default_rng(2))
     assert degrade(clean, how, np.random.default_rng(0), grey=False).shape == (48, 64, 3)
     assert degrade(clean, how, np.random.default_rng(0), grey=True).shape == (48, 64)
 
 
-def test_degrading_is_the_same_for_the_same_seed() -> None:
+def test_degrading_is_the_same_for_the_same_seed():
     clean = np.random.default_rng(1).integers(0, 255, (48, 64, 3)).astype(np.uint8)
     how = Degradation.draw(np.random.default_rng(2))
     first, second = (degrade(clean, how, np.random.default_rng(0), grey=False) for _ in range(2))
     assert np.array_equal(first, second)
 
 
-def test_a_validation_scene_has_only_held_out_instances_without_overlap() -> None:
+def test_a_validation_scene_has_only_held_out_instances_without_overlap(few_models):
     scene = compose(np.random.default_rng(3), 5, for_training=False)
     assert any(thing.model.class_id for thing in scene.objects)
     assert all(thing.model.held_out for thing in scene.objects)
@@ -147,13 +144,13 @@ def test_a_validation_scene_has_only_held_out_instances_without_overlap() -> Non
                 assert polygon_distance(points, other_points) > 0.0, (name, other)
 
 
-def thing_outline(thing: Placed) -> tuple[float, np.ndarray]:
+def thing_outline(thing):
     """Lowest height, and the outline from above."""
     points = np.asarray(thing.X_WO @ thing.model.surface.points.T).T
     return float(points[:, 2].min()), points[ConvexHull(points[:, :2]).vertices, :2]
 
 
-def test_every_tenth_scene_holds_distractors_only() -> None:
+def test_every_tenth_scene_holds_distractors_only(few_models):
     scene = compose(np.random.default_rng(3), 9, for_training=True)
     assert scene.objects
     assert all(thing.model.class_id == 0 for thing in scene.objects)
@@ -164,13 +161,13 @@ def test_every_tenth_scene_holds_distractors_only() -> None:
 # for training     some
 # for validation   none
 @pytest.mark.parametrize("for_training", [True, False])
-def test_models_of_others_lie_about_in_scenes_to_train_on_alone(for_training: bool) -> None:
+def test_models_of_others_lie_about_in_scenes_to_train_on_alone(few_models, for_training):
     other = replace(instance("mug", 3), kind="of others")
     scene = compose(np.random.default_rng(3), 4, for_training=for_training, others=[other])
     assert any(thing.model == other for thing in scene.objects) is for_training
 
 
-def test_a_crowded_scene_holds_more_than_the_same_one_without(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crowded_scene_holds_more_than_the_same_one_without(monkeypatch):
     monkeypatch.setattr("errand_train.dataset.compose.DISTRACTORS", ("mug",))
     monkeypatch.setattr(
         "errand_train.dataset.compose._any_instance", lambda _rng, name, _for_training: instance(name, 0)

@@ -21,24 +21,22 @@ AWAY = (200.0, 10.0, 260.0, 60.0)
         ([], [], 3, 0.5),
     ],
 )
-def test_the_threshold_is_halfway_below_the_best_cut(
-    scores: list[float], right: list[int], labels: int, expected: float
-) -> None:
+def test_the_threshold_is_halfway_below_the_best_cut(scores, right, labels, expected):
     found = best_threshold(np.array(scores, dtype=np.float64), np.array(right, dtype=bool), labels)
     assert found == pytest.approx(expected)
 
 
-def pictures(count: int) -> list[LabelledPicture]:
+def pictures(count):
     return [LabelledPicture(f"{k}.jpg", (Label("beer", BOX),)) for k in range(count)]
 
 
-def test_an_offset_brings_the_best_threshold_to_one_half() -> None:
+def test_an_offset_brings_the_best_threshold_to_one_half():
     found = [(Detection("beer", 0.3, BOX), Detection("beer", 0.1, AWAY))] * 30
     offset, none = score_offsets(pictures(30), found, ("beer", "coke"))
     assert 1 / (1 + math.exp(-(math.log(0.2 / 0.8) + offset))) == pytest.approx(0.5)
     assert none == 0.0
 
 
-def test_few_labels_change_nothing() -> None:
+def test_few_labels_change_nothing():
     found = [(Detection("beer", 0.3, BOX),)] * 5
     assert score_offsets(pictures(5), found, ("beer",)) == (0.0,)

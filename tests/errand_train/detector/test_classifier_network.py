@@ -30,23 +30,23 @@ CPU, NAMES = torch.device("cpu"), ("beer", "coke", "cube")
 Given = tuple["torch.Tensor", "torch.Tensor", "torch.Tensor"]
 
 
-def new_learner(seed: int) -> CropLearner:
+def new_learner(seed):
     return CropLearner.new(len(NAMES), seed, CPU, classifier=True)
 
 
-def given(count: int) -> Given:
+def given(count):
     """Crops, boxes in them and logits."""
     torch.manual_seed(1)
     boxes = torch.tensor([[22.0, 40.0, 106.0, 88.0]]).repeat(count, 1)
     return torch.rand(count, 3, CROP_PX, CROP_PX), boxes, torch.randn(count, len(NAMES))
 
 
-def batch_of(count: int) -> CropBatch:
+def batch_of(count):
     crops, boxes, logits = given(count)
     return CropBatch(crops, boxes, logits, boxes + 4.0, torch.arange(count) % (len(NAMES) + 1) - 1)
 
 
-def trained(seed: int = 1) -> ClassifierNetwork:
+def trained(seed=1):
     """A network that says something of its own."""
     torch.manual_seed(seed)
     network = ClassifierNetwork(len(NAMES))
@@ -61,7 +61,7 @@ def trained(seed: int = 1) -> ClassifierNetwork:
     return network.eval()
 
 
-def test_a_fresh_network_says_what_the_refinement_network_said() -> None:
+def test_a_fresh_network_says_what_the_refinement_network_said():
     network, (crops, boxes, logits) = ClassifierNetwork(len(NAMES)).eval(), given(2)
     with torch.no_grad():
         found, found_boxes = network(crops, boxes, logits)
@@ -69,7 +69,7 @@ def test_a_fresh_network_says_what_the_refinement_network_said() -> None:
     assert torch.allclose(found_boxes, boxes)
 
 
-def test_classifier_starts_from_imagenets_weights_and_trains_all_but_the_early_layers() -> None:
+def test_classifier_starts_from_imagenets_weights_and_trains_all_but_the_early_layers():
     learner = new_learner(1)
     learner.begin(Path("none"), [])
     learner.keep_early()
@@ -86,7 +86,7 @@ def test_classifier_starts_from_imagenets_weights_and_trains_all_but_the_early_l
     assert not any(torch.equal(before[name], after[name]) for name in trained)
 
 
-def test_crops_are_learnt_by_heart() -> None:
+def test_crops_are_learnt_by_heart():
     learner, batch = new_learner(1), batch_of(8)
     learner.begin(Path("none"), [])
     learner.keep_early()
@@ -94,16 +94,10 @@ def test_crops_are_learnt_by_heart() -> None:
     assert np.mean(found[-5:]) < 0.6 * np.mean(found[:3])
 
 
-def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(tmp_path: Path) -> None:
+def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_it(tmp_path):
     network, file, (crops, boxes, logits) = trained(), tmp_path / "t.onnx", given(3)
     shift = (0.5, 0.0, -0.5)
-    export(
-        network,
-        file,
-        class_names=NAMES,
-        facts={"score_offsets": str(list(shift))},
-        score_offsets=shift,
-    )
+    export(network, file, class_names=NAMES, facts={"score_offsets": str(list(shift))}, score_offsets=shift)
     as_bytes = (crops * 255).round()
     told = {
         "chips": as_bytes.permute(0, 2, 3, 1).numpy().astype(np.uint8),
@@ -126,7 +120,7 @@ def test_the_exported_file_says_what_the_network_says_and_learning_goes_on_from_
     assert torch.allclose(boxes_again, boxes_before, atol=0.2)
 
 
-def test_in_use_it_adds_a_part_of_what_it_adds_while_learning() -> None:
+def test_in_use_it_adds_a_part_of_what_it_adds_while_learning():
     network, (crops, boxes, logits) = trained(), given(3)
     with torch.no_grad():
         learning, learning_boxes = network(crops, boxes, logits)
@@ -137,7 +131,7 @@ def test_in_use_it_adds_a_part_of_what_it_adds_while_learning() -> None:
     assert torch.allclose(used_boxes, boxes.lerp(learning_boxes, USED), atol=0.3)
 
 
-def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_path: Path) -> None:
+def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_path):
     file = tmp_path / "t.onnx"
     export(trained(), file, class_names=NAMES, facts={})
     model = onnx.load(file)
@@ -155,7 +149,7 @@ def test_its_file_needs_no_padding_beside_convolutions_and_runs_in_8_bits(tmp_pa
     assert sum(one.name.endswith("weight_quantized") for one in made.graph.initializer) == 45
 
 
-def test_normalisation_becomes_part_of_the_layers() -> None:
+def test_normalisation_becomes_part_of_the_layers():
     network, (crops, boxes, logits) = trained(), given(2)
     with torch.no_grad():
         for mine, theirs in zip(fuse(network)(crops, boxes, logits), network(crops, boxes, logits), strict=True):
@@ -163,7 +157,7 @@ def test_normalisation_becomes_part_of_the_layers() -> None:
 
 
 # first: a box at (100, 100, 200, 200); the second makes it a tenth smaller, and sees the red there as a beer
-def test_training_crops_are_the_refinement_networks_proposals(tmp_path: Path) -> None:
+def test_training_crops_are_the_refinement_networks_proposals(tmp_path):
     picture = picture_of(("hammer", 0.2, (100, 100, 200, 200)))
     picture[50:250, 50:250, 0] = 255
     look = partial(refined_proposals, load_model(write_pair(tmp_path / "m.onnx")))
@@ -172,13 +166,13 @@ def test_training_crops_are_the_refinement_networks_proposals(tmp_path: Path) ->
     assert found.logits.argmax(axis=1).tolist() == [CLASSES.index("beer")]
 
 
-def test_classifier_training_needs_a_refinement_network(tmp_path: Path) -> None:
+def test_classifier_training_needs_a_refinement_network(tmp_path):
     pair = load_model(write_pair(tmp_path / "m.onnx"), networks=1)
     with pytest.raises(ValueError, match="no refinement network"):
         refined_proposals(pair, Scales(picture_of(), halve(picture_of())))
 
 
-def test_learning_goes_on_from_no_refinement_networks_file(tmp_path: Path) -> None:
+def test_learning_goes_on_from_no_refinement_networks_file(tmp_path):
     write_pair(tmp_path / "m.onnx")
     with pytest.raises(TrainingDataError, match=r"m_refinement\.onnx.*start again without it"):
         new_learner(2).start_from(tmp_path / "m_refinement.onnx", [])

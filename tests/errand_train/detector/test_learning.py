@@ -1,7 +1,5 @@
 """The parts of training that need torch; skipped without it."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -24,7 +22,7 @@ NAMES = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "per
 CPU = torch.device("cpu")
 
 
-def unsettled(seed: int = 0) -> DetectorNetwork:
+def unsettled(seed=0):
     """A network whose normalisation has statistics unlike the first ones."""
     torch.manual_seed(seed)
     network = DetectorNetwork(len(NAMES))
@@ -35,22 +33,22 @@ def unsettled(seed: int = 0) -> DetectorNetwork:
     return network.eval()
 
 
-def targets(*boxes: tuple[float, ...], classes: tuple[int, ...] = (), ignored: bool = False) -> Targets:
+def targets(*boxes, classes=(), ignored=False):
     chosen = np.array(classes or range(len(boxes)), dtype=np.int64)
     return Targets(np.array(boxes, np.float32).reshape(-1, 4), chosen, np.full(len(boxes), ignored))
 
 
-def assigned(scores, boxes, middles, one: Targets):
+def assigned(scores, boxes, middles, one):
     return assign(scores, boxes, middles, truth_of([one]), most_cells=4)
 
 
-def at_every_cell(side: float):
+def at_every_cell(side):
     """Middles of the cells of a 64 x 64 picture, and square boxes about them."""
     middles, _ = cells(64, 64)
     return middles, torch.cat([middles - side / 2, middles + side / 2], dim=1)[None]
 
 
-def test_cells_come_in_the_networks_order() -> None:
+def test_cells_come_in_the_networks_order():
     middles, steps = cells(64, 96)
     assert middles.shape == (8 * 12 + 4 * 6 + 2 * 3, 2)
     assert middles[0].tolist() == [4, 4]
@@ -62,7 +60,7 @@ def test_cells_come_in_the_networks_order() -> None:
     assert ((boxes[0, :, :2] < middles) & (middles < boxes[0, :, 2:])).all()
 
 
-def test_the_best_fitting_cells_are_assigned_to_an_object() -> None:
+def test_the_best_fitting_cells_are_assigned_to_an_object():
     middles, boxes = at_every_cell(16.0)
     scores = torch.full((1, len(middles), 2), 0.5)
     found = assigned(scores, boxes, middles, targets((20, 20, 36, 36), classes=(1,)))
@@ -74,7 +72,7 @@ def test_the_best_fitting_cells_are_assigned_to_an_object() -> None:
     assert (found.quality[0][found.objects[0] < 0] == 0).all()
 
 
-def test_a_cell_in_two_objects_is_assigned_to_the_better_fit() -> None:
+def test_a_cell_in_two_objects_is_assigned_to_the_better_fit():
     middles, boxes = at_every_cell(16.0)
     scores = torch.full((1, len(middles), 2), 0.5)
     found = assigned(scores, boxes, middles, targets((0, 0, 64, 64), (20, 20, 36, 36)))
@@ -83,14 +81,14 @@ def test_a_cell_in_two_objects_is_assigned_to_the_better_fit() -> None:
     assert found.objects[0, at_28].tolist() == [1]
 
 
-def test_an_object_smaller_than_a_cell_gets_one() -> None:
+def test_an_object_smaller_than_a_cell_gets_one():
     middles, boxes = at_every_cell(8.0)
     scores = torch.full((1, len(middles), 1), 0.5)
     found = assigned(scores, boxes, middles, targets((15, 15, 17, 17)))
     assert (found.objects[0] == 0).any()
 
 
-def test_cells_in_what_is_ignored_are_left_out_of_the_loss() -> None:
+def test_cells_in_what_is_ignored_are_left_out_of_the_loss():
     middles, boxes = at_every_cell(16.0)
     logits = torch.full((1, len(middles), 1), 3.0)
     found = assigned(logits.sigmoid(), boxes, middles, targets((0, 0, 64, 64), ignored=True))
@@ -111,15 +109,15 @@ def test_cells_in_what_is_ignored_are_left_out_of_the_loss() -> None:
         ((0, 0, 10, 10), (0, 0, 20, 5), 0.0, 1 / 3),
     ],
 )
-def test_boxes_apart_or_of_other_shape_overlap_less(first, second, low: float, high: float) -> None:
+def test_boxes_apart_or_of_other_shape_overlap_less(first, second, low, high):
     value = float(complete_overlap(torch.tensor([first]).float(), torch.tensor([second]).float()))
     assert low <= value <= high
 
 
-def test_the_average_follows_fast_at_first() -> None:
+def test_the_average_follows_fast_at_first():
     learner = Learner(torch.nn.Linear(1, 1), CPU)
 
-    def step_to(value: float) -> float:
+    def step_to(value):
         with torch.no_grad():
             learner.network.weight.fill_(value)
         weight = learner.network.weight
@@ -132,7 +130,7 @@ def test_the_average_follows_fast_at_first() -> None:
     assert step_to(0.0) > 4.0
 
 
-def test_without_normalisation_the_network_says_the_same() -> None:
+def test_without_normalisation_the_network_says_the_same():
     network, pictures = unsettled(), torch.rand(2, 3, 64, 64)
     with torch.no_grad():
         for mine, theirs in zip(network(pictures), fuse(network)(pictures), strict=True):
@@ -140,7 +138,7 @@ def test_without_normalisation_the_network_says_the_same() -> None:
     assert not any(isinstance(module, torch.nn.BatchNorm2d) for module in fuse(network).modules())
 
 
-def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
+def test_the_exported_file_says_what_the_network_says(tmp_path):
     network, file = unsettled(), tmp_path / "made.onnx"
     export(network, file, class_names=NAMES, facts={"seed": "1", "data": "abc"})
     model = load_model(file)
@@ -154,7 +152,7 @@ def test_the_exported_file_says_what_the_network_says(tmp_path: Path) -> None:
     assert file.stat().st_size < 12_000_000
 
 
-def trained(learner: ProposalLearner, steps: int) -> list[float]:
+def trained(learner, steps):
     """Losses in training four pictures with a bright rectangle each."""
     canvases = []
     for k in range(4):
@@ -165,13 +163,13 @@ def trained(learner: ProposalLearner, steps: int) -> list[float]:
     return [sum(learner.step(batch, 3e-3)) for _ in range(steps)]
 
 
-def test_four_pictures_are_learnt_by_heart() -> None:
+def test_four_pictures_are_learnt_by_heart():
     learner = ProposalLearner.new(len(NAMES), 1, CPU)
     found = trained(learner, 60)
     assert np.mean(found[-5:]) < 0.25 * np.mean(found[:5])
 
 
-def test_a_resumed_training_goes_on_to_the_bit(tmp_path: Path) -> None:
+def test_a_resumed_training_goes_on_to_the_bit(tmp_path):
     torch.set_num_threads(1)
     whole = ProposalLearner.new(len(NAMES), 1, CPU)
     trained(whole, 6)
@@ -189,7 +187,7 @@ def test_a_resumed_training_goes_on_to_the_bit(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("content", [b"", b"no checkpoint"])
-def test_a_damaged_checkpoint_is_named(tmp_path: Path, content: bytes) -> None:
+def test_a_damaged_checkpoint_is_named(tmp_path, content):
     file = tmp_path / "checkpoint.pt"
     file.write_bytes(content)
     with pytest.raises(TrainingDataError, match=r"checkpoint\.pt"):

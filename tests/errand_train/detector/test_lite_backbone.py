@@ -1,7 +1,5 @@
 """EfficientNet-Lite0 and its weights of ImageNet; skipped without torch."""
 
-from pathlib import Path
-
 import pytest
 
 torch = pytest.importorskip("torch")
@@ -12,7 +10,7 @@ from errand_train.detector.lite_backbone import LiteBackbone, PaddedConv  # noqa
 
 
 @pytest.fixture(scope="module")
-def backbone() -> LiteBackbone:
+def backbone():
     made = LiteBackbone().eval()
     made.begin_with_imagenet()
     return made
@@ -21,18 +19,18 @@ def backbone() -> LiteBackbone:
 # stride     8    16   32
 # channels   40   112  320
 # of 64x96   8x12 4x6  2x3
-def test_features_are_of_strides_8_16_and_32(backbone: LiteBackbone) -> None:
+def test_features_are_of_strides_8_16_and_32(backbone):
     at8 = backbone.early(torch.rand(2, 3, 64, 96))
     at16, at32 = backbone.late(at8)
     assert [tuple(one.shape) for one in (at8, at16, at32)] == [(2, 40, 8, 12), (2, 112, 4, 6), (2, 320, 2, 3)]
 
 
-def test_it_has_as_many_weights_as_efficientnet_lite0_before_its_head(backbone: LiteBackbone) -> None:
+def test_it_has_as_many_weights_as_efficientnet_lite0_before_its_head(backbone):
     """4 652 008 less those of the head: a convolution, its normalisation, and the classes."""
     assert sum(weight.numel() for weight in backbone.parameters()) == 4_652_008 - 320 * 1280 - 2 * 1280 - 1281 * 1000
 
 
-def test_imagenets_statistics_fit_what_the_layers_make_of_a_picture(backbone: LiteBackbone) -> None:
+def test_imagenets_statistics_fit_what_the_layers_make_of_a_picture(backbone):
     """With weights at the wrong places, what is normalised would be far from mean 0 and spread 1."""
     smooth = torch.nn.functional.interpolate(torch.rand(8, 3, 16, 16), 224, mode="bicubic").clamp(0, 1)
     spreads: list[float] = []
@@ -53,7 +51,7 @@ def test_imagenets_statistics_fit_what_the_layers_make_of_a_picture(backbone: Li
     assert all(0.05 < spread < 10.0 for spread in spreads)
 
 
-def test_bytes_make_the_same_features(backbone: LiteBackbone) -> None:
+def test_bytes_make_the_same_features(backbone):
     picture = torch.randint(0, 256, (1, 3, 64, 64)).float()
     expected = backbone.early(picture / 255)
     other = LiteBackbone().eval()
@@ -66,7 +64,7 @@ def test_bytes_make_the_same_features(backbone: LiteBackbone) -> None:
 # 3        0, 1: the last output's middle is the last row but one
 # 5        1, 2
 @pytest.mark.parametrize(("kernel", "before"), [(3, 0), (5, 1)])
-def test_with_stride_2_there_is_more_padding_behind(kernel: int, before: int) -> None:
+def test_with_stride_2_there_is_more_padding_behind(kernel, before):
     layer, one = PaddedConv(1, 1, kernel, 2), torch.zeros(1, 1, 8, 8)
     with torch.no_grad():
         layer.weight.zero_()
@@ -85,9 +83,7 @@ def test_with_stride_2_there_is_more_padding_behind(kernel: int, before: int) ->
         (b"weights", "is damaged, or of another version"),
     ],
 )
-def test_other_weights_than_those_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes | None, told: str
-) -> None:
+def test_other_weights_than_those_are_refused(tmp_path, monkeypatch, content, told):
     folder = tmp_path / "some_weights"
     (folder / "models").mkdir(parents=True)
     (folder / "__init__.py").touch()
@@ -99,7 +95,7 @@ def test_other_weights_than_those_are_refused(
         LiteBackbone().begin_with_imagenet()
 
 
-def test_weights_that_are_not_installed_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_weights_that_are_not_installed_are_named(monkeypatch):
     monkeypatch.setattr(lite_backbone, "_PACKAGE", "weights_that_nobody_has")
     with pytest.raises(TrainingDataError, match=r"weights_that_nobody_has: there is no such package.*make train"):
         LiteBackbone().begin_with_imagenet()

@@ -1,7 +1,5 @@
 """Going on from an ONNX file; skipped without torch."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from random_networks import random_network
@@ -11,7 +9,6 @@ pytest.importorskip("onnx")
 
 from errand_train.detector.export import export  # noqa: E402
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
-from errand_train.detector.network import DetectorNetwork  # noqa: E402
 from errand_train.detector.onnx_weights import settle, take_over  # noqa: E402
 from errand_train.detector.quantisation import write_quantised  # noqa: E402
 
@@ -19,7 +16,7 @@ NAMES = ("beer", "coke", "cube")
 
 
 @pytest.fixture
-def written(tmp_path: Path) -> tuple[DetectorNetwork, Path]:
+def written(tmp_path):
     """A network and its file, with scores shifted."""
     network, file = random_network(1, len(NAMES)), tmp_path / "made.onnx"
     shift = {"score_offsets": "[0.5, -0.25, 0.0]"}
@@ -27,7 +24,7 @@ def written(tmp_path: Path) -> tuple[DetectorNetwork, Path]:
     return network, file
 
 
-def test_a_network_says_what_the_one_in_the_file_said(written: tuple[DetectorNetwork, Path]) -> None:
+def test_a_network_says_what_the_one_in_the_file_said(written):
     network, file = written
     pictures, other = torch.rand(2, 3, 64, 96), random_network(2, len(NAMES))
     take_over(other, file)
@@ -36,9 +33,7 @@ def test_a_network_says_what_the_one_in_the_file_said(written: tuple[DetectorNet
             assert torch.allclose(mine, theirs, atol=1e-3)
 
 
-def test_quantised_weights_dequantise_to_the_original_ones(
-    written: tuple[DetectorNetwork, Path], tmp_path: Path
-) -> None:
+def test_quantised_weights_dequantise_to_the_original_ones(written, tmp_path):
     network, file = written
     given = {"images": np.random.default_rng(0).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}
     write_quantised(file, [given], tmp_path / "8.onnx")
@@ -49,9 +44,7 @@ def test_quantised_weights_dequantise_to_the_original_ones(
             assert torch.allclose(mine, theirs, atol=5e-2)
 
 
-def test_settled_on_pictures_it_says_the_same_and_so_it_does_while_learning_from_them(
-    written: tuple[DetectorNetwork, Path],
-) -> None:
+def test_settled_on_pictures_it_says_the_same_and_so_it_does_while_learning_from_them(written):
     network, file = written
     pictures, other = torch.rand(4, 3, 64, 96), random_network(2, len(NAMES))
     take_over(other, file)
@@ -66,7 +59,7 @@ def test_settled_on_pictures_it_says_the_same_and_so_it_does_while_learning_from
     assert torch.allclose(lengths, torch.ones_like(lengths), atol=1e-5)
 
 
-def test_a_network_of_other_classes_is_refused(written: tuple[DetectorNetwork, Path]) -> None:
+def test_a_network_of_other_classes_is_refused(written):
     _, file = written
     with pytest.raises(TrainingDataError, match=r"made\.onnx.*another network"):
         take_over(random_network(2, 5), file)

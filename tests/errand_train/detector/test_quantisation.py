@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -20,7 +19,7 @@ from errand_train.detector.quantisation import main, quantise, quantise_detector
 from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
 
 
-def convolutions(*, separable: bool = False) -> "onnx.ModelProto":
+def convolutions(*, separable=False):
     """A proposal network of three convolutions, to a box and scores at each cell of 32 pixels.
 
     One that is `separable` has two more after the first: of each channel by itself, and of all.
@@ -71,7 +70,7 @@ def convolutions(*, separable: bool = False) -> "onnx.ModelProto":
     return model
 
 
-def _separable(given: str, output: str) -> list["onnx.NodeProto"]:
+def _separable(given, output):
     return [
         convolution("alone", given, pads=[1, 1, 1, 1], group=16),
         helper.make_node("Relu", ["alone"], ["alone_on"]),
@@ -80,26 +79,26 @@ def _separable(given: str, output: str) -> list["onnx.NodeProto"]:
     ]
 
 
-def convolution(name: str, given: str, **told: list[int] | int) -> "onnx.NodeProto":
+def convolution(name, given, **told):
     return helper.make_node("Conv", [given, f"network.{name}.weight", f"network.{name}.bias"], [name], **told)
 
 
-def noise(seed: int) -> np.ndarray:
+def noise(seed):
     return np.random.default_rng(seed).integers(0, 256, (480, 640, 3), dtype=np.uint8)
 
 
 @pytest.fixture(scope="module")
-def plain() -> "onnx.ModelProto":
+def plain():
     return convolutions()
 
 
 @pytest.fixture(scope="module")
-def made(plain: "onnx.ModelProto") -> "onnx.ModelProto":
+def made(plain):
     return quantise(plain, [{"images": noise(k)[None]} for k in range(10)])
 
 
 @pytest.fixture
-def data(tmp_path: Path) -> Path:
+def data(tmp_path):
     """A data set of three pictures."""
     folder = tmp_path / "data"
     folder.mkdir()
@@ -111,7 +110,7 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_quantised_network_has_nearly_the_same_output(plain: "onnx.ModelProto", made: "onnx.ModelProto") -> None:
+def test_a_quantised_network_has_nearly_the_same_output(plain, made):
     given = {"images": noise(99)[None]}
     said, expected = (InferenceSession(one.SerializeToString()).run(None, given) for one in (made, plain))
     for mine, theirs in zip(said, expected, strict=True):
@@ -119,19 +118,19 @@ def test_a_quantised_network_has_nearly_the_same_output(plain: "onnx.ModelProto"
         assert 0.0 < apart < 0.05 * np.ptp(theirs)
 
 
-def test_the_convolutions_at_both_ends_stay_as_they_are(made: "onnx.ModelProto") -> None:
+def test_the_convolutions_at_both_ends_stay_as_they_are(made):
     nodes = {output: node.op_type for node in made.graph.node for output in node.output}
     given = [nodes.get(node.input[1]) for node in made.graph.node if node.op_type == "Conv"]
     assert given == [None, "DequantizeLinear", None]
 
 
-def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too() -> None:
+def test_a_separable_convolution_right_after_the_first_stays_as_it_is_too():
     made = quantise(convolutions(separable=True), [{"images": noise(k)[None]} for k in range(4)])
     kept = {one.name for one in made.graph.initializer if one.name.endswith("weight_quantized")}
     assert kept == {"network.second.weight_quantized"}
 
 
-def test_quantised_weights_are_within_half_a_step_of_8_bits(plain: "onnx.ModelProto", made: "onnx.ModelProto") -> None:
+def test_quantised_weights_are_within_half_a_step_of_8_bits(plain, made):
     before, after = trained_weights(plain), trained_weights(made)
     assert set(before) == set(after)
     for name, values in before.items():
@@ -139,13 +138,13 @@ def test_quantised_weights_are_within_half_a_step_of_8_bits(plain: "onnx.ModelPr
         assert (np.abs(after[name] - values) <= 0.502 * largest / 127 + 1e-5).all()
 
 
-def test_weights_between_convolutions_have_8_bits(made: "onnx.ModelProto") -> None:
+def test_weights_between_convolutions_have_8_bits(made):
     kinds = {one.name: one.data_type for one in made.graph.initializer}
     assert kinds["network.second.weight_quantized"] == TensorProto.INT8
     assert kinds["network.first.weight"] == TensorProto.FLOAT
 
 
-def test_the_others_come_too_and_belong_together(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
+def test_the_others_come_too_and_belong_together(tmp_path, data, plain):
     first = tmp_path / "detector.onnx"
     first.write_bytes(plain.SerializeToString())
     second = refinement_file(first)
@@ -162,7 +161,7 @@ def test_the_others_come_too_and_belong_together(tmp_path: Path, data: Path, pla
     }
 
 
-def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
+def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path, data, plain):
     first = tmp_path / "detector.onnx"
     first.write_bytes(plain.SerializeToString())
     once = quantise_detector(first, data, tmp_path / "once")
@@ -171,7 +170,7 @@ def test_a_proposal_network_in_8_bits_stays_as_it_is(tmp_path: Path, data: Path,
     assert twice.read_bytes() == once.read_bytes()
 
 
-def test_an_already_quantised_network_is_refused(tmp_path: Path, data: Path) -> None:
+def test_an_already_quantised_network_is_refused(tmp_path, data):
     told = {"format": "errand-detector-1", "class_names": json.dumps(list(CLASSES)), "eight_bits": "yes"}
     file = write_model(tmp_path / "detector.onnx", metadata=told)
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*is quantised already"):
@@ -179,7 +178,7 @@ def test_an_already_quantised_network_is_refused(tmp_path: Path, data: Path) -> 
     assert not (tmp_path / "out").exists()
 
 
-def test_no_file_is_overwritten(tmp_path: Path, data: Path, plain: "onnx.ModelProto") -> None:
+def test_no_file_is_overwritten(tmp_path, data, plain):
     file = tmp_path / "detector.onnx"
     file.write_bytes(plain.SerializeToString())
     with pytest.raises(TrainingDataError, match=r"detector\.onnx.*written over"):
@@ -195,16 +194,7 @@ def test_no_file_is_overwritten(tmp_path: Path, data: Path, plain: "onnx.ModelPr
         ("detector.onnx", "none", "none"),
     ],
 )
-def test_a_missing_file_is_named_and_ends_with_2(
-    tmp_path: Path,
-    data: Path,
-    plain: "onnx.ModelProto",
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    detector: str,
-    pictures: str,
-    named: str,
-) -> None:
+def test_a_missing_file_is_named_and_ends_with_2(tmp_path, data, plain, monkeypatch, capsys, detector, pictures, named):
     (tmp_path / "detector.onnx").write_bytes(plain.SerializeToString())
     out = tmp_path / "out"
     monkeypatch.setattr(

@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -23,7 +22,7 @@ from skills.perception.detector.model_files import classifier_file, load_model, 
 from skills.perception.detector.onnx_detector import OnnxDetector  # noqa: E402
 
 
-def write_split(folder: Path, split: str, count: int, names: tuple[str, ...] = CLASSES) -> None:
+def write_split(folder, split, count, names=CLASSES):
     """Pictures of noise that are said to hold many things as large as an unlearnt network's boxes."""
     images, labels = [], []
     for k in range(count):
@@ -41,7 +40,7 @@ def write_split(folder: Path, split: str, count: int, names: tuple[str, ...] = C
 
 
 @pytest.fixture
-def options(tmp_path: Path) -> RefineOptions:
+def options(tmp_path):
     """As a data set and a proposal network stand after `errand dataset train`."""
     data = tmp_path / "data"
     data.mkdir()
@@ -53,7 +52,7 @@ def options(tmp_path: Path) -> RefineOptions:
     )
 
 
-def real_first(file: Path) -> Path:
+def real_first(file):
     """A proposal network in the form that learning can take over, which sees something everywhere."""
     from errand_train.detector.export import export
 
@@ -61,7 +60,7 @@ def real_first(file: Path) -> Path:
     return file
 
 
-def test_a_proposal_network_gets_a_refinement_network(options: RefineOptions) -> None:
+def test_a_proposal_network_gets_a_refinement_network(options):
     told = list[Report]()
     file = refine(options, told.append)
     assert file == refinement_file(options.out / MODEL)
@@ -73,7 +72,7 @@ def test_a_proposal_network_gets_a_refinement_network(options: RefineOptions) ->
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl"}
 
 
-def test_both_get_a_classifier_network_that_belongs_to_them(options: RefineOptions, tmp_path: Path) -> None:
+def test_both_get_a_classifier_network_that_belongs_to_them(options, tmp_path):
     refine(options, lambda _: None)
     next_one = replace(options, classifier=True, model=options.out / MODEL, out=tmp_path / "next")
     file = refine(next_one, lambda _: None)
@@ -85,19 +84,19 @@ def test_both_get_a_classifier_network_that_belongs_to_them(options: RefineOptio
     assert len(OnnxDetector(model).detect([picture_of()])) == 1
 
 
-def test_without_a_refinement_network_there_is_no_classifier_network(options: RefineOptions) -> None:
+def test_without_a_refinement_network_there_is_no_classifier_network(options):
     with pytest.raises(TrainingDataError, match=r"first_refinement\.onnx: cannot be copied"):
         refine(replace(options, classifier=True), lambda _: None)
 
 
-def test_a_training_resumes_from_its_checkpoint(options: RefineOptions) -> None:
+def test_a_training_resumes_from_its_checkpoint(options):
     refine(options, lambda _: None)
     told = list[Report]()
     refine(replace(options, budget=Budget(pictures=16), resume=True), told.append)
     assert [report.steps for report in told if report.figures is not None] == [3, 4]
 
 
-def test_weights_of_another_training_are_taken_over(options: RefineOptions, tmp_path: Path) -> None:
+def test_weights_of_another_training_are_taken_over(options, tmp_path):
     refine(options, lambda _: None)
     budget, start = Budget(pictures=4), options.out / CHECKPOINT
     refine(replace(options, out=tmp_path / "next", budget=budget, start=start, schedule=Schedule(0.0)), lambda _: None)
@@ -108,7 +107,7 @@ def test_weights_of_another_training_are_taken_over(options: RefineOptions, tmp_
     assert torch.equal(before["average"][averaged], after["network"][weight])
 
 
-def test_weights_of_a_refinement_networks_file_are_taken_over(options: RefineOptions, tmp_path: Path) -> None:
+def test_weights_of_a_refinement_networks_file_are_taken_over(options, tmp_path):
     start, still = refine(replace(options, budget=Budget(pictures=32)), lambda _: None), Schedule(0.0)
     out = tmp_path / "next"
     refine(replace(options, out=out, budget=Budget(pictures=4), start=start, schedule=still), lambda _: None)
@@ -118,14 +117,14 @@ def test_weights_of_a_refinement_networks_file_are_taken_over(options: RefineOpt
     assert torch.allclose(before["average"][averaged], after["network"][weight], atol=1e-4)
 
 
-def test_a_network_of_other_classes_is_refused(options: RefineOptions) -> None:
+def test_a_network_of_other_classes_is_refused(options):
     for split in ("train", "val"):
         write_split(options.data, split, 4, names=("beer", "coke", "wrench"))
     with pytest.raises(TrainingDataError, match="knows other classes"):
         refine(options, lambda _: None)
 
 
-def test_a_network_without_proposals_is_refused(options: RefineOptions, tmp_path: Path) -> None:
+def test_a_network_without_proposals_is_refused(options, tmp_path):
     blind = write_model(tmp_path / "blind.onnx")
     for file in options.data.glob("*.png"):
         cv2.imwrite(str(file), picture_of())
@@ -133,7 +132,7 @@ def test_a_network_without_proposals_is_refused(options: RefineOptions, tmp_path
         refine(replace(options, model=blind), lambda _: None)
 
 
-def test_a_file_that_is_no_network_is_refused(options: RefineOptions) -> None:
+def test_a_file_that_is_no_network_is_refused(options):
     (options.data / "none.onnx").write_bytes(b"none")
     with pytest.raises(TrainingDataError, match=r"none\.onnx.*damaged or no ONNX file"):
         refine(replace(options, model=options.data / "none.onnx"), lambda _: None)

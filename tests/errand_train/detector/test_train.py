@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -23,7 +22,7 @@ NAMES = ("beer", "coke")
 SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))
 
 
-def write_split(folder: Path, split: str, count: int) -> None:
+def write_split(folder, split, count):
     images, labels = [], []
     for k in range(count):
         name = f"{split}{k}.png"
@@ -38,7 +37,7 @@ def write_split(folder: Path, split: str, count: int) -> None:
 
 
 @pytest.fixture
-def options(tmp_path: Path) -> TrainOptions:
+def options(tmp_path):
     data = tmp_path / "data"
     data.mkdir()
     write_split(data, "train", 4)
@@ -46,7 +45,7 @@ def options(tmp_path: Path) -> TrainOptions:
     return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
 
 
-def test_a_data_set_becomes_a_detectors_file(options: TrainOptions) -> None:
+def test_a_data_set_becomes_a_detectors_file(options):
     told = list[Report]()
     file = train(options, told.append)
     assert file == options.out / MODEL
@@ -56,14 +55,14 @@ def test_a_data_set_becomes_a_detectors_file(options: TrainOptions) -> None:
     assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, "training.jsonl", "pictures"}
 
 
-def test_a_resumed_training_counts_what_it_has_seen(options: TrainOptions) -> None:
+def test_a_resumed_training_counts_what_it_has_seen(options):
     train(options, lambda _report: None)
     told = list[Report]()
     train(replace(options, resume=True, budget=Budget(pictures=12)), told.append)
     assert told[-1].steps == 6
 
 
-def test_a_finished_training_writes_its_file_again(options: TrainOptions) -> None:
+def test_a_finished_training_writes_its_file_again(options):
     file = train(options, lambda _report: None)
     content = file.read_bytes()
     file.unlink()
@@ -71,20 +70,20 @@ def test_a_finished_training_writes_its_file_again(options: TrainOptions) -> Non
     assert file.read_bytes() == content
 
 
-def test_weights_that_are_not_there_are_named(options: TrainOptions, tmp_path: Path) -> None:
+def test_weights_that_are_not_there_are_named(options, tmp_path):
     chosen = replace(options, start=tmp_path / "none.pt")
     with pytest.raises(TrainingDataError, match=r"none\.pt"):
         train(chosen, lambda _report: None)
 
 
-def test_weights_of_another_training_are_taken_over(options: TrainOptions, tmp_path: Path) -> None:
+def test_weights_of_another_training_are_taken_over(options, tmp_path):
     train(options, lambda _report: None)
     told = list[Report]()
     train(replace(options, out=tmp_path / "next", start=options.out / CHECKPOINT), told.append)
     assert told[-1].steps == 4
 
 
-def test_learning_goes_on_from_an_onnx_file(options: TrainOptions, tmp_path: Path) -> None:
+def test_learning_goes_on_from_an_onnx_file(options, tmp_path):
     start = train(options, lambda _report: None)
     told = list[Report]()
     chosen = replace(options, out=tmp_path / "next", start=start)
@@ -93,14 +92,14 @@ def test_learning_goes_on_from_an_onnx_file(options: TrainOptions, tmp_path: Pat
 
 
 @pytest.mark.parametrize("content", [b"", b"no network"])
-def test_an_onnx_file_that_is_damaged_is_named(options: TrainOptions, tmp_path: Path, content: bytes) -> None:
+def test_an_onnx_file_that_is_damaged_is_named(options, tmp_path, content):
     file = tmp_path / "old.onnx"
     file.write_bytes(content)
     with pytest.raises(TrainingDataError, match=r"old\.onnx"):
         train(replace(options, start=file), lambda _report: None)
 
 
-def test_scores_are_shifted_by_pictures_that_are_not_crowded(options: TrainOptions) -> None:
+def test_scores_are_shifted_by_pictures_that_are_not_crowded(options):
     document = json.loads((options.data / "train.json").read_text())
     for image in document["images"][1:]:
         image["crowded"] = True
@@ -108,7 +107,7 @@ def test_scores_are_shifted_by_pictures_that_are_not_crowded(options: TrainOptio
     assert [one.file for one in examination(options.data, "train", NAMES).pictures] == ["train0.png"]
 
 
-def test_a_picture_that_is_damaged_is_named(options: TrainOptions) -> None:
+def test_a_picture_that_is_damaged_is_named(options):
     (options.data / "train2.png").write_bytes(b"no picture")
     with pytest.raises(TrainingDataError, match=r"train2\.png"):
         train(options, lambda _report: None)

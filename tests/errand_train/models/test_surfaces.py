@@ -1,7 +1,5 @@
 """Surfaces: closed, outward, and of the volume of the book."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -18,11 +16,11 @@ MATERIALS = {"red": Material((1.0, 0.0, 0.0)), "label": Material(texture="label.
 L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
 
 
-def mesh() -> Mesh:
+def mesh():
     return Mesh(MATERIALS)
 
 
-def test_an_ellipsoid_weighs_what_it_should() -> None:
+def test_an_ellipsoid_weighs_what_it_should():
     body = mesh()
     add_ellipsoid(body, "red", (1, 2, 3), (0.1, 0.2, 0.3), sides=40)
     mass = solid_mass(body, 1000.0)
@@ -30,7 +28,7 @@ def test_an_ellipsoid_weighs_what_it_should() -> None:
     np.testing.assert_allclose(mass.com, (1, 2, 3), atol=1e-6)
 
 
-def test_a_tube_and_a_ring_are_closed_and_look_outward() -> None:
+def test_a_tube_and_a_ring_are_closed_and_look_outward():
     tube, ring = mesh(), mesh()
     add_tube(tube, "red", [(0, 0, 0), (0, 0, 1), (0, 0, 2)], [0.1, 0.1, 0.1], sides=40)
     add_ring(ring, "red", 0.1, 0.2, 0.0, 0.1)
@@ -39,24 +37,24 @@ def test_a_tube_and_a_ring_are_closed_and_look_outward() -> None:
 
 
 @pytest.mark.parametrize("outline", [L_SHAPE, L_SHAPE[::-1]])
-def test_a_hollow_outline_is_filled_whichever_way_it_runs(outline: list[tuple[float, float]]) -> None:
+def test_a_hollow_outline_is_filled_whichever_way_it_runs(outline):
     body = mesh()
     add_extruded(body, "red", outline, 0.0, 1.0)
     assert solid_mass(body, 1.0).mass_kg == pytest.approx(3.0)
 
 
-def test_triangles_of_an_outline_cover_its_area_without_overlap() -> None:
+def test_triangles_of_an_outline_cover_its_area_without_overlap():
     points = np.array(L_SHAPE, dtype=float)
     assert sum(area(points[list(t)]) for t in triangles_of(points)) == pytest.approx(area(points))
     assert all(area(points[list(t)]) >= 0 for t in triangles_of(points))
 
 
-def test_an_inset_moves_every_edge_inward_by_the_distance() -> None:
+def test_an_inset_moves_every_edge_inward_by_the_distance():
     square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
     assert area(inset(square, 0.1)) == pytest.approx(0.64)
 
 
-def test_a_rounded_box_is_a_little_lighter_than_the_box() -> None:
+def test_a_rounded_box_is_a_little_lighter_than_the_box():
     body = mesh()
     add_rounded_box(body, "red", (0, 0, 0), (1, 2, 3), 0.05)
     mass = solid_mass(body, 1.0)
@@ -64,7 +62,7 @@ def test_a_rounded_box_is_a_little_lighter_than_the_box() -> None:
     np.testing.assert_allclose(mass.com, (0.5, 1.0, 1.5), atol=1e-6)
 
 
-def test_two_bodies_together_obey_the_parallel_axes() -> None:
+def test_two_bodies_together_obey_the_parallel_axes():
     parts = []
     for x in (-1.0, 1.0):
         part = mesh()
@@ -77,14 +75,14 @@ def test_two_bodies_together_obey_the_parallel_axes() -> None:
     np.testing.assert_allclose(np.diag(whole.inertia), (2 * own, 2 * own + 2.0, 2 * own + 2.0), rtol=1e-9)
 
 
-def test_an_empty_or_inverted_mesh_has_no_mass() -> None:
+def test_an_empty_or_inverted_mesh_has_no_mass():
     body = mesh()
     body.add_rectangle("red", (0, 0, 1), (0, 1, 0), (1, 0, 0))
     with pytest.raises(ValueError, match="empty, open or inside out"):
         solid_mass(body, 1.0)
 
 
-def test_gltf_names_its_pictures_and_holds_every_triangle() -> None:
+def test_gltf_names_its_pictures_and_holds_every_triangle():
     body = mesh()
     body.add_box("red", (0, 0, 0), (1, 1, 1))
     body.add_rectangle("label", (0, 0, 2), (1, 0, 0), (0, 1, 0))

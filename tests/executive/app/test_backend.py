@@ -117,10 +117,7 @@ def test_a_fault_that_ends_is_logged_and_the_robot_goes_on(prepared):
     assert report.report.outcome == "success"
     events = read_events(prepared.request.out / "log.mcap")
     told = [(round(event.stamp_s, 2), event.data["message"]) for event in events if event.topic == "control"]
-    assert told == [
-        (1.0, "lidar: dropout 0.5 s at 1 s: begins"),
-        (1.5, "lidar: dropout 0.5 s at 1 s: is over"),
-    ]
+    assert told == [(1.0, "lidar: dropout 0.5 s at 1 s: begins"), (1.5, "lidar: dropout 0.5 s at 1 s: is over")]
 
 
 def test_its_work_is_in_report_and_log_and_its_parts_are_timed(prepared):

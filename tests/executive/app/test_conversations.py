@@ -10,10 +10,7 @@ from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.words.robot_config import RobotConfig
 
-TWO = (
-    RobotConfig("Alice", "spot"),
-    RobotConfig("Bob", "spot"),
-)
+TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
 
 
 @pytest.fixture(scope="module")
@@ -65,10 +62,7 @@ def test_one_robot_is_told_to_go_on_and_the_other_stays(talk, control):
 def test_one_robot_does_not_go_on_while_all_are_paused(talk, control):
     control.pause("a fire drill")
     reply = talk.hear("go on", "Bob")
-    assert (reply.kind, reply.text) == (
-        ReplyKind.REFUSED,
-        "a fire drill, as all robots are; say so to all of them",
-    )
+    assert (reply.kind, reply.text) == (ReplyKind.REFUSED, "a fire drill, as all robots are; say so to all of them")
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,7 @@ from skills.robot import Pose2D
 
 WORLD = open_world("flat")
 KNOWN = knowledge_of(WORLD)
-TWO = (
-    RobotConfig("Alice", "spot"),
-    RobotConfig("Bob", "fetch"),
-)
+TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "fetch"))
 
 
 def test_the_first_robot_stands_at_the_worlds_start_and_charges_at_its_dock():
@@ -40,25 +37,14 @@ def test_robots_keep_the_order_in_which_they_are_named():
 def test_a_robot_with_no_start_makes_room_for_one_with_a_start():
     here = Pose2D(WORLD.start.x_m, WORLD.start.y_m, 0.0)
     robots = placed_robots(
-        WORLD,
-        KNOWN,
-        (
-            RobotConfig("Bob", "spot"),
-            RobotConfig("Carl", "spot", start=Pose2D(4.0, 4.5, 0.0)),
-        ),
+        WORLD, KNOWN, (RobotConfig("Bob", "spot"), RobotConfig("Carl", "spot", start=Pose2D(4.0, 4.5, 0.0)))
     )
     assert (robots["Bob"].start, robots["Carl"].start.x_m) == (here, 4.0)
 
 
 # What is said of the starts and docks; the words of the refusal.
 REFUSED = [
-    (
-        (
-            RobotConfig("Alice", "spot"),
-            RobotConfig("Bob", "spot", start=Pose2D(9.5, 4.05, 0.0)),
-        ),
-        "overlap",
-    ),
+    ((RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot", start=Pose2D(9.5, 4.05, 0.0))), "overlap"),
     ((RobotConfig("Alice", "spot", start=Pose2D(50.0, 50.0, 0.0)),), "stands in an obstacle"),
     ((RobotConfig("Alice", "spot", dock="moon"),), "is no place"),
 ]

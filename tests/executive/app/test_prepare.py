@@ -13,10 +13,7 @@ from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
 from skills.robot import Pose2D
 
-TWO = (
-    RobotConfig("Alice", "spot"),
-    RobotConfig("Bob", "spot"),
-)
+TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
 
 # Sentence, and the commands of each robot.
 MEANT = [

@@ -144,13 +144,7 @@ def test_until_idle_it_ends_when_nothing_is_queued(server, store, standing, worl
     assert world.waits == []
 
 
-@pytest.mark.parametrize(
-    ("missed", "expected"),
-    [
-        (Missed.SKIP, ["08:10", "08:40"]),
-        (Missed.ONCE, ["08:10", "08:35"]),
-    ],
-)
+@pytest.mark.parametrize(("missed", "expected"), [(Missed.SKIP, ["08:10", "08:40"]), (Missed.ONCE, ["08:10", "08:35"])])
 def test_times_during_a_mission_count_as_missed(server, standing, world, missed, expected):
     """Missions take 25 minutes: 08:20 and 08:30 pass while that of 08:10 runs."""
     world.takes = timedelta(minutes=25)
@@ -597,7 +591,7 @@ def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
         token = (tmp_path / ".errand" / "missions.sqlite-token").read_text().strip()
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
         bearer = {"Authorization": f"Bearer {token}"}
-        connection.request("POST", "/missions/pose", json.dumps({"x": 6.0}), bearer)
+        connection.request("POST", "/missions/pose", json.dumps({"x": 9.0, "y": 4.05, "yaw": 0.0}), bearer)
         assert connection.getresponse().status == 202
         assert any(line.startswith("Written to") for line in server.stderr)
         server.send_signal(signal.SIGTERM)

@@ -93,8 +93,7 @@ def test_a_door_is_named_by_its_rooms_in_any_order(read):
 
 
 @pytest.mark.parametrize(
-    ("said", "name", "to"),
-    [("coke_2", "coke_2", "table"), ("coke", "coke_1", "table"), ("hammer", "hammer", "table")],
+    ("said", "name", "to"), [("coke_2", "coke_2", "table"), ("coke", "coke_1", "table"), ("hammer", "hammer", "table")]
 )
 def test_an_object_is_named_by_itself_or_its_class(read, said, name, to):
     (move,) = read(event(f"{{object: {said}, at: 15 s, to: {to}}}")).moves
@@ -149,10 +148,7 @@ def test_a_scenario_comes_back_from_the_json_of_its_request(read):
         ),
         (event("{door: [hall, kitchen]}"), "a door needs 'closes' or 'opens'"),
         (event("{door: [hall, kitchen], closes: 1, to: hall}"), "a door has no key 'to'"),
-        (
-            event("{door: [hall, garden], closes: 1}"),
-            "no door is known between hall and garden; known are kitchen",
-        ),
+        (event("{door: [hall, garden], closes: 1}"), "no door is known between hall and garden; known are kitchen"),
         (event("{object: coke, at: 3, to: [1, 2]}"), "to a surface, or to a point"),
         (event("{object: coke, at: 3, to: kitchen}"), "'kitchen' is no surface"),
         (event("{object: cook, at: 3, to: table}"), "there is no 'cook' in the world; did you mean 'coke'"),

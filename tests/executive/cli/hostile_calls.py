@@ -11,6 +11,7 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 from unittest.mock import patch
@@ -149,7 +150,8 @@ def places() -> list[Place]:
     ]
 
 
-def commands() -> dict[str, Any]:
+@cache
+def commands() -> Mapping[str, Any]:
     """All commands by the words that call them."""
     top = {name: entry.shipped_command(name) for name in entry.COMMANDS}
     top["dataset"] = entry.plugin_command("dataset")

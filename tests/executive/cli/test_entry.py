@@ -16,65 +16,62 @@ MISSIONS = Path(__file__).parents[3] / "missions"
 UNUSED_AT_RUN_TIME = ("errand_train", "plant.models.builder", "plant.worlds.builder")
 HEAVY = {"pydrake", "spacy", "onnxruntime", "cv2", "numba", "scipy"}
 
-# Command, and which of the heavy libraries it imports.
+CHECK = ["check", str(MISSIONS / "fetch_drink.yaml")]
+
+# Commands that one process calls one after the other, and which heavy libraries it has imported after each.
 IMPORTS = [
-    (["--help"], set()),
-    (["parse", "--open", "fetch me a drink"], {"spacy"}),
-    (["parse", "Hey Alice, fetch me a drink"], {"spacy"}),
-    (["check", str(MISSIONS / "fetch_drink.yaml")], {"pydrake"}),
-    (["run", "--help"], set()),
-    (["evaluate", "--help"], set()),
-    (["queue", "--help"], {"pydrake"}),
-    (["log", "--help"], set()),
-    (["new", "skill", "--help"], set()),
+    [
+        (["--help"], ""),
+        (["run", "--help"], ""),
+        (["run", "--wake", "--say", "get a beer"], ""),
+        (["evaluate", "--help"], ""),
+        (["log", "--help"], ""),
+        (["new", "skill", "--help"], ""),
+        (["parse", "--open", "fetch me a drink"], "spacy"),
+        (["parse", "Hey Alice, fetch me a drink"], "spacy"),
+    ],
+    [(["queue", "--help"], "pydrake"), (["queue", "add", "--wake", "--say=go"], "pydrake"), (CHECK, "pydrake")],
 ]
+PROGRAM = f"""
+import sys
+from executive.cli.entry import command_line
+for words in %r:
+    sys.argv = ["errand", *words]
+    try:
+        command_line()
+    except SystemExit as end:
+        assert end.code == 2 * ("--wake" in words), end.code
+    assert not [name for name in sys.modules if name.startswith({UNUSED_AT_RUN_TIME!r})]
+    print("imported:", *sorted({{name.split(".")[0] for name in sys.modules}} & {HEAVY!r}))
+print(*sorted(name for name in sys.modules if name.startswith("executive.language.")))
+print(*sorted(name for name in sys.modules if name.startswith("skills.") and name.endswith(".skill")))
+"""
 
 
-@pytest.mark.parametrize(
-    ("asked", "imported"),
-    [(["run", "--wake", "--say", "get a beer"], set()), (["queue", "add", "--wake", "--say=go"], {"pydrake"})],
-)
-def test_a_missing_wake_phrase_is_refused_before_anything_else_is_imported(asked, imported):
-    program = (
-        "import sys; from executive.cli.entry import command_line\n"
-        f"sys.argv = ['errand', *{asked!r}]\n"
-        "try: command_line()\n"
-        "except SystemExit as end: assert end.code == 2, end.code\n"
-        f"print(*{{name.split('.')[0] for name in sys.modules}} & {HEAVY!r})"
-    )
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert (set(run.stdout.split()), "--no-wake" in run.stderr) == (imported, True)
+@pytest.fixture(scope="module")
+def call_in_process(tmp_path_factory):
+    """Calls commands in a process of its own; returns its lines and its errors. The paths of `check` are planned."""
+    environment = {"XDG_CACHE_HOME": str(tmp_path_factory.mktemp("cache"))}
+    assert CliRunner().invoke(app, CHECK, env=environment).exit_code == 0
+
+    def call(commands):
+        command, variables = [sys.executable, "-c", PROGRAM % commands], {**os.environ, **environment}
+        run = subprocess.run(command, capture_output=True, text=True, check=True, env=variables)
+        return run.stdout.splitlines(), run.stderr
+
+    return call
 
 
-@pytest.mark.parametrize(("arguments", "expected"), IMPORTS)
-def test_a_command_imports_no_heavy_library_that_it_does_not_use(arguments, expected, tmp_path):
-    program = (
-        "import sys; from executive.cli.entry import command_line\n"
-        f"sys.argv = ['errand', *{arguments!r}]\n"
-        "try: command_line()\n"
-        "except SystemExit as end: assert not end.code, end.code\n"
-        f"assert not [name for name in sys.modules if name.startswith({UNUSED_AT_RUN_TIME!r})]\n"
-        f"print(*sorted({{name.split('.')[0] for name in sys.modules}} & {HEAVY!r}))"
-    )
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
-    for _ in range(1 + (arguments[0] == "check")):  # its ways are planned the first time
-        run = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment
-        )
-    assert set(run.stdout.splitlines()[-1].split()) == expected
+@pytest.mark.parametrize("calls", IMPORTS)
+def test_a_command_imports_no_heavy_library_that_it_does_not_use(call_in_process, calls):
+    lines, errors = call_in_process([words for words, _ in calls])
+    imported = [line.removeprefix("imported:").strip() for line in lines if line.startswith("imported:")]
+    assert imported == [libraries for _, libraries in calls]
+    assert errors.count("--no-wake") == sum("--wake" in words for words, _ in calls)
 
 
-def test_a_check_imports_nothing_that_understands_sentences_and_no_skill_that_declares_its_ports():
-    program = (
-        "import sys; from executive.cli.entry import command_line\n"
-        f"sys.argv = ['errand', 'check', {str(MISSIONS / 'fetch_drink.yaml')!r}]\n"
-        "try: command_line()\n"
-        "except SystemExit as end: assert not end.code, end.code\n"
-        "print(*sorted(name for name in sys.modules if name.startswith('executive.language.')))\n"
-        "print(*sorted(name for name in sys.modules if name.startswith('skills.') and name.endswith('.skill')))"
-    )
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    language, skills = (line.split() for line in run.stdout.splitlines()[-2:])
+def test_a_check_imports_nothing_that_understands_sentences_and_no_skill_that_declares_its_ports(call_in_process):
+    language, skills = (line.split() for line in call_in_process([CHECK])[0][-2:])
     assert language == ["executive.language.parser", "executive.language.questions"]
     assert skills == [
         f"skills.{name}.skill"

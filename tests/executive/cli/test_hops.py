@@ -17,6 +17,7 @@ def hops(*words: str) -> int:
     return int(json.loads(done.stdout.splitlines()[-1])["hops"])
 
 
+@pytest.mark.nightly
 @pytest.mark.mission
 def test_a_sentence_comes_to_its_first_tick_within_the_budget_of_hops(tmp_path: Path) -> None:
     assert 10 < hops(str(tmp_path)) <= MOST_TO_THE_FIRST_TICK

@@ -124,10 +124,7 @@ def test_robots_that_cannot_be_called_by_voice_are_refused(says, wav, options, w
 
 def test_a_run_with_several_robots_hears_the_one_that_is_called(says, wav):
     says("Hey Bob, go to the kitchen.")
-    robots = (
-        RobotConfig("Alice", "spot"),
-        RobotConfig("Bob", "fetch"),
-    )
+    robots = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "fetch"))
     console = Console(file=io.StringIO())
     assert hear_request(wav, Request(robots=robots), console=console) == ("Hey Bob, go to the kitchen.")
 

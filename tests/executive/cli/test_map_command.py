@@ -14,16 +14,7 @@ from executive.cli.map_command import _route_points
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
 
-KEYS = {
-    "world",
-    "seed",
-    "map",
-    "distance_m",
-    "loop_closures",
-    "sim_time_s",
-    "wall_time_s",
-    "trajectory_error_m",
-}
+KEYS = {"world", "seed", "map", "distance_m", "loop_closures", "sim_time_s", "wall_time_s", "trajectory_error_m"}
 
 
 def invoke(*arguments: object):

@@ -56,10 +56,7 @@ def test_every_number_of_the_command_line_has_a_quantity_with_a_range(command: s
         (("run", "--friction", "0,5"), "errand: --friction: should be a number; write 0.5, with a point"),
         (("run", "--people", "three"), "errand: --people: should be a whole number; write 3"),
         (("evaluate", "--jobs", "0"), "errand: --jobs: should be from 1 to 100000; it reads 0 now"),
-        (
-            ("detect", "x.png", "--threshold", "50"),
-            "errand: --threshold: should be from 0 to 1; it reads 50 now",
-        ),
+        (("detect", "x.png", "--threshold", "50"), "errand: --threshold: should be from 0 to 1; it reads 50 now"),
         (("run", "--say", "x", "--start", "5", "4.5", "90"), "--start 5 4.5 90: the heading should be from -6.283"),
         (("run", "--say", "x", "--start", "5", "4,5", "0"), "--start 5 4,5 0: y should be a number; write 4.5"),
         (("run", "--say", "x", "--start", "5", "4.5"), "--start 5 4.5: a pose has 3 numbers, not 2"),

@@ -101,11 +101,7 @@ def test_bad_input_is_refused_in_one_line_with_status_2(mesh, tmp_path, argument
     ("name", "text", "why"),
     [
         ("none.stl", None, "none.stl: there is no such file; check the path"),
-        (
-            "notes.txt",
-            "hello",
-            "files *.txt are not read; export it as one of obj, stl, ply",
-        ),
+        ("notes.txt", "hello", "files *.txt are not read; export it as one of obj, stl, ply"),
         ("notes", "hello", "its name has no ending"),
         ("notes.stl", "hello", "notes.stl: it is no mesh: there are no triangles in it"),
         ("notes.obj", "hello", "notes.obj: it is no mesh: there are no triangles in it"),

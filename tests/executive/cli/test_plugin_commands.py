@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -33,8 +34,10 @@ def moor():
 
 
 @pytest.fixture
-def install(tmp_path):
-    """Makes distributions that register commands, as an installer would leave them."""
+def install(tmp_path, monkeypatch):
+    """Makes distributions that register commands, as an installer would leave them; they are found anew."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr("skills.files.plugins._all_installed", entry_points)
 
     def installed(name, commands, summary="Commands for ships."):
         info = tmp_path / f"{name}-1.0.dist-info"
@@ -43,42 +46,38 @@ def install(tmp_path):
         (info / "entry_points.txt").write_text("\n".join(["[errand.commands]", *commands, ""]))
 
     (tmp_path / "ships.py").write_text(MODULE)
-    return installed
+    yield installed
+    sys.modules.pop("ships", None)
 
 
-@pytest.fixture
-def errand(tmp_path):
-    where = os.pathsep.join([str(tmp_path), str(ROOT)])
-
-    def run(*words):
-        command = [sys.executable, "-m", "executive.cli", *words]
-        return subprocess.run(command, env={**os.environ, "PYTHONPATH": where}, capture_output=True, text=True)
-
-    return run
+def errand(*words):
+    return CliRunner().invoke(app, words)
 
 
-def test_the_help_lists_a_command_of_another_distribution_and_imports_none_of_it(install, errand):
+def test_the_help_lists_a_command_of_another_distribution_and_imports_none_of_it(install):
     install("ships", ["ports = no_such_module:count"])
     ended = errand("--help")
-    assert ended.returncode == 0
+    assert ended.exit_code == 0
     line = next(line for line in ended.stdout.splitlines() if line.split()[:1] == ["ports"])
     assert "Commands for ships." in line
 
 
-def test_a_function_becomes_a_command_with_its_options(install, errand):
+def test_a_function_becomes_a_command_with_its_options(install, tmp_path):
     install("ships", ["ports = ships:count"])
-    assert errand("ports", "--ports", "5").stdout == "ports: 5\n"
+    command = [sys.executable, "-m", "executive.cli", "ports", "--ports", "5"]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    assert subprocess.run(command, env=environment, capture_output=True, text=True).stdout == "ports: 5\n"
 
 
-def test_a_typer_app_becomes_a_group_of_commands(install, errand):
+def test_a_typer_app_becomes_a_group_of_commands(install):
     install("ships", ["ships = ships:fleet"])
     assert errand("ships", "sail").stdout == "sailing\n"
 
 
-def test_a_command_refuses_bad_input_in_one_line_by_raising_an_input_error(install, errand):
+def test_a_command_refuses_bad_input_in_one_line_by_raising_an_input_error(install):
     install("ships", ["ports = ships:count"])
     ended = errand("ports", "--ports", "-1")
-    assert (ended.returncode, ended.stderr) == (2, "errand: no ship has fewer than 0 ports; give --ports 1\n")
+    assert (ended.exit_code, ended.stderr) == (2, "errand: no ship has fewer than 0 ports; give --ports 1\n")
 
 
 @pytest.mark.parametrize(
@@ -89,27 +88,27 @@ def test_a_command_refuses_bad_input_in_one_line_by_raising_an_input_error(insta
         ("ships:typer", "it is neither a typer.Typer nor a function"),
     ],
 )
-def test_a_broken_command_is_refused_in_one_line_that_names_its_distribution(install, errand, value, why):
+def test_a_broken_command_is_refused_in_one_line_that_names_its_distribution(install, value, why):
     install("ships", [f"ports = {value}"])
     ended = errand("ports")
-    assert (ended.returncode, len(ended.stderr.splitlines())) == (2, 1)
+    assert (ended.exit_code, len(ended.stderr.splitlines())) == (2, 1)
     assert f"cannot load command 'ports' ({value}) of ships: " in ended.stderr
     assert why in ended.stderr
 
 
-def test_a_command_that_two_distributions_register_is_refused(install, errand):
+def test_a_command_that_two_distributions_register_is_refused(install):
     install("ships", ["ports = ships:count"])
     install("docks", ["ports = ships:fleet"])
     ended = errand("ports")
-    assert ended.returncode == 2
+    assert ended.exit_code == 2
     assert ended.stderr == "errand: docks and ships both have a command 'ports'; uninstall one of them\n"
 
 
-def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install, errand):
+def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install):
     install("ships", ["missions = ships:count"])
     assert "fetch_drink" in errand("missions").stdout
     ended = errand("plugins")
-    assert ended.returncode == 1
+    assert ended.exit_code == 1
     assert "a command of Errand has this name" in ended.stdout
 
 

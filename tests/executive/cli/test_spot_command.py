@@ -73,12 +73,12 @@ def test_a_map_that_cannot_be_written_is_one_error(tmp_path):
 @pytest.mark.parametrize("pace", ["real", "client"])
 def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd, pace):
     pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
-    (tmp_path / "beside.py").write_text("GOAL_M = 0.5\n")
+    (tmp_path / "beside.py").write_text("GOAL_M = 0.2\n")
     program = tmp_path / "walk.py"
     program.write_text(PROGRAM)
     result = CliRunner().invoke(app, ["sdk", "--seed", "2", "--pace", pace, str(program), "127.0.0.1"])
     said = capfd.readouterr().out
-    assert (result.exit_code, "walked 0.5 640" in said) == (7, True), said + result.output
+    assert (result.exit_code, "walked 0.2 640" in said) == (7, True), said + result.output
 
 
 def test_nothing_but_the_server_loads_the_sdk():

@@ -15,7 +15,7 @@ def test_a_corrected_mission_is_fulfilled_as_corrected(tmp_path):
     prepared, control = prepare(Request("go to the kitchen", out=tmp_path, record=False)), Control(pace=None)
     conversation = conversation_of(prepared, control)
     conversation.set_mission(prepared.tree, memory=prepared.meant.memory)
-    said = [(1.0, "where are you"), (2.0, "no, to the bathroom"), (4.0, "wait"), (6.0, "go on")]
+    said = [(1.0, "where are you"), (2.0, "no, to the living room"), (4.0, "wait"), (6.0, "go on")]
     replies = []
 
     def observe(progress):
@@ -26,4 +26,4 @@ def test_a_corrected_mission_is_fulfilled_as_corrected(tmp_path):
     finished = run_request(prepared, visitors=[OnTick(observe)], control=control)
     assert replies[0] == "I am in the living room"
     assert finished.report.achieved
-    assert finished.report.commands == ("Take [Nothing] to [bathroom] and do [Nothing] to [Nothing]",)
+    assert finished.report.commands == ("Take [Nothing] to [living room] and do [Nothing] to [Nothing]",)

@@ -39,10 +39,7 @@ TO_BEDROOM = ["bedroom"]
         ("keep out of the kitchen and the workshop and go to the bedroom", [KEPT_OUT, ("keep_out", "workshop")]),
         ("drive slowly in the entrance and go to the bedroom", [("speed_limit", "hall", 0.3)]),
         ("in the hall drive slowly, and go to the bedroom", [("speed_limit", "hall", 0.3)]),
-        (
-            "go to the bedroom, no faster than half a metre per second in the hall",
-            [("speed_limit", "hall", 0.5)],
-        ),
+        ("go to the bedroom, no faster than half a metre per second in the hall", [("speed_limit", "hall", 0.5)]),
         (
             "don't drive faster than 40 centimetres per second in the hall, and go to the bedroom",
             [("speed_limit", "hall", 0.4)],

@@ -14,8 +14,8 @@ _spec = importlib.util.spec_from_file_location("mission_mutations", Path(__file_
 mutations = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(mutations)
 
-COUNT, SEED = 500, 7
-RANDOM = 150
+COUNT, SEED = 300, 7
+RANDOM = 100
 EVERY_BLOCK = Path(__file__).with_name("every_block.yaml")
 
 

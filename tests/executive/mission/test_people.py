@@ -31,11 +31,7 @@ def test_places_become_points_by_any_of_their_names(tmp_path, flat):
     routes = routes_of_people(loaded(tmp_path, WALKS), flat)
     counter = flat.place_pose("kitchen counter")
     assert routes["Robin"].model_dump(exclude_defaults=True) == {
-        "waypoints": (
-            {"at": (8.4, 6.9)},
-            {"at": (4.0, 4.5)},
-            {"at": (counter.x, counter.y), "pause": 2.0},
-        ),
+        "waypoints": ({"at": (8.4, 6.9)}, {"at": (4.0, 4.5)}, {"at": (counter.x, counter.y), "pause": 2.0}),
         "speed": 0.9,
         "loop": True,
         "start": 5.0,

@@ -16,15 +16,9 @@ def test_a_start_is_a_pose_or_unknown():
 
 def test_from_anywhere_the_stacks_of_robots_are_found(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    robots = (
-        RobotConfig("Alice", "spot", stack=Path("own.yaml")),
-        RobotConfig("Bob", "fetch"),
-    )
+    robots = (RobotConfig("Alice", "spot", stack=Path("own.yaml")), RobotConfig("Bob", "fetch"))
     found = Request("go", robots=robots).from_anywhere().robots
-    assert found == (
-        RobotConfig("Alice", "spot", stack=tmp_path / "own.yaml"),
-        RobotConfig("Bob", "fetch"),
-    )
+    assert found == (RobotConfig("Alice", "spot", stack=tmp_path / "own.yaml"), RobotConfig("Bob", "fetch"))
 
 
 @pytest.mark.parametrize("text", ["", "nowhere", "1 2", "1 2 3 4", "1 2 nan", "1 2 x"])

@@ -156,11 +156,7 @@ def test_closing_twice_is_fine_and_writing_afterwards_is_not(tmp_path, clock):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"#ROSBAG V2.0\n", "a bag of ROS 1"),
-        (b"SQLite format 3\0", "a bag of ROS 2"),
-    ],
+    ("content", "said"), [(b"#ROSBAG V2.0\n", "a bag of ROS 1"), (b"SQLite format 3\0", "a bag of ROS 2")]
 )
 def test_a_log_of_another_form_is_named(tmp_path, content, said):
     (tmp_path / "other.mcap").write_bytes(content + bytes(200))

@@ -38,7 +38,7 @@ def moving_skill(skill_name, inputs, outputs_):
         outputs: ClassVar[dict[str, type]] = outputs_
 
         def begin(self, inputs):
-            self.left = 12
+            self.left = 8
             robot, lease, now_s = self.context.robot, self.context.lease, self.context.clock.now()
             q = np.array(list(robot.joints().position_rad.values()))
             swing = np.stack([q, q + np.array([0.6, 0.3, -0.3, 0.2, 0.2, 0.2]) * (-1 if q[0] > 0.2 else 1)])
@@ -80,7 +80,7 @@ def run_until(mission, tick, act):
         [entry],
         clock=clock,
         worker=LockStepWorker(clock),
-        settings=RunSettings(tick_period_s=TICK_S),
+        settings=RunSettings(tick_period_s=TICK_S, verb_limit_s=60.0),  # a fresh clone compiles kernels meanwhile
         control=control,
         visitors=[OnTick(lambda progress: act(control, robot, progress) if progress.ticks >= tick else None)],
     )
@@ -101,17 +101,17 @@ def cancelled(mission, tick):
 def test_cancel_at_every_tick_leaves_the_robot_at_rest_within_its_time(mission):
     whole, _, _ = run_until(mission, 1_000_000, None)
     assert whole.outcome is Outcome.SUCCESS
-    assert whole.ticks > 70
+    assert whole.ticks > 45
     in_motion = 0
     for tick in range(whole.ticks):
         result, moved, speed, parts, still = cancelled(mission, tick)
         assert (result.outcome, result.worst.cause) == (Outcome.CANCELLED, Cause.CANCELLED), f"tick {tick}"
         assert (speed, parts, still) == (0.0, (), True), f"tick {tick}: {parts} still moves"
         in_motion += "drive" in moved
-    assert in_motion > 30
+    assert in_motion > 20
 
 
-@pytest.mark.parametrize("tick", range(3, 75, 6))
+@pytest.mark.parametrize("tick", range(3, 48, 4))
 def test_pausing_leaves_the_robot_at_rest_within_its_time_and_the_mission_goes_on(mission, tick):
     speeds = {}
 

@@ -276,10 +276,7 @@ def test_a_lost_lease_suspends_until_it_is_free_again(compiled, run_tree, make, 
     result = run_tree(compiled(*make.FETCH), control=control, observer=observe)
     assert result.outcome is Outcome.SUCCESS
     assert set(modes) == {(Mode.LEASE_LOST, False)}
-    assert notes() == [
-        ("lease lost", "tablet holds the lease of Alice"),
-        ("lease back", "Alice has its lease again"),
-    ]
+    assert notes() == [("lease lost", "tablet holds the lease of Alice"), ("lease back", "Alice has its lease again")]
     assert robot.holder is None
 
 
@@ -457,11 +454,7 @@ def test_a_control_controls_one_run_only(compiled, run_tree, make, control):
 def test_manual_actions_are_logged(compiled, run_tree, make, control, notes):
     actions = {2: control.toggle_pause, 4: control.toggle_pause, 5: lambda: control.cancel("enough")}
     run_tree(compiled(*make.FETCH), control=control, observer=at_ticks(actions))
-    assert notes() == [
-        ("pause", "paused by the operator"),
-        ("resume", "the mission goes on"),
-        ("cancel", "enough"),
-    ]
+    assert notes() == [("pause", "paused by the operator"), ("resume", "the mission goes on"), ("cancel", "enough")]
 
 
 def test_an_untouched_control_changes_no_log(compiled, run_tree, make, robot, clock, published):

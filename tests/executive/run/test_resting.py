@@ -137,7 +137,7 @@ class Lane:
             clock=self.clock,
             worker=LockStepWorker(self.clock),
             visitors=[OnMessage(lambda topic, message: self.published.append((topic, message)))],
-            settings=RunSettings(verb_limit_s=self.verb_limit_s, time_limit_s=120.0),
+            settings=RunSettings(tick_period_s=0.1, verb_limit_s=self.verb_limit_s, time_limit_s=120.0),
         )
 
 

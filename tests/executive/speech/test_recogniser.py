@@ -36,11 +36,7 @@ def test_a_file_of_names_has_one_on_each_line(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "told"),
-    [
-        (b"\xff\xfe\x00", "UTF-16"),
-        (b"x" * 200, "too long"),
-        (b"\n".join(b"n%d" % n for n in range(6000)), "too many"),
-    ],
+    [(b"\xff\xfe\x00", "UTF-16"), (b"x" * 200, "too long"), (b"\n".join(b"n%d" % n for n in range(6000)), "too many")],
 )
 def test_file_without_names_is_refused(tmp_path, content, told):
     file = tmp_path / "names.txt"

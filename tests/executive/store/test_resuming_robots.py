@@ -23,10 +23,7 @@ TAKE_AND_PUT = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
     "Take [drink] to [bedroom] and do [place] to [drink]",
 )
-ROBOTS = (
-    RobotConfig("Alice", "spot"),
-    RobotConfig("Bob", "fetch"),
-)
+ROBOTS = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "fetch"))
 REQUEST = Request("tidy", name="tidy", world_name="flat", robot="Alice", fingerprint="print", robots=ROBOTS)
 
 
@@ -55,7 +52,7 @@ def robots(clock, make):
 
 
 @pytest.fixture
-def handling(world, robots, registry):
+def handling(world, robots, registry, script):
     """Skills of which the third step changes the world, and the fourth is the last."""
 
     class Handling(registry["stow"].__mro__[1]):
@@ -100,6 +97,7 @@ def handling(world, robots, registry):
         def undone(self, inputs):
             return None if world.put_by == self.robot.name and world.holder is None else "it is not there any more"
 
+    script.steps = 2
     return {**installed_skills(), **registry, "grasp": Grasp, "place": Place}
 
 

@@ -113,8 +113,7 @@ def test_other_times_are_refused_with_a_hint(said, words):
 
 
 @pytest.mark.parametrize(
-    ("said", "written"),
-    [("30", "every 30s"), ("1.5h", "every 90m"), ("1 h 30 min", "every 90m"), ("PT5M", "every 5m")],
+    ("said", "written"), [("30", "every 30s"), ("1.5h", "every 90m"), ("1 h 30 min", "every 90m"), ("PT5M", "every 5m")]
 )
 def test_a_period_takes_every_form_of_a_duration(said, written):
     assert str(Every.from_text(said)) == written

@@ -97,10 +97,7 @@ def test_time_before_and_after_adds_up(leaf_of, clock):
 
 def test_a_skill_may_go_on_where_it_was(leaf_of):
     log = []
-    hooks = {
-        "suspend": lambda self: log.append("rest"),
-        "resume": lambda self, inputs: log.append(f"on {inputs}"),
-    }
+    hooks = {"suspend": lambda self: log.append("rest"), "resume": lambda self, inputs: log.append(f"on {inputs}")}
     leaf = leaf_of("a", [Running(""), Succeeded("")], log, **hooks)
     leaf.tick_once()
     suspend(leaf)

@@ -157,22 +157,10 @@ def test_a_raw_pose_out_of_reach_is_refused(check):
 @pytest.mark.parametrize(
     ("text", "abilities", "says"),
     [
-        (
-            GET.format("hammer"),
-            {"masses_kg": {"coke": 0.3}},
-            "no 'hammer' that could",
-        ),
+        (GET.format("hammer"), {"masses_kg": {"coke": 0.3}}, "no 'hammer' that could"),
         (GET.format("hammer"), {"lift_kg": 0.4}, "'hammer' is too heavy: 0.5 kg"),
-        (
-            GET.format("drink"),
-            ONLY_COKE,
-            "what beer looks like",
-        ),
-        (
-            "Take [Nothing] to [kitchen] and do [find] to [drink]",
-            ONLY_COKE,
-            "what beer looks like",
-        ),
+        (GET.format("drink"), ONLY_COKE, "what beer looks like"),
+        ("Take [Nothing] to [kitchen] and do [find] to [drink]", ONLY_COKE, "what beer looks like"),
         (GET.format("blue coke"), {}, "what blue looks like"),
     ],
 )

@@ -226,12 +226,7 @@ def test_people_who_cannot_be_looked_for_are_refused(compiled, asked, goal, why)
 @pytest.mark.parametrize(
     ("asked", "seen_on", "answer", "told"),
     [
-        (
-            "some coke",
-            ("counter", "shelf"),
-            True,
-            "yes: cokes in the kitchen; there are two cokes on the counter and",
-        ),
+        ("some coke", ("counter", "shelf"), True, "yes: cokes in the kitchen; there are two cokes on the counter and"),
         ("2 coke", ("counter", "shelf"), True, "yes: two cokes in the kitchen; there are two cokes"),
         ("2 coke", ("shelf",), False, "no: not two cokes in the kitchen; there is one coke on the shelf"),
         ("some coke", (), False, "no: no cokes in the kitchen"),

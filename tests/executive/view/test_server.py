@@ -162,9 +162,9 @@ def test_a_panels_buttons_are_for_its_robot_alone(feed, clock, compiled, make):
     control = Control(attended=True)
     control.begin({name: compiled(*make.FETCH) for name in ("Alice", "Bob")})
     with PageServer(PageContent(feed, control_actions(control))) as server:
+        act(server, "cancel", {"robot": "Bob"})
         assert act(server, "pause", {"robot": "Bob"}) == (200, {"said": "Bob: pausing"})
         act(server, "stop", {"robot": "Alice"})
-        act(server, "cancel", {"robot": "Bob"})
         assert act(server, "pause", {"robot": "Carl"})[0] == 409
         modes = {name: each.mode for name, each in control.state.robots.items()}
         assert modes == {"Alice": Mode.STOPPED, "Bob": Mode.PAUSED}

@@ -44,8 +44,7 @@ def test_a_call_with_the_token_is_carried_out(server, calls):
 
 
 @pytest.mark.parametrize(
-    "given",
-    ["", "Bearer", "Bearer ", "Bearer wrong", f"Bearer {TOKEN}x", f"Basic {TOKEN}", TOKEN, "Bearer \u00fc"],
+    "given", ["", "Bearer", "Bearer ", "Bearer wrong", f"Bearer {TOKEN}x", f"Basic {TOKEN}", TOKEN, "Bearer \u00fc"]
 )
 @pytest.mark.parametrize("name", ["patrol", "unknown", "full"])
 def test_every_call_without_the_token_is_refused_in_the_same_way(server, calls, given, name):

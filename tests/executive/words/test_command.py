@@ -28,10 +28,7 @@ TEXT_FORMS = [
         Command(item=ObjectKind("apple juice"), goal="desk"),
         "Take [apple juice] to [desk] and do [Nothing] to [Nothing]",
     ),
-    (
-        Command(task=Task.FOLLOW, object=ObjectKind(SPEAKER)),
-        "Take [Nothing] to [Nothing] and do [follow] to [speaker]",
-    ),
+    (Command(task=Task.FOLLOW, object=ObjectKind(SPEAKER)), "Take [Nothing] to [Nothing] and do [follow] to [speaker]"),
     (
         Command(goal="living room", task=Task.GREET, object=ObjectKind("person"), object_count=0),
         "Take [Nothing] to [living room] and do [greet] to [some person]",

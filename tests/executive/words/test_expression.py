@@ -274,7 +274,7 @@ def meant(text, values):
     return found
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(ANY_TEXT)
 def test_any_text_gives_a_value_or_an_expression_error(text):
     meant(text, VALUES)
@@ -304,7 +304,7 @@ def of_the_grammar(draw, depth=3):
     return f"({parts[0]} {draw(OPERATORS)} {parts[1]})"
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(
     of_the_grammar(),
     st.floats(-1e15, 1e15) | st.sampled_from([0.0, 1e15, -1e15]),

@@ -72,13 +72,7 @@ def test_a_place_is_found_by_name_and_alias(knowledge, name, own):
 
 @pytest.mark.parametrize(
     ("name", "classes"),
-    [
-        ("coke", ("coke",)),
-        ("coca cola", ("coke",)),
-        ("drink", ("coke", "beer")),
-        ("Tool", ("hammer",)),
-        ("robot", ()),
-    ],
+    [("coke", ("coke",)), ("coca cola", ("coke",)), ("drink", ("coke", "beer")), ("Tool", ("hammer",)), ("robot", ())],
 )
 def test_category_includes_its_classes(knowledge, name, classes):
     assert knowledge.classes(name) == classes

@@ -49,11 +49,7 @@ leaves = st.one_of(
 )
 conditions = st.recursive(
     leaves,
-    lambda inner: st.one_of(
-        built(Not, part=inner),
-        built(AllOf, parts=row(inner)),
-        built(AnyOf, parts=row(inner)),
-    ),
+    lambda inner: st.one_of(built(Not, part=inner), built(AllOf, parts=row(inner)), built(AnyOf, parts=row(inner))),
     max_leaves=4,
 )
 awaited = st.one_of(
@@ -101,7 +97,7 @@ def holding(steps):
 missions = row(st.recursive(small, holding, max_leaves=6))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(missions)
 def test_yaml_reads_back_to_the_same_steps(steps):
     assert steps_from_yaml(steps_to_yaml(steps)) == steps

@@ -1,7 +1,6 @@
 """Folders of imported objects are read back, and damaged ones are refused."""
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -21,17 +20,14 @@ DRILL = ImportedObject(
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     (tmp_path / "drill.sdf").write_text("<sdf/>")
     write_imported(tmp_path, DRILL)
     return tmp_path
 
 
-def test_a_written_object_is_read_back(folder: Path) -> None:
+def test_a_written_object_is_read_back_and_its_form_rests_at_half_its_height(folder):
     assert read_imported(folder) == DRILL
-
-
-def test_its_form_lies_in_the_folder_and_rests_at_half_its_height(folder: Path) -> None:
     form = DRILL.form(folder)
     assert form.path() == folder / "drill.sdf"
     assert (form.half_extents_m, form.rest_height_m, form.round) == ((0.1, 0.03), 0.02, False)
@@ -48,13 +44,13 @@ def test_its_form_lies_in_the_folder_and_rests_at_half_its_height(folder: Path) 
         ("name: drill", "name: other", "other.sdf is missing"),
     ],
 )
-def test_a_damaged_folder_is_refused_with_its_place(folder: Path, old: str, new: str, why: str) -> None:
+def test_a_damaged_folder_is_refused_with_its_place(folder, old, new, why):
     facts = folder / "object.yaml"
     facts.write_text(facts.read_text().replace(old, new, 1))
     with pytest.raises(InputError, match=f"{re.escape(str(folder))}.*{why}.*`errand object import`"):
         read_imported(folder)
 
 
-def test_a_folder_without_one_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_one_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"there is no imported object \(object.yaml is missing\)"):
         read_imported(tmp_path)

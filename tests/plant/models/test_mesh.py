@@ -1,7 +1,5 @@
 """Meshes: tiling of textures, outward surfaces, and the OBJ and material files."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -16,11 +14,11 @@ MATERIALS = {
 }
 
 
-def groups(mesh: Mesh) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def groups(mesh):
     return {name: (points, normals, uvs) for name, points, normals, uvs in mesh.groups()}
 
 
-def test_a_rectangle_larger_than_its_texture_is_cut_into_tiles() -> None:
+def test_a_rectangle_larger_than_its_texture_is_cut_into_tiles():
     mesh = Mesh(MATERIALS)
     mesh.add_rectangle("tiles", (0, 0, 0), (1.2, 0, 0), (0, 0.5, 0))
     points, normals, uvs = groups(mesh)["tiles"]
@@ -31,22 +29,22 @@ def test_a_rectangle_larger_than_its_texture_is_cut_into_tiles() -> None:
     assert area(points) == pytest.approx(0.6)
 
 
-def area(points: np.ndarray) -> float:
+def area(points):
     a, b, c = points[0::3], points[1::3], points[2::3]
     return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
 
-def add_box(mesh: Mesh) -> None:
+def add_box(mesh):
     mesh.add_box("red", (-1, -1, -1), (1, 1, 1))
 
 
-def add_ball(mesh: Mesh) -> None:
+def add_ball(mesh):
     angle = np.linspace(-np.pi / 2, np.pi / 2, 9)
     mesh.add_lathe("red", [(float(np.cos(a)), float(np.sin(a))) for a in angle])
 
 
 @pytest.mark.parametrize("add", [add_box, add_ball])
-def test_closed_shapes_look_outward(add: object) -> None:
+def test_closed_shapes_look_outward(add):
     mesh = Mesh(MATERIALS)
     assert callable(add)
     add(mesh)
@@ -58,7 +56,7 @@ def test_closed_shapes_look_outward(add: object) -> None:
     assert np.all(np.sum(faces * normals[0::3], axis=1)[solid] > 0)
 
 
-def test_a_turned_mesh_keeps_unit_normals_that_stay_square_to_it() -> None:
+def test_a_turned_mesh_keeps_unit_normals_that_stay_square_to_it():
     part, mesh = Mesh(MATERIALS), Mesh(MATERIALS)
     part.add_rectangle("red", (0, 0, 0), (1, 0, 1), (0, 1, 0))
     mesh.add_mesh(part, np.diag([2.0, 1.0, 0.5]), (1, 2, 3))
@@ -68,12 +66,12 @@ def test_a_turned_mesh_keeps_unit_normals_that_stay_square_to_it() -> None:
     np.testing.assert_allclose(points.min(axis=0), [1, 2, 3])
 
 
-def test_an_unknown_material_is_refused() -> None:
+def test_an_unknown_material_is_refused():
     with pytest.raises(KeyError, match="no material 'gold'"):
         Mesh(MATERIALS).add_box("gold", (0, 0, 0), (1, 1, 1))
 
 
-def test_plain_colours_share_the_palette_and_find_their_cell() -> None:
+def test_plain_colours_share_the_palette_and_find_their_cell():
     mesh = Mesh(MATERIALS)
     mesh.add_box("red", (0, 0, 0), (1, 1, 1))
     mesh.add_box("blue", (2, 0, 0), (3, 1, 1))
@@ -85,7 +83,7 @@ def test_plain_colours_share_the_palette_and_find_their_cell() -> None:
         assert tuple(picture[row, column]) == colour
 
 
-def test_faces_point_at_lines_that_exist() -> None:
+def test_faces_point_at_lines_that_exist():
     mesh = Mesh(MATERIALS)
     add_box(mesh)
     mesh.add_rectangle("tiles", (0, 0, 2), (1, 0, 0), (0, 1, 0))
@@ -96,7 +94,7 @@ def test_faces_point_at_lines_that_exist() -> None:
     assert tuple(corners.max(axis=0)) == tuple(counts)
 
 
-def test_the_material_file_has_only_used_materials() -> None:
+def test_the_material_file_has_only_used_materials():
     mesh = Mesh(MATERIALS)
     add_box(mesh)
     text = mtl_text(mesh, "palette.png")

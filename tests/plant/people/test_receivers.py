@@ -83,6 +83,19 @@ class Hall:
             self.engine.advance(0.05)
         assert self.robot.gripper().holding
 
+    def saved(self):
+        """The state of the hall now."""
+        world = {name: each.copy() for name, each in self.engine.world_state().items()}
+        return self.engine.state(), world, self.referee.state()
+
+    def put_back(self, saved):
+        """Put all back to a saved state; Alice's commands are over, and she holds on."""
+        engine, world, referee = saved
+        self.engine.resume(engine, world)
+        self.referee.resume(referee, {})
+        self.lease = self.robot.acquire_lease("test")
+        return self
+
     @property
     def can(self):
         return self.world.plant.GetBodyByName("coke")
@@ -105,8 +118,23 @@ class Hall:
         self.robot.set_gripper(1.2, 20.0, until_s=self.engine.now() + 3.0, lease=self.lease)
 
 
-def test_the_tray_moves_down_at_the_body_before_it_nears_the_object(tmp_path):
-    hall = Hall(tmp_path).until(Phase.BRINGING)
+@pytest.fixture(scope="module")
+def stage(tmp_path_factory):
+    """One hall with its states: when Alice holds the can out, and when each phase of the receiving begins."""
+    hall = Hall(tmp_path_factory.mktemp("hall"))
+    held = hall.saved()
+    return hall, {None: held, **{each: hall.until(each).saved() for each in (Phase.BRINGING, Phase.PULLING)}}
+
+
+@pytest.fixture
+def at(stage):
+    """Puts the hall back to the beginning of a phase, or to the time when the can is held out."""
+    hall, states = stage
+    return lambda phase=None: hall.put_back(states[phase])
+
+
+def test_the_tray_moves_down_at_the_body_before_it_nears_the_object(at):
+    hall = at(Phase.BRINGING)
     tray, lowest_m = hall.world.trays["Kim"], hall.place_W(hall.can)[2] - 0.06
     while hall.kim.phase is not Phase.PULLING:
         x, _, z = hall.place_W(tray)
@@ -115,8 +143,8 @@ def test_the_tray_moves_down_at_the_body_before_it_nears_the_object(tmp_path):
         hall.engine.advance(0.05)
 
 
-def test_the_lowest_point_of_a_gripper_is_found_from_a_few_of_its_balls(tmp_path, monkeypatch):
-    hall, computed = Hall(tmp_path), []
+def test_the_lowest_point_of_a_gripper_is_found_from_a_few_of_its_balls(at, monkeypatch):
+    hall, computed = at(), []
     offers, plant, lowest_m = Offers(hall.world, hall.engine.context), hall.world.plant, receivers._lowest_m
     monkeypatch.setattr(receivers, "_lowest_m", lambda X_WB, row: computed.append(1) or lowest_m(X_WB, row))
     found_m = offers.lowest_m(Offer("Alice", "coke"))
@@ -131,8 +159,8 @@ def test_the_lowest_point_of_a_gripper_is_found_from_a_few_of_its_balls(tmp_path
     assert len(computed) < len(shapes) // 3
 
 
-def test_the_tray_moves_below_an_offered_object_without_contact(tmp_path):
-    hall = Hall(tmp_path)
+def test_the_tray_moves_below_an_offered_object_without_contact(at):
+    hall = at()
     tray, before_W = hall.world.trays["Kim"], hall.place_W(hall.can)
     assert hall.place_W(tray) == pytest.approx([1.45, 0.0, 1.08], abs=1e-6)
     speeds = []
@@ -147,8 +175,8 @@ def test_the_tray_moves_below_an_offered_object_without_contact(tmp_path):
     assert hall.place_W(hall.can) == pytest.approx(before_W, abs=0.005)
 
 
-def test_an_object_released_under_the_pull_rests_on_the_tray(tmp_path):
-    hall = Hall(tmp_path).until(Phase.PULLING)
+def test_an_object_released_under_the_pull_rests_on_the_tray(at):
+    hall = at(Phase.PULLING)
     hall.engine.advance(0.4)
     hall.let_go()
     hall.until(Phase.RECEIVING).engine.advance(2.0)
@@ -158,13 +186,13 @@ def test_an_object_released_under_the_pull_rests_on_the_tray(tmp_path):
     assert hall.referee.collisions == ()
 
 
-def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(tmp_path):
-    hall = Hall(tmp_path).until(Phase.PULLING).until(Phase.PAUSING).until(Phase.PULLING)
+def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(at):
+    hall = at(Phase.PULLING).until(Phase.PAUSING).until(Phase.PULLING)
     assert hall.robot.gripper().holding
 
 
-def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(tmp_path):
-    hall = Hall(tmp_path).until(Phase.PULLING)
+def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(at):
+    hall = at(Phase.PULLING)
     state = hall.kim.state()
     hall.kim.restore(
         {**state, "p_HO": pack(unpack(state["p_HO"]) + [0.011, 0.0, 0.0])}
@@ -189,8 +217,8 @@ def test_the_arms_joints_feel_the_pull(tmp_path):
     assert abs(effort() - before) > 2.0
 
 
-def test_the_tray_goes_home_when_the_object_is_drawn_in(tmp_path):
-    hall = Hall(tmp_path).until(Phase.PULLING)
+def test_the_tray_goes_home_when_the_object_is_drawn_in(at):
+    hall = at(Phase.PULLING)
     q = hall.robot.joints().position_rad
     names = hall.robot.capabilities().arm.joint_names
     way = np.vstack([[q[name] for name in names], [0.0, -3.0, 2.85, 0.0, 0.1, 1.57]])
@@ -218,23 +246,23 @@ def test_a_walking_person_stops_to_take_an_object(tmp_path):
     assert stopped_W[1] < 2.0
 
 
-def test_a_state_taken_up_again_goes_on_as_before(tmp_path):
-    hall = Hall(tmp_path).until(Phase.PULLING)
-    state, world = hall.engine.state(), {name: each.copy() for name, each in hall.engine.world_state().items()}
-    hall.engine.advance(1.0)
-    hall.engine.resume(state, world)
-    assert hall.kim.phase is Phase.PULLING
-    assert hall.kim.state() == state["receivers"]["people"]["Kim"]
-    hall.lease = hall.robot.acquire_lease("again")
-    hall.let_go()
-    hall.until(Phase.RECEIVING).engine.advance(2.0)
-    assert hall.referee.objects["coke"].on_tray_of == "Kim"
+def test_a_state_taken_up_again_goes_on_as_before(at, stage):
+    _, states = stage
+    for _ in range(2):
+        hall = at(Phase.PULLING)
+        assert hall.kim.phase is Phase.PULLING
+        assert hall.kim.state() == states[Phase.PULLING][0]["receivers"]["people"]["Kim"]
+        assert hall.referee.objects["coke"].on_tray_of is None
+        hall.engine.advance(1.0)
+        hall.let_go()
+        hall.until(Phase.RECEIVING).engine.advance(2.0)
+        assert hall.referee.objects["coke"].on_tray_of == "Kim"
 
 
 # how far (m) the object has moved in the hand while the tray still comes -> whether it counts as let go of
 @pytest.mark.parametrize(("moved_m", "let_go"), [(0.013, False), (0.02, True)])
-def test_a_small_creep_before_the_pull_does_not_count_as_released(tmp_path, moved_m, let_go):
-    hall = Hall(tmp_path).until(Phase.BRINGING)
+def test_a_small_creep_before_the_pull_does_not_count_as_released(at, moved_m, let_go):
+    hall = at(Phase.BRINGING)
     state = hall.kim.state()
     hall.kim.restore({**state, "p_HO": pack(unpack(state["p_HO"]) + [moved_m, 0.0, 0.0])})
     hall.engine.advance(0.3)

@@ -16,8 +16,7 @@ from plant.people.walk import Leg, Walk
 from plant.referee import Referee
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import SPOT
-from plant.simulation import Simulation
-from plant.worlds.seeding import Lapse, PointRoute, PointStop
+from plant.worlds.seeding import Lapse, PointRoute, PointStop, place_people
 from plant.worlds.world import DoorRule, WorldError, load_world
 from skills.robot import Pose2D
 
@@ -222,15 +221,15 @@ def test_a_restored_walk_continues(hall):
 
 
 def test_a_person_who_has_yielded_for_long_walks_around_the_robot(hall):
-    stage = hall((-1.0, -2.5), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
-    stage.engine.advance(12.0)
-    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 3.5), abs=1e-6)
+    stage = hall((-1.0, -1.0), (-1.0, 2.2), robot=Pose2D(-1.0, 0.5, 0.0))
+    stage.engine.advance(9.0)
+    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 2.2), abs=1e-6)
     assert not stage.referee.collisions
 
 
 def test_a_detour_continues_after_a_restart(hall):
-    stage = hall((-1.0, -2.5), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
-    stage.engine.advance(6.0)
+    stage = hall((-1.0, -1.0), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
+    stage.engine.advance(4.5)
     state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
     stage.engine.advance(1.0)
     there = stage.person_W
@@ -319,13 +318,13 @@ def test_a_person_takes_another_path_around_a_closed_door(hall):
 
 
 def test_people_who_meet_pass_each_other_apart(hall):
-    other = PointRoute((PointStop((-1.0, 3.0)), PointStop((-1.0, -3.0))), apart=True)
-    stage = hall((-1.0, -3.0), (-1.0, 3.0), apart=True, others={"Robin": other})
+    other = PointRoute((PointStop((-1.0, 2.0)), PointStop((-1.0, -2.0))), apart=True)
+    stage = hall((-1.0, -2.0), (-1.0, 2.0), apart=True, others={"Robin": other})
     apart_m = []
     stage.engine.observe(lambda _: apart_m.append(math.dist(*stage.engine.walkers.places_W())), every=4)
-    stage.engine.advance(12.0)
+    stage.engine.advance(8.0)
     assert min(apart_m) > 0.4
-    assert [round(y, 3) for _, y in stage.engine.walkers.places_W()] == [3.0, -3.0]
+    assert [round(y, 3) for _, y in stage.engine.walkers.places_W()] == [2.0, -2.0]
 
 
 HALL_W, ROOM_W = (5.6, 4.5), (8.6, 2.5)
@@ -335,7 +334,9 @@ HALL_W, ROOM_W = (5.6, 4.5), (8.6, 2.5)
 def flat_walkers(**routes):
     people = {name: Route(waypoints=points, apart=True, start=0.0) for name, points in routes.items()}
     world = load_world("flat").without_people().with_routes(people)
-    return Simulation(world, seed=1, visuals=False).engine.walkers
+    models = [LooseModel(each.name, each.model_path, each.X_WO, route=each.route) for each in place_people(world, 1)]
+    config = DiagramConfig(directives=world.directives_path, models=models, visuals=False, render=False)
+    return Engine(build_diagram(config)).walkers
 
 
 def test_people_who_meet_in_a_doorway_make_way():

@@ -152,19 +152,16 @@ def test_noise_has_the_given_sigma_and_dropout():
     assert np.isnan(error).mean() == pytest.approx(0.02, rel=0.2)
 
 
-def test_returns_nearer_than_the_least_range_are_lost():
+def test_returns_too_near_or_too_far_are_lost():
     assert not np.isfinite(Scene(room(half_x=0.4, half_y=0.4)).scan().ranges_m[8, 450])
+    scene = Scene([])
+    assert not np.isfinite(scene.scan().ranges_m[:, :100]).any()
+    assert scene.lidar.true_ranges(scene.context, RigidTransform())[0, 0] == NO_RETURN_M
 
 
 def test_same_seed_gives_the_same_scan():
     first, second = (Scene(room(), spec=LidarSpec()).scan().ranges_m for _ in range(2))
     np.testing.assert_array_equal(first, second)
-
-
-def test_nothing_around_gives_no_returns():
-    scene = Scene([])
-    assert not np.isfinite(scene.scan().ranges_m[:, :100]).any()
-    assert scene.lidar.true_ranges(scene.context, RigidTransform())[0, 0] == NO_RETURN_M
 
 
 def test_scan_of_three_hundred_shapes_is_fast():

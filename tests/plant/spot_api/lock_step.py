@@ -3,18 +3,16 @@
 import gc
 import threading
 import time
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import ModuleType
 
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.adapter.robot import ApiRobot
-from plant.spot_api.server.computer import PERIOD_S, Computer, Pace
+from plant.spot_api.server.computer import PERIOD_S, Pace
 from plant.spot_api.server.estop import Tablet
 from plant.spot_api.server.server import Options, SpotServer
 from skills.manipulation.arm.kinematics import arm_model
-from skills.robot import Clock, Robot
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 
@@ -22,13 +20,16 @@ USER, PASSWORD = "user", "right"
 SILENT_S = 1.0
 
 
-@contextmanager
-def scripted_spot(
-    credentials, *, tablet=Tablet.TABLET, password=PASSWORD, pace=Pace.REAL, **scripted
-) -> Iterator[tuple[SpotServer, ScriptedRobot]]:
-    """Serves a scripted Spot from a thread, which steps it in real time, or lets a client step it."""
+def scripted(**options):
+    """Builds a scripted Spot."""
     clock = VirtualClock()
-    robot = ScriptedRobot(clock, capabilities=spot_capabilities(), **scripted)
+    return ScriptedRobot(clock, **{"capabilities": spot_capabilities(), **options}), clock
+
+
+@contextmanager
+def scripted_spot(credentials, *, tablet=Tablet.TABLET, password=PASSWORD, pace=Pace.REAL, **given):
+    """Serves a scripted Spot from a thread, which steps it in real time, or lets a client step it."""
+    robot, clock = scripted(**given)
     options = Options({USER: password}, tablet=tablet, pace=pace)
     server = SpotServer(robot, clock, arm_model(spot_capabilities()), credentials, options)
     stopping = threading.Event()
@@ -44,10 +45,10 @@ def scripted_spot(
             stepping.join()
 
 
-def robot_time(computer: Computer) -> ModuleType:
+def robot_time(computer):
     """Module `time` of a client in this process: the robot's time, which the main thread steps when it sleeps."""
 
-    def sleep(seconds: float) -> None:
+    def sleep(seconds):
         if threading.current_thread() is threading.main_thread():
             steps = max(1, round(seconds / PERIOD_S))
             computer.do(lambda: [computer.step() for _ in range(steps)]).result()
@@ -67,7 +68,7 @@ class LockStep:
     `build` makes robot and clock in the server's thread, to which a renderer belongs.
     """
 
-    def __init__(self, build: Callable[[], tuple[Robot, Clock]], credentials, perception=None) -> None:
+    def __init__(self, build, credentials, perception=None):
         self._build, self._credentials, self.certificate = build, credentials, credentials.certificate
         self._perception = perception
         self._ready, self._stopping, self._polled_s = threading.Event(), threading.Event(), time.monotonic()
@@ -81,7 +82,7 @@ class LockStep:
         self.connection.synchronise()
         self.robot = ApiRobot("Alice", self.connection, self, spot_capabilities())
 
-    def _serve(self) -> None:
+    def _serve(self):
         options = Options({USER: PASSWORD}, pace=Pace.CLIENT, perception=self._perception)
         try:
             robot, clock = self._build()
@@ -94,16 +95,18 @@ class LockStep:
         with self.server.running():
             self._ready.set()
             self.server.computer.serve(self._stopping)
+        renders = not isinstance(robot, ScriptedRobot)
         del robot, clock, self.served, self._build, self.server
-        gc.collect()  # a renderer ends in the thread in which it began
+        if renders:
+            gc.collect()  # a renderer ends in the thread in which it began
 
-    def now(self) -> float:
+    def now(self):
         return self.server.computer.clock.now()
 
-    def robot_time_s(self) -> float:
+    def robot_time_s(self):
         return self.server.computer.now_s()
 
-    def advance(self, dt_s: float) -> None:
+    def advance(self, dt_s):
         computer = self.server.computer
         if time.monotonic() - self._polled_s > SILENT_S:  # a slow tick is no silence
             self.robot.poll()
@@ -112,27 +115,29 @@ class LockStep:
         self.robot.poll()
         self._polled_s = time.monotonic()
 
-    def until(self, true: Callable[[], bool], most_s: float = 10.0) -> bool:
+    def until(self, true, most_s=10.0, *, every_s=0.05):
         """Advances until a condition holds; returns whether it did in time."""
         until_s = self.now() + most_s
         while not true() and self.now() < until_s:
-            self.advance(0.05)
+            self.advance(every_s)
         return true()
 
-    def done(self, command) -> bool:
+    def done(self, command):
         """Advances until a command has ended."""
-        return self.until(lambda: self.robot.command_status(command).state.value != "running")
+        return self.until(lambda: self.robot.command_status(command).state.value != "running", every_s=0.1)
 
-    def stand_up(self) -> None:
+    def stand_up(self):
         """Switches the motors on and stands up."""
         lease = self.robot.acquire_lease("test")
         self.connection.power(True)
-        assert self.until(lambda: self.robot.powered)
+        assert self.until(lambda: self.robot.powered, every_s=0.2)
         assert self.done(self.robot.stand(0.52, 0.0, until_s=self.now() + 10.0, lease=lease))
         self.robot.return_lease(lease)
 
-    def close(self) -> None:
+    def close(self):
         work = self.server.computer.do
+        if not isinstance(self.served, ScriptedRobot):
+            gc.collect()  # else that thread would end what other tests left
         self._stopping.set()
         work(lambda: None)  # it waits for work no longer
         del work  # the server's thread drops the robot, and with it the renderer

@@ -11,14 +11,14 @@ _AT_ONCE = struct.pack("ii", 1, 0)
 class Proxy:
     """Forwards connections to `127.0.0.1:port`, until they are cut (reset) or silenced (nothing comes through)."""
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port):
         self._server_port, self._silent = port, threading.Event()
         self._ends: list[socket.socket] = []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
         threading.Thread(target=self._accept, daemon=True).start()
 
-    def _accept(self) -> None:
+    def _accept(self):
         with suppress(OSError):
             while True:
                 client, _ = self._listener.accept()
@@ -27,17 +27,17 @@ class Proxy:
                 for a, b in ((client, server), (server, client)):
                     threading.Thread(target=self._pump, args=(a, b), daemon=True).start()
 
-    def _pump(self, source: socket.socket, target: socket.socket) -> None:
+    def _pump(self, source, target):
         with suppress(OSError):
             while data := source.recv(65536):
                 if not self._silent.is_set():
                     target.sendall(data)
 
-    def silence(self) -> None:
+    def silence(self):
         """Loses all that is sent from now on; the connections stay open."""
         self._silent.set()
 
-    def cut(self) -> None:
+    def cut(self):
         """Resets all connections, and refuses new ones."""
         with suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)

@@ -8,14 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.spot_api.messages import (
-    InvalidRequestError,
-    frame_tree,
-    pose,
-    seconds,
-    timestamp,
-    transform,
-)
+from plant.spot_api.messages import InvalidRequestError, frame_tree, pose, seconds, timestamp, transform
 
 coordinates = st.floats(-100.0, 100.0)
 angles = st.floats(-1.5, 1.5)

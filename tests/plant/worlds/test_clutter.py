@@ -1,7 +1,5 @@
 """Clutter and passers-by that a variation adds to the flat."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -17,17 +15,17 @@ from plant.worlds.seeding import (
     place_people,
     polygon_distance,
 )
-from plant.worlds.world import World, WorldError, load_world
+from plant.worlds.world import WorldError, load_world
 
 SEEDS = (1, 2)
 
 
 @pytest.fixture(scope="module")
-def world() -> World:
+def world():
     return load_world("flat")
 
 
-def test_clutter_lies_on_surfaces_and_touches_nothing(world: World) -> None:
+def test_clutter_lies_on_surfaces_and_touches_nothing(world):
     for seed in SEEDS:
         things = place_objects(world, seed)
         clutter = place_clutter(world, things, 12, seed)
@@ -37,14 +35,14 @@ def test_clutter_lies_on_surfaces_and_touches_nothing(world: World) -> None:
         assert min(polygon_distance(a, b) for a, b in itertools.combinations(outlines, 2)) > 0
 
 
-def test_clutter_is_of_no_class_that_the_mission_speaks_of(world: World) -> None:
+def test_clutter_is_of_no_class_that_the_mission_speaks_of(world):
     for seed in SEEDS:
         things = place_objects(world, seed)
         clutter = place_clutter(world, things, 12, seed, spared=("coke", "beer"))
         assert not {each.class_name for each in clutter} & {"coke", "beer", "person"}
 
 
-def test_clutter_moves_nothing_that_was_there_and_is_the_same_for_a_seed(world: World) -> None:
+def test_clutter_moves_nothing_that_was_there_and_is_the_same_for_a_seed(world):
     things = place_objects(world, 3)
     first, second = place_clutter(world, things, 6, 3), place_clutter(world, things, 6, 3)
     assert [(each.name, each.surface) for each in first] == [(each.name, each.surface) for each in second]
@@ -53,7 +51,7 @@ def test_clutter_moves_nothing_that_was_there_and_is_the_same_for_a_seed(world: 
     assert all(a.X_WO.IsExactlyEqualTo(b.X_WO) for a, b in zip(first, more, strict=False))
 
 
-def test_passers_by_walk_between_places_of_the_world(world: World) -> None:
+def test_passers_by_walk_between_places_of_the_world(world):
     varied = add_passers_by(world, 2, 5)
     routes = {each.name: each.route for each in place_people(varied, 5)}
     for name in ("passer-by 1", "passer-by 2"):
@@ -63,11 +61,11 @@ def test_passers_by_walk_between_places_of_the_world(world: World) -> None:
     assert all(np.array_equal(after[name], place) for name, place in before.items())
 
 
-def test_without_passers_by_the_world_stays_as_it_is(world: World) -> None:
+def test_without_passers_by_the_world_stays_as_it_is(world):
     assert add_passers_by(world, 0, 5) is world
 
 
-def test_a_crowd_stands_apart_at_places_that_the_seed_chooses() -> None:
+def test_a_crowd_stands_apart_at_places_that_the_seed_chooses():
     world = load_world("flat")
     crowds = [place_people(add_crowd(world, 8, seed), seed)[1:] for seed in (5, 5, 6)]
     places = [[tuple(each.X_WO.translation()[:2]) for each in crowd] for crowd in crowds]

@@ -1,12 +1,9 @@
 """What a world's geometry names is looked at before Drake reads it."""
 
-from __future__ import annotations
-
 import os
 import struct
 import time
 import zlib
-from pathlib import Path
 
 import pytest
 
@@ -30,7 +27,7 @@ MODEL = """<sdf version="1.9"><model name="walls"><link name="walls">
 
 
 @pytest.fixture
-def home(tmp_path: Path) -> Path:
+def home(tmp_path):
     folder = tmp_path / "home"
     folder.mkdir()
     (folder / "world.dmd.yaml").write_text(DIRECTIVES)
@@ -41,24 +38,24 @@ def home(tmp_path: Path) -> Path:
     return folder
 
 
-def png(width: int, height: int) -> bytes:
+def png(width, height):
     """The head of a picture without its pixels."""
     data = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
     return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + data + struct.pack(">I", zlib.crc32(data))
 
 
-def refusal(home: Path) -> InputError:
+def refusal(home):
     with pytest.raises(InputError) as error:
         check_directives(home / "world.dmd.yaml", home)
     return error.value
 
 
-def test_a_good_world_is_taken(home: Path) -> None:
+def test_a_good_world_is_taken(home):
     check_directives(home / "world.dmd.yaml", home)
 
 
 @pytest.mark.parametrize("name", known_worlds())
-def test_the_worlds_that_come_with_the_plant_are_taken(name: str) -> None:
+def test_the_worlds_that_come_with_the_plant_are_taken(name):
     assert load_world(name).name == name
 
 
@@ -75,7 +72,7 @@ def test_the_worlds_that_come_with_the_plant_are_taken(name: str) -> None:
         ("package://world/", "no name of a file"),
     ],
 )
-def test_a_name_that_leads_elsewhere_is_refused_in_its_line(home: Path, name: str, said: str) -> None:
+def test_a_name_that_leads_elsewhere_is_refused_in_its_line(home, name, said):
     (home / "world.dmd.yaml").write_text(DIRECTIVES.replace("package://world/walls.sdf", name))
     error = refusal(home)
     assert said in str(error)
@@ -83,13 +80,13 @@ def test_a_name_that_leads_elsewhere_is_refused_in_its_line(home: Path, name: st
 
 
 @pytest.mark.parametrize("name", ["http://x/walls.obj", "../walls.obj", "none.obj", "model://nobody/x.obj"])
-def test_a_bad_file_name_in_a_model_is_refused_in_its_line(home: Path, name: str) -> None:
+def test_a_bad_file_name_in_a_model_is_refused_in_its_line(home, name):
     (home / "walls.sdf").write_text(MODEL.replace("walls.obj", name))
     error = refusal(home)
     assert (error.file, error.line) == (home / "walls.sdf", 2)
 
 
-def test_a_world_that_includes_itself_is_refused(home: Path) -> None:
+def test_a_world_that_includes_itself_is_refused(home):
     (home / "world.dmd.yaml").write_text(DIRECTIVES + "- add_directives: {file: package://world/more.dmd.yaml}\n")
     (home / "more.dmd.yaml").write_text("directives:\n- add_directives: {file: package://world/world.dmd.yaml}\n")
     error = refusal(home)
@@ -97,7 +94,7 @@ def test_a_world_that_includes_itself_is_refused(home: Path) -> None:
     assert (error.file, error.line) == (home / "more.dmd.yaml", 2)
 
 
-def test_directives_that_multiply_are_refused(home: Path) -> None:
+def test_directives_that_multiply_are_refused(home):
     for n in range(15):
         text = f"- add_directives: {{file: package://world/{n + 1}.dmd.yaml}}\n" * 4
         (home / f"{n}.dmd.yaml").write_text(f"directives:\n{text}")
@@ -106,7 +103,7 @@ def test_directives_that_multiply_are_refused(home: Path) -> None:
     assert "too many other files" in str(refusal(home))
 
 
-def test_a_model_that_includes_itself_is_refused(home: Path) -> None:
+def test_a_model_that_includes_itself_is_refused(home):
     (home / "walls.sdf").write_text(MODEL.replace("</model>", "<include><uri>walls.sdf</uri></include></model>"))
     assert "includes itself" in str(refusal(home))
 
@@ -121,14 +118,14 @@ def test_a_model_that_includes_itself_is_refused(home: Path) -> None:
         ("", "broken XML"),
     ],
 )
-def test_a_broken_model_is_refused_in_its_line(home: Path, model: str, said: str) -> None:
+def test_a_broken_model_is_refused_in_its_line(home, model, said):
     (home / "walls.sdf").write_text(model)
     error = refusal(home)
     assert said in str(error)
     assert (error.file, error.line is not None) == (home / "walls.sdf", True)
 
 
-def test_a_texture_is_no_pipe_and_not_too_large(home: Path) -> None:
+def test_a_texture_is_no_pipe_and_not_too_large(home):
     (home / "picture.png").write_bytes(png(13_000, 13_000))
     error = refusal(home)
     assert "13000 x 13000 pixels" in str(error)
@@ -149,12 +146,12 @@ def test_a_texture_is_no_pipe_and_not_too_large(home: Path) -> None:
         ("models: []\n", 1),
     ],
 )
-def test_broken_directives_are_refused_in_their_line(home: Path, text: str, line: int) -> None:
+def test_broken_directives_are_refused_in_their_line(home, text, line):
     (home / "world.dmd.yaml").write_text(text)
     assert refusal(home).line == line
 
 
-def test_an_imported_model_is_looked_at_as_well(home: Path) -> None:
+def test_an_imported_model_is_looked_at_as_well(home):
     check_model(home / "walls.sdf", home)
     (home / "walls.obj").unlink()
     with pytest.raises(InputError, match=r"walls\.sdf:2: walls\.obj: there is no such file"):

@@ -1,9 +1,6 @@
 """Worlds with imported models: they are placed, of their class, and rest where they lie."""
 
-from __future__ import annotations
-
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,7 +20,7 @@ OUTLINE = np.vstack([T_SHAPE, [[0.12, 0.013], [-0.15, 0.013]]])
 OBJECTS = "objects:\n  - {name: my tool, model: tool, surfaces: [workbench]}\n"
 
 
-def import_tool(folder: Path, name: str = "tool") -> Path:
+def import_tool(folder, name="tool"):
     """A T of 0.5 kg, 28 mm thick, as a hammer, in a folder with a space in its name."""
     file = folder / "tool.stl"
     trimesh.creation.extrude_triangulation(OUTLINE, np.array(triangles_of(OUTLINE)), 0.028).export(file)
@@ -34,7 +31,7 @@ def import_tool(folder: Path, name: str = "tool") -> Path:
 
 
 @pytest.fixture
-def world_folder(tmp_path: Path) -> Path:
+def world_folder(tmp_path):
     """The flat with one object, an imported one, and nobody in it."""
     import_tool(tmp_path)
     folder = tmp_path / "flat"

@@ -1,7 +1,5 @@
 """Placement of objects in the flat for the seeds 0 to 50."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 
@@ -9,8 +7,8 @@ import numpy as np
 import pytest
 
 from plant.models.catalogue import load_catalogue
-from plant.worlds.seeding import Placement, outline_W, place_objects, place_people, polygon_distance
-from plant.worlds.world import World, WorldError, load_world
+from plant.worlds.seeding import outline_W, place_objects, place_people, polygon_distance
+from plant.worlds.world import WorldError, load_world
 from skills.robot import Pose2D
 
 SEEDS = range(51)
@@ -19,28 +17,26 @@ HOME = {"coke": "kitchen", "beer": "kitchen", **dict.fromkeys(TOOLS, "workshop")
 
 
 @pytest.fixture(scope="module")
-def world() -> World:
+def world():
     return load_world("flat")
 
 
 @pytest.fixture(scope="module")
-def placed(world: World) -> dict[int, tuple[Placement, ...]]:
+def placed(world):
     return {seed: place_objects(world, seed) for seed in SEEDS}
 
 
-def outline(placement: Placement) -> np.ndarray:
+def outline(placement):
     pose = Pose2D.from_transform(placement.X_WO)
     return outline_W(placement.form, (pose.x_m, pose.y_m), pose.yaw_rad)
 
 
-def test_each_thing_lies_in_its_room(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+def test_each_thing_lies_in_its_room(world, placed):
     for things in placed.values():
         assert {t.name: world.surface_places[t.surface or ""] for t in things} == HOME
 
 
-def test_each_thing_starts_a_millimetre_above_its_surface(
-    world: World, placed: dict[int, tuple[Placement, ...]]
-) -> None:
+def test_each_thing_starts_a_millimetre_above_its_surface(world, placed):
     for thing in itertools.chain(*placed.values()):
         top = world.surfaces[thing.surface or ""].height_m
         rest = thing.form.rest_height_m
@@ -48,7 +44,7 @@ def test_each_thing_starts_a_millimetre_above_its_surface(
         assert thing.X_WO.rotation().matrix()[2, 2] == pytest.approx(1.0)
 
 
-def test_each_thing_lies_within_reach_of_a_front_edge(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+def test_each_thing_lies_within_reach_of_a_front_edge(world, placed):
     for thing in itertools.chain(*placed.values()):
         centre = thing.X_WO.translation()[:2]
         depths = []
@@ -60,16 +56,14 @@ def test_each_thing_lies_within_reach_of_a_front_edge(world: World, placed: dict
         assert min(depths) <= 0.25 + 1e-9
 
 
-def test_outlines_stay_on_the_surface(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+def test_outlines_stay_on_the_surface(world, placed):
     for thing in itertools.chain(*placed.values()):
         corners = np.array(world.surfaces[thing.surface or ""].polygon_W)
         assert np.all(outline(thing) >= corners.min(axis=0))
         assert np.all(outline(thing) <= corners.max(axis=0))
 
 
-def test_things_keep_clear_of_each_other_and_of_fixtures(
-    world: World, placed: dict[int, tuple[Placement, ...]]
-) -> None:
+def test_things_keep_clear_of_each_other_and_of_fixtures(world, placed):
     for things in placed.values():
         outlines = [outline(thing) for thing in things]
         pairs = list(itertools.combinations(outlines, 2))
@@ -77,24 +71,24 @@ def test_things_keep_clear_of_each_other_and_of_fixtures(
         assert min(polygon_distance(a, b) for a, b in pairs) >= 0.12 - 1e-9
 
 
-def test_every_allowed_surface_is_used(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+def test_every_allowed_surface_is_used(world, placed):
     used = {(thing.name, thing.surface) for thing in itertools.chain(*placed.values())}
     assert used == {(rule.name, surface) for rule in world.seed_rules.objects for surface in rule.surfaces}
 
 
-def test_every_form_of_a_class_is_used(placed: dict[int, tuple[Placement, ...]]) -> None:
+def test_every_form_of_a_class_is_used(placed):
     used = {(thing.class_name, thing.form.file) for thing in itertools.chain(*placed.values())}
     forms = {(name, form.file) for name, entry in load_catalogue().items() for form in entry.forms.values()}
     assert used == {pair for pair in forms if pair[0] != "person"}
 
 
-def test_poses_differ_between_seeds_and_not_within_one(world: World, placed: dict[int, tuple[Placement, ...]]) -> None:
+def test_poses_differ_between_seeds_and_not_within_one(world, placed):
     assert len({tuple(things[0].X_WO.translation()) for things in placed.values()}) == len(SEEDS)
     for first, second in zip(placed[7], place_objects(world, 7), strict=True):
         assert first.X_WO.IsExactlyEqualTo(second.X_WO)
 
 
-def test_the_person_stands_before_the_robot_and_looks_at_it(world: World) -> None:
+def test_the_person_stands_before_the_robot_and_looks_at_it(world):
     start = np.array([world.start.x_m, world.start.y_m])
     for seed in SEEDS:
         (robin,) = place_people(world, seed)
@@ -104,20 +98,20 @@ def test_the_person_stands_before_the_robot_and_looks_at_it(world: World) -> Non
         assert robin.X_WO.translation()[2] == 0.0
 
 
-def test_things_that_do_not_fit_are_refused(world: World) -> None:
+def test_things_that_do_not_fit_are_refused(world):
     crowded = world.seed_rules.model_copy(update={"objects": world.seed_rules.objects[:1] * 60})
     with pytest.raises(WorldError, match="coke finds no free spot on kitchen"):
         place_objects(dataclasses.replace(world, seed_rules=crowded), 1)
 
 
-def test_a_model_that_does_not_exist_is_refused(world: World) -> None:
+def test_a_model_that_does_not_exist_is_refused(world):
     rule = world.seed_rules.objects[0].model_copy(update={"model": "sofa"})
     wrong = world.seed_rules.model_copy(update={"objects": (rule,)})
     with pytest.raises(WorldError, match="no model 'sofa'; there are beer, coke"):
         place_objects(dataclasses.replace(world, seed_rules=wrong), 1)
 
 
-def test_polygon_distance_is_zero_for_overlap_and_the_gap_otherwise() -> None:
+def test_polygon_distance_is_zero_for_overlap_and_the_gap_otherwise():
     square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
     assert polygon_distance(square, square + [0.5, 0.5]) == 0.0
     assert polygon_distance(square, square * 0.2 + 0.4) == 0.0

@@ -1,26 +1,20 @@
 """The worlds of our own fit the robot: doors, free poses, heights of surfaces, maps that agree with the shapes."""
 
-from __future__ import annotations
-
-from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 import yaml
-from pydrake.geometry import QueryObject
-from pydrake.multibody.parsing import LoadModelDirectives, Parser, ProcessModelDirectives
-from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from errand_train.worlds.__main__ import build
 from errand_train.worlds.plan import PLANS, load_plan
 from executive.tree.nodes.door_check import view_of
 from executive.words.knowledge import load_knowledge
+from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.worlds.seeding import place_objects, place_people
-from plant.worlds.world import PACKAGE_NAME, World, add_package, known_worlds, load_world
+from plant.worlds.world import PACKAGE_NAME, known_worlds, load_world
 
 FOOTPRINT_M = (1.1, 0.6)  # the standing outline of 1.0 by 0.5 with 5 cm around
 FREE, UNKNOWN, OCCUPIED = 254, 205, 0
@@ -29,66 +23,55 @@ FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 class Map:
     """A map_server grid, read on its own here."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path):
         self.header: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
         picture = cv2.imread(str(path.parent / self.header["image"]), cv2.IMREAD_GRAYSCALE)
         assert picture is not None
         self.cells = picture[::-1]
 
-    def at(self, points: np.ndarray) -> np.ndarray:
+    def at(self, points):
         index = np.floor((points - self.header["origin"][:2]) / self.header["resolution"]).astype(int)
         return self.cells[index[..., 1], index[..., 0]]
 
 
 @pytest.fixture(scope="module", params=PLANS)
-def world(request: pytest.FixtureRequest) -> World:
+def world(request):
     return load_world(request.param)
 
 
 @pytest.fixture(scope="module")
-def knowledge(world: World) -> dict[str, Any]:
+def knowledge(world):
     return dict(yaml.safe_load(world.knowledge_path.read_text(encoding="utf-8")))
 
 
 @pytest.fixture(scope="module")
-def keepout(world: World) -> Map:
+def keepout(world):
     return Map(world.surveyed.keepout_map_path)
 
 
 @pytest.fixture(scope="module")
-def furnished(world: World) -> tuple[Diagram, Context]:
-    """The world with all objects of seed 1 in Drake."""
-    builder = DiagramBuilder()
-    config = MultibodyPlantConfig(time_step=0.005, discrete_contact_approximation="sap")
-    plant, _ = AddMultibodyPlant(config, builder)
-    parser = Parser(plant)
-    parser.SetAutoRenaming(True)
-    add_package(parser.package_map())
-    ProcessModelDirectives(LoadModelDirectives(str(world.directives_path)), plant, parser)
-    for thing in place_objects(world, 1):
-        parser.AddModels(str(thing.model_path))
-        plant.SetDefaultFloatingBaseBodyPose(plant.GetBodyByName(thing.class_name), thing.X_WO)
-    for one in place_people(world, 1):
-        (model,) = parser.AddModels(str(one.model_path))
-        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(one.class_name, model), one.X_WO)
-    plant.Finalize()
-    diagram = builder.Build()
+def furnished(world):
+    """The world in the plant, with all objects and people of seed 1."""
+    objects = [LooseModel(each.name, each.model_path, each.X_WO) for each in place_objects(world, 1)]
+    people = [LooseModel(each.name, each.model_path, each.X_WO, fixed=True) for each in place_people(world, 1)]
+    config = DiagramConfig(directives=world.directives_path, models=[*objects, *people], visuals=False, render=False)
+    diagram = build_diagram(config).diagram
     return diagram, diagram.CreateDefaultContext()
 
 
-def query(diagram: Diagram, context: Context) -> QueryObject:
+def query(diagram, context):
     scene_graph = diagram.GetSubsystemByName("scene_graph")
     return scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(context))
 
 
-def footprint(pose: dict[str, float], size: tuple[float, float] = FOOTPRINT_M) -> np.ndarray:
+def footprint(pose, size=FOOTPRINT_M):
     x, y = (np.arange(-length / 2, length / 2 + 1e-9, 0.0125) for length in size)
     local = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     c, s = np.cos(pose["yaw"]), np.sin(pose["yaw"])
     return local @ np.array([[c, s], [-s, c]]) + [pose["x"], pose["y"]]
 
 
-def known_poses(knowledge: dict[str, Any]) -> dict[str, dict[str, float]]:
+def known_poses(knowledge):
     poses = {"start": knowledge["start"], "dock": knowledge["dock"]}
     poses |= {name: place["pose"] for name, place in knowledge["places"].items()}
     for name, surface in knowledge["surfaces"].items():
@@ -96,16 +79,16 @@ def known_poses(knowledge: dict[str, Any]) -> dict[str, dict[str, float]]:
     return poses
 
 
-def test_every_plan_is_a_world_that_comes_with_the_project() -> None:
+def test_every_plan_is_a_world_that_comes_with_the_project():
     assert known_worlds() == tuple(sorted(PLANS))
 
 
-def test_every_known_pose_is_free(knowledge: dict[str, Any], keepout: Map) -> None:
+def test_every_known_pose_is_free(knowledge, keepout):
     taken = [name for name, pose in known_poses(knowledge).items() if np.any(keepout.at(footprint(pose)) != FREE)]
     assert taken == []
 
 
-def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keepout: Map) -> None:
+def test_every_room_has_a_free_circle_to_turn_in(knowledge, keepout):
     radius = cv2.distanceTransform((keepout.cells == FREE).astype(np.uint8), cv2.DIST_L2, 5)
     x = (np.arange(keepout.cells.shape[1]) + 0.5) * keepout.header["resolution"] + keepout.header["origin"][0]
     y = (np.arange(keepout.cells.shape[0]) + 0.5) * keepout.header["resolution"] + keepout.header["origin"][1]
@@ -117,7 +100,7 @@ def test_every_room_has_a_free_circle_to_turn_in(knowledge: dict[str, Any], keep
         assert 2 * radius[window].max() * keepout.header["resolution"] >= 1.5, name
 
 
-def test_from_before_every_door_it_is_seen_from_a_free_pose(world: World, keepout: Map) -> None:
+def test_from_before_every_door_it_is_seen_from_a_free_pose(world, keepout):
     knowledge = load_knowledge(world.knowledge_path)
     for door in knowledge.doors:
         views = [view for room in door.between if (view := view_of(knowledge, door, room)) is not None]
@@ -139,7 +122,7 @@ def test_from_before_every_door_it_is_seen_from_a_free_pose(world: World, keepou
         if not door.open
     ],
 )
-def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name: str, door: Any) -> None:
+def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name, door):
     keepout, width = Map(load_world(name).surveyed.keepout_map_path), load_plan(name).width_m(door)
     across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
     along = across[::-1]
@@ -153,7 +136,7 @@ def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name: str, door
     assert np.all(keepout.at(way) == FREE)
 
 
-def test_rooms_hang_together(knowledge: dict[str, Any], keepout: Map) -> None:
+def test_rooms_hang_together(knowledge, keepout):
     resolution = keepout.header["resolution"]
     passable = cv2.erode((keepout.cells == FREE).astype(np.uint8), np.ones((2 * int(0.31 / resolution) + 1,) * 2))
     _, parts = cv2.connectedComponents(passable)
@@ -164,7 +147,7 @@ def test_rooms_hang_together(knowledge: dict[str, Any], keepout: Map) -> None:
     assert 0 not in labels
 
 
-def test_known_places_hold_their_poses_and_surfaces(knowledge: dict[str, Any]) -> None:
+def test_known_places_hold_their_poses_and_surfaces(knowledge):
     places = {name: np.array(place["polygon"], dtype=np.float32) for name, place in knowledge["places"].items()}
     inside = [(name, (p["pose"]["x"], p["pose"]["y"])) for name, p in knowledge["places"].items()]
     for surface in knowledge["surfaces"].values():
@@ -174,7 +157,7 @@ def test_known_places_hold_their_poses_and_surfaces(knowledge: dict[str, Any]) -
         assert cv2.pointPolygonTest(places[name], point, False) >= 0, (name, point)
 
 
-def test_viewpoints_face_their_surface_from_the_right_distance(knowledge: dict[str, Any]) -> None:
+def test_viewpoints_face_their_surface_from_the_right_distance(knowledge):
     for name, surface in knowledge["surfaces"].items():
         polygon = np.array(surface["polygon"], dtype=np.float32)
         for view in surface["viewpoints"]:
@@ -187,9 +170,7 @@ def test_viewpoints_face_their_surface_from_the_right_distance(knowledge: dict[s
             assert cv2.pointPolygonTest(polygon, ahead, False) > 0, name
 
 
-def test_surfaces_are_solid_and_flat_at_their_heights(
-    world: World, knowledge: dict[str, Any], furnished: tuple[Diagram, Context]
-) -> None:
+def test_surfaces_are_solid_and_flat_at_their_heights(world, knowledge, furnished):
     query_object = query(*furnished)
     things = [t.X_WO.translation() for t in place_objects(world, 1)]
     for name, surface in knowledge["surfaces"].items():
@@ -205,7 +186,7 @@ def test_surfaces_are_solid_and_flat_at_their_heights(
 
 
 @pytest.mark.parametrize("name", ["scan", "keepout"])
-def test_maps_agree_with_the_collision_shapes(name: str, world: World, furnished: tuple[Diagram, Context]) -> None:
+def test_maps_agree_with_the_collision_shapes(name, world, furnished):
     grid, query_object = Map(world.folder / "truth" / f"{name}.yaml"), query(*furnished)
     moving = [p.X_WO.translation()[:2] for p in (*place_objects(world, 1), *place_people(world, 1))]
     rng, (z0, z1) = np.random.default_rng(5), grid.header["height_band_m"]
@@ -222,37 +203,37 @@ def test_maps_agree_with_the_collision_shapes(name: str, world: World, furnished
     assert occupied > 10
 
 
-def distance_m(query_object: QueryObject, point: np.ndarray, z: float) -> float:
+def distance_m(query_object, point, z):
     """Horizontal reach is enough: the nearest shape within 5 cm, else 1."""
     found = query_object.ComputeSignedDistanceToPoint(np.array([*point, z]), 0.03)
     return min((f.distance for f in found), default=1.0)
 
 
-def test_outside_of_the_walls_is_unknown(world: World, keepout: Map) -> None:
+def test_outside_of_the_walls_is_unknown(world, keepout):
     x, y = load_plan(world.name).outline_m
     assert np.all(keepout.at(np.array([(-0.3, y / 2), (x + 0.3, y / 2), (x / 2, y + 0.3), (x / 2, -0.3)])) == UNKNOWN)
 
 
-def test_the_coffee_table_is_for_the_body_and_not_for_the_lidar(world: World, keepout: Map) -> None:
+def test_the_coffee_table_is_for_the_body_and_not_for_the_lidar(world, keepout):
     middle = np.mean(world.surfaces["coffee table"].polygon_W, axis=0)
     assert keepout.at(middle) == OCCUPIED
     assert Map(world.surveyed.scan_map_path).at(middle) == FREE
 
 
-def test_people_and_things_are_not_surveyed(world: World, keepout: Map) -> None:
+def test_people_and_things_are_not_surveyed(world, keepout):
     for seed in range(10):
         for one in place_people(world, seed):
             around = {"x": one.X_WO.translation()[0], "y": one.X_WO.translation()[1], "yaw": 0.0}
             assert np.all(keepout.at(footprint(around, (1.4, 1.4))) == FREE), one.name
 
 
-def test_things_lie_where_the_robot_is_told_that_they_usually_are(world: World, knowledge: dict[str, Any]) -> None:
+def test_things_lie_where_the_robot_is_told_that_they_usually_are(world, knowledge):
     for seed in range(10):
         for thing in place_objects(world, seed):
             assert thing.surface in knowledge["things"][thing.class_name]["usual"]
 
 
-def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diagram, Context]) -> None:
+def test_things_stay_where_the_seed_put_them(world, furnished):
     diagram, context = furnished
     simulator = Simulator(diagram, context.Clone())
     simulator.AdvanceTo(1.0)
@@ -266,7 +247,8 @@ def test_things_stay_where_the_seed_put_them(world: World, furnished: tuple[Diag
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.nightly] * (name != "flat")) for name in PLANS])
-def test_committed_world_is_what_the_builder_writes(name: str, tmp_path: Path) -> None:
+def test_committed_world_is_what_the_builder_writes(name, tmp_path, monkeypatch):
+    monkeypatch.setattr("errand_train.worlds.__main__.save_png", lambda *_: None)  # its bytes are the library's
     world = load_world(name)
     build(load_plan(world.name), tmp_path, f"{PACKAGE_NAME}/worlds/{world.name}")
     written = [p for p in tmp_path.rglob("*") if p.suffix in (".sdf", ".obj", ".mtl", ".yaml", ".pgm")]
@@ -275,7 +257,7 @@ def test_committed_world_is_what_the_builder_writes(name: str, tmp_path: Path) -
         assert (world.folder / path.relative_to(tmp_path)).read_bytes() == path.read_bytes(), path.name
 
 
-def test_a_way_of_more_than_a_hundred_metres_leads_around_the_rooms_of_the_lab() -> None:
+def test_a_way_of_more_than_a_hundred_metres_leads_around_the_rooms_of_the_lab():
     corridors = {
         room.name: room.inside for room in load_plan("lab").rooms if room.name.endswith(("corridor", "passage"))
     }

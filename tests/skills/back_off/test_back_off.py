@@ -73,20 +73,13 @@ def test_shut_in_it_says_so_and_stays():
 
 def test_a_robot_that_refuses_is_an_execution_failure():
     bench = Bench(IN_THE_OPEN)
-    bench.robot.refuse_because = "it sits"
+    bench.robot.refuse_because["drive"] = "it sits"
     assert outcome(bench) == Failed(Cause.EXECUTION, "The robot refused to drive: it sits.")
 
 
 def test_a_robot_that_does_not_move_is_given_up():
     bench = Bench(IN_THE_OPEN)
-    robot, passing = bench.robot, bench.robot.pass_time
-
-    def pass_time(dt_s):
-        before = robot.pose, robot.odometry_pose
-        passing(dt_s)
-        robot.pose, robot.odometry_pose = before
-
-    robot.pass_time = pass_time
+    bench.robot._move_base = lambda dt_s: None
     step = outcome(bench)
     assert (step.cause, "is stuck" in step.message) == (Cause.EXECUTION, True)
 

@@ -37,7 +37,7 @@ def test_an_object_that_still_stands_there_is_seen_again():
 
 def test_a_removed_obstacle_is_forgotten():
     bench = seen_bench()
-    bench.robot.boxes.remove(CRATE)
+    bench.robot.blocks.remove(CRATE)
     assert isinstance(outcome(bench.context(), bench), Succeeded)
     assert len(bench.costmap.obstacle_cells()) == 0
 

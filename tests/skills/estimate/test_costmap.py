@@ -22,14 +22,14 @@ def test_without_unmapped_objects_only_the_survey_counts():
 
 
 def test_a_person_in_the_path_is_seen():
-    bench = ticked(Bench(START, unmapped=[PERSON]))
+    bench = ticked(Bench(START, unmapped=[PERSON], azimuths=900))
     assert bench.costmap.clearance_m(AT_PERSON)[0] < 0.05
     assert bench.costmap.clearance_m(AT_PERSON + [-0.5, 0.0])[0] == pytest.approx(0.5, abs=0.12)
 
 
 def test_a_person_who_walks_away_is_forgotten_at_once():
     bench = ticked(Bench(START, unmapped=[PERSON]))
-    bench.robot.boxes.remove(PERSON)
+    bench.robot.blocks.remove(PERSON)
     ticked(bench, 6)
     assert bench.costmap.clearance_m(AT_PERSON)[0] > 0.5
 

@@ -51,7 +51,7 @@ def test_a_person_who_leaves_is_cleared_and_unseen_ground_is_a_little_free():
     behind = np.array([[4.6, 5.4]])
     assert bench.costmap.clearance_m(np.array([[3.22, 5.4]]))[0] < 0.05
     assert bench.costmap.clearance_m(behind)[0] <= RollingCostmapOptions().unknown_clearance_m
-    bench.robot.boxes.remove(PERSON)
+    bench.robot.blocks.remove(PERSON)
     ticked(bench, 40)
     assert bench.costmap.clearance_m(np.array([[3.4, 5.4]]))[0] > 0.5
     assert bench.costmap.clearance_m(behind)[0] > RollingCostmapOptions().unknown_clearance_m
@@ -79,7 +79,7 @@ def test_the_window_follows_the_robot_and_keeps_its_cells():
 def test_only_new_obstacles_count_as_unexplained():
     bench = ticked(bench_of())
     assert len(bench.costmap.unexplained_returns()[1]) < 20
-    bench.robot.boxes.append(PERSON)
+    bench.robot.blocks.append(PERSON)
     ticked(bench, 2)
     near = bench.costmap.unexplained_returns()[1]
     assert np.count_nonzero(np.hypot(near[:, 0] - 3.3, near[:, 1] - 5.4) < 0.5) > 20

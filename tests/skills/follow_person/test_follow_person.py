@@ -76,7 +76,7 @@ class Walk:
 
     def tick(self):
         """One tick of everybody; returns the skill's step."""
-        now_s, boxes = self.bench.clock.now(), self.bench.robot.boxes
+        now_s, boxes = self.bench.clock.now(), self.bench.robot.blocks
         boxes[:] = [box for box in boxes if box != person_at(self.x_m, LANE_M)]
         step_m = 0.05 * self.speed_m_s if now_s > 3.0 else 0.0
         self.x_m += math.copysign(min(abs(step_m), abs(self.to_m - self.x_m)), step_m)
@@ -166,7 +166,7 @@ def test_robot_goes_aside_for_a_person_who_comes_back():
 
 @pytest.mark.parametrize(("answer", "outcome"), [("yes", Succeeded), ("no", Failed)])
 def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(answer, outcome):
-    walk = Walk(to_m=5.5, gone_s=6.0, back_s=10.0, answer=answer, place_W=(3.2, LANE_M), until_W=END)
+    walk = Walk(to_m=5.5, gone_s=6.0, back_s=9.5, answer=answer, place_W=(3.2, LANE_M), until_W=END)
     assert isinstance(walk.run(), outcome)
     assert walk.questions == ["Are you Robin?"]
 

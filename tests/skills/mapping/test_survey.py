@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planar_robot import TWO_ROOMS, Box, PlanarClock, PlanarRobot
+from planar_robot import TWO_ROOMS, Box, PlanarRobot, capabilities_of
 
 from skills.estimate.grid_map import load_grid_map
 from skills.files.errors import InputError
@@ -14,6 +14,7 @@ from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
 from skills.robot import Pose2D
 from skills.testing.blocks import grid_of
+from skills.testing.clock import VirtualClock
 
 pytest.importorskip("gtsam")
 
@@ -41,8 +42,8 @@ class Trip:
         home: Pose2D | None = None,
         boxes=TWO_ROOMS,
     ) -> None:
-        self.clock = PlanarClock()
-        self.robot = PlanarRobot(self.clock, boxes, pose, azimuths=450, cameras=False)
+        self.clock = VirtualClock()
+        self.robot = PlanarRobot(self.clock, boxes, pose, capabilities=capabilities_of(cameras=False))
         self.mapper = mapper or Mapper(pose)
         lease = self.robot.acquire_lease("test")
         self.survey = Survey(self.robot, lease, self.mapper, home=home or pose, route=route)

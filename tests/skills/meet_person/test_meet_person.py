@@ -52,7 +52,7 @@ def test_robot_goes_after_a_person_who_walks_on():
     bench = Bench(START, unmapped=(first,), surveyed=TWO_ROOMS, cameras=False)
 
     def walk_on():
-        bench.robot.boxes[bench.robot.boxes.index(first)] = then
+        bench.robot.blocks[bench.robot.blocks.index(first)] = then
 
     step = met(bench, MeetPersonInputs("Robin", (5.0, 5.4)), {60: walk_on})
     assert isinstance(step, Succeeded), step
@@ -62,7 +62,7 @@ def test_robot_goes_after_a_person_who_walks_on():
 def test_robot_does_not_claim_to_have_met_a_person_who_is_gone():
     first = person_at(5.0, 5.4)
     bench = Bench(START, unmapped=(first,), surveyed=TWO_ROOMS, cameras=False)
-    step = met(bench, MeetPersonInputs("Robin", (5.0, 5.4)), {40: lambda: bench.robot.boxes.remove(first)})
+    step = met(bench, MeetPersonInputs("Robin", (5.0, 5.4)), {40: lambda: bench.robot.blocks.remove(first)})
     assert isinstance(step, Failed)
     assert (step.cause, step.message) == (Cause.POSTCONDITION, "Robin is not seen at (5.00, 5.40)")
 

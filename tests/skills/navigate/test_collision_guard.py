@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planar_people import person_at
-from planar_robot import OUTLINE, TWO_ROOMS, Bench
+from planar_robot import OUTLINE, Bench
 
 from skills.api import Running, Succeeded
 from skills.navigate.collision_guard import CollisionGuard
@@ -22,8 +22,8 @@ class Drive:
     """A drive along the corridor, with a person at `place(time_s, robot_x)` or, while that is None, without."""
 
     def __init__(self, place, *, options=None, most_s=60.0):
-        self.bench = Bench(START, surveyed=TWO_ROOMS)
-        fixed = list(self.bench.robot.boxes)
+        self.bench = Bench(START)
+        fixed = list(self.bench.robot.blocks)
         skill = Navigate(self.bench.context(), options)
         skill.begin(NavigateInputs(GOAL))
         self.gaps, self.messages, step = [], [], skill.step()
@@ -31,7 +31,7 @@ class Drive:
             self.messages.append(step.message)
             x, there = self.bench.robot.pose.x_m, None
             there = place(self.bench.clock.now(), x)
-            self.bench.robot.boxes[:] = fixed if there is None else [*fixed, person_at(*there)]
+            self.bench.robot.blocks[:] = fixed if there is None else [*fixed, person_at(*there)]
             self.bench.tick()
             if there is not None:
                 speed = float(np.hypot(*self.bench.robot.velocity[:2]))

@@ -40,7 +40,7 @@ def go(bench, goal, *, limit_s=40.0, nearby_m=(), each=lambda: None, context=Non
 
 
 def watch(*unmapped, start=BEFORE_RIGHT):
-    bench = Bench(start, unmapped=unmapped)
+    bench = Bench(start, unmapped=unmapped, azimuths=900)
     for _ in range(10):
         bench.tick()
     doors = DoorWatch(context_of(bench))
@@ -61,7 +61,7 @@ def test_a_person_in_a_doorway_is_no_closed_door(aside_m):
 
 def test_a_door_that_opens_is_no_longer_closed():
     bench, doors = watch(RIGHT_PANEL)
-    bench.robot.boxes.remove(RIGHT_PANEL)
+    bench.robot.blocks.remove(RIGHT_PANEL)
     for _ in range(10):
         bench.tick()
     doors.look()
@@ -133,8 +133,8 @@ def test_robot_drives_through_a_door_that_opens_while_it_waits():
     bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
 
     def opens():
-        if bench.clock.now() > 3.0 and RIGHT_PANEL in bench.robot.boxes:
-            bench.robot.boxes.remove(RIGHT_PANEL)
+        if bench.clock.now() > 3.0 and RIGHT_PANEL in bench.robot.blocks:
+            bench.robot.blocks.remove(RIGHT_PANEL)
 
     assert isinstance(go(bench, KITCHEN, each=opens), Succeeded)
 

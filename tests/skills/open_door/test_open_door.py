@@ -78,7 +78,7 @@ def run(skill_class, inputs, opener, bench=None):
 @pytest.mark.parametrize(("skill", "inputs"), [(OpenDoor, INPUTS), (Navigate, NavigateInputs(KITCHEN))])
 def test_a_door_that_opens_after_its_call_is_passed(skill, inputs):
     bench = Bench(BEFORE, unmapped=[PANEL])
-    with served(opens=lambda: bench.robot.boxes.remove(PANEL)) as (address, calls):
+    with served(opens=lambda: bench.robot.blocks.remove(PANEL)) as (address, calls):
         _, step = run(skill, inputs, HttpDoor(address), bench)
     assert isinstance(step, Succeeded), step
     assert calls == [("POST", "/open")]

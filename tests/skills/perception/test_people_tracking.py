@@ -92,7 +92,7 @@ def test_a_person_counts_when_seen_twice_and_the_second_view_comes_soon():
 
 def test_a_person_who_has_gone_is_forgotten():
     bench, detector, watch = watched(person_at(3.5, 5.5))
-    bench.robot.boxes.remove(detector.people[0])
+    bench.robot.blocks.remove(detector.people[0])
     look(bench, watch, 0.5)
     assert len(watch.people()) == 1
     look(bench, watch, 1.5)
@@ -105,7 +105,7 @@ def test_a_person_out_of_view_is_remembered_while_an_obstacle_is_there(stays, re
     bench.robot.push(0.0, 0.0, math.pi)
     bench.robot.scan = lambda: None
     if not stays:
-        bench.robot.boxes.remove(detector.people[0])
+        bench.robot.blocks.remove(detector.people[0])
         bench.costmap.clear_obstacles()
     look(bench, watch, remembered_s - 0.6)
     assert len(watch.people()) == 1
@@ -126,7 +126,7 @@ def test_people_are_published_and_also_when_none_is_left():
     assert topic == "people"
     assert message["people"][0]["position_W"] == pytest.approx([3.5, 5.5], abs=0.2)
     assert len(message["people"][0]["covariance"]) == 4
-    bench.robot.boxes.remove(detector.people[0])
+    bench.robot.blocks.remove(detector.people[0])
     look(bench, watch, 5.0)
     count = len(bench.published)
     assert bench.published[-1][1]["people"] == []
@@ -236,7 +236,7 @@ def test_a_person_out_of_sight_is_tracked_for_a_while():
     bench = Bench(START, unmapped=[person_at(3.5, 5.5)])
     watch = PeopleWatch(bench.context(), PeopleOptions(track_m=6.0))
     look(bench, watch, 1.0)
-    bench.robot.boxes.remove(person_at(3.5, 5.5))
+    bench.robot.blocks.remove(person_at(3.5, 5.5))
     look(bench, watch, PeopleOptions().hidden_s - 0.5)
     assert len(watch.tracks()) == 1
     look(bench, watch, 1.0)

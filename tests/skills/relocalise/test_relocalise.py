@@ -146,7 +146,7 @@ def test_in_one_of_two_equal_rooms_it_finds_out_which(seed):
 
 def test_a_robot_that_refuses_to_move_is_an_execution_failure():
     bench = strange_bench()
-    bench.robot.refuse_because = "it sits"
+    bench.robot.refuse_because["drive"] = "it sits"
     step, _ = outcome(bench)
     assert step == Failed(Cause.EXECUTION, "The robot refused to drive: it sits.")
 

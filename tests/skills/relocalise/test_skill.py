@@ -5,13 +5,11 @@ import math
 import numpy as np
 import pytest
 from analytic_scan import scan_of
-from planar_robot import PlanarClock, PlanarRobot
 
 from skills.relocalise.skill import FreeSpaceOptions, can_turn, free_m, obstacles_B
-from skills.robot import Pose2D
+from skills.testing.robot import BASE_ONLY as BODY
 
 OPTIONS = FreeSpaceOptions(side_m=0.15, ahead_m=0.3)
-BODY = PlanarRobot(PlanarClock(), (), Pose2D(0.0, 0.0, 0.0), azimuths=4).capabilities()
 
 
 def test_ahead_is_free_up_to_the_wall_less_the_body_and_the_margin():

@@ -1,6 +1,7 @@
 """Random missions: what the seeds draw from what is known of a world."""
 
 from collections import Counter
+from functools import cache
 
 import pytest
 
@@ -20,6 +21,7 @@ WORLDS = tuple(known(name) for name in known_worlds())
 BARE = {"start": {"x": 0, "y": 0}, "places": {"hall": {"pose": {"x": 1, "y": 0}, "polygon": [(0, 0), (2, 0), (2, 2)]}}}
 
 
+@cache
 def drawn(seeds):
     return random_evaluation(WORLDS, seeds, name="random").runs
 

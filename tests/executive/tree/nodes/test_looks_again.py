@@ -86,12 +86,7 @@ TABLE = {
     "together in repeat": (times(2, block(Together(steps=(BRANCH, WAIT)))), "YN", 1, 1),
     "each of several": (block(Group(steps=(block(Group(steps=(BRANCH,))), block(Group(steps=(BRANCH,)))))), "YN", 1, 1),
     "repeat in repeat": (times(2, times(2, BRANCH)), "YNNY", 2, 2),
-    "retries": (
-        block(Choose(condition=BEER, then=(FAILS,), otherwise=(OTHER,)), policy=Policy(retries=2)),
-        "YN",
-        0,
-        1,
-    ),
+    "retries": (block(Choose(condition=BEER, then=(FAILS,), otherwise=(OTHER,)), policy=Policy(retries=2)), "YN", 0, 1),
 }
 
 

@@ -552,10 +552,7 @@ def test_with_another_object_in_the_gripper_nothing_is_searched_for(compiled, ru
 
     script.ends["navigate"] = holds_another
     worst = run_tree(compiled(GO, GRASP)).worst
-    assert (worst.cause, worst.message) == (
-        Cause.PRECONDITION,
-        "the gripper holds the beer already; put it down first",
-    )
+    assert (worst.cause, worst.message) == (Cause.PRECONDITION, "the gripper holds the beer already; put it down first")
     assert script.begun == ["navigate"]
 
 

@@ -98,8 +98,8 @@ def pose(engine):
 def test_it_stands_still_without_creeping(engine):
     engine.advance(1.0)
     before = pose(engine)
-    engine.advance(20.0)
-    np.testing.assert_allclose(pose(engine), before, atol=2e-4)
+    engine.advance(10.0)
+    np.testing.assert_allclose(pose(engine), before, atol=1e-4)
 
 
 def test_it_drives_a_metre_ahead_within_two_centimetres(engine, fetch, lease):
@@ -251,16 +251,10 @@ def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, fetch, leas
     assert "no longer counts" in fetch.command_status(refused).reason
 
 
-def test_a_restored_robot_moves_like_the_original(floor):
+def test_a_restored_robot_moves_like_the_original(fetch_world):
     """The same commands after a restore end at the same place as without one."""
 
-    def new():
-        world = build_diagram(
-            DiagramConfig(models=[floor], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.5, 0.2, 0.0))], render=False)
-        )
-        return Engine(world, seed=3)
-
-    first, second = new(), new()
+    first, second = Engine(fetch_world, seed=3), Engine(fetch_world, seed=3)
     lease = first.robots["Bob"].acquire_lease("test")
     first.robots["Bob"].drive(0.4, 0.0, 0.3, until_s=1.0, lease=lease)
     first.robots["Bob"].stand(0.5, 0.0, until_s=5.0, lease=lease)
@@ -312,7 +306,7 @@ def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
     assert bob.gripper().opening == pytest.approx(0.05, abs=0.004)
     assert bob.gripper().force_n == pytest.approx(40.0, abs=8.0)
     X_HO = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)
-    for _ in range(80):
+    for _ in range(40):
         bob.drive(0.5, 0.0, 0.5, until_s=boxed.now() + 0.3, lease=lease)
         boxed.advance(0.1)
     now = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)

@@ -18,7 +18,7 @@ f 1/1/1 7/1/1 3/1/1
 """
 
 
-def rows(kind: str) -> list[list[str]]:
+def rows(kind):
     lines = (line.split() for line in simplify_obj(SOUP, cell_m=0.01).splitlines())
     return [line[1:] for line in lines if line[0] == kind]
 

@@ -10,24 +10,7 @@ from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, CommandCause, CommandState, DoorHandle, LeaseError, Pose2D
-
-
-@pytest.fixture
-def engine():
-    world = build_diagram(
-        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0.5, 0.2, 0.0))], visuals=False, render=False)
-    )
-    return Engine(world)
-
-
-@pytest.fixture
-def spot(engine):
-    return engine.robots["Alice"]
-
-
-@pytest.fixture
-def lease(spot):
-    return spot.acquire_lease("test")
+from tests.plant.robots.spot.conftest import new_engine
 
 
 def truth(engine):
@@ -196,6 +179,21 @@ def test_a_command_that_has_expired_already_is_refused(engine, spot, lease):
     engine.advance(1.0)
     command = spot.drive(0.5, 0.0, 0.0, until_s=0.5, lease=lease)
     assert "expires" in spot.command_status(command).reason
+
+
+def test_an_engine_that_was_put_back_runs_like_a_new_one(kept_spot):
+    def walked(engine):
+        spot = engine.robots["Alice"]
+        lease = spot.acquire_lease("test")
+        spot.move_arm(arm_to(spot, 0.8, 1.5), until_s=5.0, lease=lease)
+        spot.set_gripper(1.0, 30.0, until_s=5.0, lease=lease)
+        spot.drive(0.8, 0.0, 0.5, until_s=9.0, lease=lease)
+        engine.advance(1.0)
+        return truth(engine), [*spot.odometry().X_OB.translation(), *spot.joints().position_rad.values()]
+
+    (new, _), first, second = (walked(begin()) for begin in (new_engine, kept_spot.again, kept_spot.again))
+    np.testing.assert_allclose(first[0], new, rtol=0.0, atol=1e-6)
+    np.testing.assert_array_equal(np.concatenate(first), np.concatenate(second))
 
 
 def test_unknown_command_ids_raise(spot):

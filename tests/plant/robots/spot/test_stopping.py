@@ -3,32 +3,15 @@
 import numpy as np
 import pytest
 
-from plant.diagram import DiagramConfig, build_diagram
-from plant.engine import Engine
-from plant.robots.robot_kind import PlacedRobot
-from skills.robot import ArmTrajectory, Pose2D
+from skills.robot import ArmTrajectory
 
 STILL_S = 0.2
 
 
 @pytest.fixture
-def engine():
-    world = build_diagram(
-        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0.5, 0.2, 0.0))], visuals=False, render=False)
-    )
-    engine = Engine(world)
+def engine(engine):
     engine.advance(0.2)
     return engine
-
-
-@pytest.fixture
-def spot(engine):
-    return engine.robots["Alice"]
-
-
-@pytest.fixture
-def lease(spot):
-    return spot.acquire_lease("test")
 
 
 def body_speed(engine):

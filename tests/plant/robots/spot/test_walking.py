@@ -3,21 +3,9 @@
 import numpy as np
 import pytest
 
-from plant.diagram import DiagramConfig, build_diagram
-from plant.engine import Engine
-from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.description import LEGS, spot_facts
-from skills.robot import Pose2D
 
 SETTLE_S = 0.05
-
-
-@pytest.fixture
-def engine():
-    world = build_diagram(
-        DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0, 0, 0))], visuals=False, render=False)
-    )
-    return Engine(world)
 
 
 def feet_W(engine):

@@ -10,23 +10,31 @@ from plant.engine import Engine
 from plant.robots import robot_kind as kinds
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, CommandState, Pose2D
+from tests.plant.kept_engine import KeptEngine
 
 FLOOR = """<sdf version="1.7"><model name="floor"><link name="floor">
 <collision name="floor"><pose>0 0 -0.1 0 0 0</pose><geometry><box><size>20 20 0.2</size></box></geometry></collision>
 </link></model></sdf>"""
 
 
-@pytest.fixture
-def engine(rover_package, tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(rover_package.parent)
+@pytest.fixture(scope="module")
+def kept_rover(rover_package, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("floor")
+    (folder / "floor.sdf").write_text(FLOOR)
+    floor = LooseModel("floor", folder / "floor.sdf", Pose2D(0.0, 0.0, 0.0).transform(), fixed=True)
     entry = EntryPoint("rover", f"{rover_package.name}:KIND", kinds.GROUP)
-    monkeypatch.setattr(kinds, "robot_kinds", lambda: {"rover": entry})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(rover_package.parent)
+        patch.setattr(kinds, "robot_kinds", lambda: {"rover": entry})
+        kinds.robot_kind.cache_clear()
+        robot = PlacedRobot("Bob", "rover", Pose2D(0.5, 0.2, 0.0))
+        yield KeptEngine(Engine(build_diagram(DiagramConfig(models=[floor], robots=[robot], render=False))))
     kinds.robot_kind.cache_clear()
-    (tmp_path / "floor.sdf").write_text(FLOOR)
-    floor = LooseModel("floor", tmp_path / "floor.sdf", Pose2D(0.0, 0.0, 0.0).transform(), fixed=True)
-    robot = PlacedRobot("Bob", "rover", Pose2D(0.5, 0.2, 0.0))
-    yield Engine(build_diagram(DiagramConfig(models=[floor], robots=[robot], render=False)))
-    kinds.robot_kind.cache_clear()
+
+
+@pytest.fixture
+def engine(kept_rover):
+    return kept_rover.again()
 
 
 @pytest.fixture

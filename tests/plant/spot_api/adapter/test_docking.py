@@ -4,28 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.server.docking import DOCK_ID
 from skills.robot import CommandCause, CommandState, Pose2D
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
-from tests.plant.spot_api.lock_step import LockStep
-
-
-def scripted():
-    clock = VirtualClock()
-    return ScriptedRobot(clock, capabilities=spot_capabilities()), clock
 
 
 @pytest.fixture
-def step(credentials):
-    made = LockStep(scripted, credentials)
-    made.server.computer.dock_O = Pose2D(0.0, 0.0, 0.0)
-    made.lease = made.robot.acquire_lease("test")
-    made.connection.power(True)
-    assert made.until(lambda: made.robot.powered)
-    yield made
-    made.close()
+def step(powered):
+    powered.server.computer.dock_O = Pose2D(0.0, 0.0, 0.0)
+    powered.advance(1.0)  # it has sat down
+    return powered
 
 
 def dock(step, station=DOCK_ID):

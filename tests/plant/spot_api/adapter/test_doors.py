@@ -4,30 +4,11 @@ import pytest
 from bosdyn.api import basic_command_pb2
 from bosdyn.api.spot import door_pb2
 
-from plant.robots.spot.kind import spot_capabilities
 from skills.robot import CommandCause, CommandState, DoorHandle
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
-from tests.plant.spot_api.lock_step import LockStep
 
 HANDLE = DoorHandle((1.2, -0.35, 0.5), hinge_left=True, pull=False)
 PROCESSING = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_PROCESSING
 STATUS = door_pb2.DoorCommand.Feedback.Status
-
-
-def scripted():
-    clock = VirtualClock()
-    return ScriptedRobot(clock, capabilities=spot_capabilities()), clock
-
-
-@pytest.fixture
-def step(credentials):
-    made = LockStep(scripted, credentials)
-    made.lease = made.robot.acquire_lease("test")
-    made.connection.power(True)
-    assert made.until(lambda: made.robot.powered)
-    yield made
-    made.close()
 
 
 class DoorService:
@@ -49,21 +30,21 @@ class DoorService:
         return answer
 
 
-def opened(step, service):
+def opened(powered, service):
     """Opens a door by a service; returns the last status."""
-    step.connection._stubs["door"] = service
-    command = step.robot.open_door(HANDLE, until_s=step.now() + 30.0, lease=step.lease)
-    assert step.until(lambda: step.robot.command_status(command).state is not CommandState.RUNNING, 40.0)
-    return step.robot.command_status(command)
+    powered.connection._stubs["door"] = service
+    command = powered.robot.open_door(HANDLE, until_s=powered.now() + 30.0, lease=powered.lease)
+    assert powered.until(lambda: powered.robot.command_status(command).state is not CommandState.RUNNING, 40.0)
+    return powered.robot.command_status(command)
 
 
-def test_a_robot_with_arm_and_door_service_opens_doors(step):
-    assert step.robot.capabilities().opens_doors
+def test_a_robot_with_arm_and_door_service_opens_doors(powered):
+    assert powered.robot.capabilities().opens_doors
 
 
-def test_the_command_searches_the_handle_before_the_robot_and_pushes(step):
+def test_the_command_searches_the_handle_before_the_robot_and_pushes(powered):
     service = DoorService(STATUS.Value("STATUS_COMPLETED"))
-    assert opened(step, service).state is CommandState.DONE
+    assert opened(powered, service).state is CommandState.DONE
     (request,) = service.commands
     grasp = request.door_command.auto_grasp_command
     assert grasp.frame_name == "body"
@@ -78,18 +59,18 @@ def test_the_command_searches_the_handle_before_the_robot_and_pushes(step):
 
 
 @pytest.mark.parametrize("status", ["STATUS_STALLED", "STATUS_NOT_DETECTED"])
-def test_a_door_that_is_stalled_or_not_seen_stops_the_command(step, status):
-    ended = opened(step, DoorService(STATUS.Value(status)))
+def test_a_door_that_is_stalled_or_not_seen_stops_the_command(powered, status):
+    ended = opened(powered, DoorService(STATUS.Value(status)))
     assert (ended.state, ended.cause) == (CommandState.STOPPED, CommandCause.BLOCKED)
 
 
-def test_the_door_command_needs_the_lease(step):
-    step.robot.return_lease(step.lease)
-    command = step.robot.open_door(HANDLE, until_s=step.now() + 30.0, lease=step.lease)
-    assert step.robot.command_status(command).cause is CommandCause.NO_LEASE
+def test_the_door_command_needs_the_lease(powered):
+    powered.robot.return_lease(powered.lease)
+    command = powered.robot.open_door(HANDLE, until_s=powered.now() + 30.0, lease=powered.lease)
+    assert powered.robot.command_status(command).cause is CommandCause.NO_LEASE
 
 
-def test_a_server_without_doors_refuses_the_command_plainly(step):
-    command = step.robot.open_door(HANDLE, until_s=step.now() + 30.0, lease=step.lease)
-    refused = step.robot.command_status(command)
+def test_a_server_without_doors_refuses_the_command_plainly(powered):
+    command = powered.robot.open_door(HANDLE, until_s=powered.now() + 30.0, lease=powered.lease)
+    refused = powered.robot.command_status(command)
     assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.UNSUPPORTED), refused

@@ -10,7 +10,6 @@ cut       commands are refused, those that run end, and nothing moves on
 """
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -30,9 +29,7 @@ from plant.spot_api.adapter.robot import ApiRobot
 from plant.spot_api.adapter.statuses import trouble
 from plant.spot_api.server.faults import Fault
 from skills.robot import ArmTrajectory, CommandCause, CommandState, LeaseError, NoImageError
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
-from tests.plant.spot_api.lock_step import PASSWORD, USER, LockStep
+from tests.plant.spot_api.lock_step import PASSWORD, USER, LockStep, scripted
 from tests.plant.spot_api.proxy import Proxy
 
 API = "bosdyn.api."
@@ -60,7 +57,7 @@ def statuses(enum, *but):
     return [(value.number, value.name) for value in enum.values if value.name not in but]
 
 
-def status_fields(message, prefix="") -> Iterator[tuple[str, object]]:
+def status_fields(message, prefix=""):
     """Paths of the fields called `status` within a message, with their enums."""
     for field in message.fields:
         if field.enum_type is not None and field.name == "status":
@@ -78,11 +75,6 @@ def feedbacks():
             yield from (
                 pytest.param(verb, path, enum, number, name, id=f"{verb}-{name}") for verb in VERBS_OF.get(field, ())
             )
-
-
-def scripted():
-    clock = VirtualClock()
-    return ScriptedRobot(clock, capabilities=spot_capabilities()), clock
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +117,7 @@ def sent(step, verb, until_s=math.inf):
 
 def ended(step, command, within_s=WITHIN_S):
     """Advances until the command has ended; returns its status."""
-    step.until(lambda: step.robot.command_status(command).state is not CommandState.RUNNING, within_s)
+    step.until(lambda: step.robot.command_status(command).state is not CommandState.RUNNING, within_s, every_s=0.2)
     return step.robot.command_status(command)
 
 
@@ -151,7 +143,7 @@ def test_a_command_ends_as_its_feedback_says(step, verb, path, enum, number, nam
     late = name == "STATUS_COMMAND_TIMED_OUT"
     cause = CommandCause.LATE if late else trouble(enum, number).cause
     assert (status.state, status.cause, bool(status.reason)) == (CommandState.STOPPED, cause, True)
-    step.until(lambda: step.now() - begun_s > WITHIN_S)
+    step.advance(begun_s + WITHIN_S - step.now())
     assert name in ROBOT_ENDED or not moves(step)
 
 
@@ -214,10 +206,7 @@ POWERS = statuses(power_pb2.DESCRIPTOR.enum_types_by_name["PowerCommandStatus"],
 @pytest.mark.parametrize("number", [number for number, _ in POWERS])
 def test_power_that_is_not_switched_is_an_error_with_its_cause(step, number):
     fault = Fault(fields={"status": number}, handled=False)
-    with (
-        step.server.faults.fault(f"{API}PowerService/PowerCommand", fault),
-        pytest.raises(LostError) as lost,
-    ):
+    with step.server.faults.fault(f"{API}PowerService/PowerCommand", fault), pytest.raises(LostError) as lost:
         step.connection.power(False)
     assert lost.value.cause is trouble(power_pb2.DESCRIPTOR.enum_types_by_name["PowerCommandStatus"], number).cause
     step.advance(0.1)
@@ -267,7 +256,7 @@ def test_a_cut_connection_ends_what_runs_and_nothing_moves_on(step, credentials)
         proxy.cut()
         assert ended(step, running).cause is CommandCause.NO_ANSWER
         assert ended(step, sent(step, "drive")).cause is CommandCause.NO_ANSWER
-        step.until(lambda: step.now() - begun_s > WITHIN_S)
+        step.advance(begun_s + WITHIN_S - step.now())
         assert not moves(step)
     finally:
         step.robot = ours

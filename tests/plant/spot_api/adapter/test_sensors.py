@@ -7,26 +7,11 @@ localised                                 pose of `odom` in the seed frame
 import pytest
 from bosdyn.api.graph_nav import graph_nav_pb2, map_pb2
 
-from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.messages import pose
 from plant.spot_api.server.faults import Fault
 from skills.robot import Pose2D
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
-from tests.plant.spot_api.lock_step import LockStep
 
 STATE = "bosdyn.api.graph_nav.GraphNavService/GetLocalizationState"
-
-
-@pytest.fixture
-def step(credentials):
-    def build():
-        clock = VirtualClock()
-        return ScriptedRobot(clock, capabilities=spot_capabilities()), clock
-
-    step = LockStep(build, credentials)
-    yield step
-    step.close()
 
 
 def localise(step, *, anchored=True):

@@ -6,7 +6,6 @@ In a test module with `PACE = Pace.CLIENT` the sleep of the test and of the SDK 
 import os
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import pytest
@@ -34,7 +33,7 @@ class Served:
     server: SpotServer
     scripted: ScriptedRobot
 
-    def login(self, password: str = PASSWORD) -> bosdyn.client.Robot:
+    def login(self, password=PASSWORD):
         sdk = bosdyn.client.create_standard_sdk("test", cert_resource_glob=str(self.server.certificate))
         robot = sdk.create_robot("127.0.0.1")
         robot.update_secure_channel_port(self.server.port)
@@ -43,7 +42,7 @@ class Served:
 
 
 @pytest.fixture
-def served(credentials, request, monkeypatch) -> Iterator[Served]:
+def served(credentials, request, monkeypatch):
     pace = getattr(request.module, "PACE", Pace.REAL)
     with scripted_spot(credentials, pace=pace, blocks=[Block(1.7, -1.5, 1.9, 1.5)]) as (server, scripted):
         if pace is Pace.CLIENT:
@@ -71,14 +70,15 @@ class Spot:
 
 
 @pytest.fixture
-def spot(served, monkeypatch) -> Iterator[Spot]:
-    monkeypatch.setattr("plant.spot_api.server.computer.POWER_ON_S", 0.1)
+def spot(served, monkeypatch):
+    monkeypatch.setattr("plant.spot_api.server.computer.POWER_ON_S", 0.0)
     robot = served.login()
-    robot.time_sync.wait_for_sync(timeout_sec=5.0)
+    while not robot.time_sync.has_established_time_sync:
+        time.sleep(0.002)  # of the wall: the robot has not begun to sit down
     with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_exit=True):
         robot.power_on(timeout_sec=10, update_frequency=20.0)
         commands = robot.ensure_client("robot-command")
-        blocking_stand(commands, timeout_sec=5.0, update_frequency=20.0)
+        blocking_stand(commands, timeout_sec=5.0, update_frequency=5.0)
         yield Spot(robot, commands, robot.ensure_client("robot-state"), served)
     robot.time_sync.stop()
 

@@ -24,7 +24,11 @@ Answer, Progress, State = Api.DockingCommandResponse, Api.DockingCommandFeedback
 @pytest.fixture
 def at_home(spot):
     """A standing robot that knows its dock."""
-    spot.served.server.computer.dock_O = Pose2D(0.8, 0.0, 3.1416)
+    return dock_at(spot, Pose2D(0.8, 0.0, 3.1416))
+
+
+def dock_at(spot, pose_O):
+    spot.served.server.computer.dock_O = pose_O
     return spot
 
 
@@ -80,40 +84,33 @@ def test_the_prep_pose_is_before_the_dock(at_home):
     assert abs(body.rot.to_yaw()) == pytest.approx(3.14, abs=0.06)
 
 
+def holding(spot):
+    spot.served.server.computer.grip.holding = True
+
+
+def motors_off(spot):
+    spot.robot.power_off(cut_immediately=True, timeout_sec=10, update_frequency=20.0)
+
+
 @pytest.mark.parametrize(
-    ("wanted", "status"),
+    ("before", "wanted", "status"),
     [
-        ({"number": 521}, Answer.STATUS_ERROR_DOCK_NOT_FOUND),
-        ({"require_fiducial": True}, Answer.STATUS_ERROR_DOCK_NOT_FOUND),
-        ({"behaviour": Api.PREP_POSE_UNDOCK, "number": 0}, Answer.STATUS_ERROR_NOT_DOCKED),
+        (None, {"number": 521}, Answer.STATUS_ERROR_DOCK_NOT_FOUND),
+        (None, {"require_fiducial": True}, Answer.STATUS_ERROR_DOCK_NOT_FOUND),
+        (None, {"behaviour": Api.PREP_POSE_UNDOCK, "number": 0}, Answer.STATUS_ERROR_NOT_DOCKED),
+        (lambda spot: dock_at(spot, Pose2D(9.0, 0.0, 0.0)), {}, Answer.STATUS_ERROR_DOCK_NOT_FOUND),
+        (holding, {}, Answer.STATUS_ERROR_GRIPPER_HOLDING_ITEM),
+        (motors_off, {}, Answer.STATUS_ERROR_NOT_AVAILABLE),
     ],
-)
-def test_a_command_that_cannot_be_done_is_refused(at_home, wanted, status):
+    ids=["dock", "fiducial", "not docked", "far away", "holding", "motors off"],
+)  # fmt: skip
+def test_a_command_that_cannot_be_done_is_refused(at_home, before, wanted, status):
+    if before is not None:
+        before(at_home)
     with pytest.raises(ResponseError) as refused:
         command(at_home, **wanted)
     assert refused.value.response.status == status
     assert not any(at_home.served.scripted.velocity)
-
-
-def test_a_dock_that_is_far_away_is_not_found(at_home):
-    at_home.served.server.computer.dock_O = Pose2D(9.0, 0.0, 0.0)
-    with pytest.raises(ResponseError) as refused:
-        command(at_home)
-    assert refused.value.response.status == Answer.STATUS_ERROR_DOCK_NOT_FOUND
-
-
-def test_a_robot_that_holds_an_item_does_not_dock(at_home):
-    at_home.served.server.computer.grip.holding = True
-    with pytest.raises(ResponseError) as refused:
-        command(at_home)
-    assert refused.value.response.status == Answer.STATUS_ERROR_GRIPPER_HOLDING_ITEM
-
-
-def test_docking_needs_motors(at_home):
-    at_home.robot.power_off(cut_immediately=True, timeout_sec=10, update_frequency=20.0)
-    with pytest.raises(ResponseError) as refused:
-        command(at_home)
-    assert refused.value.response.status == Answer.STATUS_ERROR_NOT_AVAILABLE
 
 
 @pytest.mark.parametrize(
@@ -150,11 +147,8 @@ def test_a_robot_without_a_dock_lists_none(spot):
         command(spot)
 
 
-def test_the_dock_is_in_the_configuration(at_home):
+def test_the_dock_is_in_the_configuration_and_unknown_commands_have_no_feedback(at_home):
     configured = client(at_home).get_docking_config()
     assert [(each.id_start, each.id_end) for each in configured] == [(DOCK_ID, DOCK_ID)]
-
-
-def test_feedback_of_an_unknown_command_is_an_invalid_request(at_home):
     with pytest.raises(InvalidRequestError):
         client(at_home).docking_command_feedback_full(4711)

@@ -77,7 +77,7 @@ def ended(client, number, seconds=12.0):
     until = time.monotonic() + seconds
     while (feedback := client.navigation_feedback(number)).status == Feedback.STATUS_FOLLOWING_ROUTE:
         assert time.monotonic() < until, feedback
-        time.sleep(0.02)
+        time.sleep(0.1)
     return feedback
 
 

@@ -5,6 +5,8 @@ checked in    the times start again
 removed       nothing happens
 """
 
+import time
+
 import pytest
 from bosdyn.api import lease_pb2
 from bosdyn.api.keepalive import keepalive_pb2
@@ -123,5 +125,5 @@ def test_a_silent_client_of_the_sdk_loses_its_motors(spot):
     )
     client.modify_policy(to_add=policy)
     while spot.robot.is_powered_on():
-        pass
+        time.sleep(0.02)
     assert spot.served.scripted.height_m < 0.3

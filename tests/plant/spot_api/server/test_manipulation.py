@@ -84,7 +84,7 @@ def outcome(spot, number, states=ENDS, seconds=10.0):
             seen.append(state)
         if state in states:
             return seen
-        time.sleep(0.02)
+        time.sleep(0.05)
     raise AssertionError(f"still {Api.ManipulationFeedbackState.Name(seen[-1])}")
 
 
@@ -214,10 +214,7 @@ def oriented(**constraint):
             ),
             "fixed position",
         ),
-        (
-            pick(grasp_params=oriented(vector_alignment_with_tolerance=Api.VectorAlignmentWithTolerance())),
-            "no length",
-        ),
+        (pick(grasp_params=oriented(vector_alignment_with_tolerance=Api.VectorAlignmentWithTolerance())), "no length"),
         ({"walk_to_object_ray_in_world": Api.WalkToObjectRayInWorld(**ray(0.0, 0.0, 0.0))}, "no length"),
         ({"walk_to_object_in_image": Api.WalkToObjectInImage()}, "focal_length"),
         (

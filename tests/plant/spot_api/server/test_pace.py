@@ -8,22 +8,17 @@ the same program   moves the robot the same way, however fast its machine is
 
 import subprocess
 import sys
-import threading
-from contextlib import contextmanager
+from functools import partial
 
 import grpc
 import pytest
 from google.protobuf.duration_pb2 import Duration
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.launch import ADVANCE
 from plant.spot_api.messages import duration, seconds
 from plant.spot_api.server.computer import PERIOD_S, Pace
-from plant.spot_api.server.server import Options, SpotServer
-from skills.manipulation.arm.kinematics import arm_model
-from skills.testing.clock import VirtualClock
-from skills.testing.robot import ScriptedRobot
+from tests.plant.spot_api.lock_step import scripted_spot
 
 PROGRAM = """
 import sys, time
@@ -45,21 +40,7 @@ with LeaseKeepAlive(robot.ensure_client("lease"), must_acquire=True, return_at_e
 """
 
 
-@contextmanager
-def stepped(credentials, pace=Pace.CLIENT):
-    """A robot and its server, whose clock a client steps."""
-    clock, stopping = VirtualClock(), threading.Event()
-    robot = ScriptedRobot(clock, capabilities=spot_capabilities())
-    options = Options({"user": "right"}, pace=pace)
-    server = SpotServer(robot, clock, arm_model(spot_capabilities()), credentials, options)
-    serving = threading.Thread(target=server.computer.serve, args=(stopping,))
-    with server.running():
-        serving.start()
-        try:
-            yield robot, server
-        finally:
-            stopping.set()
-            serving.join()
+stepped = partial(scripted_spot, pace=Pace.CLIENT)
 
 
 def advance(server, data):
@@ -70,7 +51,7 @@ def advance(server, data):
 
 
 def test_a_call_steps_the_robot_and_answers_with_its_time(credentials):
-    with stepped(credentials) as (_, server):
+    with stepped(credentials) as (server, _):
         times_s = [seconds(advance(server, duration(dt_s).SerializeToString())) for dt_s in (0.0, 1.5, 0.01)]
         assert server.computer.clock.now() == pytest.approx(1.5 + 2 * PERIOD_S)
     assert times_s[1] - times_s[0] == pytest.approx(1.5, abs=1e-6)
@@ -81,7 +62,7 @@ def test_a_call_steps_the_robot_and_answers_with_its_time(credentials):
     "data", [b"\xff\xff", duration(-1.0).SerializeToString(), duration(61.0).SerializeToString()], ids=range(3)
 )
 def test_a_step_that_cannot_be_is_refused(credentials, data):
-    with stepped(credentials) as (_, server):
+    with stepped(credentials) as (server, _):
         with pytest.raises(grpc.RpcError) as refused:
             advance(server, data)
         assert refused.value.code() is grpc.StatusCode.INVALID_ARGUMENT
@@ -89,7 +70,7 @@ def test_a_step_that_cannot_be_is_refused(credentials, data):
 
 
 def test_a_robot_in_real_time_is_not_stepped_by_clients(credentials):
-    with stepped(credentials, Pace.REAL) as (_, server), pytest.raises(grpc.RpcError) as refused:
+    with scripted_spot(credentials) as (server, _), pytest.raises(grpc.RpcError) as refused:
         advance(server, Duration(seconds=1).SerializeToString())
     assert refused.value.code() is grpc.StatusCode.UNIMPLEMENTED
 
@@ -98,7 +79,7 @@ def test_an_unchanged_program_moves_the_robot_the_same_way_each_time(credentials
     program, ends = tmp_path / "walk.py", []
     program.write_text(PROGRAM)
     for sleeps in ("1.3", "1.3", "0.7"):
-        with stepped(credentials) as (robot, server):
+        with stepped(credentials) as (server, robot):
             launch = ["-m", "plant.spot_api.launch", str(server.certificate), str(server.port), "client", str(program)]
             ended = subprocess.run([sys.executable, *launch, sleeps], capture_output=True, text=True, timeout=60.0)
             assert ended.returncode == 0, ended.stderr

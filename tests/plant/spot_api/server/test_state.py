@@ -1,5 +1,7 @@
 """What clients read: state, pictures, points, objects."""
 
+import time
+
 import numpy as np
 import pytest
 from bosdyn.api import (
@@ -52,6 +54,7 @@ def test_faults_of_the_robot_are_system_faults(served, robot):
     client = robot.ensure_client("robot-state")
     faults = []
     while not faults:
+        time.sleep(0.02)
         faults = client.get_robot_state().system_fault_state.faults
     assert [fault.name for fault in faults] == ["motor too hot"]
 
@@ -193,6 +196,7 @@ def test_a_service_that_falls_silent_is_a_fault(robot):
     registration.register("mine", "my.Service", "mine.spot.robot", "127.0.0.1", 5000, liveness_timeout_secs=0.2)
     states, faults = robot.ensure_client("robot-state"), []
     while not faults:
+        time.sleep(0.02)
         faults = states.get_robot_state().service_fault_state.faults
     assert (faults[0].fault_id.service_name, faults[0].fault_id.fault_name) == ("mine", "liveness")
     with pytest.raises(ServiceAlreadyExistsError):  # by which the SDK keeps a service alive

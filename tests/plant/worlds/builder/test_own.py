@@ -1,9 +1,5 @@
 """Worlds made of grids and cylinders: walls, rooms, doors, start."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 import yaml
@@ -15,7 +11,7 @@ from plant.worlds.world import WorldError, load_world
 from skills.robot import Pose2D
 
 
-def two_rooms(resolution_m: float = 0.05) -> Grid:
+def two_rooms(resolution_m=0.05):
     """Two rooms of 3 x 4 m, x from 1 to 7.1, with a door of 0.9 m in the wall between them, 0.1 m thick."""
     scale = round(0.05 / resolution_m)
     cells = np.full((84, 126), OCCUPIED, np.uint8)
@@ -23,7 +19,7 @@ def two_rooms(resolution_m: float = 0.05) -> Grid:
     return Grid(cells.repeat(scale, axis=0).repeat(scale, axis=1), (1.0, -2.0), resolution_m)
 
 
-def test_rectangles_cover_exactly_the_occupied_cells() -> None:
+def test_rectangles_cover_exactly_the_occupied_cells():
     occupied = np.random.default_rng(3).random((40, 50)) < 0.4
     covered = np.zeros(occupied.shape, int)
     for r0, c0, r1, c1 in rectangles(occupied):
@@ -31,12 +27,12 @@ def test_rectangles_cover_exactly_the_occupied_cells() -> None:
     assert np.array_equal(covered, occupied.astype(int))
 
 
-def test_a_few_boxes_make_the_walls_of_two_rooms() -> None:
+def test_a_few_boxes_make_the_walls_of_two_rooms():
     assert len(rectangles(two_rooms().cells == OCCUPIED)) <= 8
 
 
 @pytest.mark.parametrize("resolution_m", [0.05, 0.01])
-def test_rooms_and_the_door_between_them_are_found(tmp_path: Path, resolution_m: float) -> None:
+def test_rooms_and_the_door_between_them_are_found(tmp_path, resolution_m):
     world_from_grid(tmp_path, two_rooms(resolution_m), start=None, wall_height_m=2.5)
     known = yaml.safe_load((tmp_path / "knowledge.yaml").read_text())
     assert set(known["places"]) == {"room 1", "room 2"}
@@ -46,7 +42,7 @@ def test_rooms_and_the_door_between_them_are_found(tmp_path: Path, resolution_m:
     assert door["width"] == pytest.approx(0.9, abs=0.06)
 
 
-def test_the_walls_stand_where_the_map_has_them(tmp_path: Path) -> None:
+def test_the_walls_stand_where_the_map_has_them(tmp_path):
     world_from_grid(tmp_path, two_rooms(), start=Pose2D(2.0, 0.0, 0.0), wall_height_m=2.5)
     world = load_world(tmp_path)
     assert world.start == Pose2D(2.0, 0.0, 0.0)
@@ -59,7 +55,7 @@ def test_the_walls_stand_where_the_map_has_them(tmp_path: Path) -> None:
         assert min(each.distance for each in query.ComputeSignedDistanceToPoint([x, y, z])) > 0.05
 
 
-def test_coarse_maps_are_cut_into_small_cells(tmp_path: Path) -> None:
+def test_coarse_maps_are_cut_into_small_cells(tmp_path):
     cells = np.full((12, 12), OCCUPIED, np.uint8)
     cells[1:-1, 1:-1] = FREE
     world_from_grid(tmp_path, Grid(cells, (0.0, 0.0), 0.4), start=None, wall_height_m=2.5)
@@ -71,7 +67,7 @@ def test_coarse_maps_are_cut_into_small_cells(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("value", "why"), [(OCCUPIED, "no cell of it is free"), (UNKNOWN, "no cell"), (FREE, "wide enough")]
 )
-def test_a_map_without_room_for_the_robot_is_refused(tmp_path: Path, value: int, why: str) -> None:
+def test_a_map_without_room_for_the_robot_is_refused(tmp_path, value, why):
     with pytest.raises(WorldError, match=why):
         world_from_grid(
             tmp_path, Grid(np.full((8, 8), value, np.uint8), (0.0, 0.0), 0.05), start=None, wall_height_m=2.5
@@ -79,12 +75,12 @@ def test_a_map_without_room_for_the_robot_is_refused(tmp_path: Path, value: int,
 
 
 @pytest.mark.parametrize("start", [Pose2D(4.15, 1.0, 0.0), Pose2D(50.0, 0.0, 0.0), Pose2D(4.15, -0.05, 1.57)])
-def test_a_start_that_is_not_free_is_refused_with_a_free_one(tmp_path: Path, start: Pose2D) -> None:
+def test_a_start_that_is_not_free_is_refused_with_a_free_one(tmp_path, start):
     with pytest.raises(WorldError, match=r"touches a wall or lies outside; a free one is --start"):
         world_from_grid(tmp_path, two_rooms(), start=start, wall_height_m=2.5)
 
 
-def test_cylinders_stand_in_both_grids_as_far_as_they_reach(tmp_path: Path) -> None:
+def test_cylinders_stand_in_both_grids_as_far_as_they_reach(tmp_path):
     cylinders = [(0.0, 0.0, 0.4, 1.0), (6.0, 0.0, 0.4, 0.5)]
     world_from_cylinders(tmp_path, cylinders, start=Pose2D(3.0, 0.0, 0.0), around=[(3.0, 9.0)])
     areas = {}

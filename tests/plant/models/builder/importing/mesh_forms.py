@@ -1,7 +1,5 @@
 """Meshes in the forms that programs write, with the faults that people meet: one body, made anew in each form."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Callable, Mapping
@@ -17,18 +15,18 @@ SIZE_M: Final = (0.06, 0.08, 0.12)
 """Extents of the body: a box."""
 
 
-def box() -> Any:
+def box():
     """The body, with z up, in metres."""
     return trimesh.creation.box(SIZE_M)
 
 
-def soup(triangles: np.ndarray) -> Any:
+def soup(triangles):
     """Mesh of triangles (T, 3, 3) that share no points."""
     corners = np.asarray(triangles, dtype=float).reshape(-1, 3)
     return trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
 
 
-def triangles(mesh: Any) -> np.ndarray:
+def triangles(mesh):
     """Corners (T, 3, 3) of a mesh."""
     return np.array(mesh.triangles, dtype=float)
 
@@ -49,15 +47,15 @@ class MeshForm:
     refused: str | None = None
 
 
-def exported(make: Callable[[], Any] = box, scale: float = 1.0) -> Callable[[Path], object]:
+def exported(make=box, scale=1.0):
     """Writer of a mesh by trimesh, in other units."""
     return lambda path: make().apply_scale(scale).export(path)
 
 
-def text(content: str, **others: str | bytes) -> Callable[[Path], object]:
+def text(content, **others):
     """Writer of a text file, and of files beside it (`_` in a name stands for a point)."""
 
-    def write(path: Path) -> None:
+    def write(path):
         path.write_text(content)
         for name, other in others.items():
             (path.parent / name.replace("_", ".")).write_bytes(other if isinstance(other, bytes) else other.encode())
@@ -65,10 +63,10 @@ def text(content: str, **others: str | bytes) -> Callable[[Path], object]:
     return write
 
 
-def flipped(which: Any) -> Callable[[], Any]:
+def flipped(which):
     """Maker of the body with some triangles inside out."""
 
-    def make() -> Any:
+    def make():
         corners = triangles(box())
         corners[which] = corners[which][:, ::-1]
         return soup(corners)
@@ -76,20 +74,20 @@ def flipped(which: Any) -> Callable[[], Any]:
     return make
 
 
-def joined(*parts: Callable[[], np.ndarray]) -> Callable[[], Any]:
+def joined(*parts):
     """Maker of a body of several pieces of triangles."""
     return lambda: soup(np.vstack([part() for part in parts]))
 
 
-def whole() -> np.ndarray:
+def whole():
     """Triangles of the body."""
     return triangles(box())
 
 
-def half(side: int, *, inside_out: bool = False) -> Callable[[], np.ndarray]:
+def half(side, *, inside_out=False):
     """Maker of the half of the body at one side of its middle, closed by an own wall."""
 
-    def make() -> np.ndarray:
+    def make():
         corners = triangles(trimesh.creation.box((SIZE_M[0] / 2, *SIZE_M[1:])))
         corners[..., 0] += side * SIZE_M[0] / 4
         return corners[:, ::-1] if inside_out else corners
@@ -97,10 +95,10 @@ def half(side: int, *, inside_out: bool = False) -> Callable[[], np.ndarray]:
     return make
 
 
-def in_3mf(unit: str | None = "millimeter", scale: float = 1000.0, item: str = "") -> Callable[[Path], object]:
+def in_3mf(unit="millimeter", scale=1000.0, item=""):
     """Writer of a 3MF file whose body is a component of its only item."""
 
-    def write(path: Path) -> None:
+    def write(path):
         body = box()
         points = "".join('<vertex x="{:.9g}" y="{:.9g}" z="{:.9g}"/>'.format(*p) for p in body.vertices * scale)
         faces = "".join('<triangle v1="{}" v2="{}" v3="{}"/>'.format(*face) for face in body.faces)
@@ -117,12 +115,12 @@ def in_3mf(unit: str | None = "millimeter", scale: float = 1000.0, item: str = "
     return write
 
 
-def png(colour: tuple[int, int, int]) -> bytes:
+def png(colour):
     """Picture of one colour (RGB)."""
     return bytes(cv2.imencode(".png", np.full((4, 4, 3), colour[::-1], np.uint8))[1].tobytes())
 
 
-def collada(meter: float = 0.01, up: str = "Y_UP", picture: str = "skin.png") -> str:
+def collada(meter=0.01, up="Y_UP", picture="skin.png"):
     """COLLADA file of the body with a picture, as Blender nests the names of samplers, surfaces and images."""
     turn = {"Y_UP": (0, 2, 1), "Z_UP": (0, 1, 2), "X_UP": (2, 1, 0)}[up]
     body = trimesh.creation.box(np.array(SIZE_M)[list(turn)])
@@ -152,7 +150,7 @@ def collada(meter: float = 0.01, up: str = "Y_UP", picture: str = "skin.png") ->
 """
 
 
-def obj(head: str = "", *, negative: bool = False) -> str:
+def obj(head="", *, negative=False):
     """OBJ file of the body: quadrilaterals with texture coordinates, by absolute or negative numbers of points."""
     x, y, z = np.array(SIZE_M) / 2
     points = [f"v {i * x:g} {j * y:g} {k * z:g}" for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
@@ -162,7 +160,7 @@ def obj(head: str = "", *, negative: bool = False) -> str:
     return "\n".join(["# made by hand", head, *points, "vt 0.5 0.5", *faces]) + "\n"
 
 
-def moebius() -> Any:
+def moebius():
     """A strip of paper with a half turn."""
     count = 24
     angle = np.linspace(0.0, 2.0 * np.pi, count + 1)
@@ -174,26 +172,26 @@ def moebius() -> Any:
     return soup([c for i in range(count) for c in ((low[i], low[i + 1], high[i + 1]), (low[i], high[i + 1], high[i]))])
 
 
-def with_gaps() -> Any:
+def with_gaps():
     """The body with corners that differ in the last digits of single precision."""
     return soup(whole() + np.random.default_rng(0).uniform(-4e-7, 4e-7, (12, 3, 3)))
 
 
-def gltf_without_buffer(path: Path) -> None:
+def gltf_without_buffer(path):
     """Writes a glTF file whose buffer is missing."""
     for name, content in trimesh.exchange.gltf.export_gltf(trimesh.Scene(box())).items():
         if name.endswith(".gltf"):
             path.write_bytes(content)
 
 
-def gltf(path: Path) -> None:
+def gltf(path):
     """Writes a glTF file with its buffers, with y up."""
     body = trimesh.creation.box(np.array(SIZE_M)[[0, 2, 1]])
     for name, content in trimesh.exchange.gltf.export_gltf(trimesh.Scene(body)).items():
         (path if name.endswith(".gltf") else path.parent / name).write_bytes(content)
 
 
-def cut_off(path: Path) -> None:
+def cut_off(path):
     """Writes the first half of a binary STL file."""
     stream = io.BytesIO()
     box().export(stream, file_type="stl")

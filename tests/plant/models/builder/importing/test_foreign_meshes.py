@@ -1,17 +1,13 @@
 """Meshes of other programs: units, axes, triangles that look inward, and files that are no mesh."""
 
-from __future__ import annotations
-
 import os
 import struct
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from plant.models.builder.importing import ImportOptions, ObjectImportError, import_object
 from plant.models.builder.importing.solid import solid_of
-from plant.models.catalogue import ImportedObject
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")
@@ -19,19 +15,19 @@ pytest.importorskip("coacd")
 BOX = (0.06, 0.08, 0.12)
 
 
-def imported(path: Path, folder: Path, **wanted) -> ImportedObject:
+def imported(path, folder, **wanted):
     folder.mkdir()
     return import_object(path, ImportOptions(**{"name": "gadget", "mass_kg": 0.6, **wanted}), folder)
 
 
-def refusal(path: Path, folder: Path, **wanted) -> ObjectImportError:
+def refusal(path, folder, **wanted):
     with pytest.raises(ObjectImportError) as error:
         imported(path, folder, **wanted)
     assert error.value.hint
     return error.value
 
 
-def collada(box, meter: float = 0.01, up: str = "Y_UP", kind: str = "triangles", node: str = "") -> str:
+def collada(box, meter=0.01, up="Y_UP", kind="triangles", node=""):
     points = " ".join(f"{value / meter:.9g}" for value in box.vertices.flat)
     corners = " ".join(str(value) for value in box.faces.flat)
     counts = f"<vcount>{' '.join(['3'] * len(box.faces))}</vcount>" if kind == "polylist" else ""
@@ -56,11 +52,7 @@ def collada(box, meter: float = 0.01, up: str = "Y_UP", kind: str = "triangles",
 @pytest.mark.parametrize("kind", ["triangles", "polylist"])
 @pytest.mark.parametrize(
     ("meter", "up", "size"),
-    [
-        (0.01, "Z_UP", (0.06, 0.08, 0.12)),
-        (0.001, "Y_UP", (0.06, 0.12, 0.08)),
-        (1.0, "X_UP", (0.12, 0.08, 0.06)),
-    ],
+    [(0.01, "Z_UP", (0.06, 0.08, 0.12)), (0.001, "Y_UP", (0.06, 0.12, 0.08)), (1.0, "X_UP", (0.12, 0.08, 0.06))],
 )
 def test_a_collada_file_has_its_unit_and_its_axis(tmp_path, kind, meter, up, size):
     (tmp_path / "box.dae").write_text(collada(trimesh.creation.box(BOX), meter, up, kind))
@@ -116,7 +108,7 @@ def test_triangles_that_look_inward_are_turned(tmp_path):
         np.testing.assert_allclose(made.inertia_kg_m2[:3], expected, rtol=1e-3)
 
 
-def triangles_of(mesh) -> np.ndarray:
+def triangles_of(mesh):
     return np.asarray(mesh.triangles, dtype=float)
 
 

@@ -1,10 +1,7 @@
 """Imported meshes: sizes, masses, collision parts and appearance; refusal of meshes that are no solid body."""
 
-from __future__ import annotations
-
 import re
 import sys
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -13,7 +10,7 @@ from scipy.spatial import ConvexHull
 
 from errand_train.models.outlines import triangles_of
 from plant.models.builder.importing import ImportOptions, ObjectImportError, ObjectsExtraMissingError, import_object
-from plant.models.catalogue import ImportedObject, read_imported
+from plant.models.catalogue import read_imported
 
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("coacd")
@@ -21,7 +18,7 @@ pytest.importorskip("coacd")
 L_SHAPE = np.array([[0, 0], [0.2, 0], [0.2, 0.05], [0.05, 0.05], [0.05, 0.2], [0, 0.2]])
 
 
-def imported(mesh, tmp_path: Path, ending: str = "ply", **wanted) -> tuple[ImportedObject, Path]:
+def imported(mesh, tmp_path, ending="ply", **wanted):
     """The mesh written to a file, and made a model of 0.6 kg."""
     path, folder = tmp_path / f"mesh.{ending}", tmp_path / "model"
     mesh.export(path)
@@ -37,13 +34,7 @@ def pipe():
     return trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8)
 
 
-def lidless_box():
-    box = trimesh.creation.box((0.1, 0.08, 0.06))
-    box.update_faces(box.face_normals[:, 2] < 0.5)
-    return box
-
-
-def part_points(folder: Path) -> list[np.ndarray]:
+def part_points(folder):
     files = sorted(folder.glob("gadget_part_*.obj"))
     return [np.array([line.split()[1:] for line in f.read_text().splitlines() if line[0] == "v"], float) for f in files]
 
@@ -65,9 +56,7 @@ def test_its_form_has_the_height_at_which_it_rests(tmp_path):
     assert form.path() == (folder / "gadget.sdf").resolve()
 
 
-@pytest.mark.parametrize(
-    "make", [l_shape, lambda: trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8)], ids=["L", "pipe"]
-)
+@pytest.mark.parametrize("make", [l_shape, pipe])
 def test_a_hollow_body_is_few_convex_parts_none_larger_than_it(tmp_path, make):
     mesh = make()
     made, folder = imported(mesh, tmp_path)
@@ -95,13 +84,6 @@ def test_the_bearing_spheres_stay_within_the_body(tmp_path):
 def test_a_ball_gets_spheres_to_rest_on(tmp_path):
     _, folder = imported(trimesh.creation.icosphere(3, 0.04), tmp_path)
     assert (folder / "gadget.sdf").read_text().count("<sphere>") >= 3
-
-
-def test_millimetres_are_scaled(tmp_path):
-    mesh = l_shape()
-    mesh.apply_scale(1000.0)
-    made, _ = imported(mesh, tmp_path, scale=0.001)
-    assert made.size_m == pytest.approx((0.2, 0.2, 0.05), abs=1e-6)
 
 
 def test_an_object_that_cannot_stand_is_laid_down_along_x(tmp_path):
@@ -182,17 +164,9 @@ def test_a_texture_stays(tmp_path):
     assert "map_Kd surface_000.png" in (folder / "gadget.mtl").read_text()
 
 
-def test_an_open_body_can_be_closed(tmp_path):
-    made, _ = imported(lidless_box(), tmp_path, close_holes=True)
-    whole = 0.6 / 12 * (0.08**2 + 0.06**2)
-    assert made.inertia_kg_m2[0] == pytest.approx(whole, rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ("make", "why"),
     [
-        (lidless_box, "it is open (not watertight), at 4 edges"),
-        (lambda: trimesh.creation.box((200.0, 80.0, 60.0)), "give --scale 0.001 if its unit is millimetres"),
         (lambda: trimesh.creation.box((0.002, 0.001, 0.001)), "give --scale"),
         (lambda: trimesh.PointCloud(np.eye(3)), "it is no mesh: there are no triangles in it"),
     ],
@@ -200,12 +174,6 @@ def test_an_open_body_can_be_closed(tmp_path):
 def test_a_mesh_that_encloses_no_body_is_refused(tmp_path, make, why):
     with pytest.raises(ObjectImportError, match=re.escape(why)):
         imported(make(), tmp_path)
-
-
-def test_points_that_are_no_numbers_are_refused(tmp_path):
-    (tmp_path / "m.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\nnan 1 0\n3 0 1 2\n")
-    with pytest.raises(ObjectImportError, match="coordinates are not finite"):
-        import_object(tmp_path / "m.off", ImportOptions("gadget", 1.0), tmp_path)
 
 
 def test_a_million_triangles_are_counted_and_refused(tmp_path):

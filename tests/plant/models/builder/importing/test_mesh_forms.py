@@ -1,7 +1,5 @@
 """Meshes of the forms that other programs write are read right, or refused by their reason."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np
@@ -11,13 +9,7 @@ pytest.importorskip("trimesh")
 pytest.importorskip("coacd")
 pytest.importorskip("networkx")
 
-from plant.models.builder.importing import (
-    STEPS,
-    ImportOptions,
-    ImportReports,
-    ObjectImportError,
-    import_object,
-)
+from plant.models.builder.importing import STEPS, ImportOptions, ImportReports, ObjectImportError, import_object
 from tests.plant.models.builder.importing.mesh_forms import FORMS, SIZE_M, exported
 
 

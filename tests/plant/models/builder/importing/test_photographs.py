@@ -1,9 +1,5 @@
 """Photographs become a model without a mesh; those that cannot be used are refused by name."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -18,7 +14,7 @@ RED, GROUND = (190, 40, 35), (120, 150, 160)
 SIZE_M = (0.08, 0.06, 0.1)
 
 
-def photograph(file: Path, box=(140, 100, 260, 250), ground=GROUND, colour=RED, *, opaque: bool = True) -> Path:
+def photograph(file, box=(140, 100, 260, 250), ground=GROUND, colour=RED, *, opaque=True):
     """A box of one colour before a plain ground that is lighter at the right, with noise."""
     rng = np.random.default_rng(3)
     picture = np.tile(np.array(ground, float), (320, 400, 1)) + np.linspace(-12, 12, 400)[None, :, None]
@@ -34,7 +30,7 @@ def photograph(file: Path, box=(140, 100, 260, 250), ground=GROUND, colour=RED, 
     return file
 
 
-def series(folder: Path, count: int = 4) -> Path:
+def series(folder, count=4):
     folder.mkdir()
     for k in range(count):
         photograph(folder / f"{k}.png", opaque=bool(k % 2))

@@ -161,7 +161,8 @@ class Control:
             self._ask_for(cancels=(*self._requests.cancels, (robot, reason)))
             self._note("cancel", f"{robot}: {reason}")
         elif self._requests.cancel is None and not self._ended:
-            self._holds.pop((None, Mode.PAUSED), None)
+            for held in [each for each in self._holds if each[1] is Mode.PAUSED]:
+                del self._holds[held]
             self._stride = None
             self._ask_for(cancel=reason)
             self._note("cancel", reason)

@@ -87,6 +87,13 @@ def test_a_second_cancel_ends_it_at_once(go, control, script):
     assert result.worst.message == "enough; in the end, broken off: relocalise goes on"
 
 
+@pytest.mark.parametrize("hold", [Control.pause, Control.step, lambda control: control.pause(robot="Alice")])
+def test_a_cancel_ends_a_pause_before_it(go, control, hold):
+    acts = {2: lambda: hold(control), 6: lambda: control.cancel("enough")}
+    result, begun = go(group(LONG, always=[skill("relocalise")]), act=lambda ticks: acts.get(ticks, int)())
+    assert (result.outcome, begun, result.ticks < 30) == (Outcome.CANCELLED, ["relocalise"], True)
+
+
 def test_two_cancels_in_one_tick_skip_the_steps_under_always(go, control):
     def act(ticks):
         if ticks == 3:

@@ -69,16 +69,16 @@ demo: $(VENV)/.run
 	$(BIN)/errand run --say "Hey Alice, can you fetch me a drink from the kitchen" --world flat --seed 1
 
 test: env voices
-	$(PYTEST) --durations-file out/tests/durations.json
+	$(PYTEST) --durations-file=out/tests/durations.json
 
 affected: env
-	$(PYTEST) --affected $(SINCE)
+	$(PYTEST) --affected=$(SINCE)
 
 fast: env
 	$(PYTEST) --fast -m "not mission and not nightly"
 
 nightly: env voices
-	$(PYTEST) -m nightly --durations-file out/tests/nightly.json
+	$(PYTEST) -m nightly --durations-file=out/tests/nightly.json
 
 check: env
 	$(BIN)/ruff check .

@@ -14,6 +14,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant", "training")
+TESTS = {ROOT / "tests": ROOT, ROOT / "training/tests": ROOT / "training/errand_train"}
+"""Folders of tests, and the folders of modules that they mirror."""
 EVERYTHING = {"tests/conftest.py", "pyproject.toml", "constraints.txt"}
 WITHIN = 2
 """Most imports between a test and a changed module."""
@@ -34,7 +36,7 @@ class Affected:
         return True if is_test and not touched(collection_path, self.changed) else None
 
     def pytest_terminal_summary(self, terminalreporter):
-        tests = sorted((ROOT / "tests").rglob("test_*.py"))
+        tests = sorted(test for folder in TESTS for test in folder.rglob("test_*.py"))
         left_out = [test for test in tests if not touched(test, self.changed)]
         line = terminalreporter.write_line
         line(f"changed: {', '.join(sorted(self.changed)) or 'nothing'}")
@@ -55,8 +57,8 @@ def touched(test: Path, changed: frozenset[str]) -> bool:
     """Whether a change touches the tests of a file."""
     if changed & EVERYTHING or name_of(test) in changed:
         return True
-    mirrored = Path(*test.relative_to(ROOT).parts[1:-1])
-    if any(Path(path).parent == mirrored for path in changed):
+    mirrored = next(TESTS[folder] / test.parent.relative_to(folder) for folder in test.parents if folder in TESTS)
+    if any((ROOT / path).parent == mirrored for path in changed):
         return True
     near, modules = {test}, set[Path]()
     for _ in range(WITHIN):
@@ -91,7 +93,7 @@ def imports(file: Path) -> frozenset[Path]:
 @cache
 def module_file(name: Path, beside: Path) -> Path | None:
     """File of a module of the project, or of a helper that stands beside a test or above it; None for others."""
-    above = [folder for folder in (beside, *beside.parents) if folder.is_relative_to(ROOT / "tests")]
+    above = [folder for folder in (beside, *beside.parents) if any(map(folder.is_relative_to, TESTS))]
     for folder in (ROOT, ROOT / "training", *above):
         for file in (folder / name.with_suffix(".py"), folder / name / "__init__.py"):
             if file.is_file():

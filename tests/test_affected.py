@@ -17,6 +17,9 @@ from tests.affected import ROOT, touched
         ("tests/executive/words/test_command.py", "skills/navigate/mppi.py", False),
         ("tests/executive/words/test_command.py", "README.md", False),
         ("tests/executive/words/test_command.py", "tests/conftest.py", True),
+        ("training/tests/dataset/test_coco.py", "training/errand_train/dataset/compose.py", True),
+        ("training/tests/dataset/test_coco.py", "training/errand_train/nouns.py", False),
+        ("training/tests/detector/test_refine.py", "training/tests/random_networks.py", True),
     ],
 )
 def test_a_change_touches(test, changed, expected):

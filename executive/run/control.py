@@ -161,8 +161,7 @@ class Control:
             self._ask_for(cancels=(*self._requests.cancels, (robot, reason)))
             self._note("cancel", f"{robot}: {reason}")
         elif self._requests.cancel is None and not self._ended:
-            for held in [each for each in self._holds if each[1] is Mode.PAUSED]:
-                del self._holds[held]
+            self._holds = {held: why for held, why in self._holds.items() if held[1] is not Mode.PAUSED}
             self._stride = None
             self._ask_for(cancel=reason)
             self._note("cancel", reason)

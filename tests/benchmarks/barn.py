@@ -9,8 +9,6 @@ when the robot has left the start by 0.1 m until it is within 1 m of the goal; `
 
 import json
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,35 +27,14 @@ NO_MAP_STACK = Path(__file__).parents[2] / "skills" / "no_map_stack.yaml"
 NOTHING = GridMap(np.zeros((2, 2), dtype=bool), 1.0, (0.0, 0.0))
 
 
-@dataclass(frozen=True)
-class Run:
-    """One world's result, rounded."""
-
-    world: int
-    success: bool
-    collided: bool
-    time_s: float
-    path_m: float
-    score: float
-    stood_s: float
-    plans: int
-    control_ms_median: float | None
-    control_ms_p99: float | None
-    planning_ms_max: float | None
-    message: str
-
-
-def cases(
-    folder: Path, worlds: tuple[int, ...] = (), stack: Path = NO_MAP_STACK, seed: int = 1
-) -> Iterator[tuple[int, Path, Path, int]]:
+def cases(folder: Path, worlds: tuple[int, ...] = (), stack: Path = NO_MAP_STACK, seed: int = 1):
     """Numbers and files of the worlds, of all unless some are named, with the stack and the seed."""
     for number, file in sorted((int(file.stem.split("_")[1]), file) for file in folder.glob("world_*.json")):
         if number in worlds or not worlds:
             yield number, file, stack, seed
 
 
-def run_case(number: int, file: Path, stack: Path, seed: int, folder: Path) -> Run:
-    """Drives through one world."""
+def run_case(number, file, stack, seed, folder):
     told = json.loads(file.read_text())
     start, goal = Pose2D(*told["start"]), told["goal"]
     world_from_cylinders(folder, told["cylinders"], start=start, around=[(start.x_m, start.y_m), tuple(goal)])
@@ -69,24 +46,23 @@ def run_case(number: int, file: Path, stack: Path, seed: int, folder: Path) -> R
     took_s = TICK_S * float(arrived[0] - int(np.argmax(left))) if len(arrived) and left.any() else LIMIT_S
     success = bool(len(arrived)) and not trip.hits and bool(off_m[-1] < NEAR_M)
     optimal_s = told["optimal_path_len"] / OPTIMAL_M_S
-    return Run(
-        told["world"],
-        success,
-        bool(trip.hits),
-        round(took_s, 2),
-        round(trip.path_m, 2),
-        round(success * optimal_s / float(np.clip(took_s, 2.0 * optimal_s, 8.0 * optimal_s)), 3),
-        round(trip.time_s, 2),
-        len(trip.planning_ms),
-        quantile(trip.control_ms),
-        quantile(trip.control_ms, 0.99),
-        quantile(trip.planning_ms, 1.0, 1),
-        "; ".join((trip.message, *trip.hits)),
-    )
+    return {
+        "world": told["world"],
+        "success": success,
+        "collided": bool(trip.hits),
+        "time_s": round(took_s, 2),
+        "path_m": round(trip.path_m, 2),
+        "score": round(success * optimal_s / float(np.clip(took_s, 2.0 * optimal_s, 8.0 * optimal_s)), 3),
+        "stood_s": round(trip.time_s, 2),
+        "plans": len(trip.planning_ms),
+        "control_ms_median": quantile(trip.control_ms),
+        "control_ms_p99": quantile(trip.control_ms, 0.99),
+        "planning_ms_max": quantile(trip.planning_ms, 1.0, 1),
+        "message": "; ".join((trip.message, *trip.hits)),
+    }
 
 
-def summary(runs: Sequence[Run]) -> dict[str, object]:
-    """Runs, their share of success and mean score."""
+def summary(runs):
     mean_score = round(math.fsum(run.score for run in runs) / len(runs), 4)
     return {"runs": runs, "success_rate": share([run.success for run in runs], 4), "mean_score": mean_score}
 

@@ -8,18 +8,16 @@ any time in between; `carried` when it was brought 20 m and through two doors at
 """
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise, product
-from pathlib import Path
 
 import shapely
 
 from plant.simulation import Simulation
-from plant.worlds.world import World, load_world
+from plant.worlds.world import load_world
 from tests.benchmarks.harness import benchmark, totals
 from tests.benchmarks.manipulation_room import LOOK_S, ROBOT, TARGET
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.benchmarks.plant_mission import PlantMission
 
 PLACES = {"coke": "kitchen", "beer": "kitchen"} | dict.fromkeys(
     ("hammer", "cube", "wrench", "screwdriver", "cylinder", "extinguisher"), "workshop"
@@ -42,7 +40,7 @@ class Way:
     _held_s: float | None = None
     _due_s: float = 0.0
 
-    def __call__(self, now_s: float) -> None:
+    def __call__(self, now_s):
         if now_s < self._due_s:
             return
         self._due_s = now_s + LOOK_S
@@ -58,36 +56,21 @@ class Way:
         self.rooms = entered(self.rooms, room_at(self.simulation.world, self._xy_W))
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Result of a trial, by the plant's truth."""
-
-    ended: Ended
-    taken: bool
-    lost: bool
-    lost_at_s: float | None
-    carried: bool
-    way_m: float
-    doors: int
-
-
-def room_at(world: World, xy_W: tuple[float, float]) -> str | None:
-    """Room about a point, None in a doorway."""
+def room_at(world, xy_W):
     point = shapely.Point(xy_W)
     return next((name for name, corners in world.rooms.items() if shapely.Polygon(corners).contains(point)), None)
 
 
-def entered(rooms: Sequence[str], room: str | None) -> list[str]:
+def entered(rooms, room):
     """Rooms in the order in which they were entered, with the one that the robot is in now."""
     return [*rooms, room] if room is not None and room not in rooms[-1:] else list(rooms)
 
 
-def doors(rooms: Sequence[str]) -> int:
-    """Number of doors on a way through rooms."""
+def doors(rooms):
     return sum({one, other} != OPENING for one, other in pairwise(rooms))
 
 
-def flat_with(class_name: str) -> World:
+def flat_with(class_name):
     """The flat with nobody and nothing in it but one object of a class, called `target`, where the class usually is."""
     world = load_world("flat").without_people()
     (rule,) = (each for each in world.seed_rules.objects if each.model == class_name)
@@ -95,15 +78,13 @@ def flat_with(class_name: str) -> World:
     return replace(world, seed_rules=world.seed_rules.model_copy(update={"objects": only}))
 
 
-def cases(classes: tuple[str, ...] = ("coke", "beer"), trials: int = 2, seed: int = 1) -> Iterable[tuple[str, int]]:
-    """Classes with the seeds of their trials."""
+def cases(classes: tuple[str, ...] = ("coke", "beer"), trials: int = 2, seed: int = 1):
     if unknown := [name for name in classes if name not in PLACES]:
         raise SystemExit(f"no class {', '.join(unknown)} is in the flat; there are {', '.join(PLACES)}")
     return product(classes, range(seed, seed + trials))
 
 
-def run_case(class_name: str, seed: int, folder: Path) -> Trial:
-    """Takes an object of a class, carries it there and back and there again."""
+def run_case(class_name, seed, folder):
     near = PLACES[class_name]
     goals = (FAR[near], near, FAR[near])
     commands = (
@@ -119,11 +100,11 @@ def run_case(class_name: str, seed: int, folder: Path) -> Trial:
     held = mission.simulation.referee.objects[TARGET].holder is not None
     lost = taken and (way.lost_at_s is not None or not held)
     carried = taken and not lost and way.way_m >= CARRIED_M and doors(way.rooms) >= DOORS
-    return Trial(ended, taken, lost, way.lost_at_s, carried, round(way.way_m, 1), doors(way.rooms))
+    told = {"lost_at_s": way.lost_at_s, "way_m": round(way.way_m, 1), "doors": doors(way.rooms)}
+    return vars(ended) | {"taken": taken, "lost": lost, "carried": carried, **told}
 
 
-def summary(trials: Sequence[Trial]) -> dict[str, object]:
-    """Trials, and how many objects were lost and carried."""
+def summary(trials):
     return {"runs": trials, **totals(trials, "lost", "carried")}
 
 

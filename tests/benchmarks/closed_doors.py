@@ -8,47 +8,30 @@ least one, and no open door. `given_up_s`: the robot's time from when it had see
 failure. With `--detours`, that many more cases have one door of the room left open, and the robot arrives.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-
 import cv2
 import numpy as np
 
 from executive.record.history import read_history
 from executive.record.schemas import DOORS
-from executive.words.knowledge import Knowledge, load_knowledge
+from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
 from tests.benchmarks.harness import benchmark, totals
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.benchmarks.plant_mission import PlantMission
 
 WORLDS = ("flat", "shop", "lab")
 MOST_DOORS = 2
 LATEST_S, LIMIT_S = 10.0, 300.0
 WITHIN_S = 15.0
 BODY_M, JAMB_M = 0.2, 0.1
-Closing = tuple[tuple[str, str], float | None]
-"""Rooms of a door, and the time at which it closes (s); None: it stays open."""
 
 
-@dataclass(frozen=True)
-class Result:
-    """Result of a case; with a `detour` one door stays open."""
-
-    detour: bool
-    ended: Ended
-    named: bool
-    given_up_s: float | None
-
-
-def cases(first: int = 9840, count: int = 20, detours: int = 0) -> list[tuple[int, bool]]:
-    """Numbers of cases, without and with a detour."""
+def cases(first: int = 9840, count: int = 20, detours: int = 0):
     return [*((first + n, False) for n in range(count)), *((first + n, True) for n in range(detours))]
 
 
-def draw(number: int, *, detour: bool) -> tuple[str, str, list[Closing]]:
-    """World, room and doors of a case; with `detour` the first door of a room with two stays open."""
+def draw(number, *, detour):
+    """World, room, and its doors with the times (s) at which they close; None for the one that a detour leaves open."""
     rng = np.random.default_rng([number, 51, detour])
     while True:
         world = str(rng.choice(WORLDS))
@@ -62,7 +45,7 @@ def draw(number: int, *, detour: bool) -> tuple[str, str, list[Closing]]:
         return world, room, [(doors[n], None if detour and k == 0 else times[n]) for k, n in enumerate(order)]
 
 
-def is_cut_off(world: str, knowledge: Knowledge, room: str) -> bool:
+def is_cut_off(world, knowledge, room):
     """True if the doors of a room are its only ways in, from the robot's start, on the map."""
     grid = load_grid_map(load_world(world).keepout_map_path).with_unknown_blocked()
     free = grid.distance > BODY_M
@@ -78,8 +61,7 @@ def is_cut_off(world: str, knowledge: Knowledge, room: str) -> bool:
     return bool(here != there)
 
 
-def run_case(number: int, detour: bool, folder: Path) -> Result:
-    """Sends the robot to the room of a case."""
+def run_case(number, detour, folder):
     world, room, closings = draw(number, detour=detour)
     closes_s = {frozenset(door): at_s for door, at_s in closings if at_s is not None}
     events = "".join(f"  - {{door: {list(door)}, closes: {at_s}}}\n" for door, at_s in closings if at_s is not None)
@@ -87,7 +69,7 @@ def run_case(number: int, detour: bool, folder: Path) -> Result:
     scenario.write_text(f"events:\n{events}".replace("'", '"'))
     asked = {"sentence": f"go to the {room}", "scenario_files": (scenario,), "time_limit_s": LIMIT_S}
     ended = PlantMission(folder, number, world=world, **asked).end(f"{room} in {world}")
-    seen_s: dict[frozenset[str], float] = {}
+    seen_s = {}
     for event in read_history(folder / "log.mcap").events:
         for door in event.data["doors"] if event.topic == DOORS else ():
             if door["state"] == "closed" and frozenset(door["between"]) in closes_s:
@@ -95,22 +77,22 @@ def run_case(number: int, detour: bool, folder: Path) -> Result:
     every = [door.between for door in load_knowledge(load_world(world).knowledge_path).doors]
     named = {frozenset(door) for door in every if f"between the {door[0]} and the {door[1]}" in ended.message}
     given_up_s = round(ended.sim_time_s - max(seen_s.values()), 1) if seen_s else None
-    return Result(detour, ended, bool(named) and named == set(seen_s), given_up_s)
+    right = bool(named) and named == set(seen_s)
+    return vars(ended) | {"detour": detour, "named": right, "given_up_s": given_up_s}
 
 
-def summary(results: Sequence[Result]) -> dict[str, object]:
-    """Figures of the cases with all doors closed, and of the detours."""
+def summary(results):
     closed = [each for each in results if not each.detour]
     late = [each for each in closed if each.given_up_s is None or each.given_up_s > WITHIN_S]
     return {
         "closed": len(closed),
         **totals(closed, "named"),
         "given_up_s": sorted(each.given_up_s for each in closed if each.given_up_s is not None),
-        "given_up_late": [each.ended.seed for each in late],
-        "not_named": [each.ended.seed for each in closed if not each.named],
+        "given_up_late": [each.seed for each in late],
+        "not_named": [each.seed for each in closed if not each.named],
         "detours": len(results) - len(closed),
-        "arrived": sum(each.detour and each.ended.claimed for each in results),
-        "collisions": sum(each.ended.collisions for each in results),
+        "arrived": sum(each.detour and each.claimed for each in results),
+        "collisions": sum(each.collisions for each in results),
     }
 
 

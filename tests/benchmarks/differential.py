@@ -8,18 +8,19 @@ for its footprint, with 8 cm around, and can be planned to. A goal is reached wi
 
 import math
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
 from plant.worlds.world import load_world
-from skills.api import Costmap, PlanningError
+from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
 from skills.geometry import compose
 from skills.navigate.footprint import Footprint, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner
 from skills.robot import BaseKind, Pose2D
-from skills.stack import ControllerComponent, components
+from skills.stack import components
 from tests.benchmarks.driving import TICK_S, free_poses, maps_of, within
 from tests.benchmarks.harness import command, tell, totals
 
@@ -29,27 +30,11 @@ CORNERS = [(HALF_M, HALF_M), (-HALF_M, HALF_M), (-HALF_M, -HALF_M), (HALF_M, -HA
 BASE = replace(Footprint.rectangle(CORNERS), base_kind=BaseKind.DIFFERENTIAL)
 
 
-@dataclass(frozen=True)
-class Driven:
-    """One drive: whether it reached its goal, the time (s), the least clearance (m), all commands (N, 3)."""
+def drive(costmap, footprint, start, goal, controller, *, limit_s=180.0):
+    """Plans once and follows until the base stands at the goal: time (s), least clearance (m), all commands (N, 3).
 
-    reached: bool
-    time_s: float
-    least_m: float
-    commands: np.ndarray
-    pose: Pose2D
-
-
-def drive(
-    costmap: Costmap,
-    footprint: Footprint,
-    start: Pose2D,
-    goal: Pose2D,
-    controller: ControllerComponent,
-    *,
-    limit_s: float = 180.0,
-) -> Driven:
-    """Plans once and follows until the base stands at the goal. Raises PlanningError."""
+    Raises PlanningError.
+    """
     path = LatticePlanner().problem(costmap, footprint, start, goal, max_speed_m_s=SPEED_M_S)()
     follower = controller.build(path, footprint, max_speed_m_s=SPEED_M_S)
     pose, velocity, last, commands, least_m = start, np.zeros(3), np.zeros(3), [], math.inf
@@ -63,21 +48,20 @@ def drive(
         near = within(goal, pose, (0.4 * REACHED[0], 0.4 * REACHED[1]))
         if near and float(np.max(np.abs(velocity))) < 0.05:
             break
-    return Driven(within(goal, pose, REACHED), TICK_S * len(commands), least_m, np.array(commands), pose)
+    ended = {"reached": within(goal, pose, REACHED), "pose": pose, "least_m": least_m}
+    return SimpleNamespace(**ended, time_s=TICK_S * len(commands), commands=np.array(commands))
 
 
 def measure(
     goals: int = 30, worlds: tuple[str, ...] = ("shop", "lab"), seed: int = 1, controller: str = "path_follower"
-) -> list[dict[str, object]]:
-    """Drives from goal to goal in each world."""
+):
     return [measure_world(each, goals, seed, components("controller")[controller]()) for each in worlds]
 
 
-def measure_world(world: str, count: int, seed: int, controller: ControllerComponent) -> dict[str, object]:
-    """Drives from goal to goal in a world."""
+def measure_world(world, count, seed, controller):
     grid = maps_of(load_world(world))[1]
     costmap, poses = LayeredCostmap(grid), free_poses(grid, BASE, seed)
-    here, drives, no_way = next(poses), list[Driven](), 0
+    here, drives, no_way = next(poses), [], 0
     begun = time.perf_counter()
     while len(drives) < count:
         goal = next(poses)

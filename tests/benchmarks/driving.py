@@ -5,9 +5,9 @@ Shared by the benchmarks of navigation: tick by tick as the runner does it, with
 
 import math
 import time
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from executive.run.worker import LockStepWorker
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import spot_capabilities
 from plant.simulation import Simulation
-from plant.worlds.world import World
 from skills.api import Failed, PlanningError, Running, SkillContext
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import GridMap, load_grid_map
@@ -24,10 +23,9 @@ from skills.geometry import relative_pose
 from skills.navigate.footprint import Footprint, footprint_clear
 from skills.navigate.planner import plan_path
 from skills.navigate.sensor_watch import WatchOptions
-from skills.navigate.skill import Navigate, NavigateInputs
+from skills.navigate.skill import Navigate
 from skills.navigate.surroundings import NavigateOptions
 from skills.robot import Pose2D
-from skills.stack import RobotStack
 
 TICK_S, ROBOT = 0.05, "Alice"
 SPOT = Footprint.of(spot_capabilities())
@@ -35,14 +33,11 @@ Maps = tuple[GridMap, GridMap]
 """Scan and keep-out grid."""
 
 
-def maps_of(world: World) -> Maps:
-    """The grids of a world that its robot is given."""
+def maps_of(world):
     return load_grid_map(world.scan_map_path), load_grid_map(world.keepout_map_path).with_unknown_blocked()
 
 
-def free_poses(
-    grid: GridMap, footprint: Footprint, seed: int, accept: Callable[[Pose2D], bool] = lambda pose: True
-) -> Iterator[Pose2D]:
+def free_poses(grid, footprint, seed, accept=lambda pose: True):
     """Random poses that the footprint fits at with 8 cm around it."""
     rng, costmap = np.random.default_rng([seed, 27]), LayeredCostmap(grid)
     free = grid.centres(np.argwhere(grid.distance > footprint.inscribed_m))
@@ -53,37 +48,10 @@ def free_poses(
             yield pose
 
 
-def within(goal: Pose2D, pose: Pose2D, limits: tuple[float, float]) -> bool:
+def within(goal, pose, limits):
     """True if a pose is that near (m, rad) to a goal."""
     off = relative_pose(goal, pose)
     return math.hypot(off.x_m, off.y_m) <= limits[0] and abs(off.yaw_rad) <= limits[1]
-
-
-@dataclass(frozen=True)
-class Trip:
-    """One drive: its end as the skill reports it, when it stood (s), the true poses (N, 3) a tick apart, what it hit.
-
-    `planning_ms` and `control_ms` are wall times of single plans and control steps.
-    """
-
-    message: str
-    succeeded: bool
-    time_s: float
-    poses: np.ndarray
-    estimate: Pose2D
-    hits: tuple[str, ...]
-    planning_ms: tuple[float, ...]
-    control_ms: tuple[float, ...]
-
-    @property
-    def path_m(self) -> float:
-        """Length of the path that the robot really went."""
-        return float(np.sum(np.hypot(*np.diff(self.poses[:, :2], axis=0).T)))
-
-    @property
-    def pose(self) -> Pose2D:
-        """Pose at which the robot really stands."""
-        return Pose2D(*self.poses[-1].tolist())
 
 
 @dataclass
@@ -93,22 +61,22 @@ class Timed:
     component: Any
     took_ms: list[float] = field(default_factory=list)
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self.component, name)
 
-    def problem(self, *arguments: Any, **named: Any) -> Callable[[], Any]:
+    def problem(self, *arguments, **named):
         begun = time.perf_counter()
         plan = self.component.problem(*arguments, **named)
         return self._timed(plan, time.perf_counter() - begun)
 
-    def build(self, *arguments: Any, **named: Any) -> "Timed":
+    def build(self, *arguments, **named):
         return Timed(self.component.build(*arguments, **named), self.took_ms)
 
-    def command(self, *arguments: Any, **named: Any) -> Any:
+    def command(self, *arguments, **named):
         return self._timed(lambda: self.component.command(*arguments, **named), 0.0)()
 
-    def _timed(self, work: Callable[[], Any], before_s: float) -> Callable[[], Any]:
-        def timed() -> Any:
+    def _timed(self, work, before_s):
+        def timed():
             begun = time.perf_counter()
             try:
                 return work()
@@ -121,7 +89,7 @@ class Timed:
 class Driver:
     """One Spot at the start of a world, which is given maps."""
 
-    def __init__(self, world: World, stack: RobotStack, maps: Maps, *, seed: int) -> None:
+    def __init__(self, world, stack, maps, *, seed):
         robots = [PlacedRobot(ROBOT, "spot", world.start, world.dock)]
         self.simulation = Simulation(world, seed=seed, visuals=False, robots=robots)
         self.planner, self.controller = Timed(stack.planner), Timed(stack.controller)
@@ -145,19 +113,22 @@ class Driver:
         with suppress(PlanningError):
             plan_path(self.context.costmap, SPOT, self.context.pose(), self.context.pose())
 
-    def tick(self) -> None:
-        """Lets a tick's time pass, and updates the estimators."""
+    def tick(self):
         self.simulation.clock.advance(TICK_S)
         self.context.localiser.update(self.context.robot)
         self.context.costmap.update(self.context.robot, self.context.localiser.estimate())
 
-    def go(self, inputs: NavigateInputs, *, limit_s: float = 120.0, cancel_at_s: float = math.inf) -> Trip:
-        """Goes to a pose; `cancel_at_s` ends the skill so long after its begin, and the trip once the robot stands."""
+    def go(self, inputs, *, limit_s=120.0, cancel_at_s=math.inf):
+        """Goes to a pose; `cancel_at_s` ends the skill so long after its begin, and the trip once the robot stands.
+
+        Returns the end as the skill reports it, when the robot stood (s), the true poses (N, 3) a tick apart with the
+        last pose and their length, what it hit, and the wall times of single plans and control steps (ms).
+        """
         clock, collisions = self.simulation.clock, len(self.simulation.referee.collisions)
         planned, controlled = len(self.planner.took_ms), len(self.controller.took_ms)
         skill, begun_s, poses = Navigate(self.context), clock.now(), [self.simulation.true_pose(ROBOT)]
         skill.begin(inputs)
-        step: Any = Running("begins")
+        step = Running("begins")
         while isinstance(step, Running) and clock.now() - begun_s < min(limit_s, cancel_at_s):
             self.tick()
             poses.append(self.simulation.true_pose(ROBOT))
@@ -169,11 +140,14 @@ class Driver:
                 break
             self.tick()
             poses.append(self.simulation.true_pose(ROBOT))
-        return Trip(
+        path = np.array([(p.x_m, p.y_m, p.yaw_rad) for p in poses])
+        return SimpleNamespace(
             message=getattr(step, "message", "") or str(step),
             succeeded=not isinstance(step, Running | Failed),
             time_s=clock.now() - begun_s,
-            poses=np.array([(p.x_m, p.y_m, p.yaw_rad) for p in poses]),
+            poses=path,
+            pose=poses[-1],
+            path_m=float(np.sum(np.hypot(*np.diff(path[:, :2], axis=0).T))),
             estimate=self.context.pose(),
             hits=tuple(bump.sentence for bump in self.simulation.referee.collisions[collisions:]),
             planning_ms=tuple(self.planner.took_ms[planned:]),

@@ -11,82 +11,57 @@ time.
 import hashlib
 import json
 import lzma
+import shlex
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Literal
 
-from executive.record.history import Event, read_events
+from executive.record.history import read_events
 from tests.benchmarks.errand_process import ROOT, errand, kill_at, run_errand
 from tests.benchmarks.harness import command, tell
 
-MOST_DIFFERENCES: Final = 5
-RESUMED_AT_S: Final = 50.0
-VOLATILE: Final = frozenset({"versions", "wall_time_s", "real_time_factor", "bytes_logged", "log", "report", "page"})
+MOST_DIFFERENCES = 5
+RESUMED_AT_S = 50.0
+VOLATILE = frozenset({"versions", "wall_time_s", "real_time_factor", "bytes_logged", "log", "report", "page"})
 """What a result or a message tells that is not the same in two equal runs."""
-LEFT_OUT: Final = frozenset({"wall", "map"})
+LEFT_OUT = frozenset({"wall", "map"})
 """Topics of wall time, and of what stands in the world's files anyway."""
-TOLD_WHOLE: Final = frozenset({"transitions", "answer", "speech", "run", "taskChannel", "missions"})
+TOLD_WHOLE = frozenset({"transitions", "answer", "speech", "run", "taskChannel", "missions"})
 """Topics whose messages are kept, so that a difference can be shown; of all others a digest is."""
 
-Words = Sequence[str]
-
-
-@dataclass(frozen=True)
-class Case:
-    """One run: what `errand` is told, first what is queued; with `resumed` it is killed once and resumed."""
-
-    run: Words
-    queued: Sequence[Words] = ()
-    resumed: bool = False
-
-
-def _say(sentence: str, *more: str, seed: int = 1) -> Words:
-    return ("run", "--say", sentence, "--seed", str(seed), *more)
-
-
-CASES: Final[Mapping[str, Case]] = {
-    "fetch": Case(_say("fetch me a coke")),
-    "deliver": Case(("run", "missions/deliver.yaml", "--seed", "2")),
-    "decisions": Case(
-        _say("if there is a beer in the kitchen, take it to the coffee table, otherwise go to the office", seed=3)
-    ),
-    "together": Case(("run", "missions/speak_while_driving.yaml", "--seed", "4")),
-    "ask": Case(("run", "missions/tea_or_coffee.yaml", "--seed", "5", "--answer", "coffee", "--answer", "two")),
-    "two_robots": Case(("run", "missions/two_robots.yaml", "--seed", "6")),
-    "fleet": Case(
-        ("fleet", "run", "{out}", "--robots", "alice=spot,carol=spot,bob=fetch,dave=fetch", "--seed", "7"),
-        queued=tuple(
-            ("queue", "add", "--store", "{out}/missions.sqlite", "--say", sentence)
-            for sentence in ("go to the office", "take a coke to the desk", "go to the bedroom", "go to the hall")
-        ),
-    ),
-    "shop": Case(_say("bring me a beer", "--world", "shop", seed=8)),
-    "lab": Case(_say("go to the storage", "--world", "lab", seed=9)),
-    "resume": Case(_say("fetch me a drink from the kitchen", seed=10), resumed=True),
-    "fault": Case(_say("fetch me a coke", "--fault", "camera.hand: dropout 5 s at 20 s", seed=11)),
-    "question": Case(_say("is there a beer in the kitchen?", seed=12)),
+QUEUED = ("go to the office", "take a coke to the desk", "go to the bedroom", "go to the hall")
+"""Sentences in the queue of the run `fleet`; the run `resume` is killed once and resumed."""
+CASES = {
+    "fetch": "run --say 'fetch me a coke' --seed 1",
+    "deliver": "run missions/deliver.yaml --seed 2",
+    "decisions": "run --seed 3 --say "
+    "'if there is a beer in the kitchen, take it to the coffee table, otherwise go to the office'",
+    "together": "run missions/speak_while_driving.yaml --seed 4",
+    "ask": "run missions/tea_or_coffee.yaml --seed 5 --answer coffee --answer two",
+    "two_robots": "run missions/two_robots.yaml --seed 6",
+    "fleet": "fleet run {out} --robots alice=spot,carol=spot,bob=fetch,dave=fetch --seed 7",
+    "shop": "run --say 'bring me a beer' --seed 8 --world shop",
+    "lab": "run --say 'go to the storage' --seed 9 --world lab",
+    "resume": "run --say 'fetch me a drink from the kitchen' --seed 10",
+    "fault": "run --say 'fetch me a coke' --seed 11 --fault 'camera.hand: dropout 5 s at 20 s'",
+    "question": "run --say 'is there a beer in the kitchen?' --seed 12",
 }
 
 
-def run_case(case: Case, out: Path) -> dict[str, Any]:
+def run_case(name, out):
     """Runs a case in an empty folder; returns its exit code, result and events."""
-
-    def words(*given: str) -> list[str]:
-        return [word.format(out=out) for word in given]
-
-    for each in case.queued:
-        ended = run_errand(*words(*each))
+    for sentence in QUEUED if name == "fleet" else ():
+        ended = run_errand("queue", "add", "--store", out / "missions.sqlite", "--say", sentence)
         if ended.returncode != 0:
             raise RuntimeError(ended.stderr)
-    fixed = ("--quiet", "--json", "--no-record")
-    run = words(*case.run, *fixed, "--out", str(out / "fleet" if case.queued else out))
-    if not case.resumed:
+    fixed, own = ("--quiet", "--json", "--no-record"), out / "fleet" if name == "fleet" else out
+    run = (*(word.format(out=out) for word in shlex.split(CASES[name])), *fixed, "--out", own)
+    if name != "resume":
         ended = run_errand(*run)
     else:
         process = subprocess.Popen(errand(*run), cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -100,14 +75,14 @@ def run_case(case: Case, out: Path) -> dict[str, Any]:
     }
 
 
-def steady(value: Any) -> Any:
+def steady(value):
     """What a result or message tells, without what differs between two equal runs."""
     if isinstance(value, Mapping):
         return {key: steady(each) for key, each in value.items() if key not in VOLATILE}
     return [steady(each) for each in value] if isinstance(value, list) else value
 
 
-def lines(events: Sequence[Event], out: str) -> Iterator[str]:
+def lines(events, out):
     """A line for each event: its moment (s), its topic, and what it tells or a digest of that."""
     for event in events:
         if event.topic not in LEFT_OUT and event.data.get("format") not in ("jpeg", "png"):
@@ -116,7 +91,7 @@ def lines(events: Sequence[Event], out: str) -> Iterator[str]:
             yield f"{event.stamp_s:.3f} {event.topic} {kept}"
 
 
-def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[str]:
+def differences(before, now):
     """What differs between a run as it was kept and as it is, in lines of the form `- before`, `+ now`."""
     for key in ("exit", "result"):
         if before[key] != now[key]:
@@ -129,16 +104,14 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> Iterator[s
                 yield f"log {number}, event {line} of {len(old)} and {len(new)}\n  - {mine}\n  + {other}"
 
 
-def keep(folder: Path, name: str) -> str:
-    """Do a run and write what came of it."""
+def keep(folder, name):
     folder.mkdir(parents=True, exist_ok=True)
     found = _timed(name)
     (folder / f"{name}.json.xz").write_bytes(lzma.compress(json.dumps(found).encode()))
     return f"{name}: exit {found['exit']}, {sum(map(len, found['logs']))} events"
 
 
-def compare(folder: Path, name: str) -> str:
-    """Do a run again and tell what differs."""
+def compare(folder, name):
     before = json.loads(lzma.decompress((folder / f"{name}.json.xz").read_bytes()))
     found = list(differences(before, _timed(name)))
     if not found:
@@ -146,17 +119,17 @@ def compare(folder: Path, name: str) -> str:
     return "\n".join([f"{name}: {len(found)} differences", *found[:MOST_DIFFERENCES]])
 
 
-def _timed(name: str) -> dict[str, Any]:
+def _timed(name):
     begun = time.perf_counter()
     with tempfile.TemporaryDirectory(prefix="errand-equal-") as folder:
-        found = run_case(CASES[name], Path(folder))
+        found = run_case(name, Path(folder))
     tell(f"{name}: {time.perf_counter() - begun:.0f} s")
     return found
 
 
-def main(what: Literal["keep", "compare"], folder: Path, only: tuple[str, ...] = tuple(CASES), jobs: int = 1) -> int:
+def main(what: Literal["keep", "compare"], folder: Path, only: tuple[str, ...] = tuple(CASES), jobs: int = 1):
     """Keeps or compares runs; returns 1 when one differs."""
-    work: Callable[[Path, str], str] = keep if what == "keep" else compare
+    work = keep if what == "keep" else compare
     all_equal = True
     with ThreadPoolExecutor(jobs) as threads:
         for line in threads.map(lambda name: work(folder, name), only):

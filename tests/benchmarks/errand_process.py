@@ -6,7 +6,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 from plant.diagram import TIME_STEP_S
 from plant.snapshot_file import SnapshotError, read_snapshot
@@ -14,23 +13,22 @@ from plant.snapshot_file import SnapshotError, read_snapshot
 ROOT = Path(__file__).parents[2]
 
 
-def errand(*words: object) -> list[str]:
+def errand(*words):
     """Command line of `errand` with some arguments."""
     return [sys.executable, "-m", "executive.cli", *map(str, words)]
 
 
-def run_errand(*words: object) -> subprocess.CompletedProcess[str]:
-    """Runs `errand` to its end."""
+def run_errand(*words):
     return subprocess.run(errand(*words), cwd=ROOT, capture_output=True, text=True, check=False)
 
 
-def report_of(text: str) -> dict[str, Any]:
+def report_of(text):
     """Report that `errand --json` prints last; empty without one."""
     lines = [line for line in text.splitlines() if line.startswith("{")]
     return dict(json.loads(lines[-1])) if lines else {}
 
 
-def kill_at(process: subprocess.Popen[bytes], out: Path, moment_s: float) -> bool:
+def kill_at(process, out, moment_s):
     """Kills a run when its plant's clock has come to the moment; False when the run ended before."""
     while process.poll() is None:
         try:

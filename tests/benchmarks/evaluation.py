@@ -30,12 +30,11 @@ from tests.benchmarks.harness import command
 SHORT = "Hey Alice, go to the living room"
 
 
-def runs_of(count: int) -> tuple[RunSpec, ...]:
-    """So many runs of a short mission."""
+def runs_of(count):
     return tuple(RunSpec(Request(SHORT, seed=seed), SHORT, {"light": str(seed % 3)}) for seed in range(count))
 
 
-def made_case(run: RunSpec) -> Case:
+def made_case(run):
     """A made result; every tenth has failed and has a timeline and a picture."""
     seed = run.request.seed
     rng, failed = random.Random(seed), seed % 10 == 0
@@ -50,8 +49,7 @@ def made_case(run: RunSpec) -> Case:
     return Case(run, report, {"navigate": 40.0, "detect": rng.uniform(1, 9)}, evidence, 1.0, "here:1")
 
 
-def report(results: int = 10_000) -> dict[str, object]:
-    """Times the report of so many results."""
+def report(results: int = 10_000):
     with tempfile.TemporaryDirectory() as folder:
         file, html, runs = Path(folder) / "r.sqlite", Path(folder) / "report.html", runs_of(results)
         with ResultsFile(file, create=True) as kept:
@@ -67,15 +65,14 @@ def report(results: int = 10_000) -> dict[str, object]:
         return {"results": results, "failures": failures, "took_s": took_s, "bytes": html.stat().st_size}
 
 
-def cheap(run: RunSpec) -> Case:
-    """A run that takes 0.05 s, with its process."""
+def cheap(run):
     time.sleep(0.05)
     return replace(made_case(run), worker=str(os.getpid()))
 
 
-def kill(runs: int = 200) -> dict[str, int]:
+def kill(runs: int = 200):
     """Kills two workers while they work, and counts what the results file holds."""
-    found, landed, killed = Counter[str](), Counter[str](), list[str]()
+    found, landed, killed = Counter(), Counter(), []
     with (
         tempfile.TemporaryDirectory() as folder,
         local_cluster(2) as workers,
@@ -94,7 +91,7 @@ def kill(runs: int = 200) -> dict[str, int]:
     return {"runs": runs, "killed": len(killed), "lost": lost, "doubled": doubled}
 
 
-def cluster(runs: int = 60) -> dict[str, object]:
+def cluster(runs: int = 60):
     """Times the same runs by one worker and by two, each warmed by two missions."""
     walls, overheads, digests = {}, {}, {}
     for number in (1, 2):

@@ -10,38 +10,26 @@ wrench is left out unless it is named: from the height of the head it is seen to
 
 import re
 from collections import Counter
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from executive.app.evaluate.summary import Rate
 from executive.words.robot_config import RobotConfig
 from tests.benchmarks.harness import benchmark, totals
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.benchmarks.plant_mission import PlantMission
 
-TIME_LIMIT_S: Final = 420.0
-PERSON: Final = "Robin"
-THINGS: Final = ("beer", "coke", "cube", "cylinder", "hammer", "screwdriver")
-SURFACES: Final = (
-    "kitchen counter",
-    "kitchen table",
-    "coffee table",
-    "sideboard",
-    "night stand",
-    "dresser",
-    "bathroom cabinet",
-    "workbench",
-    "tool trolley",
-    "desk",
-    "hall console",
+TIME_LIMIT_S = 420.0
+PERSON = "Robin"
+THINGS = ("beer", "coke", "cube", "cylinder", "hammer", "screwdriver")
+SURFACES = (
+    *("kitchen counter", "kitchen table", "coffee table", "sideboard", "night stand", "dresser", "bathroom cabinet"),
+    *("workbench", "tool trolley", "desk", "hall console"),
 )
 
 
 def cases(
     first: int = 0, count: int = 5, things: tuple[str, ...] = THINGS, goals: tuple[str, ...] = (PERSON, *SURFACES)
-) -> list[tuple[str, int]]:
+):
     """Sentences with their numbers; a person is the goal as often as all surfaces among `goals` together."""
     surfaces, drawn = [goal for goal in goals if goal != PERSON], []
     for number in range(first, first + count):
@@ -54,20 +42,17 @@ def cases(
     return drawn
 
 
-def run_case(sentence: str, number: int, folder: Path) -> Ended:
-    """Runs one mission."""
+def run_case(sentence, number, folder):
     robots = (RobotConfig("bob", "fetch"),)
     mission = PlantMission(folder, number, sentence=sentence, world="flat", time_limit_s=TIME_LIMIT_S, robots=robots)
     return mission.end(sentence)
 
 
-def touched(events: Sequence[str]) -> list[str]:
-    """Names of what the robot hit: a hand that takes what lies feels for the surface below it."""
+def touched(events):
     return [found[1] for event in events if (found := re.search(r" hit (?:the )?(.+) at [\d.]+ s", event))]
 
 
-def summary(results: Sequence[Ended]) -> dict[str, object]:
-    """Figures of the missions."""
+def summary(results):
     fulfilled = Rate(sum(each.fulfilled is True for each in results), len(results))
     failed = [each for each in results if not each.fulfilled]
     return {

@@ -9,21 +9,17 @@ as it is told carries a camera that renders the room, and `--true-boxes` gives i
 
 import math
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
 
 import cv2
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from errand_train.dataset.compose import Placed, Scene, compose
+from errand_train.dataset.compose import Placed, compose
 from errand_train.dataset.lighting import random_lighting
-from errand_train.dataset.objects import CLASSES, DISTRACTORS, ObjectModel, instance, numbers
+from errand_train.dataset.objects import CLASSES, DISTRACTORS, instance, numbers
 from errand_train.dataset.render import is_validation
 from errand_train.dataset.resting import choose_pose, resting_poses
-from errand_train.dataset.room import Support
 from errand_train.dataset.views import View, camera_specs
 from executive.app.placed_robots import shared_detector
 from executive.app.worlds import open_world
@@ -32,18 +28,18 @@ from plant.engine import Engine
 from plant.robots.robot_kind import PlacedRobot
 from plant.robots.spot.kind import spot_capabilities
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
-from skills.api import Detection, Surface
+from skills.api import Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.estimate.localiser import ScanMatchingLocaliser
 from skills.geometry import inside_polygon
-from skills.robot import FloatArray, FrameTree, Image, Picture, Pose2D
+from skills.robot import FrameTree, Image, Pose2D
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot, Start
 from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
-from tests.benchmarks.harness import benchmark, quantile, share
+from tests.benchmarks.harness import benchmark, by, for_each, quantile, share
 from tests.benchmarks.position_scenes import DepthStage, truths, well_seen
 
 LYING_ABOUT = tuple(name for name in CLASSES if name not in ("person", "extinguisher"))
@@ -52,21 +48,7 @@ RIGHT_WITHIN_M, TRIES, ROOM_TRIES = 0.12, 200, 40
 HEIGHTS_M, LEAST_ROOM_M = (0.35, 1.05), 0.4
 
 
-@dataclass(frozen=True)
-class Asked:
-    """One question and its answer; `off_m` is the error of the object's middle."""
-
-    world: str
-    class_name: str
-    there: bool
-    right: bool
-    claimed: bool
-    off_m: float | None
-    message: str
-    wall_s: float
-
-
-def ask(world: str, bench: SkillBench, surface: Surface, name: str, places: Sequence[FloatArray]) -> Asked:
+def ask(world, bench, surface, name, places):
     """Asks for a class whose objects stand at some places, none where it is absent."""
     begun = time.perf_counter()
     run, off_m = bench.run(Detect, DetectInputs((name,), (surface,))), None
@@ -74,26 +56,24 @@ def ask(world: str, bench: SkillBench, surface: Surface, name: str, places: Sequ
         seen = np.array(run.outputs["observation"].position_W)
         off_m = min((float(np.linalg.norm(seen - place)) for place in places), default=None)
     right = off_m is not None and off_m < RIGHT_WITHIN_M if places else not claimed and f"no {name} seen" in run.message
-    wall_s = round(time.perf_counter() - begun, 1)
-    return Asked(world, name, bool(places), right, claimed, off_m, run.message, wall_s)
+    asked = {"world": world, "class_name": name, "there": bool(places)}
+    told = {"message": run.message, "wall_s": round(time.perf_counter() - begun, 1)}
+    return asked | told | {"right": right, "claimed": claimed, "off_m": off_m}
 
 
-def middle(placed: Placed) -> FloatArray:
-    """Middle of an object's bounding box in the world."""
+def middle(placed):
     points = placed.model.surface.points
     return np.asarray(placed.X_WO @ (0.5 * (points.min(axis=0) + points.max(axis=0))))
 
 
-def held_out_instance(rng: np.random.Generator, category: str) -> ObjectModel:
+def held_out_instance(rng, category):
     """A random instance of a category that served not in training."""
     return instance(str(category), int(rng.choice(numbers(str(category), for_training=False))))
 
 
-def scattered(
-    rng: np.random.Generator, models: Sequence[ObjectModel], surface: Surface, pose: Pose2D
-) -> Iterator[Placed]:
+def scattered(rng, models, surface, pose):
     """Objects laid on a surface where they fit, clear of each other and not too far from the robot."""
-    corners, taken = np.asarray(surface.polygon_W), list[tuple[FloatArray, float]]()
+    corners, taken = np.asarray(surface.polygon_W), []
     for model in models:
         rest = choose_pose(rng, model, resting_poses(model))
         points = model.surface.points @ rest.R.T
@@ -110,7 +90,7 @@ def scattered(
                 break
 
 
-def in_flat(seed: int, number: int) -> Iterator[Asked]:
+def in_flat(seed, number):
     """One placement in the flat: two classes and three other objects on one surface."""
     rng, world = np.random.default_rng([seed, number, 11]), open_world("flat")
     surface = surface_of(str(rng.choice(SURFACES)))
@@ -140,25 +120,24 @@ class TrueBoxes:
 
     class_names = CLASSES
 
-    def __init__(self) -> None:
-        self.latest: tuple[Detection, ...] = ()
+    def __init__(self):
+        self.latest = ()
 
-    def detect(self, pictures: Sequence[Picture]) -> list[tuple[Detection, ...]]:
+    def detect(self, pictures):
         return [self.latest for _ in pictures]
 
 
 class RoomRobot(ScriptedRobot):
     """A robot whose arm moves as it is told, in a rendered room. `boxes` is told what its pictures show."""
 
-    def __init__(self, clock: VirtualClock, stage: DepthStage, pose: Pose2D, seed: int, boxes: TrueBoxes) -> None:
+    def __init__(self, clock, stage, pose, seed, boxes):
         super().__init__(clock, capabilities=spot_capabilities(), start=Start(pose))
         self._stage, self._spec, self._X_WO, self._boxes = stage, camera_specs()["hand"], pose.transform(), boxes
         rng, lens = np.random.default_rng([seed, 5]), self._spec.intrinsics()
         self._degrade = PictureDegrader(rng, lens.height, lens.width, PictureNoise())
         self._degrade_depth = DepthDegrader(rng, lens, self._spec.depth_range_m, DepthNoise())
 
-    def image(self, source: str, *, visual: bool = True, depth: bool = True) -> Image:
-        """A rendered picture."""
+    def image(self, source, *, visual=True, depth=True):
         edges = {"body": ("odom", self._X_OB()), "hand": ("body", self.arm.X_BH(self.q_rad))}
         frames = FrameTree({**edges, "hand_camera": ("hand", self._spec.X_link_camera())})
         lens = self._spec.intrinsics()
@@ -171,14 +150,13 @@ class RoomRobot(ScriptedRobot):
         return Image(stamp_s, source, "hand_camera", lens, lens, colour, grey, noisy, frames)
 
 
-def room_bench(stage: Any, pose: Pose2D, detector: Any, seed: int, number: int) -> SkillBench:
-    """A bench with the robot of a rendered room."""
+def room_bench(stage, pose, detector, seed, number):
     clock, boxes = VirtualClock(), detector if isinstance(detector, TrueBoxes) else TrueBoxes()
     robot, place = RoomRobot(clock, stage, pose, seed, boxes), KnownPlace(pose)
     return SkillBench(robot, clock, localiser=place, costmap=BlockCostmap(), detector=detector, seed=number)
 
 
-def in_room(seed: int, index: int, number: int, detector: Any, folder: Path) -> Iterator[Asked]:
+def in_room(seed, index, number, detector, folder):
     """One placement in a generated room: what the room's maker laid on one of its supports."""
     rng, scene, (surface, pose, objects) = room_of(seed, index)
     stage = DepthStage(replace(scene, held=None), random_lighting(rng, scene.room), folder, 1.0)
@@ -191,17 +169,14 @@ def in_room(seed: int, index: int, number: int, detector: Any, folder: Path) -> 
         yield ask("room", bench, surface, str(rng.choice(absent)), [])
 
 
-Placement = tuple[Surface, Pose2D, list[Placed]]
-
-
-def room_of(seed: int, index: int) -> tuple[np.random.Generator, Scene, Placement | None]:
+def room_of(seed, index):
     """A generated room, and a support before which the robot can stand with objects of the classes on it, if any."""
     rng = np.random.default_rng([seed, index, 13])
     scene = compose(rng, index, for_training=False)
     return rng, scene, next(_choices(rng, scene), None)
 
 
-def _choices(rng: np.random.Generator, scene: Scene) -> Iterator[Placement]:
+def _choices(rng, scene):
     for k in rng.permutation(len(scene.room.supports)):
         support = scene.room.supports[k]
         if not HEIGHTS_M[0] < support.height_m < HEIGHTS_M[1] or support.room_m < LEAST_ROOM_M:
@@ -216,7 +191,7 @@ def _choices(rng: np.random.Generator, scene: Scene) -> Iterator[Placement]:
                 yield surface, pose, near
 
 
-def _stands(scene: Scene, support: Support) -> Iterator[Pose2D]:
+def _stands(scene, support):
     """Free poses before each side of a support."""
     width, depth, _ = scene.room.size_m
     for quarter in range(4):
@@ -229,20 +204,17 @@ def _stands(scene: Scene, support: Support) -> Iterator[Pose2D]:
             yield Pose2D(x, y, yaw)
 
 
-def _blocks(low: FloatArray, high: FloatArray, foot: FloatArray) -> bool:
+def _blocks(low, high, foot):
     return bool(np.all(foot > low[:2] - 0.25) and np.all(foot < high[:2] + 0.25) and low[2] < 1.0)
 
 
-def _lies_on(thing: Placed, surface: Surface) -> bool:
+def _lies_on(thing, surface):
     points = np.asarray(thing.X_WO @ thing.model.surface.points.T).T
     on = inside_polygon(middle(thing)[None, :2], surface.polygon_W)[0]
     return bool(on and abs(points[:, 2].min() - surface.height_m) < 0.03)
 
 
-def cases(
-    flat: int = 5, rooms: int = 5, seed: int = 1, true_boxes: bool = False
-) -> Iterator[tuple[str, int, int, int, bool]]:
-    """Placements in the flat and in rooms by number and index; rooms where nothing fits are left out."""
+def cases(flat: int = 5, rooms: int = 5, seed: int = 1, true_boxes: bool = False):
     for number in range(flat):
         yield "flat", seed, 0, number, true_boxes
     number = 0
@@ -252,32 +224,28 @@ def cases(
             number += 1
 
 
-def run_case(world: str, seed: int, index: int, number: int, true_boxes: bool, folder: Path) -> list[Asked]:
-    """Asks about one placement."""
+def run_case(world, seed, index, number, true_boxes, folder):
     if world == "flat":
         return list(in_flat(seed, number))
     return list(in_room(seed, index, number, TrueBoxes() if true_boxes else shared_detector(), folder))
 
 
-def summary(placements: Sequence[Sequence[Asked]]) -> dict[str, object]:
-    """Shares of objects found and of absent objects reported absent, by world, and all questions."""
+def summary(placements):
     asked = [each for placement in placements for each in placement]
-    worlds = sorted({each.world for each in asked})
-    return {"summary": {w: figures([each for each in asked if each.world == w]) for w in worlds}, "asked": asked}
+    return {"summary": for_each("world", figures)(asked), "asked": asked}
 
 
-def figures(asked: Sequence[Asked]) -> dict[str, object]:
-    """Figures of one world."""
+def figures(asked):
     there, absent = ([each for each in asked if each.there is so] for so in (True, False))
-    classes = sorted({each.class_name for each in there})
-    by_class = {name: [each.right for each in there if each.class_name == name] for name in classes}
     return {
         "there": len(there),
         "found": share([each.right for each in there]),
         "absent": len(absent),
         "reported_absent": share([each.right for each in absent]),
         "off_m_median": quantile([each.off_m for each in there if each.right and each.off_m is not None], digits=4),
-        "found_by_class": {name: f"{sum(right)}/{len(right)}" for name, right in by_class.items()},
+        "found_by_class": {
+            name: f"{sum(each.right for each in own)}/{len(own)}" for name, own in by(there, "class_name").items()
+        },
     }
 
 

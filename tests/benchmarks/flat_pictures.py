@@ -10,10 +10,8 @@ and with `--scans STL_FOLDER` those that others scanned (`scanned_models.py`), t
 """
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -21,7 +19,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from errand_train.dataset.coco import document
 from errand_train.dataset.compose import ONLY_DISTRACTORS_EVERY, Placed
-from errand_train.dataset.objects import DISTRACTORS, ObjectModel
+from errand_train.dataset.objects import DISTRACTORS
 from errand_train.dataset.render import label_view
 from errand_train.dataset.resting import choose_pose, resting_poses
 from errand_train.dataset.silhouette import project
@@ -38,8 +36,7 @@ from errand_train.dataset.views import (
 from executive.app.worlds import knowledge_of, open_world
 from plant.scene_pictures import look_at
 from plant.sensors.noise import PictureDegrader, PictureNoise
-from skills.estimate.grid_map import GridMap, load_grid_map
-from skills.robot import FloatArray, Picture
+from skills.estimate.grid_map import load_grid_map
 from tests.benchmarks.find_things import LYING_ABOUT, held_out_instance, middle, scattered
 from tests.benchmarks.flat_scene import FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, supplied
@@ -52,42 +49,33 @@ HAND_HEIGHTS_M, REACH_M = (0.3, 1.5), 0.9
 LEAST_SHOWN_PX = 40
 
 
-@dataclass(frozen=True)
-class Supply:
-    """Source of objects: the categories that may lie about, those of no class, and a random one of a category."""
-
-    lying_about: Sequence[str]
-    others: Sequence[str]
-    take: Callable[[np.random.Generator, str], ObjectModel]
+HELD_OUT = SimpleNamespace(lying_about=LYING_ABOUT, others=DISTRACTORS, take=held_out_instance)
+"""Source of objects: categories that may lie about, those of no class, and a random one of a category."""
 
 
-HELD_OUT = Supply(LYING_ABOUT, DISTRACTORS, held_out_instance)
-
-
-def foreign_supply(folder: Path, catalogues: Path, scans: Path | None) -> Supply:
+def foreign_supply(folder, catalogues, scans):
     """Objects that others modelled, and with a folder of `scans` those that others scanned, written to a folder."""
     models = supplied(folder, catalogues)
     for category, more in (scanned(folder, scans) if scans is not None else {}).items():
         models[category] = [*models.get(category, ()), *more]
 
-    def take(rng: np.random.Generator, category: str) -> ObjectModel:
+    def take(rng, category):
         return models[category][int(rng.integers(len(models[category])))]
 
-    return Supply([name for name in LYING_ABOUT if name in models], (OTHERS,), take)
+    lying_about = [name for name in LYING_ABOUT if name in models]
+    return SimpleNamespace(lying_about=lying_about, others=(OTHERS,), take=take)
 
 
 class Stage(FlatScene):
-    """The flat with objects in it, by their labels in Drake's label images; `of_classes` are of the nine classes."""
-
-    def __init__(self, objects: Sequence[Placed]) -> None:
+    def __init__(self, objects):
         super().__init__([(each.model.path, each.X_WO) for each in objects])
         self.objects = dict(zip(self.bodies, objects, strict=True))
         self.of_classes = {label: each for label, each in self.objects.items() if each.model.class_id}
 
 
-def furnished(rng: np.random.Generator, free: GridMap, supply: Supply, *, bare: bool) -> Stage:
+def furnished(rng, free, supply, *, bare):
     """The flat with objects on some surfaces and on the floor; of no class if `bare`."""
-    objects, names = list[Placed](), sorted(knowledge_of(open_world("flat")).surfaces)
+    objects, names = [], sorted(knowledge_of(open_world("flat")).surfaces)
     for name in map(str, rng.choice(names, min(SURFACES_IN_USE, len(names)), replace=False)):
         pose = viewpoint_of(rng, name)
         classes = [] if bare else [str(each) for each in rng.choice(supply.lying_about, 3)]
@@ -96,8 +84,8 @@ def furnished(rng: np.random.Generator, free: GridMap, supply: Supply, *, bare: 
     return Stage([*objects, *(() if bare else _on_the_floor(rng, free, supply))])
 
 
-def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> Iterator[Placed]:
-    taken: list[FloatArray] = []
+def _on_the_floor(rng, free, supply):
+    taken = []
     for category in ("person", "extinguisher", str(rng.choice(supply.lying_about))):
         model = supply.take(rng, category)
         rest = choose_pose(rng, model, resting_poses(model))
@@ -110,13 +98,12 @@ def _on_the_floor(rng: np.random.Generator, free: GridMap, supply: Supply) -> It
         yield Placed(model, RigidTransform(RotationMatrix.ProjectToRotationMatrix(turned), [*xy, rest.height_m]))
 
 
-def _floor_points(free: GridMap, room_m: float) -> FloatArray:
-    """Points (N, 2) on the floor with so much room around."""
+def _floor_points(free, room_m):
     known = np.ones_like(free.occupied) if free.unknown is None else ~free.unknown
     return free.centres(np.argwhere((free.distance > room_m) & known))
 
 
-def views(rng: np.random.Generator, stage: Stage, free: GridMap) -> Iterator[View]:
+def views(rng, stage, free):
     """Views in which objects of the classes show, by turns; other objects where there are none."""
     targets = list(stage.of_classes) or list(stage.objects)
     order = rng.permutation(len(targets))
@@ -131,7 +118,7 @@ def views(rng: np.random.Generator, stage: Stage, free: GridMap) -> Iterator[Vie
             yield view
 
 
-def _shows(stage: Stage, view: View, label: int) -> bool:
+def _shows(stage, view, label):
     """Whether an object shows in the picture; one of no class need only lie before the camera."""
     thing = stage.objects[label]
     aim = view.X_WC.inverse() @ middle(thing)
@@ -141,7 +128,7 @@ def _shows(stage: Stage, view: View, label: int) -> bool:
     return not thing.model.class_id or int((stage.labels(view.X_WC, view.intrinsics) == label).sum()) >= LEAST_SHOWN_PX
 
 
-def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View | None:
+def _hand_view(rng, floor, thing):
     """The hand before the object, within the reach of a robot that stands where there is room; None where there is not.
 
     The object is anywhere in the picture, from as near as fits in to where it is but some pixels long.
@@ -155,7 +142,7 @@ def _hand_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> Vi
     return View("hand", X_WC, camera, False, False)
 
 
-def _body_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> View:
+def _body_view(rng, floor, thing):
     """The robot stands so that one of its body cameras looks about towards the object."""
     specs, aim = camera_specs(), middle(thing)
     spec = specs[str(rng.choice([name for name in specs if name != "hand"]))]
@@ -169,7 +156,7 @@ def _body_view(rng: np.random.Generator, floor: FloatArray, thing: Placed) -> Vi
     return View(spec.name, X_WB @ X_BC, camera, not spec.colour, False)
 
 
-def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, list[dict[str, Any]]]:
+def taken(rng, stage, view):
     """The picture (H, W, 3) RGB or (H, W) grey as the plant's camera gives it, and its labels."""
     lens, shrink = view.intrinsics, camera_specs()[view.camera].picture_shrink
     clean, labels = stage.colour(view.X_WC, lens), stage.labels(view.X_WC, lens)
@@ -179,7 +166,7 @@ def taken(rng: np.random.Generator, stage: Stage, view: View) -> tuple[Picture, 
     return picture, label_view(labelled, labels, view, RigidTransform(), picture)
 
 
-def shots(out: Path, seed: int, scenes: int, supply: Supply) -> Iterator[dict[str, Any]]:
+def shots(out, seed, scenes, supply):
     """Pictures written to a folder, with their entries; the same for the same seed."""
     free = load_grid_map(open_world("flat").surveyed.keepout_map_path)
     for index in range(scenes):
@@ -204,8 +191,7 @@ def write(
     foreign: Path | None = None,
     catalogues: Path = CATALOGUES,
     scans: Path | None = None,
-) -> dict[str, object]:
-    """Writes the pictures and their labels; counts them."""
+):
     if scans is not None and foreign is None:
         raise SystemExit("--scans goes with --foreign FOLDER, which models are written to")
     out.mkdir(parents=True, exist_ok=True)

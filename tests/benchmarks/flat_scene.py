@@ -1,32 +1,25 @@
 """Objects that lie in the flat, and pictures of them with the noise of a robot's cameras."""
 
-from collections.abc import Iterable
-from pathlib import Path
-
 import cv2
 import numpy as np
-from pydrake.math import RigidTransform
 
 from executive.app.worlds import knowledge_of, open_world
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
 from plant.rendering import RENDERER, render_parameters
-from plant.robots.robot_kind import PlacedRobot
-from plant.sensors.camera_spec import CameraSpec, colour_render_camera, depth_render_camera
+from plant.sensors.camera_spec import colour_render_camera, depth_render_camera
 from plant.sensors.noise import DepthDegrader, DepthNoise, PictureDegrader, PictureNoise
 from skills.api import Surface
-from skills.robot import FloatArray, FrameTree, Image, Intrinsics, Pose2D
+from skills.robot import FrameTree, Image, Pose2D
 
 SURFACES = ("coffee table", "sideboard", "dresser", "bathroom cabinet", "desk", "workbench", "kitchen counter")
 
 
-def surface_of(name: str) -> Surface:
-    """A surface of the flat by its name."""
+def surface_of(name):
     facts = knowledge_of(open_world("flat")).surfaces[name]
     return Surface(name, tuple((float(x), float(y)) for x, y in facts.polygon), facts.height)
 
 
-def viewpoint_of(rng: np.random.Generator, name: str) -> Pose2D:
-    """One of the viewpoints of a surface."""
+def viewpoint_of(rng, name):
     views = knowledge_of(open_world("flat")).surfaces[name].viewpoints
     view = views[int(rng.integers(len(views)))]
     return Pose2D(view.x, view.y, view.yaw)
@@ -35,7 +28,7 @@ def viewpoint_of(rng: np.random.Generator, name: str) -> Pose2D:
 class FlatScene:
     """The flat with models at poses; `bodies` are their labels in Drake's label images."""
 
-    def __init__(self, models: Iterable[tuple[Path, RigidTransform]], robots: Iterable[PlacedRobot] = ()) -> None:
+    def __init__(self, models, robots=()):
         loose = [LooseModel(f"thing{k}", file, X_WO, fixed=True) for k, (file, X_WO) in enumerate(models)]
         directives, parameters = open_world("flat").directives_path, render_parameters()
         self.built = build_diagram(
@@ -46,22 +39,22 @@ class FlatScene:
         self._query = self.built.scene.query_at(plant.GetPositions(plant.CreateDefaultContext()))
         self.bodies = [int(plant.GetBodyIndices(self.built.models[each.name])[0]) for each in loose]
 
-    def colour(self, X_WC: RigidTransform, lens: Intrinsics) -> np.ndarray:
+    def colour(self, X_WC, lens):
         """Clean picture (H, W, 3)."""
         picture = self._query.RenderColorImage(colour_render_camera(lens, RENDERER), self._frame, X_WC)
         return np.ascontiguousarray(picture.data[..., :3])
 
-    def labels(self, X_WC: RigidTransform, lens: Intrinsics) -> np.ndarray:
+    def labels(self, X_WC, lens):
         """Body of each pixel (H, W)."""
         picture = self._query.RenderLabelImage(colour_render_camera(lens, RENDERER), self._frame, X_WC)
         return np.array(picture.data[..., 0], dtype=np.int16)
 
-    def depth_m(self, X_WC: RigidTransform, lens: Intrinsics, range_m: tuple[float, float]) -> FloatArray:
+    def depth_m(self, X_WC, lens, range_m):
         """Clean depth (H, W) in m."""
         picture = self._query.RenderDepthImage(depth_render_camera(lens, RENDERER, range_m), self._frame, X_WC)
         return np.asarray(picture.data[..., 0], dtype=np.float32)
 
-    def image(self, rng: np.random.Generator, spec: CameraSpec, X_WC: RigidTransform) -> Image:
+    def image(self, rng, spec, X_WC):
         """Picture with depth as the plant's camera takes it."""
         lens, depth_lens = spec.intrinsics(), spec.depth_intrinsics()
         degrader = PictureDegrader(rng, lens.height, lens.width, PictureNoise(), spec.picture_shrink)

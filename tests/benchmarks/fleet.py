@@ -12,12 +12,7 @@ nothing is done twice: no object is lifted by both, and by the log no command is
 import re
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import groupby
-from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,12 +21,12 @@ from executive.app.fleet_run import run_fleet, simulated_fleet
 from executive.app.prepare import prepare
 from executive.app.simulated import SimulatedBackend
 from executive.mission.request import Request
-from executive.record.history import Event, read_events
+from executive.record.history import read_events
 from executive.run.outcome import Outcome
 from executive.store.missions import MissionState, MissionStore
 from executive.words.command import parse_command
 from executive.words.robot_config import RobotConfig
-from tests.benchmarks.harness import benchmark, totals
+from tests.benchmarks.harness import benchmark, for_each, totals
 from tests.benchmarks.tick_time import fetch, ticks_of_a_run
 
 NAMES = ("alice", "bob", "carol", "dave", "erin", "frank")
@@ -44,43 +39,14 @@ KILLED_S, STEPS_EACH, ROUNDS = (5.0, 110.0), 40, 5
 COMMAND_NODE = re.compile(r"[^/]+/[^/]+/(\d+)-[^/]+")
 
 
-@dataclass(frozen=True)
-class Result:
-    """Result of one run. `robot_h` are hours on the robots' clock, of all robots together."""
-
-    what: str
-    seed: int
-    missions: int
-    done: int
-    contacts: int
-    collisions: int
-    robot_h: float
-    wall_s: float
-    right: bool
-    rows: tuple[Mapping[str, Any], ...]
-    bumps: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Ticks:
-    """Mean CPU time of a cycle for one robot and for four (us), and their ratio."""
-
-    one_us: float
-    four_us: float
-    ratio: float
-    what: str = "ticks"
-
-
-def cases(
-    what: tuple[str, ...] = ("missions",), first: int = 3001, count: int = 1, robots: str = "2+2"
-) -> Iterator[tuple[str, int, str]]:
+def cases(what: tuple[str, ...] = ("missions",), first: int = 3001, count: int = 1, robots: str = "2+2"):
     """Kinds of runs with their seeds, and how many Spots and Fetches."""
     for each in what:
         for seed in range(first, first + (1 if each == "ticks" else count)):
             yield each, seed, robots if each == "missions" else "2+0"
 
 
-def sentences(seed: int, count: int, carries: int) -> list[str]:
+def sentences(seed, count, carries):
     """So many sentences, some of which carry an object to another place, in an order that the seed draws."""
     rng = np.random.default_rng([seed, count])
     things = rng.permutation(OBJECTS)[:carries]
@@ -89,10 +55,10 @@ def sentences(seed: int, count: int, carries: int) -> list[str]:
     return [str(sentence) for sentence in rng.permutation(said)]
 
 
-def run_case(what: str, seed: int, robots: str, folder: Path) -> Result | Ticks:
+def run_case(what, seed, robots, folder):
     """Runs sentences with a fleet; when Alice dies, it is right that all is done or told, and nothing twice."""
     if what == "ticks":
-        return time_ticks()
+        return {"what": what, **time_ticks()}
     spots, fetches = map(int, robots.split("+"))
     kinds = ["spot"] * spots + ["fetch"] * fetches
     configs = [RobotConfig(name, kind) for name, kind in zip(NAMES, kinds, strict=False)]
@@ -111,22 +77,22 @@ def run_case(what: str, seed: int, robots: str, folder: Path) -> Result | Ticks:
     assert isinstance(backend, SimulatedBackend)
     whole = [row for row in rows if row["part_of"] is None]
     bumps = tuple(bump.sentence for bump in backend.referee.collisions)
-    return Result(
-        what,
-        seed,
-        len(whole),
-        done=sum(bool(row["referee"] is not None and row["referee"]["success"]) for row in whole),
-        contacts=sum(bool(re.search(rf"(?:{names}).* hit (?:{names})", bump)) for bump in bumps),
-        collisions=len(bumps),
-        robot_h=backend.clock.now() * len(dispatch.robots) / 3600.0,
-        wall_s=wall_s,
-        right=what == "killed" and is_right(rows, backend, read_events(folder / "log.mcap")),
-        rows=tuple({key: row[key] for key in ("id", "robot", "outcome", "reassigned", "message")} for row in rows),
-        bumps=bumps,
-    )
+    return {
+        "what": what,
+        "seed": seed,
+        "missions": len(whole),
+        "done": sum(bool(row["referee"] is not None and row["referee"]["success"]) for row in whole),
+        "contacts": sum(bool(re.search(rf"(?:{names}).* hit (?:{names})", bump)) for bump in bumps),
+        "collisions": len(bumps),
+        "robot_h": backend.clock.now() * len(dispatch.robots) / 3600.0,
+        "wall_s": wall_s,
+        "right": what == "killed" and is_right(rows, backend, read_events(folder / "log.mcap")),
+        "rows": [{key: row[key] for key in ("id", "robot", "outcome", "reassigned", "message")} for row in rows],
+        "bumps": bumps,
+    }
 
 
-def is_right(rows: Sequence[Mapping[str, Any]], backend: SimulatedBackend, events: Iterable[Event]) -> bool:
+def is_right(rows, backend, events):
     """True if all is over, no claim is denied, no object was lifted by two robots and no command begun again."""
     twice = any(len({lift.robot for lift in each.lifts}) > 1 for each in backend.referee.objects.values())
     over = all(row["outcome"] not in (MissionState.QUEUED.value, MissionState.RUNNING.value) for row in rows)
@@ -134,16 +100,16 @@ def is_right(rows: Sequence[Mapping[str, Any]], backend: SimulatedBackend, event
     return over and not twice and all(r["referee"]["success"] is not False for r in claimed) and not begun_again(events)
 
 
-def begun_again(events: Iterable[Event]) -> list[str]:
+def begun_again(events):
     """Commands that a log has as begun again, by any robot, after they were done for good.
 
     A command is done for good when it was the last, or when the next one needs nothing in the gripper.
     """
-    told: Sequence[str] = ()
-    commands: dict[str, Sequence[str]] = {}
-    missions: dict[str, int] = {}
-    done: set[tuple[int, str]] = set()
-    again: list[str] = []
+    told = ()
+    commands = {}
+    missions = {}
+    done = set()
+    again = []
     for event in events:
         data = event.data
         if event.topic == "run":
@@ -165,9 +131,9 @@ def begun_again(events: Iterable[Event]) -> list[str]:
     return again
 
 
-def time_ticks() -> Ticks:
+def time_ticks():
     """Times the cycles of scripted robots that fetch something, one and four in turn."""
-    took_s: dict[int, list[float]] = {1: [], 4: []}
+    took_s = {1: [], 4: []}
     for robots in [*took_s] * ROUNDS:
         trees = [fetch(STEPS_EACH, robot=name.title()) for name in NAMES[:robots]]
         with tempfile.TemporaryDirectory() as folder:
@@ -175,17 +141,11 @@ def time_ticks() -> Ticks:
         assert result.outcome is Outcome.SUCCESS, result.worst.message
         took_s[robots] += cycles
     one_us, four_us = (1e6 * float(np.mean(each)) for each in took_s.values())
-    return Ticks(one_us, four_us, four_us / one_us)
+    return {"one_us": one_us, "four_us": four_us, "ratio": four_us / one_us}
 
 
-def summary(results: Sequence[Result | Ticks]) -> dict[str, object]:
-    """Figures of each kind of run."""
-    return {what: figures(list(each)) for what, each in groupby(results, attrgetter("what"))}
-
-
-def figures(results: Sequence[Any]) -> object:
-    """Figures of one kind of run."""
-    if isinstance(results[0], Ticks):
+def figures(results):
+    if results[0].what == "ticks":
         return results[0]
     sums = totals(results, "missions", "done", "contacts", "collisions", "robot_h", "wall_s", "right")
     done_share = round(sums["done"] / sums["missions"], 3)
@@ -193,4 +153,4 @@ def figures(results: Sequence[Any]) -> object:
 
 
 if __name__ == "__main__":
-    benchmark(cases, run_case, summary)
+    benchmark(cases, run_case, for_each("what", figures))

@@ -6,7 +6,6 @@ the size of each. They stay where they are; nothing of them is part of the proje
 
 import re
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -21,7 +20,7 @@ from skills.robot import FloatArray
 
 CATALOGUES = Path("/usr/share/sweethome3d/furniture")
 OTHERS = "other"
-CLASS_OF_NAME: Mapping[str, str] = {
+CLASS_OF_NAME = {
     "Extinguisher": "extinguisher",
     "Hammer": "hammer",
     "Screwdriver": "screwdriver",
@@ -55,7 +54,7 @@ class Entry:
     R: FloatArray
 
     @property
-    def category(self) -> str | None:
+    def category(self):
         """Its class, `other` for what is none of ours, None for what is left out."""
         if self.catalogue.stem == PEOPLE_CATALOGUE:
             stands = self.size_m[1] > LEAST_PERSON_M and not re.search("sitting|lying", self.name, re.IGNORECASE)
@@ -67,11 +66,11 @@ class Entry:
         return OTHERS if fits and solid and not NOT_OTHERS.search(f"{self.name} {self.path}") else None
 
 
-def entries(catalogue: Path) -> Iterator[Entry]:
+def entries(catalogue):
     """All things of a catalogue that have a size."""
     with zipfile.ZipFile(catalogue) as archive:
         text = archive.read("PluginFurnitureCatalog.properties").decode("latin-1")
-    facts: dict[int, dict[str, str]] = {}
+    facts = {}
     for key, number, value in re.findall(r"^(\w+)#(\d+)=(.*)$", text, re.MULTILINE):
         facts.setdefault(int(number), {})[key] = value.strip()
     for fact in facts.values():
@@ -93,7 +92,7 @@ class Wavefront:
     libraries: list[str] = field(default_factory=list)
 
 
-def read_wavefront(text: str) -> Wavefront:
+def read_wavefront(text):
     """Triangles of an OBJ file; faces of more corners become fans."""
     made, material = Wavefront(), ""
     rows = {"v": (made.points, 3), "vt": (made.textures, 2), "vn": (made.normals, 3)}
@@ -114,7 +113,7 @@ def read_wavefront(text: str) -> Wavefront:
     return made
 
 
-def _corner(text: str, counts: Sequence[int]) -> Corner:
+def _corner(text, counts):
     """Indices of a corner such as `3/1/2` or `-1//-1`; negative numbers count from the last of so many."""
     numbers = [int(each) if each else None for each in [*text.split("/"), "", ""][:3]]
     point, texture, normal = (
@@ -126,9 +125,8 @@ def _corner(text: str, counts: Sequence[int]) -> Corner:
     return point, texture, normal
 
 
-def read_materials(text: str) -> dict[str, dict[str, list[str]]]:
-    """Materials of an MTL file, each by its keys."""
-    made, name = dict[str, dict[str, list[str]]](), ""
+def read_materials(text):
+    made, name = {}, ""
     for line in text.splitlines():
         word, *rest = line.split() or [""]
         if word == "newmtl":
@@ -138,9 +136,9 @@ def read_materials(text: str) -> dict[str, dict[str, list[str]]]:
     return made
 
 
-def written(entry: Entry, number: int, category: str, folder: Path) -> ObjectModel:
+def written(entry, number, category, folder):
     """Writes the model of an entry to a folder of its own, in the size that its catalogue tells."""
-    draft, materials = Draft(np.random.default_rng(0)), dict[str, dict[str, list[str]]]()
+    draft, materials = Draft(np.random.default_rng(0)), {}
     with zipfile.ZipFile(entry.catalogue) as archive:
         source = read_wavefront(archive.read(str(entry.path)).decode("latin-1"))
         for library in source.libraries:
@@ -172,13 +170,13 @@ def written(entry: Entry, number: int, category: str, folder: Path) -> ObjectMod
     return kept_model(draft, category, number, entry.name, folder)
 
 
-def _chosen(values: Sequence[Sequence[float]], indices: Sequence[int | None], width: int) -> FloatArray:
+def _chosen(values, indices, width):
     """Values of the corners (N, 3, width) of triangles, zero where there is none."""
     every = np.array([*values, [0.0] * width])
     return every[[-1 if k is None else k for k in indices]].reshape(-1, 3, width)
 
 
-def kept_model(draft: Draft, category: str, number: int, name: str, folder: Path) -> ObjectModel:
+def kept_model(draft, category, number, name, folder):
     """Writes the model of a draft to a folder of its own; of no class where its category is none of the nine."""
     made = draft.finish(MASS_KG, on_floor=category == "person")
     x, y, z = (float(value) for value in made.mass.com)
@@ -189,9 +187,7 @@ def kept_model(draft: Draft, category: str, number: int, name: str, folder: Path
     return read_model(folder)
 
 
-def _paint(
-    draft: Draft, name: str, material: Mapping[str, Sequence[str]], archive: zipfile.ZipFile, folder: PurePosixPath
-) -> None:
+def _paint(draft, name, material, archive, folder):
     """Paints a material by its picture where the archive has it, else by its colour."""
     inside = str(folder / " ".join(material.get("map_Kd", [])))
     if "map_Kd" in material and inside in archive.namelist():
@@ -205,12 +201,12 @@ def _paint(
     draft.paint(name, colour if len(colour) == 3 else GREY)
 
 
-def supplied(folder: Path, catalogues: Path = CATALOGUES) -> dict[str, list[ObjectModel]]:
+def supplied(folder, catalogues=CATALOGUES):
     """Writes all models to a folder; returns them by category. Raises FileNotFoundError without the catalogues."""
     files = sorted(catalogues.glob("*.sh3f"))
     if not files:
         raise FileNotFoundError(f"{catalogues}: no catalogue *.sh3f; install Debian's sweethome3d-furniture")
-    made: dict[str, list[ObjectModel]] = {}
+    made = {}
     for entry in (entry for file in files for entry in entries(file)):
         category = entry.category
         if category is not None:

@@ -10,7 +10,6 @@ truth. The way gone is compared with the shortest one for the footprint. Every f
 
 import math
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,16 +18,15 @@ from executive.mission.load import load_stack
 from plant.worlds.builder.own import world_from_grid
 from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
 from plant.worlds.seeding import place_people
-from plant.worlds.world import World, load_world
+from plant.worlds.world import load_world
 from skills.api import PlanningError
 from skills.estimate.costmap import LayeredCostmap
-from skills.estimate.grid_map import GridMap
 from skills.geometry import relative_pose
 from skills.navigate.path import path_length
 from skills.navigate.planner import LatticePlanner, plan_path
 from skills.navigate.skill import NavigateInputs
 from skills.robot import Pose2D
-from tests.benchmarks.driving import SPOT, Driver, Trip, free_poses, maps_of, within
+from tests.benchmarks.driving import SPOT, Driver, free_poses, maps_of, within
 from tests.benchmarks.harness import command, quantile, tell
 
 OWN, TRUE = (0.05, math.radians(3.0)), (0.12, math.radians(4.0))
@@ -38,8 +36,7 @@ SPEEDS = {"forward_m_s": 1.0, "backward_m_s": 1.0, "lateral_m_s": 1.0, "turn_rad
 SHORTEST = LatticePlanner(**SPEEDS, soft_weight=1e-3, greed=1.0)
 
 
-def rooms_with_door(folder: Path) -> World:
-    """Two rooms side by side, a door in the wall between them."""
+def rooms_with_door(folder):
     rows, columns = round(ROOM_M / CELL_M), round(2.0 * ROOM_M / CELL_M)
     cells = np.full((rows, columns), FREE, dtype=np.uint8)
     edge, half, middle = round(0.1 / CELL_M), round(0.5 * DOOR_M / CELL_M), columns // 2
@@ -50,14 +47,12 @@ def rooms_with_door(folder: Path) -> World:
     return load_world(str(folder))
 
 
-def from_people(world: World, seed: int) -> Callable[[Pose2D], bool]:
-    """Test whether a pose is away from all people of a world."""
+def from_people(world, seed):
     people = [one.X_WO.translation()[:2] for one in place_people(world, seed)]
     return lambda pose: all(math.dist((pose.x_m, pose.y_m), each) >= FROM_PEOPLE_M for each in people)
 
 
-def shortest_m(grid: GridMap, start: Pose2D, goal: Pose2D) -> float | None:
-    """Length of the shortest path for the footprint on the map, None where there is none."""
+def shortest_m(grid, start, goal):
     try:
         return path_length(plan_path(LayeredCostmap(grid), SPOT, start, goal, SHORTEST))
     except PlanningError:
@@ -71,19 +66,18 @@ def run(
     stack: Path | None = None,
     speed: float = 0.8,
     doors: bool = False,
-) -> dict[str, object]:
+):
     """Measures drives to goals, at most at a speed (m/s)."""
     with tempfile.TemporaryDirectory() as folder:
         return measure(rooms_with_door(Path(folder)) if doors else load_world(world), goals, seed, stack, speed, doors)
 
 
-def measure(world: World, count: int, seed: int, stack: Path | None, most_m_s: float, doors: bool) -> dict[str, object]:
-    """Goes to so many goals."""
+def measure(world, count, seed, stack, most_m_s, doors):
     maps, right = maps_of(world), True
     driver = Driver(world, load_stack(stack), maps, seed=seed)
     far = from_people(world, seed)
 
-    def accept(pose: Pose2D) -> bool:
+    def accept(pose):
         """True away from people, and beyond the door."""
         nonlocal right
         beyond = not doors or ((pose.x_m > ROOM_M) == right and abs(pose.x_m - ROOM_M) >= 0.8)
@@ -91,7 +85,7 @@ def measure(world: World, count: int, seed: int, stack: Path | None, most_m_s: f
         right ^= fits
         return fits
 
-    trips: list[Trip] = []
+    trips = []
     reached = nowhere = 0
     off, ratios, misses, stops = [], [], [], []
     for goal in free_poses(maps[1], SPOT, seed, accept):

@@ -15,9 +15,7 @@ solver gave up.
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -30,11 +28,10 @@ from pydrake.geometry import (
     Cylinder,
     GeometrySet,
     ProximityProperties,
-    Shape,
 )
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.parsing import Parser
-from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlantConfig
 from pydrake.multibody.tree import PdControllerGains, PrismaticJoint, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
@@ -43,7 +40,6 @@ from plant.diagram import NEAR_RIGID, TIME_STEP_S
 from plant.models import urdf
 from plant.robots.servos import gripper_set_point
 from plant.robots.spot.description import FINGER_LINK, GRIPPER_JOINT, HAND_LINK, spot_facts
-from skills.robot import FloatArray
 from tests.benchmarks.harness import command, show
 
 DOTS = {
@@ -80,16 +76,15 @@ class Thing:
     friction: float = 0.6
 
     @property
-    def shape(self) -> Shape:
-        """Its shape; a cylinder is along z."""
+    def shape(self):
         return Cylinder(0.5 * self.size_m[2], self.size_m[1]) if self.round else Box(*self.size_m)
 
     @property
-    def pad_friction(self) -> float:
+    def pad_friction(self):
         """Friction coefficient between it and a pad of 1.0, as Drake combines them."""
         return 2.0 * self.friction / (1.0 + self.friction)
 
-    def patch_m(self) -> float:
+    def patch_m(self):
         """Mean distance (m) of the points of a pad's patch on it from the grip's middle."""
         x = 0.0 if self.round else min(0.5 * self.size_m[0], PAD_END_M - self.ahead_m)
         y = min(HALF_BREADTH_M, 0.5 * self.size_m[1])
@@ -114,7 +109,7 @@ THINGS = (
 class Bench:
     """The hand on a carriage and an object between its fingers, whose loads (torque and force in the world) are set."""
 
-    def __init__(self, pads: str, thing: Thing, step_s: float) -> None:
+    def __init__(self, pads, thing, step_s):
         builder = DiagramBuilder()
         config = MultibodyPlantConfig(
             time_step=step_s, discrete_contact_approximation="sap", use_sampled_output_ports=False
@@ -142,7 +137,7 @@ class Bench:
         self.load_W, self._force_n = np.zeros(6), 0.0
         self._begin()
 
-    def _add_carriage(self) -> None:
+    def _add_carriage(self):
         before = self.plant.world_body()
         self._slides = self.plant.AddModelInstance("carriage")
         for name, axis in zip("xyz", np.eye(3), strict=True):
@@ -152,7 +147,7 @@ class Bench:
             before = after
         self.plant.WeldFrames(before.body_frame(), self.hand.body_frame(), RigidTransform(self.R_WH, np.zeros(3)))
 
-    def _add_thing(self, rigid: bool) -> None:
+    def _add_thing(self, rigid):
         """Adds the object; its body's origin is the centre of mass."""
         thing, contact = self.thing, ProximityProperties()
         inertia = SpatialInertia(thing.mass_kg, np.zeros(3), UnitInertia.SolidBox(*thing.size_m))
@@ -164,7 +159,7 @@ class Bench:
         X_OS = RigidTransform(turn, np.array([0.0, thing.lever_m, 0.0]))
         self.plant.RegisterCollisionGeometry(self._thing, X_OS, thing.shape, "thing", contact)
 
-    def _begin(self) -> None:
+    def _begin(self):
         """Puts the object beside the fixed jaw and opens the finger about it."""
         gap_m = self.thing.size_m[2] + 2.0 * BESIDE_M
         self._open_rad = -2.0 * math.asin(0.5 * (gap_m + 0.01) / 0.125)
@@ -174,25 +169,23 @@ class Bench:
         self.plant.SetFreeBodyPose(self._context, self._thing, X_WO)
         self._X_HO = X_HO
 
-    def close(self, force_n: float) -> None:
-        """Closes the gripper on the weightless object."""
+    def close(self, force_n):
         self._force_n = force_n
         self.wait(CLOSING_S)
         self._X_HO = self.X_HO()
 
-    def weigh_down(self) -> None:
-        """Gives the object its weight."""
+    def weigh_down(self):
         weight_W = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -9.81 * self.thing.mass_kg])
         self.wait(LOADING_S, load_W=weight_W)
         self.load_W = weight_W
 
-    def wait(self, duration_s: float, shaken: int | None = None, load_W: FloatArray | None = None) -> None:
+    def wait(self, duration_s, shaken=None, load_W=None):
         """Steps for a time, or until the object is lost."""
         for _ in self.steps(duration_s, shaken, load_W):
             if self.slid_m() > LOST_M:
                 return
 
-    def steps(self, duration_s: float, shaken: int | None = None, load_W: FloatArray | None = None) -> Iterator[float]:
+    def steps(self, duration_s, shaken=None, load_W=None):
         """Steps while the hand is shaken along an axis, and a load grows from nothing; yields the part of the time."""
         began_s, gripper = self._root.get_time(), self.finger.model_instance()
         lead_rad = self._force_n * spot_facts()["gripper"]["tip_radius"] / FINGER_GAINS.p
@@ -213,35 +206,34 @@ class Bench:
             self._simulator.AdvanceTo(began_s + elapsed_s + self._step_s)
             yield part
 
-    def X_HO(self) -> RigidTransform:
-        """Pose of the object in the hand."""
+    def X_HO(self):
         return self.hand.EvalPoseInWorld(self._context).inverse() @ self._thing.EvalPoseInWorld(self._context)
 
-    def turned_deg(self, axis: int | None = None) -> float:
+    def turned_deg(self, axis=None):
         """Turn of the object in the hand since it was gripped: about an axis of the hand, or about any."""
         turn = (self.X_HO().rotation() @ self._X_HO.rotation().inverse()).ToAngleAxis()
         return math.degrees(abs(turn.angle() * (1.0 if axis is None else turn.axis()[axis])))
 
-    def slid_m(self) -> float:
+    def slid_m(self):
         """Slide of the object's gripped point in the hand since it was gripped."""
         p_OG = np.array([0.0, self.thing.lever_m, 0.0])
         return float(np.linalg.norm(self.X_HO() @ p_OG - self._X_HO @ p_OG))
 
 
-def hand_urdf(pads: str) -> str:
+def hand_urdf(pads):
     """The last arm link and the finger of Spot alone, with one model of the pads."""
     facts = spot_facts()
     robot = ElementTree.Element("robot", name="hand")
     for part in facts["arm"][-2:]:
         link = urdf.add_link(robot, part["link"], part)
-        boxes: list[tuple[urdf.Shape, Mapping[str, float]]] = [(shape, {}) for shape in part["collision"]]
+        boxes = [(shape, {}) for shape in part["collision"]]
         for index, (shape, contact) in enumerate((*boxes, *spheres(pads, part))):
             urdf.add_collision(link, f"{part['link']}_{index}", shape, contact)
     urdf.add_joint(robot, GRIPPER_JOINT, HAND_LINK, GRIPPER_JOINT, facts["arm"][-1])
     return ElementTree.tostring(robot, encoding="unicode")
 
 
-def spheres(pads: str, part: Mapping[str, Any]) -> Iterator[tuple[urdf.Shape, Mapping[str, float]]]:
+def spheres(pads, part):
     """Spheres of a link's pads with their proximity properties; hydroelastic pads have none."""
     facts = spot_facts()
     if pads == "dots":
@@ -251,8 +243,7 @@ def spheres(pads: str, part: Mapping[str, Any]) -> Iterator[tuple[urdf.Shape, Ma
         yield from urdf.pad_shapes(part["pads"], facts["pad_friction"], facts["pad_stiffness_n_m"])
 
 
-def add_soft_pads(plant: MultibodyPlant) -> None:
-    """Adds compliant boxes along the middles of the dots."""
+def add_soft_pads(plant):
     for link, places in DOTS.items():
         for index, (start, end) in enumerate(itertools.pairwise(np.array(places))):
             along, contact = end - start, ProximityProperties()
@@ -264,45 +255,41 @@ def add_soft_pads(plant: MultibodyPlant) -> None:
             plant.RegisterCollisionGeometry(plant.GetBodyByName(link), X_LP, box, f"soft_{link}_{index}", contact)
 
 
-def held(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, float | bool]:
-    """Holds and shakes an object."""
+def held(pads, thing, force_n, step_s):
     bench = Bench(pads, thing, step_s)
     bench.close(force_n)
     bench.weigh_down()
     bench.wait(HOLDING_S)
-    result: dict[str, float | bool] = {"turned_deg": bench.turned_deg(), "slid_mm": 1e3 * bench.slid_m()}
+    result = {"turned_deg": bench.turned_deg(), "slid_mm": 1e3 * bench.slid_m()}
     for axis in range(3):
         bench.wait(SHAKING_S, shaken=axis)
     result |= {"shaken_deg": bench.turned_deg(), "shaken_mm": 1e3 * bench.slid_m()}
     return {name: round(value, 1) for name, value in result.items()} | {"held": bench.slid_m() < LOST_M}
 
 
-def twisted(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, float]:
-    """Twists an object about the closing axis."""
+def twisted(pads, thing, force_n, step_s):
     bench = Bench(pads, replace(thing, lever_m=0.0), step_s)
     torque_W = 2.0 * thing.pad_friction * force_n * thing.patch_m() * bench.R_WH.matrix()[:, 2]
     load = np.array([*torque_W, 0.0, 0.0, 0.0])
     return {"twist": _resisted(bench, force_n, load, lambda: bench.turned_deg(2) > TURNED_DEG)}
 
 
-def pulled(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, float]:
-    """Pulls an object out along the fingers."""
+def pulled(pads, thing, force_n, step_s):
     bench = Bench(pads, replace(thing, lever_m=0.0), step_s)
     force_W = 2.0 * thing.pad_friction * force_n * bench.R_WH.matrix()[:, 0]
     load = np.array([0.0, 0.0, 0.0, *force_W])
     return {"pull": _resisted(bench, force_n, load, lambda: bench.slid_m() > SLID_M)}
 
 
-def _resisted(bench: Bench, force_n: float, load: FloatArray, moved: Callable[[], bool]) -> float:
+def _resisted(bench, force_n, load, moved):
     """Part of a load at which the clamped object moves; the load grows to `MOST_LOAD` times itself."""
     bench.close(force_n)
     parts = bench.steps(PULLING_S, load_W=MOST_LOAD * load)
     return round(MOST_LOAD * next((part for part in parts if moved()), 1.0), 2)
 
 
-def measure(pads: str, thing: Thing, force_n: float, step_s: float) -> Mapping[str, Any]:
-    """Runs all tests of one object with one force."""
-    result: dict[str, Any] = {"pads": pads, "thing": thing.name, "force_n": force_n, "failed": 0}
+def measure(pads, thing, force_n, step_s):
+    result = {"pads": pads, "thing": thing.name, "force_n": force_n, "failed": 0}
     began_s = time.process_time()
     for test in (held, twisted, pulled):
         try:
@@ -317,8 +304,7 @@ def main(
     things: tuple[str, ...] = tuple(thing.name for thing in THINGS),
     force_n: tuple[float, ...] = (40.0, 100.0),
     step_s: float = TIME_STEP_S,
-) -> None:
-    """Prints a line of JSON for each model, object and force."""
+):
     chosen = [thing for thing in THINGS if thing.name in things]
     for case in itertools.product(pads, chosen, force_n):
         show(measure(*case, step_s))

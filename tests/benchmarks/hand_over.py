@@ -7,33 +7,18 @@ person who takes what is offered. The plant's truth judges: `taken` when the obj
 the person's tray at the end, `false_claim` when the robot says otherwise.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 
-from tests.benchmarks.harness import benchmark, totals
+from tests.benchmarks.harness import benchmark, by, totals
 from tests.benchmarks.manipulation_room import CLASSES, PERSON, ROBOT, TAKEN, TARGET, room
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.benchmarks.plant_mission import PlantMission
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Result of a trial, by the plant's truth."""
-
-    ended: Ended
-    taken: bool
-    given: bool
-    false_claim: bool
-
-
-def cases(classes: tuple[str, ...] = CLASSES, trials: int = 5, seed: int = 1) -> Iterable[tuple[str, int]]:
-    """Classes with the seeds of their trials."""
+def cases(classes: tuple[str, ...] = CLASSES, trials: int = 5, seed: int = 1):
     return product(classes, range(seed, seed + trials))
 
 
-def run_case(class_name: str, seed: int, folder: Path) -> Trial:
-    """Takes an object of a class and hands it over."""
+def run_case(class_name, seed, folder):
     commands = (
         f"Take [Nothing] to [{TAKEN}] and do [grasp] to [{class_name}]",
         f"Take [{class_name}] to [{PERSON}] and do [Nothing] to [Nothing]",
@@ -43,18 +28,15 @@ def run_case(class_name: str, seed: int, folder: Path) -> Trial:
     mission = PlantMission(folder, seed, world=str(world.folder), **asked)
     ended, target = mission.end(class_name), mission.simulation.referee.objects[TARGET]
     given = target.on_tray_of == PERSON
-    return Trial(ended, bool(target.lifts), given, ended.claimed != given)
+    return vars(ended) | {"taken": bool(target.lifts), "given": given, "false_claim": ended.claimed != given}
 
 
-def summary(trials: Sequence[Trial]) -> dict[str, object]:
-    """Figures of all trials."""
-    classes = sorted({each.ended.what for each in trials})
-    of_class = {name: [each for each in trials if each.ended.what == name] for name in classes}
+def summary(trials):
     return {
         "runs": trials,
         **totals(trials, "taken", "given"),
         "false_claims": sum(each.false_claim for each in trials),
-        "given_by_class": {name: sum(each.given for each in own) for name, own in of_class.items()},
+        "given_by_class": {name: sum(each.given for each in own) for name, own in by(trials, "what").items()},
     }
 
 

@@ -3,16 +3,17 @@
 A benchmark draws cases, runs each of them in a folder of its own, and sums up their results:
 
     def cases(first: int = 0, count: int = 10, what: tuple[str, ...] = ("door",)) -> Iterable[tuple[str, int]]: ...
-    def run_case(what: str, number: int, folder: Path) -> Result: ...
-    def summary(results: Sequence[Result]) -> dict[str, object]: ...
+    def run_case(what, number, folder): return {"what": what, "reached": True}
+    def summary(results): return {"reached": share([each.reached for each in results])}
 
     if __name__ == "__main__":
         benchmark(cases, run_case, summary)
 
 The parameters of `cases`, and those of `summary` but the first, are options of the command line. All benchmarks have
 `--jobs` (processes), `--json` (figures on one line) and `--out`, a folder that stores the results and the files of the
-cases: after an interruption the same command goes on there. `command(measure)` does the same for a function without
-cases. What a summary or a measure returns is printed; an integer is the exit code.
+cases: after an interruption the same command goes on there. Results are stored as JSON; a summary reads their fields as
+attributes. `command(measure)` does the same for a function without cases. What a summary or a measure returns is
+printed; an integer is the exit code.
 """
 
 import argparse
@@ -23,19 +24,17 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Collection, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, is_dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from types import UnionType
-from typing import Any, Literal, get_args, get_origin
+from types import SimpleNamespace, UnionType
+from typing import Literal, get_args, get_origin
 
 import numpy as np
-from pydantic import TypeAdapter
 
 
-def command(*functions: Callable[..., Any]) -> None:
+def command(*functions):
     """Calls a function with the options of the command line; of several functions the first argument names one."""
     description, layout = sys.modules["__main__"].__doc__, argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=description, formatter_class=layout)
@@ -55,12 +54,10 @@ def command(*functions: Callable[..., Any]) -> None:
         show(figures, indent=None if on_one_line else 1)
 
 
-def benchmark(
-    cases: Callable[..., Iterable[Any]], run: Callable[..., Any], summary: Callable[..., Any], *, alone: bool = False
-) -> None:
+def benchmark(cases, run, summary, *, alone=False):
     """Runs the cases that the command line asks for, each in a process of its own if `alone`; shows their summary."""
 
-    def measure(jobs: int = 1, out: Path | None = None, **options: Any) -> Any:
+    def measure(jobs: int = 1, out: Path | None = None, **options):
         drawn = list(cases(**{name: options[name] for name in _parameters(cases)}))
         with tempfile.TemporaryDirectory(prefix="errand-") as made:
             results = run_all(run, drawn, out or Path(made), jobs=jobs, alone=alone)
@@ -72,18 +69,18 @@ def benchmark(
     command(measure)
 
 
-def _parameters(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+def _parameters(function):
     """Parameters of a function by name, as keyword arguments."""
     found = inspect.signature(function, eval_str=True).parameters
     return {name: each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for name, each in found.items()}
 
 
-def _add_option(parser: argparse.ArgumentParser, parameter: inspect.Parameter) -> None:
+def _add_option(parser, parameter):
     """Adds the option for a parameter: one without a default is positional, a tuple is a list with commas."""
     kind, default, name = parameter.annotation, parameter.default, f"--{parameter.name.replace('_', '-')}"
     if isinstance(kind, UnionType):
         kind, _ = get_args(kind)
-    read: dict[str, Any] = {"type": kind}
+    read = {"type": kind}
     if kind is bool:
         read = {"action": argparse.BooleanOptionalAction}
     elif get_origin(kind) is tuple:
@@ -96,14 +93,12 @@ def _add_option(parser: argparse.ArgumentParser, parameter: inspect.Parameter) -
         parser.add_argument(name, default=default, help=f"by default {default}", **read)
 
 
-def run_all(
-    run: Callable[..., Any], cases: Sequence[Any], out: Path, *, jobs: int = 1, alone: bool = False
-) -> list[Any]:
+def run_all(run, cases, out, *, jobs=1, alone=False):
     """Results of the cases, in their order; a case whose result the folder stores does not run again."""
     out.mkdir(parents=True, exist_ok=True)
-    file, form = out / "results.jsonl", TypeAdapter(inspect.signature(run, eval_str=True).return_annotation)
-    stored = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    found = {each["case"]: form.validate_python(each["result"]) for each in stored}
+    file = out / "results.jsonl"
+    file.touch()
+    found = dict(map(_stored, file.read_text().splitlines()))
     named = {re.sub(r"[^\w.+-]+", "_", "-".join(map(str, case)))[-120:]: case for case in cases}
     left, begun_s = {name: case for name, case in named.items() if name not in found}, time.monotonic()
     once = 1 if alone else None
@@ -117,40 +112,59 @@ def run_all(
             print(line, file=lines, flush=True)
             left_s = (time.monotonic() - begun_s) / done * (len(left) - done)
             tell(f"{done} of {len(left)}, {left_s:.0f} s left: {line}")
-            found[name] = result
+            found.update([_stored(line)])
     return [found[name] for name in named]
 
 
-def _run_one(run: Callable[..., Any], case: tuple[Any, ...], folder: Path) -> tuple[str, Any]:
+def _stored(line):
+    """Case and result of a line of the file."""
+    read = json.loads(line, object_hook=lambda fields: SimpleNamespace(**fields))
+    return read.case, read.result
+
+
+def _run_one(run, case, folder):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     return folder.name, run(*case, folder)
 
 
-def tell(line: object) -> None:
+def tell(line):
     """Prints a line of progress to standard error."""
     print(line, file=sys.stderr, flush=True)
 
 
-def show(figures: Any, *, indent: int | None = None) -> None:
+def show(figures, *, indent=None):
     """Prints figures as JSON."""
     print(json.dumps(figures, indent=indent, default=_plain), flush=True)
 
 
-def _plain(value: Any) -> Any:
+def _plain(value):
+    if isinstance(value, SimpleNamespace):
+        return vars(value)
     return asdict(value) if is_dataclass(value) else value.tolist() if hasattr(value, "tolist") else str(value)
 
 
-def totals(results: Collection[Any], *names: str) -> dict[str, Any]:
+def totals(results, *names):
     """Sums of fields over all results; a field that is true or false is counted."""
     return {name: sum(getattr(each, name) for each in results) for name in names}
 
 
-def share(flags: Collection[bool], digits: int = 3) -> float | None:
+def by(results, name):
+    """Results by the value of a field, sorted."""
+    values = sorted({getattr(each, name) for each in results})
+    return {value: [each for each in results if getattr(each, name) == value] for value in values}
+
+
+def for_each(name, figures):
+    """Summary with the figures of the results for each value of a field."""
+    return lambda results: {value: figures(own) for value, own in by(results, name).items()}
+
+
+def share(flags, digits=3):
     """Share that is true; None without any."""
     return round(sum(flags) / len(flags), digits) if len(flags) else None
 
 
-def quantile(values: Collection[float], part: float = 0.5, digits: int = 2) -> float | None:
+def quantile(values, part=0.5, digits=2):
     """Quantile of values, by default the median; None without any."""
     return round(float(np.quantile(list(values), part)), digits) if len(values) else None

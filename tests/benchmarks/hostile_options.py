@@ -18,7 +18,7 @@ from tests.executive.cli import hostile_calls
 SLOW_S = 5.0
 
 
-def measure(texts: int = 1000, seed: int = 1, commands: tuple[str, ...] = ()) -> int:
+def measure(texts: int = 1000, seed: int = 1, commands: tuple[str, ...] = ()):
     """Tries so many texts in each place of some commands, or of all; returns 1 when a call has a defect."""
     drawn, every, bad, calls = random.Random(seed), hostile_calls.hostile_texts(), 0, 0
     with tempfile.TemporaryDirectory() as name:

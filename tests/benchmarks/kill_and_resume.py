@@ -8,9 +8,6 @@ moment. With `--two` two robots have a part each, at the same time. Prints JSON.
 
 import subprocess
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -26,19 +23,7 @@ MISSIONS = (
 TWO = ("Alice, take a beer from the kitchen to the coffee table, and Bob, go to the office", 70.0)
 
 
-@dataclass(frozen=True)
-class Trial:
-    """One kill at a moment (s) of a mission, and how the resumed mission ended."""
-
-    number: int
-    moment_s: float
-    right: bool
-    lifts: int
-    wall_s: float
-    message: str
-
-
-def cases(moments: int = 30, seed: int = 1, two: bool = False) -> Iterator[tuple[int, float, str, str]]:
+def cases(moments: int = 30, seed: int = 1, two: bool = False):
     """Numbers and moments, with the sentences and the robots of each."""
     rng = np.random.default_rng(seed)
     for number in range(1, moments + 1):
@@ -46,7 +31,7 @@ def cases(moments: int = 30, seed: int = 1, two: bool = False) -> Iterator[tuple
         yield number, round(float(rng.uniform(0.2, length_s)), 3), sentence, "alice=spot,bob=fetch" if two else ""
 
 
-def run_case(number: int, moment_s: float, sentence: str, robots: str, folder: Path) -> Trial:
+def run_case(number, moment_s, sentence, robots, folder):
     """Runs, kills and resumes a mission; one that has ended before the moment is killed at an earlier one."""
     begun = time.perf_counter()
     asked = ["run", "--say", sentence, "--seed", number, "--out", folder, "--no-record", "--quiet", "--json"]
@@ -67,12 +52,14 @@ def run_case(number: int, moment_s: float, sentence: str, robots: str, folder: P
     right = right and (bool(robots) or lifts == 1)  # of several robots the lifts are not told
     message = f"{report.get('message', 'no report')} / {report.get('referee', {}).get('why', '')}"
     wall_s = round(time.perf_counter() - begun, 1)
-    return Trial(number, moment_s, right and not done_twice(folder), lifts, wall_s, message)
+    right = right and not done_twice(folder)
+    told = {"moment_s": moment_s, "lifts": lifts, "wall_s": wall_s, "message": message}
+    return {"number": number, "right": right, **told}
 
 
-def done_twice(folder: Path) -> bool:
+def done_twice(folder):
     """True if the logs tell that a leaf which changes the world did its work to the end more than once."""
-    done: list[tuple[str, str]] = []
+    done = []
     for log in sorted(folder.glob("log*.mcap")):
         for event in read_events(log):
             told = event.data
@@ -82,8 +69,7 @@ def done_twice(folder: Path) -> bool:
     return len(done) > len(set(done))
 
 
-def summary(trials: Sequence[Trial]) -> dict[str, object]:
-    """Counts of the trials, and the numbers of those that went wrong."""
+def summary(trials):
     return {"trials": len(trials), **totals(trials, "right"), "wrong": [e.number for e in trials if not e.right]}
 
 

@@ -14,10 +14,8 @@ pose where it begins.
 
 import math
 import time
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -48,33 +46,31 @@ class Seen:
     taken: Scan
     true: Pose2D
 
-    def odometry(self) -> Odometry:
+    def odometry(self):
         return Odometry(self.taken.stamp_s, self.taken.X_OB, (0.0, 0.0, 0.0))
 
-    def scan(self) -> Scan:
+    def scan(self):
         return self.taken
 
 
-def errors(localiser: Any, scan: Scan, true: Pose2D) -> tuple[float, float]:
-    """Error of a localiser's estimate (m, rad)."""
+def errors(localiser, scan, true):
     off = relative_pose(true, Pose2D.from_transform(localiser.estimate().X_WO @ scan.X_OB))
     return math.hypot(off.x_m, off.y_m), abs(off.yaw_rad)
 
 
-def took_ms(work: Callable[[], object]) -> float:
-    """Wall time of a piece of work (ms)."""
+def took_ms(work):
     begun = time.perf_counter()
     work()
     return 1000.0 * (time.perf_counter() - begun)
 
 
-def record(file: Path, seed: int = 1, say: str = SENTENCE) -> dict[str, object]:
+def record(file: Path, seed: int = 1, say: str = SENTENCE):
     """Runs a mission and stores what its LiDAR and odometry saw."""
     mission = PlantMission(file.with_suffix(""), seed, sentence=say, world="flat")
     simulation, name = mission.simulation, mission.robot_name
-    kept: list[tuple[Scan, np.ndarray, Pose2D]] = []
+    kept = []
 
-    def keep() -> None:
+    def keep():
         scan = simulation.robots[name].scan()
         fresh = scan is not None and scan.stamp_s >= simulation.engine.now() - 1e-6
         if fresh and (not kept or scan.stamp_s >= kept[-1][0].stamp_s + 0.049):
@@ -97,8 +93,7 @@ def record(file: Path, seed: int = 1, say: str = SENTENCE) -> dict[str, object]:
     return {"outcome": report.outcome, "scans": len(kept)}
 
 
-def recorded(file: Path) -> Iterator[Seen]:
-    """Scans of a recorded drive."""
+def recorded(file):
     with np.load(file) as kept:
         data = dict(kept)
     X_BL = RigidTransform(data["X_BL"])
@@ -109,7 +104,7 @@ def recorded(file: Path) -> Iterator[Seen]:
         yield Seen(scan, Pose2D(*true.tolist()))
 
 
-def replay(file: Path, localiser: str = "monte_carlo", unknown_start: bool = False) -> dict[str, object]:
+def replay(file: Path, localiser: str = "monte_carlo", unknown_start: bool = False):
     """Measures the error of a localiser along a recorded drive, while it moves and at rest, and its updates' times."""
     grid = load_grid_map(load_world("flat").scan_map_path)
     first, *drive = recorded(file)
@@ -144,14 +139,14 @@ def replay(file: Path, localiser: str = "monte_carlo", unknown_start: bool = Fal
     }
 
 
-def _rms(values: np.ndarray) -> float:
+def _rms(values):
     return round(float(np.sqrt(np.mean(np.square(values)))), 3)
 
 
 class Wanderer(GlidingBase):
     """A robot that drives about on free ground of the flat."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed):
         self.rng = np.random.default_rng(seed)
         super().__init__(Simulation(load_world("flat"), seed=seed, visuals=False), self.rng)
         self._keepout = load_grid_map(load_world("flat").surveyed.keepout_map_path).with_unknown_blocked()
@@ -160,13 +155,13 @@ class Wanderer(GlidingBase):
         self.believed = self.true
         self.sense()
 
-    def carry_off(self) -> None:
+    def carry_off(self):
         """Puts the robot at a random pose with room to turn about, which odometry does not notice."""
         free = np.argwhere(self._keepout.distance > 0.62)
         x, y = self._keepout.centres(free[self.rng.integers(len(free))][None])[0]
         self.true = Pose2D(float(x), float(y), float(self.rng.uniform(-math.pi, math.pi)))
 
-    def step(self) -> None:
+    def step(self):
         """Drives ahead while there is room, else turns to one side."""
         ahead = [compose(self.true, Pose2D(d, 0.0, 0.0)) for d in (0.3, 0.6, 0.9)]
         if self._keepout.distance_m(np.array([(p.x_m, p.y_m) for p in ahead])).min() > 0.4:
@@ -178,9 +173,7 @@ class Wanderer(GlidingBase):
         self.move(np.array(velocity), STEP_S)
 
 
-def kidnap(
-    count: int = 50, localiser: str = "monte_carlo", seed: int = 1, unknown_start: bool = False
-) -> dict[str, object]:
+def kidnap(count: int = 50, localiser: str = "monte_carlo", seed: int = 1, unknown_start: bool = False):
     """Counts in how many of so many kidnappings, or starts at unknown places, it is right again within 15 m."""
     grid, wanderer = load_grid_map(load_world("flat").scan_map_path), Wanderer(seed)
     ways, failed, false_claims = [], [], 0
@@ -211,7 +204,7 @@ def kidnap(
     }
 
 
-def _recovered(wanderer: Wanderer, localiser: Any) -> tuple[float | None, bool]:
+def _recovered(wanderer, localiser):
     """The way (m) until it is right, None when it is not; whether it claimed a wrong place for 2 s after 3 m."""
     begun_m, right_since, wrong_s, false, at_m = wanderer.way_m, None, 0.0, False, 0.0
     while wanderer.way_m < begun_m + MOST_M:
@@ -231,7 +224,7 @@ def _recovered(wanderer: Wanderer, localiser: Any) -> tuple[float | None, bool]:
     return None, false
 
 
-def timing(file: Path, particles: int = 1000, beams: int = 60) -> dict[str, object]:
+def timing(file: Path, particles: int = 1000, beams: int = 60):
     """Times a whole update of the filter, and with it that of the localiser."""
     grid, seen = load_grid_map(load_world("flat").scan_map_path), list(recorded(file))[:400]
     options = FilterOptions(min_particles=particles, max_particles=particles, beams=beams)
@@ -242,7 +235,7 @@ def timing(file: Path, particles: int = 1000, beams: int = 60) -> dict[str, obje
     points = localiser._points(seen[0].taken)
     chosen = np.ascontiguousarray(points[np.linspace(0, len(points) - 1, beams).astype(int)])
 
-    def update() -> None:
+    def update():
         alone.move(Pose2D(0.01, 0.0, 0.0))
         alone.weigh(chosen)
         alone.resample()

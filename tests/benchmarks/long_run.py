@@ -11,9 +11,8 @@ minute at the beginning and at the end, and the size of the recording. `--wait` 
 import tempfile
 import time
 import tracemalloc
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
 from executive.app.runs import new_run
 from executive.mission.request import Request
-from executive.run.visitor import Progress, RunVisitor
+from executive.run.visitor import RunVisitor
 from executive.store.missions import STORE, MissionStore
 from tests.benchmarks.harness import command, show
 
@@ -41,37 +40,29 @@ steps:
 PAGE_BYTES, MB = 4096, 1e6
 
 
-@dataclass(frozen=True)
-class Report:
-    """One stretch of the run: until when (min on the robot's clock), memory, bytes written in it, and its speed."""
-
-    until_min: float
-    memory_mb: float
-    written_kb_per_min: float
-    real_time_factor: float
-
-
 class Watch(RunVisitor):
     """Reporter of the process, every so many seconds of the robot's clock."""
 
-    def __init__(self, period_s: float, *, top: int = 0) -> None:
-        self.reports: list[Report] = []
+    def __init__(self, period_s, *, top=0):
+        self.reports = []
         self._period_s, self._top = period_s, top
         self._at_s, self._wall_s, self._written = 0.0, time.monotonic(), written_bytes()
-        self._first: tracemalloc.Snapshot | None = None
+        self._first = None
 
-    def tick(self, progress: Progress) -> None:
+    def tick(self, progress):
         took_s, now_s = progress.now_s - self._at_s, progress.now_s
         if took_s < self._period_s:
             return
         per_minute = (written_bytes() - self._written) / 1e3 / (took_s / 60.0)
-        self.reports.append(Report(now_s / 60.0, memory_mb(), per_minute, took_s / (time.monotonic() - self._wall_s)))
+        speed = took_s / (time.monotonic() - self._wall_s)
+        own = {"until_min": now_s / 60.0, "memory_mb": memory_mb(), "written_kb_per_min": per_minute}
+        self.reports.append(SimpleNamespace(**own, real_time_factor=speed))
         show({key: round(value, 2) for key, value in vars(self.reports[-1]).items()})
         if self._top:
             self._show_growth()
         self._at_s, self._wall_s, self._written = now_s, time.monotonic(), written_bytes()
 
-    def _show_growth(self) -> None:
+    def _show_growth(self):
         now = tracemalloc.take_snapshot()
         self._first = self._first or now
         for each in now.compare_to(self._first, "lineno")[: self._top]:
@@ -79,14 +70,13 @@ class Watch(RunVisitor):
             show({"grown_kb": round(each.size_diff / 1e3), "count": each.count_diff, "at": at})
 
 
-def written_bytes() -> int:
+def written_bytes():
     """Bytes that this process has written to files so far."""
     told = dict(line.split(": ") for line in Path("/proc/self/io").read_text().splitlines())
     return int(told["wchar"])
 
 
-def memory_mb() -> float:
-    """Memory of this process."""
+def memory_mb():
     return int(Path("/proc/self/statm").read_text().split()[1]) * PAGE_BYTES / MB
 
 
@@ -97,8 +87,7 @@ def measure(
     record: bool = True,
     world: str = "flat",
     top: int = 0,
-) -> None:
-    """Runs the mission for so many minutes, and shows the summary."""
+):
     if top:
         tracemalloc.start()
     with tempfile.TemporaryDirectory(prefix="errand-long-") as made:
@@ -113,8 +102,7 @@ def measure(
         show(summary(watch.reports, finished.report.outcome, out))
 
 
-def summary(reports: Sequence[Report], outcome: str, out: Path) -> dict[str, object]:
-    """Figures of the whole run."""
+def summary(reports, outcome, out):
     later = reports[len(reports) // 2 :]
     times = [each.until_min for each in later]
     slope = float(np.polyfit(times, [each.memory_mb for each in later], 1)[0]) if len(later) > 1 else 0.0

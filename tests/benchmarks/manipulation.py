@@ -23,14 +23,12 @@ around.
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
-from pydrake.math import RigidTransform
 
 from errand_train.commands.worst_sheet import Shown, contact_sheet
 from errand_train.detector.scoring import Judged
@@ -39,7 +37,7 @@ from executive.app.simulated import run_entry, simulate
 from executive.app.worlds import knowledge_of
 from executive.run.outcome import Outcome
 from executive.run.runner import run
-from executive.run.visitor import Progress, RunSettings, RunVisitor
+from executive.run.visitor import RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import compile_mission
 from executive.tree.registry import built_in_skills
@@ -50,12 +48,10 @@ from plant.models.catalogue import FACTS_FILE, read_imported
 from plant.scene_pictures import best_view, render_view, save_png
 from plant.simulation import Simulation
 from plant.worlds.seeding import place_objects
-from plant.worlds.world import SurfaceTop
-from skills.api import Job, Worker
+from skills.api import Worker
 from skills.files.errors import InputError
 from skills.perception.class_forms import ANY_OBJECT
-from skills.robot import FloatArray
-from tests.benchmarks.harness import benchmark, quantile, share, tell
+from tests.benchmarks.harness import benchmark, for_each, quantile, share, tell
 from tests.benchmarks.manipulation_room import CLASSES, LOOK_S, ROBOT, SECOND, SURFACES, TAKEN, TARGET, room
 from tests.benchmarks.shapes import written_shape
 
@@ -70,39 +66,14 @@ OUTCOMES = {
 }
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Result of a trial; `model` is the form's file, `ending` the picture of how a failed trial ended."""
+def failure(trial):
+    """Why a trial failed: the mission's cause, else what the truth denies; empty for a good one."""
+    return trial.cause or next((words for key, words in OUTCOMES.items() if not getattr(trial, key)), "")
 
-    name: str
-    model: str
-    surface: str
-    clutter: int
-    seed: int
-    lifted: bool
-    held_10s: bool
-    placed: bool
-    placed_upright: bool | None
-    place_error_m: float | None
-    others_disturbed: int
-    false_claim: bool
-    collisions: int
-    cause: str
-    sim_time_s: float
-    pick_s: float | None
-    planning_s: tuple[float, ...] = ()
-    grasp_planning_s: tuple[float, ...] = ()
-    ending: Path | None = None
 
-    @property
-    def failure(self) -> str:
-        """Why the trial failed: the mission's cause, else what the truth denies; empty for a good one."""
-        return self.cause or next((words for key, words in OUTCOMES.items() if not getattr(self, key)), "")
-
-    @property
-    def near_upright(self) -> bool:
-        """True if the object stands upright within 5 cm of the spot."""
-        return bool(self.placed_upright and self.place_error_m is not None and self.place_error_m <= NEAR_SPOT_M)
+def near_upright(trial):
+    """True if the object stands upright within 5 cm of the spot."""
+    return bool(trial.placed_upright and trial.place_error_m is not None and trial.place_error_m <= NEAR_SPOT_M)
 
 
 @dataclass
@@ -122,7 +93,7 @@ class Watch(RunVisitor):
     _stands_since_s: float = 0.0
     _base_W: tuple[float, float] = (0.0, 0.0)
 
-    def __call__(self, now_s: float) -> None:
+    def __call__(self, now_s):
         if now_s < self._due_s:
             return
         self._due_s = now_s + LOOK_S
@@ -136,11 +107,11 @@ class Watch(RunVisitor):
         self.lifted_since_s = now_s if self.lifted_since_s is None else self.lifted_since_s
         self.longest_s = max(self.longest_s, now_s - self.lifted_since_s)
 
-    def tick(self, progress: Progress) -> None:
+    def tick(self, progress):
         for checkpoint in (each for note in progress.notes.values() for each in note.checkpoints.values()):
             self.spot_W = checkpoint.get("spot_W", self.spot_W)
 
-    def message(self, topic: str, message: Mapping[str, Any]) -> Mapping[str, Any]:
+    def message(self, topic, message):
         grasps = topic == "transitions" and "grasp" in message["node"].rsplit("/", 1)[-1]
         self.claimed = self.claimed or (grasps and message["to"] == "SUCCESS")
         return message
@@ -153,16 +124,16 @@ class TimedWorker:
     within: Worker
     spent_s: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
 
-    def submit(self, work: Callable[[], Any], *, latency_s: float, name: str) -> Job[Any]:
+    def submit(self, work, *, latency_s, name):
         return self.within.submit(lambda: self._timed(name, work), latency_s=latency_s, name=name)
 
-    def sense(self, read: Callable[[], Any], work: Callable[[Any], Any], *, latency_s: float, name: str) -> Job[Any]:
-        def timed(given: Any) -> Any:
+    def sense(self, read, work, *, latency_s, name):
+        def timed(given):
             return self._timed(name, lambda: work(given))
 
         return self.within.sense(read, timed, latency_s=latency_s, name=name)
 
-    def _timed(self, name: str, work: Callable[[], Any]) -> Any:
+    def _timed(self, name, work):
         begun_s = time.perf_counter()
         try:
             return work()
@@ -170,35 +141,32 @@ class TimedWorker:
             self.spent_s[name].append(round(time.perf_counter() - begun_s, 4))
 
 
-def poses(simulation: Simulation) -> dict[str, RigidTransform]:
-    """True pose of each loose object."""
+def poses(simulation):
     plant, context = simulation.engine.world.plant, simulation.engine.context
     models = {name: plant.GetModelInstanceByName(name) for name in simulation.referee.objects}
     bodies = {name: plant.get_body(plant.GetBodyIndices(model)[0]) for name, model in models.items()}
     return {name: plant.EvalBodyPoseInWorld(context, body) for name, body in bodies.items()}
 
 
-def tilt_rad(before: RigidTransform, after: RigidTransform) -> float:
-    """Angle by which a body leans against how it stood."""
+def tilt_rad(before, after):
     up = after.rotation().matrix() @ before.rotation().matrix().T @ np.array([0.0, 0.0, 1.0])
     return float(np.arccos(np.clip(up[2], -1.0, 1.0)))
 
 
-def disturbed(before: RigidTransform, after: RigidTransform) -> bool:
+def disturbed(before, after):
     """True if something else was pushed well away or knocked over."""
     moved = float(np.linalg.norm(after.translation() - before.translation()))
     return moved > DISTURBED_M or tilt_rad(before, after) > DISTURBED_RAD
 
 
-def within(surface: SurfaceTop, X_WO: RigidTransform) -> bool:
-    """True if an object lies on a surface."""
+def within(surface, X_WO):
     x, y, z = X_WO.translation()
     corners = np.array(surface.polygon_W)
     inside = np.all(corners.min(axis=0) <= [x, y]) and np.all([x, y] <= corners.max(axis=0))
     return bool(inside and surface.height_m - 0.02 < z < surface.height_m + 0.4)
 
 
-def middle_W(simulation: Simulation, X_WO: RigidTransform) -> FloatArray:
+def middle_W(simulation, X_WO):
     """Middle (3,) of the target's bounding box in its own frame, in the world."""
     plant = simulation.engine.world.plant
     body = plant.get_body(plant.GetBodyIndices(plant.GetModelInstanceByName(TARGET))[0])
@@ -211,18 +179,17 @@ def middle_W(simulation: Simulation, X_WO: RigidTransform) -> FloatArray:
     return np.asarray(X_WO @ ((corners_O.min(axis=1) + corners_O.max(axis=1)) / 2.0))
 
 
-def query_of(simulation: Simulation) -> Any:
-    """Scene as it is now."""
+def query_of(simulation):
     engine = simulation.engine
     return engine.world.scene.query_at(engine.world.plant.GetPositions(engine.context))
 
 
-def place_error_m(spot_W: Sequence[float] | None, p_W: FloatArray) -> float | None:
+def place_error_m(spot_W, p_W):
     """Distance (m) along the surface from the spot that something was lowered on; None where it never was."""
     return None if spot_W is None else round(float(np.linalg.norm(np.asarray(spot_W) - p_W[:2])), 4)
 
 
-def is_false_claim(claimed: bool, *, lifted: bool, held_s: float) -> bool:
+def is_false_claim(claimed, *, lifted, held_s):
     """True if "holding" was claimed of what was never lifted, or never of what was held for long.
 
     What falls as it is lifted, and is not claimed, is reported rightly.
@@ -238,7 +205,7 @@ def cases(
     trials: int = 3,
     clutter: str = "0-4",
     seed: int = 1,
-) -> Iterator[tuple[str, str, int, int, str]]:
+):
     """Class, surface, number of others, seed, and the folder of a model or the number of a shape.
 
     `trials` of each class over the surfaces in turn; the seed chooses the clutter.
@@ -255,7 +222,7 @@ def cases(
             yield class_name, surfaces[number % len(surfaces)], others, seed + number, model
 
 
-def own(folder: Path) -> list[tuple[str, str]]:
+def own(folder):
     """Class and folder of each imported object in a folder, or of the one that it is. Raises SystemExit."""
     folders = sorted(path.parent for path in folder.glob(f"*/{FACTS_FILE}"))
     folders = [folder] if (folder / FACTS_FILE).exists() else folders
@@ -271,8 +238,7 @@ def own(folder: Path) -> list[tuple[str, str]]:
     return found
 
 
-def run_case(class_name: str, surface: str, clutter: int, seed: int, source: str, folder: Path) -> Trial:
-    """Takes, holds and puts down; judges by the plant's truth."""
+def run_case(class_name, surface, clutter, seed, source, folder):
     others = np.random.default_rng([seed, 5]).choice([each for each in CLASSES if each != class_name], clutter)
     shape = source.startswith("shape ")
     model = written_shape(int(source.split()[1]), folder) if shape else Path(source) if source else None
@@ -296,7 +262,7 @@ def run_case(class_name: str, surface: str, clutter: int, seed: int, source: str
     after, target = poses(simulation), simulation.referee.objects[TARGET]
     p_W, lifted = middle_W(simulation, after[TARGET]), watch.pick_s is not None
     placed = target.resting and within(world.surfaces[SECOND], after[TARGET])
-    trial = Trial(
+    trial = SimpleNamespace(
         name=class_name if model is None else model.name,
         model=str(place_objects(world, seed)[0].form.file),
         surface=surface,
@@ -313,28 +279,30 @@ def run_case(class_name: str, surface: str, clutter: int, seed: int, source: str
         cause="" if result.outcome is Outcome.SUCCESS else f"{result.cause}: {result.message}",
         sim_time_s=round(simulation.clock.now(), 1),
         pick_s=watch.pick_s,
-        planning_s=tuple(worker.spent_s[MOTION_WORK]),
-        grasp_planning_s=tuple(worker.spent_s[GRASP_WORK]),
+        planning_s=worker.spent_s[MOTION_WORK],
+        grasp_planning_s=worker.spent_s[GRASP_WORK],
+        ending=None,
     )
-    if not trial.failure:
+    if not failure(trial):
         return trial
     query = query_of(simulation)
     save_png(folder / "ending.png", render_view(query, best_view(query, p_W), (800, 600)))
-    return replace(trial, ending=folder / "ending.png")
+    trial.ending = folder / "ending.png"
+    return trial
 
 
-def failures(trials: Sequence[Trial]) -> list[str]:
+def failures(trials):
     """A line for each class and cause with its number of failures, the commonest first."""
-    counted = Counter((each.name, each.failure) for each in trials if each.failure)
+    counted = Counter((each.name, failure(each)) for each in trials if failure(each))
     return [f"{number:4}  {name:14} {cause}" for (name, cause), number in counted.most_common()]
 
 
-def write_sheet(path: Path, trials: Sequence[Trial]) -> str:
+def write_sheet(path, trials):
     """Writes a sheet of failed trials; returns a line about it. Raises OSError when it cannot be written."""
     shown = []
     for each in (each for each in trials if each.ending is not None):
         picture = cv2.cvtColor(cv2.imread(str(each.ending)), cv2.COLOR_BGR2RGB)
-        caption = f"{each.name} {each.surface} {each.seed}: {each.failure}"[:55]
+        caption = f"{each.name} {each.surface} {each.seed}: {failure(each)}"[:55]
         shown.append(Shown(caption, picture, Judged((), (), ())))
     if not shown:
         return f"no trial failed: {path} is not written"
@@ -342,38 +310,34 @@ def write_sheet(path: Path, trials: Sequence[Trial]) -> str:
     return f"{path}: {len(shown)} failed trials"
 
 
-def summary(trials: Sequence[Trial], sheet: Path | None = None) -> dict[str, object]:
+def summary(trials, sheet: Path | None = None):
     """Rates over all trials; tells the failures, and writes a sheet of them."""
     for line in [*failures(trials), *([] if sheet is None else [write_sheet(sheet, trials)])]:
         tell(line)
 
-    def held_by(key: str) -> dict[str, float | None]:
-        groups = sorted({getattr(each, key) for each in trials})
-        return {name: share([e.held_10s for e in trials if getattr(e, key) == name]) for name in groups}
+    def held(own):
+        return share([each.held_10s for each in own])
 
-    planning_s = [spent_s for each in trials for spent_s in each.planning_s]
-    grasp_planning_s = [spent_s for each in trials for spent_s in each.grasp_planning_s]
     return {
         "runs": trials,
         "lifted_rate": share([each.lifted for each in trials]),
-        "held_rate": share([each.held_10s for each in trials]),
+        "held_rate": held(trials),
         "placed_rate": share([each.placed for each in trials]),
         "upright_rate": share([each.placed_upright for each in trials if each.placed_upright is not None]),
-        "placed_near_upright_rate": share([each.near_upright for each in trials]),
+        "placed_near_upright_rate": share(list(map(near_upright, trials))),
         "place_error_m_median": quantile([e.place_error_m for e in trials if e.place_error_m is not None], digits=4),
-        "planning_s": spread(planning_s),
-        "grasp_planning_s": spread(grasp_planning_s),
+        "planning_s": spread([spent_s for each in trials for spent_s in each.planning_s]),
+        "grasp_planning_s": spread([spent_s for each in trials for spent_s in each.grasp_planning_s]),
         "disturbed_rate": share([each.others_disturbed > 0 for each in trials]),
         "false_claims": sum(each.false_claim for each in trials),
-        "by_class": held_by("name"),
-        "by_surface": held_by("surface"),
+        "by_class": for_each("name", held)(trials),
+        "by_surface": for_each("surface", held)(trials),
         "causes": dict(Counter(each.cause for each in trials if each.cause).most_common()),
         "pick_s_median": quantile([each.pick_s for each in trials if each.pick_s is not None]),
     }
 
 
-def spread(values: Sequence[float]) -> dict[str, float | None]:
-    """Median and 95th percentile."""
+def spread(values):
     return {"median": quantile(values, digits=3), "p95": quantile(values, 0.95, 3)}
 
 

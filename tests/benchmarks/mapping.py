@@ -13,20 +13,19 @@ import json
 import math
 import time
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 
 from plant.referee.object_history import align, trajectory_error_m
 from plant.simulation import Simulation
-from plant.worlds.world import World, load_world
-from skills.estimate.grid_map import GridMap, load_grid_map
+from plant.worlds.world import load_world
+from skills.estimate.grid_map import load_grid_map
 from skills.geometry import compose, relative_pose
 from skills.mapping.map_folder import map_grids, save_graph, save_grids
 from skills.mapping.mapper import Mapper
 from skills.mapping.survey import Survey
-from skills.robot import CommandId, CommandState, CommandStatus, FloatArray, Pose2D
+from skills.robot import CommandId, CommandState, CommandStatus, Pose2D
 from tests.benchmarks.driving import within
 from tests.benchmarks.gliding import GlidingBase
 from tests.benchmarks.harness import command, share, tell
@@ -37,27 +36,25 @@ CELL_M, OCCUPIED, FREE, BODY_M, NEAR_M = 0.025, 0.65, 0.45, 0.3, 0.1
 
 
 class GlidingRobot(GlidingBase):
-    """A robot whose base follows velocities at once."""
-
-    def __init__(self, simulation: Simulation, seed: int) -> None:
+    def __init__(self, simulation, seed):
         super().__init__(simulation, np.random.default_rng(seed))
         robot = simulation.robots["Alice"]
         self.capabilities, self.joints, self.gripper = robot.capabilities, robot.joints, robot.gripper
         self._velocity, self._until_s = np.zeros(3), 0.0
         self.sense()
 
-    def advance(self, dt_s: float) -> None:
+    def advance(self, dt_s):
         self.move(self._velocity if self.now_s < self._until_s else np.zeros(3), dt_s)
 
-    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: object) -> CommandId:
+    def drive(self, vx, vy, wz, *, until_s, lease):
         self._velocity, self._until_s = np.array([vx, vy, wz]), until_s
         return CommandId(0)
 
-    def stop(self, *, lease: object, only: CommandId | None = None) -> CommandId:
+    def stop(self, *, lease, only=None):
         self._velocity = np.zeros(3)
         return CommandId(0)
 
-    def command_status(self, command: CommandId) -> CommandStatus:
+    def command_status(self, command):
         return CommandStatus(CommandState.RUNNING)
 
 
@@ -68,18 +65,18 @@ def survey(
     out: Path | None = None,
     dynamics: bool = False,
     most: float = 3000.0,
-) -> dict[str, object]:
+):
     """Surveys a world, by a route if there is one, and judges the map; the files of the map are written to a folder."""
     opened = load_world(world)
     simulation = Simulation(opened, seed=seed, visuals=False)
-    robot: Any = simulation.robots["Alice"] if dynamics else GlidingRobot(simulation, seed)
+    robot = simulation.robots["Alice"] if dynamics else GlidingRobot(simulation, seed)
     lease = robot.acquire_lease("benchmark") if dynamics else None
     clock = simulation.clock
     points = None if route is None else [compose(opened.start, Pose2D(*p, 0.0)) for p in json.loads(route.read_text())]
     stops = None if points is None else [(pose.x_m, pose.y_m) for pose in points]
     mapper = Mapper(opened.start)
     made = Survey(robot, lease, mapper, home=opened.start, route=stops)
-    truth: dict[float, Pose2D] = {}
+    truth = {}
     now_s, own_s, told_s, begun, slowest_s = 0.0, 0.0, 0.0, time.perf_counter(), 0.0
     while not made.done and now_s < most:
         (clock if dynamics else robot).advance(STEP_S)
@@ -128,21 +125,19 @@ def survey(
     }
 
 
-def false_closures(mapper: Mapper, true: list[Pose2D]) -> int:
-    """Number of loop closures whose relative pose is off the truth."""
+def false_closures(mapper, true):
     real = [relative_pose(true[edge.first], true[edge.second]) for edge in mapper.graph.closures]
     return sum(
         not within(edge.measured, pose, SAME_PLACE) for edge, pose in zip(mapper.graph.closures, real, strict=True)
     )
 
 
-def judged(world: World, grids: Any, mapper: Mapper, true: list[Pose2D]) -> dict[str, object]:
+def judged(world, grids, mapper, true):
     """Figures of the grids against the surveyed ones of the world."""
     files = {"scan": world.surveyed.scan_map_path, "keepout": world.surveyed.keepout_map_path}
     surveyed = {band: load_grid_map(file) for band, file in files.items()}
 
-    def aligned(cells: np.ndarray) -> FloatArray:
-        """Middles of cells of the map, in the world."""
+    def aligned(cells):
         points = (np.argwhere(cells)[:, ::-1] + 0.5) * CELL_M + np.array(grids.origin_m)
         return align(points, mapper.graph.poses, true)
 
@@ -159,8 +154,7 @@ def judged(world: World, grids: Any, mapper: Mapper, true: list[Pose2D]) -> dict
     }
 
 
-def cells_at(truth: GridMap, points: FloatArray) -> np.ndarray:
-    """Cells of a grid that points lie in."""
+def cells_at(truth, points):
     marked = np.zeros(truth.occupied.shape, dtype=bool)
     rows, columns = truth.cells(points).T
     inside = (rows >= 0) & (columns >= 0) & (rows < marked.shape[0]) & (columns < marked.shape[1])
@@ -168,12 +162,12 @@ def cells_at(truth: GridMap, points: FloatArray) -> np.ndarray:
     return marked
 
 
-def free_seen(truth: GridMap, free: FloatArray) -> float:
+def free_seen(truth, free):
     """Share of the truth's ground with room for the body that is free in the map."""
     return round(float(cells_at(truth, free)[truth.with_unknown_blocked().distance > BODY_M].mean()), 4)
 
 
-def obstacles_found(truth: GridMap, occupied: FloatArray) -> float:
+def obstacles_found(truth, occupied):
     """Share of the keep-out's surface by the ground where the body fits that the map has within 10 cm."""
     found = (~cells_at(truth, occupied)).astype(np.uint8)
     off_m = cv2.distanceTransform(found, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * truth.resolution_m

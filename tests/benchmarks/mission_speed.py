@@ -18,7 +18,7 @@ SENTENCE = "Hey Alice, can you fetch me a drink from the kitchen"
 DRIVING_S, TICK_S = 30.0, 0.05
 
 
-def mission_factor(world: str, seed: int, *options: str) -> float:
+def mission_factor(world, seed, *options):
     """Simulated seconds in a second of wall time of `errand run`."""
     with tempfile.TemporaryDirectory() as out:
         common = ["--world", world, "--seed", seed, "--quiet", "--json", "--out", out]
@@ -27,7 +27,7 @@ def mission_factor(world: str, seed: int, *options: str) -> float:
     return report["real_time_factor"]
 
 
-def plant_factor(world: str, seed: int) -> float:
+def plant_factor(world, seed):
     """The same of the plant while the robot drives in a small circle and nothing else is done, pictures included."""
     simulation = Simulation(load_world(world), seed=seed)
     clock, robot = simulation.clock, simulation.robots["Alice"]
@@ -40,9 +40,8 @@ def plant_factor(world: str, seed: int) -> float:
     return DRIVING_S / (time.perf_counter() - begin)
 
 
-def measure(repeat: int = 3, seed: int = 1, world: str = "flat") -> dict[str, object]:
-    """Medians of the rounds."""
-    rounds: list[dict[str, float]] = []
+def measure(repeat: int = 3, seed: int = 1, world: str = "flat"):
+    rounds = []
     for _ in range(repeat):
         mission, plant = mission_factor(world, seed, "--no-record"), plant_factor(world, seed)
         shown = mission_factor(world, seed, "--view", "--view-for", "0")

@@ -1,8 +1,8 @@
 """Mutants: small defects drawn in the product, and how many of them the tests catch; prints JSON.
 
-    python -m tests.benchmarks.mutants draw --seed 65 --count 60 --out mutants.json
+    python -m tests.benchmarks.mutants draw mutants.json [--seed 65] [--count 60]
     python -m tests.benchmarks.mutants probe mutants.json --tree COPY
-    python -m tests.benchmarks.mutants run mutants.json --tree COPY [--only 3 17]
+    python -m tests.benchmarks.mutants run mutants.json --tree COPY [--only 3,17]
 
 A mutant turns a comparison, changes a constant, empties a branch or swaps two arguments. `probe` runs the whole suite
 once in a copy of the tree (with a `.venv` of its own), with a probe before each place, and stores which tests come by.
@@ -11,9 +11,6 @@ cannot stand before (values of a module or class, compiled kernels) are tried wi
 folder first.
 """
 
-from __future__ import annotations
-
-import argparse
 import ast
 import json
 import os
@@ -22,11 +19,12 @@ import re
 import signal
 import subprocess
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
+from tests.benchmarks.harness import command, show
+
+HERE = Path.cwd()
 PACKAGES = ("executive", "skills", "plant")
 TURNED = {ast.Lt: ast.GtE, ast.GtE: ast.Lt, ast.Gt: ast.LtE, ast.LtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
           ast.Is: ast.IsNot, ast.IsNot: ast.Is, ast.In: ast.NotIn, ast.NotIn: ast.In}  # fmt: skip
@@ -62,7 +60,7 @@ class Mutant:
     probed: bool
     tests: tuple[str, ...] = ()
 
-    def apply(self, tree: Path) -> str:
+    def apply(self, tree):
         """Write the defect into the tree; the file's text as it was."""
         file = tree / self.path
         text = file.read_bytes()
@@ -71,7 +69,7 @@ class Mutant:
         return text.decode()
 
 
-def mutants_of(path: Path, root: Path) -> Iterator[Mutant]:
+def mutants_of(path, root):
     """All defects that can be made in a module."""
     source = path.read_bytes()
     starts = [0]
@@ -85,7 +83,7 @@ def mutants_of(path: Path, root: Path) -> Iterator[Mutant]:
             yield Mutant(0, kind, *place, new, probed)
 
 
-def statements(parent: ast.AST, *, probed: bool) -> Iterator[tuple[ast.stmt, bool]]:
+def statements(parent, *, probed):
     """Statements that may hold a defect, and whether a probe may stand before them."""
     for name in ("body", "orelse", "finalbody", "handlers", "cases"):
         for child in getattr(parent, name, ()):
@@ -98,7 +96,7 @@ def statements(parent: ast.AST, *, probed: bool) -> Iterator[tuple[ast.stmt, boo
                 yield from statements(child, probed=probed)
 
 
-def changes(statement: ast.stmt) -> Iterator[tuple[str, Any, str]]:
+def changes(statement):
     """Changes of a statement without those in its body: kind, what is replaced, and by what."""
     if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Constant):
         return
@@ -117,7 +115,7 @@ def changes(statement: ast.stmt) -> Iterator[tuple[str, Any, str]]:
                 yield "arguments", node, ast.unparse(ast.Call(node.func, [second, first, *more], node.keywords))
 
 
-def expressions(node: ast.AST) -> Iterator[ast.AST]:
+def expressions(node):
     """Expressions in a statement, without those of statements in it and without annotations and formatted texts."""
     for name, value in ast.iter_fields(node):
         if name in ("body", "orelse", "finalbody", "handlers", "annotation", "cases"):
@@ -130,13 +128,13 @@ def expressions(node: ast.AST) -> Iterator[ast.AST]:
                 yield from expressions(child)
 
 
-def draw(root: Path, seed: int, count: int) -> list[Mutant]:
+def drawn_mutants(root, seed, count):
     """Draws as many of each kind, each in another module."""
     rng = random.Random(seed)
     found = [mutant for package in PACKAGES for path in sorted((root / package).rglob("*.py"))
              for mutant in mutants_of(path, root)]  # fmt: skip
     rng.shuffle(found)
-    drawn: list[Mutant] = []
+    drawn = []
     for mutant in found:
         of_kind = sum(each.kind == mutant.kind for each in drawn)
         if of_kind * len(KINDS) < count and all(each.path != mutant.path for each in drawn):
@@ -144,7 +142,7 @@ def draw(root: Path, seed: int, count: int) -> list[Mutant]:
     return drawn[:count]
 
 
-def probe(tree: Path, drawn: Sequence[Mutant]) -> list[Mutant]:
+def with_tests(tree, drawn):
     """Runs the suite with probes; the mutants with the tests that come by their places."""
     hits = tree / "probes.txt"
     hits.write_text("")
@@ -169,7 +167,7 @@ def probe(tree: Path, drawn: Sequence[Mutant]) -> list[Mutant]:
     return [replace(each, tests=tuple(sorted(tests[each.number] - {""}))) for each in drawn]
 
 
-def suite(tree: Path, arguments: Sequence[str], limit_s: float, **environment: str) -> str:
+def suite(tree, arguments, limit_s, **environment):
     """Runs tests in the tree: the first that fails, or the end of what they print where they break off, or nothing."""
     command = [str(tree / ".venv/bin/python"), "-m", "pytest", "--ignore-glob=*_benchmarks.py", *arguments]
     path = f"{tree / '.venv/bin'}:{os.environ['PATH']}"
@@ -186,14 +184,14 @@ def suite(tree: Path, arguments: Sequence[str], limit_s: float, **environment: s
     return failed[1] if failed else printed[-300:] * (process.returncode != 0)
 
 
-def caught(tree: Path, mutant: Mutant, seconds: Mapping[str, float]) -> str:
+def caught(tree, mutant, seconds):
     """Applies a mutant and runs its tests, those of the mirrored folder and then the fastest first: who catches it."""
     mirrored = f"tests/{Path(mutant.path).parent}/"
     known = [test for test in mutant.tests if test in seconds]
     order = sorted(known, key=lambda test: (not test.startswith(mirrored), seconds[test]))
     folder = next(each for each in (tree / mirrored, *(tree / mirrored).parents) if each.is_dir())
     groups = [order[first : first + GROUP] for first in range(0, len(order), GROUP)]
-    for group in groups if mutant.probed else [[str(folder)], ["tests"]]:
+    for group in groups if mutant.probed else [[str(folder)], ["tests", "training/tests"]]:
         listed = tree / "selected.txt"
         listed.write_text("\n".join(group))
         before = mutant.apply(tree)
@@ -206,35 +204,30 @@ def caught(tree: Path, mutant: Mutant, seconds: Mapping[str, float]) -> str:
     return ""
 
 
-def main() -> None:
-    """Draw, probe or run."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("draw", "probe", "run"))
-    parser.add_argument("file", type=Path)
-    parser.add_argument("--seed", type=int, default=65)
-    parser.add_argument("--count", type=int, default=60)
-    parser.add_argument("--tree", type=Path, default=Path.cwd())
-    parser.add_argument("--only", type=int, nargs="*")
-    arguments = parser.parse_args()
-    if arguments.what == "draw":
-        drawn = draw(arguments.tree, arguments.seed, arguments.count)
-    else:
-        drawn = [Mutant(**each) for each in json.loads(arguments.file.read_text())["mutants"]]
-    if arguments.what == "probe":
-        drawn = probe(arguments.tree, drawn)
-    arguments.file.write_text(
-        json.dumps({"seed": arguments.seed, "mutants": [asdict(each) for each in drawn]}, indent=1)
-    )
-    if arguments.what != "run":
-        return
-    durations = json.loads((arguments.tree / "out/tests/durations.json").read_text())
+def read(file):
+    return [Mutant(**each) for each in json.loads(file.read_text())["mutants"]]
+
+
+def draw(file: Path, seed: int = 65, count: int = 60, tree: Path = HERE):
+    """Draws mutants of a tree into a file."""
+    file.write_text(json.dumps({"mutants": [asdict(each) for each in drawn_mutants(tree, seed, count)]}, indent=1))
+
+
+def probe(file: Path, tree: Path = HERE):
+    """Adds the tests that come by the places of a file's mutants."""
+    file.write_text(json.dumps({"mutants": [asdict(each) for each in with_tests(tree, read(file))]}, indent=1))
+
+
+def run(file: Path, tree: Path = HERE, only: tuple[int, ...] = ()):
+    """Runs the tests of a file's mutants, of all or of some."""
+    durations = json.loads((tree / "out/tests/durations.json").read_text())
     seconds = {each["name"]: each["seconds"] for each in durations["tests"]}
-    for each in drawn:
-        if not arguments.only or each.number in arguments.only:
-            by = caught(arguments.tree, each, seconds)
+    for each in read(file):
+        if not only or each.number in only:
             place = f"{each.path}:{each.line}"
-            print(json.dumps({"number": each.number, "place": place, "kind": each.kind, "caught_by": by}), flush=True)
+            by = caught(tree, each, seconds)
+            show({"number": each.number, "place": place, "kind": each.kind, "caught_by": by})
 
 
 if __name__ == "__main__":
-    main()
+    command(draw, probe, run)

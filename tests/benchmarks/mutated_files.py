@@ -10,7 +10,7 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,11 +57,11 @@ class Kind:
     raw: bool = False
 
 
-def missions() -> Callable[[Path], None]:
+def missions():
     """Reader that loads and compiles a mission; the world, the skills and the parser are loaded once."""
     flat, skills, parser = load_knowledge(FLAT / "knowledge.yaml"), installed_skills(), load_parser()
 
-    def compile_path(path: Path) -> None:
+    def compile_path(path):
         loaded = load_mission(path)
         knowledge = knowledge_of_mission(loaded, flat)
         for part in [mission_of_robot(loaded, name, name) for name in loaded.parts] if loaded.parts else [loaded]:
@@ -71,15 +71,14 @@ def missions() -> Callable[[Path], None]:
     return compile_path
 
 
-def scenarios() -> Callable[[Path], object]:
-    """Reader of a scenario of the flat."""
+def scenarios():
     knowledge, rules = load_knowledge(FLAT / "knowledge.yaml"), load_world("flat").seed_rules
     objects = {rule.name: rule.model for rule in rules.objects}
     people = {rule.name: rule.route is not None for rule in rules.people}
     return lambda path: read_scenario(path, knowledge, cameras=CAMERAS, objects=objects, people=people)
 
 
-def read_body(path: Path) -> None:
+def read_body(path):
     """Reads a mesh file as far as its solid. Raises InputError, which names the file."""
     try:
         solid_of(np.concatenate([patch.triangles for patch in read_mesh(path).patches]))
@@ -87,21 +86,18 @@ def read_body(path: Path) -> None:
         raise InputError(error.message, hint=error.hint, file=path) from error
 
 
-def contents(*files: Path) -> dict[str, bytes]:
-    """Files by their names."""
+def contents(*files):
     return {file.name: file.read_bytes() for file in files}
 
 
-def pictures() -> dict[str, bytes]:
-    """A small map in three forms."""
+def pictures():
     grey = np.full((12, 16), 254, np.uint8)
     grey[0] = 0
     pgm, png = (cv2.imencode(ending, grey)[1].tobytes() for ending in (".pgm", ".png"))
     return {"pgm": pgm, "png": png, "p2": b"P2\n# c\n16 12\n255\n" + b" ".join(b"%d" % value for value in grey.flat)}
 
 
-def kinds(folder: Path) -> dict[str, Kind]:
-    """All kinds; the files that go with a changed one are put into the folder."""
+def kinds(folder):
     shutil.copytree(Path(__file__).with_name("good_files"), folder, dirs_exist_ok=True)
     good = [*sorted((ROOT / "missions").glob("*.yaml")), ROOT / "tests/executive/mission/every_block.yaml"]
     for each in good:
@@ -113,10 +109,10 @@ def kinds(folder: Path) -> dict[str, Kind]:
     knowledge, stacks = contents(FLAT / "knowledge.yaml"), contents(*sorted((ROOT / "skills").glob("*_stack.yaml")))
     suites, walls = contents(*(ROOT / "tests/skills").rglob("*.skilltest.yaml")), contents(home / "walls.obj")
 
-    def world(_: Path) -> object:
+    def world(_):
         return load_world(home)
 
-    def tests(path: Path) -> object:
+    def tests(path):
         return load_skill_tests(path, skills)
 
     return {
@@ -138,7 +134,7 @@ def kinds(folder: Path) -> dict[str, Kind]:
     }
 
 
-def changed(kind: Kind, count: int, seed: int, folder: Path) -> Sequence[tuple[str, bytes]]:
+def changed(kind, count, seed, folder):
     """So many changed files of a kind; every tenth is none of that kind at all."""
     hostile = [(f"hostile-{number}", FILES[(seed + number) % len(FILES)]) for number in range(-(-count // 10))]
     texts, left = list(kind.good.values()), count - len(hostile)
@@ -151,7 +147,7 @@ def changed(kind: Kind, count: int, seed: int, folder: Path) -> Sequence[tuple[s
     return [*hostile, *mutated_files([folder / f"good-{number}" for number in range(len(texts))], left, seed)]
 
 
-def fault(path: Path, read: Callable[[Path], object], most_s: float = MOST_S) -> tuple[str, str]:
+def fault(path, read, most_s=MOST_S):
     """End of a file ("read", "refused", "traceback"), and what is wrong with that."""
     begun = time.process_time()
     try:
@@ -165,8 +161,7 @@ def fault(path: Path, read: Callable[[Path], object], most_s: float = MOST_S) ->
     return how, wrong or (f"it takes {spent_s:.1f} s" if spent_s > most_s else "")
 
 
-def _told_badly(error: InputError) -> str:
-    """What is wrong with an error."""
+def _told_badly(error):
     if error.file is None or not error.message:
         return f"no place: {error}"
     if error.line is None and error.file.suffix in (".yaml", ".sdf"):
@@ -177,7 +172,7 @@ def _told_badly(error: InputError) -> str:
     return f"too long: {str(error)[:300]}" if len(str(error)) > 2000 else ""
 
 
-def benchmark(files: int, seed: int, chosen: Sequence[str], tell: Callable[[str], None], most_s: float = MOST_S) -> int:
+def benchmark(files, seed, chosen, tell, most_s=MOST_S):
     """Tries so many; returns the number of those with something wrong."""
     bad, begun = 0, time.perf_counter()
     with tempfile.TemporaryDirectory() as name:
@@ -187,7 +182,7 @@ def benchmark(files: int, seed: int, chosen: Sequence[str], tell: Callable[[str]
         for number, (title, kind) in enumerate(every.items()):
             if chosen and title not in chosen:
                 continue
-            target, found = folder / kind.target, Counter[str]()
+            target, found = folder / kind.target, Counter()
             before = target.read_bytes() if target.exists() else None
             for each, content in kind.good.items():
                 target.write_bytes(content)
@@ -210,14 +205,12 @@ def benchmark(files: int, seed: int, chosen: Sequence[str], tell: Callable[[str]
     return bad
 
 
-def _memory_mb() -> float:
-    """The memory in use, where the system tells."""
+def _memory_mb():
     pages = Path("/proc/self/statm")
     return int(pages.read_text().split()[1]) * 4096 / 1e6 if pages.exists() else 0.0
 
 
-def measure(files: int = 5000, seed: int = 1, kinds: tuple[str, ...] = ()) -> int:
-    """Tries files of some kinds, or of all; returns 1 when something is wrong."""
+def measure(files: int = 5000, seed: int = 1, kinds: tuple[str, ...] = ()):
     return int(benchmark(files, seed, kinds, lambda text: print(text, flush=True)) > 0)
 
 

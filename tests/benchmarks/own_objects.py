@@ -12,16 +12,18 @@ of both is used. With `--photographs` the robot knows the objects by photographs
 import tempfile
 import time
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
 import cv2
 import numpy as np
 import trimesh
+import yaml
 from pydrake.geometry import (
     FramePoseVector,
     GeometryFrame,
@@ -36,7 +38,6 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform, RotationMatrix
 from trimesh import creation
 
-from errand_train.dataset.views import View
 from plant.models.builder.importing import (
     ImportOptions,
     ImportReports,
@@ -44,22 +45,20 @@ from plant.models.builder.importing import (
     import_object,
     import_photographs,
 )
-from plant.models.builder.importing.solid import Solid
 from plant.rendering import lights
 from plant.scene_pictures import look_at, render_view
-from skills.api import Surface
 from skills.detect.skill import Detect, DetectInputs
 from skills.detection import NoDetector
 from skills.files.errors import InputError
 from skills.files.object_model import ObjectModel, read_model
 from skills.geometry import inside_polygon
 from skills.perception.model_detector import ModelDetector
-from skills.robot import FloatArray, Pose2D
 from tests.benchmarks.find_things import room_bench
 from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, entries
-from tests.benchmarks.harness import command, share, tell
+from tests.benchmarks.harness import by, command, share, tell
 
+GENERATED = yaml.safe_load(Path(__file__).with_name("own_shapes.yaml").read_text(encoding="utf-8"))
 OBJECTS, FOREIGN, OTHERS_AROUND, IMPORTED_OTHERS = 10, 10, 4, 2
 UPRIGHT_SHARE, TRIES = 0.75, 300
 RIM_M, CLEAR_M, REACH_M, RIGHT_WITHIN_M = 0.04, 0.04, 1.7, 0.05
@@ -72,98 +71,55 @@ STANDING, LYING, SIDES = 12, 6, 3
 """Numbers of photographs of an object as it stands, and on each other side; number of other sides."""
 
 
-def revolved(*profile: tuple[float, float]) -> Any:
-    """Body of revolution from a closed profile of (radius, height) in mm."""
+def revolved(*profile):
     return creation.revolve(np.array(profile, dtype=float), sections=40)
 
 
-def block(low: Sequence[float], high: Sequence[float]) -> Any:
-    """Box between two corners (mm)."""
-    return creation.box(bounds=[low, high])
-
-
-def turned(mesh: Any, axis: Sequence[float], degrees: float, by: Sequence[float] = (0, 0, 0)) -> Any:
-    """The mesh, turned about an axis and moved."""
-    mesh.apply_transform(trimesh.transformations.rotation_matrix(np.radians(degrees), axis))
-    mesh.apply_translation(by)
-    return mesh
-
-
-def ring(radius: float, thick: float, by: Sequence[float]) -> Any:
-    """Standing ring of a handle."""
-    return turned(creation.torus(radius, thick), (1, 0, 0), 90, by)
-
-
-def rod(radius: float, length: float) -> Any:
-    """Cylinder along z."""
-    return creation.cylinder(radius, length, sections=32)
-
-
-def cup(radius: float, height: float, wall: float) -> Any:
-    """Hollow cylinder with a bottom."""
+def cup(radius, height, wall):
     inner = radius - wall
     return revolved((0, 0), (radius, 0), (radius, height), (inner, height), (inner, wall), (0, wall))
 
 
-def roof(half_x: float, half_y: float, low: float, high: float) -> Any:
+def ring(radius, thick):
+    upright = trimesh.transformations.rotation_matrix(np.radians(90), (1, 0, 0))
+    return creation.torus(radius, thick).apply_transform(upright)
+
+
+def roof(half_x, half_y, low, high):
     """Prism of a gable roof."""
     points = [[x, y, low] for x in (-half_x, half_x) for y in (-half_y, half_y)]
     return trimesh.convex.convex_hull(np.array([*points, [-half_x, 0, high], [half_x, 0, high]]))
 
 
-def shapes() -> Mapping[str, Sequence[tuple[Any, tuple[int, int, int]]]]:
-    """Generated objects: parts (mm, z up) with their colours, by name; every second is of the other half."""
-    white, red, blue, green = (235, 235, 230), (190, 40, 35), (40, 80, 185), (50, 140, 70)
-    yellow, black, brown, grey = (225, 185, 40), (35, 35, 38), (120, 80, 50), (150, 150, 155)
-    return {
-        "blue_mug": [(cup(40, 95, 4), blue), (ring(22, 5, (48, 0, 48)), blue)],
-        "red_cup": [
-            (revolved((0, 0), (30, 0), (42, 85), (38, 85), (26, 4), (0, 4)), red),
-            (ring(18, 5, (44, 0, 45)), red),
-        ],
-        "white_bowl": [(revolved((0, 0), (35, 0), (75, 60), (71, 60), (32, 5), (0, 5)), white)],
-        "green_dish": [(revolved((0, 0), (60, 0), (95, 28), (91, 28), (58, 5), (0, 5)), green)],
-        "cereal": [(block((-95, -30, 0), (95, 30, 270)), yellow), (block((-70, -31, 60), (70, 31, 200)), red)],
-        "parcel": [(block((-80, -60, 0), (80, 60, 110)), brown), (block((-82, -15, -1), (82, 15, 112)), white)],
-        "toy_car": [
-            (block((-70, -30, 12), (70, 30, 45)), red),
-            (block((-35, -27, 45), (40, 27, 75)), white),
-            *((turned(rod(16, 14), (1, 0, 0), 90, (x, y, 16)), black) for x in (-42, 42) for y in (-32, 32)),
-        ],
-        "toy_house": [(block((-45, -35, 0), (45, 35, 60)), white), (roof(52, 42, 60, 100), red)],
-        "bracket": [(block((0, -25, 0), (110, 25, 8)), grey), (block((0, -25, 8), (8, 25, 90)), grey)],
-        "pipe_bend": [(rod(18, 120), green), (turned(rod(18, 90), (0, 1, 0), 90, (45, 0, -42)), green)],
-        "squeeze_bottle": [
-            (revolved((0, 0), (32, 0), (34, 120), (14, 150), (0, 150)), yellow),
-            (revolved((0, 150), (12, 150), (5, 190), (0, 190)), red),
-        ],
-        "spray_can": [
-            (revolved((0, 0), (26, 0), (26, 150), (12, 165), (0, 165)), blue),
-            (turned(rod(9, 18), (0, 0, 1), 0, (0, 0, 174)), white),
-        ],
-        "tape_roll": [(revolved((38, 0), (55, 0), (55, 48), (38, 48), (38, 0)), brown)],
-        "hand_weight": [
-            (turned(rod(15, 130), (0, 1, 0), 90, (0, 0, 30)), black),
-            (turned(rod(30, 40), (0, 1, 0), 90, (-75, 0, 30)), grey),
-            (turned(rod(30, 40), (0, 1, 0), 90, (75, 0, 30)), grey),
-        ],
-        "white_mug": [(cup(40, 95, 4), white), (ring(22, 5, (48, 0, 48)), white)],
-        "steel_jug": [(cup(48, 150, 3), grey), (ring(40, 6, (60, 0, 85)), black)],
-    }
+SHAPES = {
+    "revolve": revolved,
+    "cup": cup,
+    "ring": ring,
+    "roof": roof,
+    "box": lambda low, high: creation.box(bounds=[low, high]),
+    "rod": lambda radius, length: creation.cylinder(radius, length, sections=32),
+}
 
 
-def generated(folder: Path, half: int) -> Iterator[tuple[Path, ImportOptions]]:
+def made_part(colour, turn=(0, 0, 0, 1), by=(0, 0, 0), **shape):
+    ((kind, sizes),) = shape.items()
+    mesh, (degrees, *axis) = SHAPES[kind](*sizes), turn
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(np.radians(degrees), axis))
+    mesh.apply_translation(by)
+    mesh.visual.face_colors = [*GENERATED["colours"][colour], 255]
+    return mesh
+
+
+def generated(folder, half):
     """Files of every second generated object, with the options of their import."""
-    for name, parts in list(shapes().items())[half::2]:
-        for mesh, colour in parts:
-            mesh.visual.face_colors = [*colour, 255]
-        whole = trimesh.util.concatenate([mesh for mesh, _ in parts])
+    for name, parts in list(GENERATED["objects"].items())[half::2]:
+        whole = trimesh.util.concatenate([made_part(**part) for part in parts])
         whole.apply_scale(0.001)
         whole.export(folder / f"{name}.ply")
         yield folder / f"{name}.ply", ImportOptions(name, None, None, 1.0, "z", close_holes=False)
 
 
-def foreign(folder: Path, half: int, catalogues: Path = CATALOGUES) -> Iterator[tuple[Path, ImportOptions]]:
+def foreign(folder, half, catalogues=CATALOGUES):
     """Files of every second model of others that has a usual size, with the options of their import."""
     every = [entry for file in sorted(catalogues.glob("*.sh3f")) for entry in entries(file)]
     sized = [entry for entry in every if SIZES_M[0] <= entry.size_m.max() <= SIZES_M[1]]
@@ -179,10 +135,10 @@ def foreign(folder: Path, half: int, catalogues: Path = CATALOGUES) -> Iterator[
         yield own / entry.path, ImportOptions(f"other{number}", None, None, scale, "y", close_holes=True)
 
 
-def imported(folder: Path, half: int) -> list[ObjectModel]:
+def imported(folder, half):
     """Imports the objects of one half, up to `FOREIGN` of others; leaves out those that no import takes."""
     folder.mkdir(parents=True, exist_ok=True)
-    models = list[ObjectModel]()
+    models = []
     with mock.patch("plant.models.builder.importing.import_object.convex_parts", _bounding_box):  # they lie still
         for file, options in (*generated(folder, half), *foreign(folder, half)):
             if sum(model.name.startswith("other") for model in models) == FOREIGN:
@@ -197,12 +153,12 @@ def imported(folder: Path, half: int) -> list[ObjectModel]:
     return models
 
 
-def _bounding_box(solid: Solid) -> tuple[FloatArray, ...]:
+def _bounding_box(solid):
     low, high = solid.points.min(axis=0), solid.points.max(axis=0)
     return (np.array(list(product(*zip(low, high, strict=True)))),)
 
 
-def photographed(folder: Path, model: ObjectModel, pictures: Path, seed: int = 0) -> Path:
+def photographed(folder, model, pictures, seed=0):
     """Renders photographs of an imported object, as it stands and on other sides; the JPEG files lie in a folder.
 
     The background is plain, and the exposure and the tint of each are a little wrong.
@@ -236,9 +192,9 @@ def photographed(folder: Path, model: ObjectModel, pictures: Path, seed: int = 0
     return pictures
 
 
-def by_photographs(folder: Path, models: Sequence[ObjectModel]) -> list[ObjectModel]:
+def by_photographs(folder, models):
     """Models of the same objects, of photographs instead of meshes; leaves out those that no import takes."""
-    found = list[ObjectModel]()
+    found = []
     for model in models:
         x, y, z = (round(float(side), 3) for side in np.ptp(model.points, axis=0))
         out = folder / f"{model.name}_seen"
@@ -255,21 +211,18 @@ def by_photographs(folder: Path, models: Sequence[ObjectModel]) -> list[ObjectMo
 
 @dataclass(frozen=True)
 class Lying:
-    """An object that lies in the flat."""
-
     model: ObjectModel
     X_WM: RigidTransform
 
     @property
-    def middle_W(self) -> FloatArray:
-        """Centre of its bounding box."""
+    def middle_W(self):
         points = self.model.points @ self.X_WM.rotation().matrix().T + self.X_WM.translation()
         return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
 
 
-def laid(rng: np.random.Generator, models: Sequence[ObjectModel], surface: Surface, pose: Pose2D) -> Iterator[Lying]:
+def laid(rng, models, surface, pose):
     """Objects laid on a surface where they fit; a quarter of them on another side."""
-    corners, taken = np.asarray(surface.polygon_W), list[tuple[FloatArray, float]]()
+    corners, taken = np.asarray(surface.polygon_W), []
     for model in models:
         for _ in range(TRIES):
             rest = 0 if rng.random() < UPRIGHT_SHARE else int(rng.integers(min(4, len(model.rests))))
@@ -291,23 +244,13 @@ class FlatStage(FlatScene):
 
     labelled: Mapping[int, Any] = {}
 
-    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, FloatArray]:
+    def seen(self, view, range_m):
         """Clean picture, labels and depth (m)."""
         lens = view.intrinsics
         return self.colour(view.X_WC, lens), self.labels(view.X_WC, lens), self.depth_m(view.X_WC, lens, range_m)
 
 
-@dataclass(frozen=True)
-class Scene:
-    """Objects on one surface of the flat, where the robot stands, and an object that is absent."""
-
-    objects: Sequence[Lying]
-    surface: Surface
-    pose: Pose2D
-    absent: str
-
-
-def scene(rng: np.random.Generator, target: ObjectModel, pool: Sequence[ObjectModel]) -> Scene | None:
+def scene(rng, target, pool):
     """Lays an object and four others; None where the object finds no place."""
     surface = surface_of(str(rng.choice(SURFACES)))
     pose = viewpoint_of(rng, surface.name)
@@ -317,24 +260,11 @@ def scene(rng: np.random.Generator, target: ObjectModel, pool: Sequence[ObjectMo
     objects = list(laid(rng, [target, *around], surface, pose))
     if not objects or objects[0].model is not target:
         return None
-    return Scene(objects, surface, pose, known[IMPORTED_OTHERS].name)
+    absent = known[IMPORTED_OTHERS].name
+    return SimpleNamespace(objects=objects, surface=surface, pose=pose, absent=absent)
 
 
-@dataclass(frozen=True)
-class Asked:
-    """One question: whether the object was there, found, or claimed elsewhere, and what was said."""
-
-    name: str
-    scene: int
-    there: bool
-    found: bool
-    mistaken: bool
-    message: str
-    wall_s: float
-
-
-def ask(made: Scene, number: int, name: str, detector: ModelDetector, folder: Path, seed: int) -> Asked:
-    """Asks for an object by its name."""
+def ask(made, number, name, detector, folder, seed):
     begun = time.perf_counter()
     files = [(folder / each.model.name / f"{each.model.name}.sdf", each.X_WM) for each in made.objects]
     bench = room_bench(FlatStage(files), made.pose, detector, seed, seed)
@@ -344,13 +274,14 @@ def ask(made: Scene, number: int, name: str, detector: ModelDetector, folder: Pa
     if claimed:
         position_W = run.outputs["observation"].position_W
         found = bool(places) and bool(np.linalg.norm(position_W - places[0]) < RIGHT_WITHIN_M)
-    wall_s = round(time.perf_counter() - begun, 1)
-    return Asked(name, number, bool(places), found, claimed and not found, run.message, wall_s)
+    asked = {"name": name, "scene": number, "there": bool(places), "found": found}
+    told = {"message": run.message, "wall_s": round(time.perf_counter() - begun, 1)}
+    return SimpleNamespace(**asked, mistaken=claimed and not found, **told)
 
 
-def measure(half: int = 0, scenes: int = 5, seed: int = 1, photographs: bool = False) -> dict[str, object]:
+def measure(half: int = 0, scenes: int = 5, seed: int = 1, photographs: bool = False):
     """Asks in all scenes of all objects, which the robot knows by their meshes or by photographs."""
-    rng, every = np.random.default_rng([seed, half]), list[Asked]()
+    rng, every = np.random.default_rng([seed, half]), []
     with tempfile.TemporaryDirectory(prefix="errand-own-") as made:
         folder = Path(made)
         models = imported(folder, half)
@@ -365,17 +296,16 @@ def measure(half: int = 0, scenes: int = 5, seed: int = 1, photographs: bool = F
     return summary(every)
 
 
-def summary(every: Sequence[Asked]) -> dict[str, object]:
+def summary(every):
     """Shares of the objects found, and of questions to which another object was claimed."""
     there, absent = ([each for each in every if each.there is so] for so in (True, False))
-    of = {name: [each.found for each in there if each.name == name] for name in dict.fromkeys(e.name for e in there)}
     return {
         "asked": len(there),
         "found": share([each.found for each in there]),
         "mistaken_of_there": share([each.mistaken for each in there]),
         "absent": len(absent),
         "mistaken_of_absent": share([each.mistaken for each in absent]),
-        "by_object": {name: f"{sum(found)}/{len(found)}" for name, found in of.items()},
+        "by_object": {name: f"{sum(e.found for e in own)}/{len(own)}" for name, own in by(there, "name").items()},
         "wall_s": round(sum(each.wall_s for each in every) / max(len(every), 1), 1),
     }
 

@@ -12,22 +12,18 @@ it while it stood, goals reached, and the time lost against the same drive witho
 import functools
 import math
 import tempfile
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from itertools import groupby, product
-from operator import attrgetter
+from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
-from executive.app.prepared import Prepared
 from executive.words.mission import Route
 from plant.worlds.builder.own import world_from_grid
 from plant.worlds.builder.rooms import FREE, OCCUPIED, Grid
-from plant.worlds.world import World
 from skills.robot import Pose2D
-from tests.benchmarks.harness import benchmark, quantile
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.benchmarks.harness import benchmark, for_each, quantile
+from tests.benchmarks.plant_mission import PlantMission
 
 CELL_M, HALL_M, DEPTH_M = 0.05, (11.0, 4.4), 1.6
 OPENINGS_M = (3.5, 5.5, 7.5)
@@ -41,52 +37,32 @@ STEPS = "  - skill: navigate\n    timeout: 120\n    with: {{x: {x}, y: {y}, yaw:
 STACK = "controller: {use: path_follower, max_speed_m_s: 1.0}\n"
 
 
-@dataclass(frozen=True)
-class Walk:
-    """Walk of somebody from one point to another, who sets off once the robot's front is `gap_m` before them there."""
-
-    name: str
-    from_W: tuple[float, float]
-    to_W: tuple[float, float]
-    speed_m_s: float
-    gap_m: float
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Result of a case; `alone_s` is the time of the same drive without anybody."""
-
-    what: str
-    ended: Ended
-    alone_s: float
-    least_gap_m: float
-
-
-def cases(
-    what: tuple[str, ...] = ("steps_in", "crosses"), first: int = 0, count: int = 10
-) -> Iterable[tuple[str, int]]:
-    """Kinds of cases with their numbers."""
+def cases(what: tuple[str, ...] = ("steps_in", "crosses"), first: int = 0, count: int = 10):
     return product(what, range(first, first + count))
 
 
-def draw_walk(what: str, number: int) -> tuple[float, Walk]:
-    """Highest speed of the robot (m/s), and the walk of somebody."""
+def draw_walk(what, number):
+    """Highest speed of the robot (m/s), and the walk of somebody from one point to another.
+
+    They set off once the robot's front is `gap_m` before them there.
+    """
     rng = np.random.default_rng([number, len(what)])
     side = float(rng.choice([-1.0, 1.0]))
     hidden = rng.random() < 0.5
     x = float(rng.choice(OPENINGS_M) if hidden else rng.uniform(3.5, 7.5))
     aside_m = float(rng.uniform(2.5, 3.0) if hidden else rng.uniform(*ASIDE_M[what]))
     robot_m_s = float(rng.uniform(0.5, 1.0))
-    start_W = (x, WAY_Y_M + side * aside_m)
+    walk = SimpleNamespace(name=what, from_W=(x, WAY_Y_M + side * aside_m))
     if what == "steps_in":
-        to_W = (x, WAY_Y_M + float(rng.uniform(-0.25, 0.25)))
-        return robot_m_s, Walk(what, start_W, to_W, float(rng.uniform(0.8, 1.4)), STEP_IN_M)
-    beyond_m = float(rng.uniform(1.2, 1.8))
-    return robot_m_s, Walk(what, start_W, (x, WAY_Y_M - side * beyond_m), 1.2, float(rng.uniform(-0.8, 1.2)))
+        walk.to_W = (x, WAY_Y_M + float(rng.uniform(-0.25, 0.25)))
+        walk.speed_m_s, walk.gap_m = float(rng.uniform(0.8, 1.4)), STEP_IN_M
+    else:
+        walk.to_W = (x, WAY_Y_M - side * float(rng.uniform(1.2, 1.8)))
+        walk.speed_m_s, walk.gap_m = 1.2, float(rng.uniform(-0.8, 1.2))
+    return robot_m_s, walk
 
 
-def make_world(folder: Path) -> None:
-    """Writes a hall with three openings at each side, to small rooms."""
+def make_world(folder):
     rows, columns = (round(length / CELL_M) for length in (HALL_M[1] + 2 * DEPTH_M, HALL_M[0]))
     cells = np.full((rows, columns), OCCUPIED, np.uint8)
     depth = round(DEPTH_M / CELL_M)
@@ -101,14 +77,14 @@ def make_world(folder: Path) -> None:
 class Trigger:
     """Observer of the plant that lets somebody set off in time to be in the robot's way."""
 
-    def __init__(self, mission: PlantMission, walk: Walk) -> None:
+    def __init__(self, mission, walk):
         self._simulation, self._robot_name, self._walk = mission.simulation, mission.robot_name, walk
         self._walker = mission.simulation.engine.walkers[walk.name]
         self._body = mission.simulation.engine.world.robots[mission.robot_name].body
         self._off = False
         self.least_gap_m = math.inf
 
-    def __call__(self, now_s: float) -> None:
+    def __call__(self, now_s):
         engine = self._simulation.engine
         plant, context = engine.world.plant, engine.context
         x, y, _ = plant.EvalBodyPoseInWorld(context, self._body).translation()
@@ -122,13 +98,13 @@ class Trigger:
             self._walker.set_off()
 
 
-def drive(folder: Path, number: int, robot_m_s: float, walk: Walk | None = None) -> tuple[Ended, float]:
-    """Drives along the hall; returns how the mission ended, and the least distance from somebody (m)."""
+def drive(folder, number, robot_m_s, walk=None):
+    """Drives along the hall; the end of the mission has the least distance from somebody, too (m)."""
     make_world(folder / "hall")
     stack = folder / "stack.yaml"
     stack.write_text(STACK)
 
-    def with_walk(prepared: Prepared) -> World:
+    def with_walk(prepared):
         if walk is None:
             return prepared.world
         route = Route(waypoints=(walk.from_W, walk.to_W), speed=walk.speed_m_s, start=86400.0, yields=False)
@@ -136,37 +112,31 @@ def drive(folder: Path, number: int, robot_m_s: float, walk: Walk | None = None)
 
     steps = STEPS.format(x=GOAL_X_M, y=WAY_Y_M, speed=robot_m_s)
     mission = PlantMission(folder, number, change=with_walk, steps=steps, world=str(folder / "hall"), stack=stack)
-    trigger = None if walk is None else Trigger(mission, walk)
-    if trigger is not None:
-        mission.simulation.engine.observe(trigger, every=2)
-    return mission.end("drive"), math.inf if trigger is None else round(trigger.least_gap_m, 3)
+    if walk is None:
+        return mission.end("drive")
+    trigger = Trigger(mission, walk)
+    mission.simulation.engine.observe(trigger, every=2)
+    ended = mission.end("drive")
+    ended.least_gap_m = round(trigger.least_gap_m, 3)
+    return ended
 
 
 @functools.cache
-def time_alone_s(robot_m_s: float) -> float:
-    """Time of the drive without anybody."""
+def time_alone_s(robot_m_s):
     with tempfile.TemporaryDirectory() as folder:
-        return drive(Path(folder), 0, robot_m_s)[0].sim_time_s
+        return drive(Path(folder), 0, robot_m_s).sim_time_s
 
 
-def run_case(what: str, number: int, folder: Path) -> Outcome:
-    """Drives with somebody, and alone."""
+def run_case(what, number, folder):
     robot_m_s, walk = draw_walk(what, number)
-    ended, least_gap_m = drive(folder, number, robot_m_s, walk)
-    return Outcome(what, ended, time_alone_s(round(robot_m_s, 1)), least_gap_m)
+    ended = drive(folder, number, robot_m_s, walk)
+    return vars(ended) | {"what": what, "lost_s": ended.sim_time_s - time_alone_s(round(robot_m_s, 1))}
 
 
-def summary(outcomes: Sequence[Outcome]) -> dict[str, object]:
-    """Figures of each kind of case."""
-    return {what: figures(list(each)) for what, each in groupby(outcomes, attrgetter("what"))}
-
-
-def figures(outcomes: Sequence[Outcome]) -> dict[str, object]:
-    """Figures of one kind of case."""
-    ends = [each.ended for each in outcomes]
-    lost_s = [each.ended.sim_time_s - each.alone_s for each in outcomes if each.ended.claimed]
+def figures(ends):
+    lost_s = [each.lost_s for each in ends if each.claimed]
     return {
-        "cases": len(outcomes),
+        "cases": len(ends),
         "cases_with_contact_while_moving": sum(each.people_hit > 0 for each in ends),
         "cases_walked_into_standing_robot": sum(each.hit_by_people > 0 for each in ends),
         "reached": sum(each.claimed for each in ends),
@@ -177,4 +147,4 @@ def figures(outcomes: Sequence[Outcome]) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    benchmark(cases, run_case, summary)
+    benchmark(cases, run_case, for_each("what", figures))

@@ -10,9 +10,6 @@ the referee does not confirm is a false one.
 
 import math
 import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import yaml
@@ -20,10 +17,10 @@ import yaml
 from executive.words.mission import Route
 from executive.words.outlines import inside
 from plant.worlds.seeding import add_answers
-from plant.worlds.world import World, load_world
+from plant.worlds.world import load_world
 from skills.estimate.grid_map import load_grid_map
 from tests.benchmarks.harness import benchmark, quantile, totals
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from tests.benchmarks.plant_mission import PlantMission
 
 USUAL = {"Robin": "living room", "Maya": "kitchen", "Sam": "office"}
 STEPS = {
@@ -37,25 +34,12 @@ CLEAR_M, APART_M, NEVER_S = 0.45, 1.3, 86400.0
 ABSENT, ELSEWHERE = 0.15, 0.25
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """End of a mission about somebody, or the people in a room, who may be `present`."""
-
-    ended: Ended
-    present: bool
-
-    @property
-    def right(self) -> bool:
-        """True if the mission was fulfilled, or rightly denied."""
-        return bool(self.ended.fulfilled) if self.ended.claimed else not self.present
-
-
-def cases(first: int = 9760, count: int = 30) -> list[tuple[str, int]]:
+def cases(first: int = 9760, count: int = 30):
     """Kinds of missions in turn, with their seeds."""
     return [([*STEPS][seed % len(STEPS)], seed) for seed in range(first, first + count)]
 
 
-def make_world(folder: Path) -> World:
+def make_world(folder):
     """Writes the flat with three people in its knowledge."""
     shutil.copytree(load_world("flat").folder, folder)
     knowledge = yaml.safe_load((folder / "knowledge.yaml").read_text())
@@ -64,13 +48,13 @@ def make_world(folder: Path) -> World:
     return load_world(str(folder))
 
 
-def draw_people(world: World, kind: str, seed: int) -> tuple[str, Mapping[str, tuple[float, float]]]:
+def draw_people(world, kind, seed):
     """Name of the person or room that a mission is about, and the places of all people."""
     rng = np.random.default_rng(seed)
     grid = load_grid_map(world.folder / "truth" / "keepout.yaml")
     rows, columns = np.nonzero(grid.distance > CLEAR_M)
     points = np.column_stack([columns + 0.5, rows + 0.5]) * grid.resolution_m + np.array(grid.origin_m)
-    people: dict[str, tuple[float, float]] = {}
+    people = {}
     whom = str(rng.choice(list(USUAL))) if kind != "greet" else str(rng.choice(GREETED))
     for name, usual in USUAL.items():
         drawn = rng.random()
@@ -87,8 +71,7 @@ def draw_people(world: World, kind: str, seed: int) -> tuple[str, Mapping[str, t
     return whom, people
 
 
-def run_case(kind: str, seed: int, folder: Path) -> Outcome:
-    """Runs the mission of a seed."""
+def run_case(kind, seed, folder):
     world = make_world(folder / "flat")
     whom, people = draw_people(world, kind, seed)
     routes = {name: Route(waypoints=(at, at), start=NEVER_S) for name, at in people.items()}
@@ -97,18 +80,18 @@ def run_case(kind: str, seed: int, folder: Path) -> Outcome:
     mission = PlantMission(folder, seed, steps=steps, world=str(world.folder), change=lambda _: peopled)
     room = world.rooms.get(whom)
     present = whom in people if room is None else any(inside(room, at) for at in people.values())
-    return Outcome(mission.end(f"{kind} {whom}"), present)
+    ended = mission.end(f"{kind} {whom}")
+    right = bool(ended.fulfilled) if ended.claimed else not present
+    return vars(ended) | {"right": right, "present": present}
 
 
-def summary(outcomes: Sequence[Outcome]) -> dict[str, object]:
-    """Figures of the missions."""
-    ends = [each.ended for each in outcomes]
+def summary(ends):
     return {
-        "missions": len(outcomes),
-        **totals(outcomes, "right"),
+        "missions": len(ends),
+        **totals(ends, "right"),
         "fulfilled": sum(each.claimed and bool(each.fulfilled) for each in ends),
         "false_claims": [each.seed for each in ends if each.false_claim],
-        "wrong_denials": [each.ended.seed for each in outcomes if each.present and not each.ended.claimed],
+        "wrong_denials": [each.seed for each in ends if each.present and not each.claimed],
         **totals(ends, "people_hit"),
         "time_s_median": quantile([each.sim_time_s for each in ends], digits=1),
     }

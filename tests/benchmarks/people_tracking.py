@@ -9,15 +9,11 @@ over to another person.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
-from executive.app.prepared import Prepared
 from executive.words.mission import Route
-from plant.worlds.world import World
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.perception.people import people_in_scan
@@ -31,32 +27,23 @@ NAMES = ("Ann", "Bob", "Cid")
 STANDING = "Robin"
 
 
-@dataclass
-class Counts:
-    """Counts of a drive: visible people, those with a track, tracks, those near a person, switches; errors (m)."""
-
-    visible: int = 0
-    found: int = 0
-    tracks: int = 0
-    right: int = 0
-    switches: int = 0
-    off_m: list[float] = field(default_factory=list)
-
-
 class Observer:
-    """Observer of the plant that tracks people in each scan and compares them with the truth."""
+    """Observer of the plant that tracks people in each scan and compares them with the truth.
 
-    def __init__(self, mission: PlantMission) -> None:
+    It counts visible people, those with a track, tracks, those near a person, and switches; `off_m` has the errors (m).
+    """
+
+    def __init__(self, mission):
         self._engine, self._robot = mission.simulation.engine, mission.simulation.robots[mission.robot_name]
         world = self._engine.world
         self._body = world.robots[mission.robot_name].body
         models = [world.models[name] for name in (*NAMES, STANDING)]
         self._people = [world.plant.get_body(world.plant.GetBodyIndices(each)[0]) for each in models]
         self._survey = LayeredCostmap(load_grid_map(mission.prepared.world.keepout_map_path))
-        self._tracker, self._stamp_s, self._person_of = PeopleTracker(), -math.inf, dict[int, int]()
-        self.counts = Counts()
+        self._tracker, self._stamp_s, self._person_of = PeopleTracker(), -math.inf, {}
+        self.counts = SimpleNamespace(visible=0, found=0, tracks=0, right=0, switches=0, off_m=[])
 
-    def __call__(self, now_s: float) -> None:
+    def __call__(self, now_s):
         scan, counts = self._robot.scan(), self.counts
         if scan is None or scan.stamp_s <= self._stamp_s or now_s - scan.stamp_s > 0.06:
             return
@@ -89,17 +76,15 @@ class Observer:
                 self._person_of[one.track] = person
 
 
-def cases(first: int = 0, count: int = 3, seconds: float = 60.0) -> list[tuple[int, float]]:
-    """Seeds, and how long each drive lasts."""
+def cases(first: int = 0, count: int = 3, seconds: float = 60.0):
     return [(seed, seconds) for seed in range(first, first + count)]
 
 
-def run_case(seed: int, seconds: float, folder: Path) -> Counts:
-    """Drives among people whose routes the seed draws."""
+def run_case(seed, seconds, folder):
     rng = np.random.default_rng(seed)
     steps = "".join(f"  - say: go to the {room}\n" for room in rng.permutation(ROOMS[:6])[:4])
 
-    def with_people(prepared: Prepared) -> World:
+    def with_people(prepared):
         routes = {}
         for name in NAMES:
             stops = [prepared.knowledge.place_pose(str(room)) for room in rng.permutation(ROOMS)[:4]]
@@ -114,8 +99,7 @@ def run_case(seed: int, seconds: float, folder: Path) -> Counts:
     return observer.counts
 
 
-def summary(counts: Sequence[Counts]) -> dict[str, object]:
-    """Figures of all drives."""
+def summary(counts):
     sums = totals(counts, "visible", "found", "tracks", "right", "switches")
     off_m = [each for one in counts for each in one.off_m]
     return {

@@ -10,12 +10,7 @@ lost Robin.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import groupby, product
-from operator import attrgetter
-from pathlib import Path
-from typing import Any
+from itertools import product
 
 import numpy as np
 
@@ -24,33 +19,21 @@ from executive.words.knowledge import load_knowledge
 from executive.words.mission import Distraction, Route
 from plant.referee.company import lost_s
 from plant.referee.object_history import TimedPath
-from plant.worlds.world import World, load_world
-from tests.benchmarks.harness import benchmark, totals
-from tests.benchmarks.plant_mission import Ended, PlantMission
+from plant.worlds.world import load_world
+from tests.benchmarks.harness import benchmark, for_each, totals
+from tests.benchmarks.plant_mission import PlantMission
 from tests.visitors import OnMessage
 
 LENGTH_M, LEAST_DOORS = (28.0, 34.0), 3
 START_ROOM, BESIDE_M = "living room", 1.6
 LIMIT_S = 300.0
-Point = tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """Result of a trial."""
-
-    what: str
-    ended: Ended
-    lost_s: float
-    wrong_person: bool
-
-
-def cases(what: tuple[str, ...] = ("follow", "crossed", "guide"), first: int = 0, count: int = 40) -> Iterable[Any]:
-    """Kinds of trials with their seeds."""
+def cases(what: tuple[str, ...] = ("follow", "crossed", "guide"), first: int = 0, count: int = 40):
     return product(what, range(first, first + count))
 
 
-def walk_through(world: World, rng: np.random.Generator) -> tuple[list[str], list[Point], float]:
+def walk_through(world, rng):
     """Rooms, waypoints and length (m) of a walk of the wanted length; its last room is not passed before."""
     knowledge = load_knowledge(world.knowledge_path)
     while True:
@@ -70,7 +53,7 @@ def walk_through(world: World, rng: np.random.Generator) -> tuple[list[str], lis
             return rooms, points, length_m
 
 
-def draw_trial(what: str, seed: int, world: World) -> tuple[str, Mapping[str, Route]]:
+def draw_trial(what, seed, world):
     """Sentence for the robot, and the people who walk."""
     rng = np.random.default_rng([seed, len(what)])
     start, beside = world.start, np.array([math.cos(world.start.yaw_rad), math.sin(world.start.yaw_rad)]) * BESIDE_M
@@ -96,13 +79,13 @@ def draw_trial(what: str, seed: int, world: World) -> tuple[str, Mapping[str, Ro
     return f"follow Robin to the {rooms[-1]}", {"Robin": robin, **others}
 
 
-def run_case(what: str, seed: int, folder: Path) -> Outcome:
+def run_case(what, seed, folder):
     """Runs the trial of a seed; Robin sets off when the robot says that it follows."""
     sentence, people = draw_trial(what, seed, load_world("flat"))
     walking = load_world("flat").without_people().with_routes(people)
     mission = PlantMission(folder, seed, change=lambda _: walking, sentence=sentence, time_limit_s=LIMIT_S)
 
-    def set_off(topic: str, message: Mapping[str, Any]) -> None:
+    def set_off(topic, message):
         if topic == SPEECH and "follow you" in message["text"]:
             mission.simulation.engine.walkers["Robin"].set_off()
 
@@ -112,28 +95,22 @@ def run_case(what: str, seed: int, folder: Path) -> Outcome:
     paths = {each: TimedPath(np.array(points)) for each, points in referee._person_paths.items()}
     away_m = {each: math.dist(path.points[-1, :2], robot.points[-1, :2]) for each, path in paths.items()}
     wrong = away_m["Robin"] > 3.0 and min(away_m.values()) < 3.0 and "lost" not in ended.message
-    return Outcome(what, ended, round(lost_s(robot, paths["Robin"], 0.0, ended.sim_time_s), 1), wrong)
+    lost = round(lost_s(robot, paths["Robin"], 0.0, ended.sim_time_s), 1)
+    return vars(ended) | {"what": what, "lost_s": lost, "wrong_person": wrong}
 
 
-def summary(outcomes: Sequence[Outcome]) -> dict[str, object]:
-    """Figures of each kind of trial."""
-    return {what: figures(list(each)) for what, each in groupby(outcomes, attrgetter("what"))}
-
-
-def figures(outcomes: Sequence[Outcome]) -> dict[str, object]:
-    """Figures of one kind of trial."""
-    ends = [each.ended for each in outcomes]
+def figures(ends):
     return {
-        "runs": len(outcomes),
+        "runs": len(ends),
         "arrived": sum(bool(each.fulfilled) for each in ends),
         "false_claims": sum(each.false_claim for each in ends),
         "contacts": sum(each.people_hit for each in ends),
         "walked_into": sum(each.hit_by_people for each in ends),
-        "lost_over_10_s": sum(each.lost_s > 10.0 for each in outcomes),
-        **totals(outcomes, "wrong_person"),
+        "lost_over_10_s": sum(each.lost_s > 10.0 for each in ends),
+        **totals(ends, "wrong_person"),
         "failed": [each.seed for each in ends if not each.fulfilled],
     }
 
 
 if __name__ == "__main__":
-    benchmark(cases, run_case, summary)
+    benchmark(cases, run_case, for_each("what", figures))

@@ -7,9 +7,9 @@ as the hand camera's, which finds none where it is dark.
 import gzip
 import pickle
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -17,7 +17,7 @@ from pydrake.common.value import Value
 from pydrake.geometry import FramePoseVector
 
 from errand_train.dataset.coco import box_of
-from errand_train.dataset.compose import Placed, Scene, compose
+from errand_train.dataset.compose import Scene, compose
 from errand_train.dataset.degrade import expose
 from errand_train.dataset.lighting import random_lighting
 from errand_train.dataset.render import Stage, is_validation
@@ -37,29 +37,16 @@ LEAST_LONG_PX, LEAST_SHORT_PX, LEAST_VISIBLE = 24, 8, 0.4
 
 @dataclass(frozen=True)
 class Truth:
-    """An object in a picture: its box there, its true middle from the camera (m), extents, share seen."""
+    """An object in a picture: its box there, its true middle from the camera (m), share seen."""
 
     detection: Detection
-    instance: str
     p_CT: FloatArray
-    size_C: tuple[float, float, float]
     visibility: float
     truncation: float
 
 
-@dataclass(frozen=True)
-class Shot:
-    """A picture with depth, and what is in it."""
-
-    image: Image
-    truths: tuple[Truth, ...]
-
-
 class DepthStage(Stage):
-    """A stage of a room that gives depth, too."""
-
-    def seen(self, view: View, range_m: tuple[float, float]) -> tuple[np.ndarray, np.ndarray, FloatArray]:
-        """Clean picture, labels and depth (m)."""
+    def seen(self, view, range_m):
         colour, labels = self.take(view)
         poses = FramePoseVector()
         poses.set_value(self._hand, self.hand_pose(view))
@@ -70,7 +57,7 @@ class DepthStage(Stage):
         return colour, labels, np.asarray(depth.data[..., 0], dtype=np.float32)
 
 
-def shots(seed: int, scenes: int, views: int = VIEWS) -> Iterator[Shot]:
+def shots(seed, scenes, views=VIEWS):
     """Pictures of held-out scenes; the same for the same seed."""
     held_out = (index for index in range(10 * scenes) if is_validation(index))
     for _, index in zip(range(scenes), held_out, strict=False):
@@ -82,7 +69,7 @@ def shots(seed: int, scenes: int, views: int = VIEWS) -> Iterator[Shot]:
             yield from _shots_of(rng, stage, scene, views)
 
 
-def _shots_of(rng: np.random.Generator, stage: DepthStage, scene: Scene, views: int) -> Iterator[Shot]:
+def _shots_of(rng, stage, scene, views):
     objects = [thing for thing in scene.objects if thing.model.class_id]
     order = [objects[k] for k in rng.permutation(len(objects))]
     for number in range(min(views, 3 * len(order))):
@@ -91,7 +78,7 @@ def _shots_of(rng: np.random.Generator, stage: DepthStage, scene: Scene, views: 
             yield _shot(rng, stage, view)
 
 
-def _hand_view(rng: np.random.Generator, scene: Scene, thing: Placed) -> View | None:
+def _hand_view(rng, scene, thing):
     """A view of the hand camera, with its own intrinsics, within 2 m or a little more."""
     for _ in range(30):
         view = view_of(rng, scene.room, thing, camera_specs())
@@ -102,7 +89,7 @@ def _hand_view(rng: np.random.Generator, scene: Scene, thing: Placed) -> View | 
     return None
 
 
-def _shot(rng: np.random.Generator, stage: DepthStage, view: View) -> Shot:
+def _shot(rng, stage, view):
     range_m = camera_specs()[view.camera].depth_range_m
     rendered, labels, clean = stage.seen(view, range_m)
     colour = np.asarray(np.round(expose(rendered.astype(np.float32), MEAN_EXPOSURE)), dtype=np.uint8)
@@ -110,16 +97,15 @@ def _shot(rng: np.random.Generator, stage: DepthStage, view: View) -> Shot:
     depth = DepthDegrader(rng, view.intrinsics, range_m, DepthNoise()).depth(clean, grey)
     frames = FrameTree({"hand_camera": ("odom", view.X_WC)})
     image = Image(0.0, "hand", "hand_camera", view.intrinsics, view.intrinsics, colour, grey, depth, frames)
-    return Shot(image, truths(stage, labels, view))
+    return SimpleNamespace(image=image, truths=truths(stage, labels, view))
 
 
-def truths(stage: DepthStage, labels: np.ndarray, view: View) -> tuple[Truth, ...]:
-    """Objects that a picture shows, from its labels."""
+def truths(stage, labels, view):
     found = (_truth(stage, int(label), labels == label, view) for label in np.unique(labels) if label in stage.labelled)
     return tuple(truth for truth in found if truth is not None)
 
 
-def _truth(stage: DepthStage, label: int, mask: np.ndarray, view: View) -> Truth | None:
+def _truth(stage, label, mask, view):
     model, X_WO, _ = stage.labelled[label]
     if mask.sum() < 20:
         return None
@@ -131,20 +117,18 @@ def _truth(stage: DepthStage, label: int, mask: np.ndarray, view: View) -> Truth
     name = next(name for name, entry in load_catalogue().items() if entry.id == model.class_id)
     return Truth(
         Detection(name, 1.0, (float(x), float(y), float(x + w), float(y + h))),
-        model.name,
         np.asarray(X_CO @ middle),
-        model.size_m,
         min(1.0, float(mask.sum()) / max(alone.inside_px, 1)),
         1.0 - alone.inside_px / max(alone.whole_px, alone.inside_px, 1),
     )
 
 
-def counts(truth: Truth) -> bool:
+def counts(truth):
     """True if an object counts for position errors: near, large and well seen."""
     return float(np.linalg.norm(truth.p_CT)) < FARTHEST_M and well_seen(truth)
 
 
-def well_seen(truth: Truth) -> bool:
+def well_seen(truth):
     """True if an object is large in the picture, and little of it hidden or cut off."""
     u0, v0, u1, v1 = truth.detection.box
     long, short = max(u1 - u0, v1 - v0), min(u1 - u0, v1 - v0)
@@ -152,7 +136,7 @@ def well_seen(truth: Truth) -> bool:
     return long >= LEAST_LONG_PX and short >= LEAST_SHORT_PX and seen >= LEAST_VISIBLE
 
 
-def stored_shots(folder: Path, seed: int, scenes: int) -> Iterator[Shot]:
+def stored_shots(folder, seed, scenes):
     """Pictures that a folder stores; an empty one stores new ones first."""
     folder.mkdir(parents=True, exist_ok=True)
     if not any(folder.iterdir()):

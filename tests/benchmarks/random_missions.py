@@ -16,58 +16,52 @@ import random
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from executive.app.goal_conditions import verdict_of
 from executive.mission.request import Request
 from executive.run.control import Control
-from executive.run.outcome import Outcome, RunResult
+from executive.run.outcome import Outcome
 from executive.run.runner import run
-from executive.run.visitor import Progress, RunEntry, RunSettings, RunVisitor
+from executive.run.visitor import RunEntry, RunSettings, RunVisitor
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
-from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
-from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Awaited, CallSkill, Charging, Check, Do, Dock, Say, Set, Speak, UseMission, Wait
 from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
-from executive.words.step import Step
-from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Steps, Together, Try, While
+from executive.words.steps import Ask, Choose, Group, Handler, Loop, Repeat, Together, Try, While
 from skills.api import WHOLE_ROBOT, Cause, Failed, ObjectKind, ObjectObservation, Part, Running, Skill, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.files.errors import InputError
 from tests.benchmarks.harness import command
 from tests.benchmarks.scripted_world import WORLD, Clock, ScriptedWorld, expected
-from tests.executive.conftest import GRIPPER, PORTS, EmptyCostmap, ManualClock, Script, ScriptedRobot, StillLocaliser
+from tests.executive.conftest import GRIPPER, PORTS, EmptyCostmap, Script, StandingRobot, StillLocaliser, VirtualClock
 from tests.executive.conftest import default_end as usual_end
 from tests.visitors import OnMessage
 
 LYING, ACCIDENTS = 0.05, 0.01
 TICK_S, LIMIT_S, ENDINGS_S = 0.5, 120.0, 30.0
 MOST_TICKS = 3000
+GRASP, FIND = ("Take [Nothing] to [{}] and do [" + task + "] to [{}]" for task in ("grasp", "find"))
+BRING = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
 COMMANDS = (
-    "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]",
-    "Take [Nothing] to [hall] and do [Nothing] to [Nothing]",
-    "Take [Nothing] to [start] and do [Nothing] to [Nothing]",
-    "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]",
-    "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
-    "Take [drink] to [bedroom] and do [Nothing] to [Nothing]",
-    "Take [drink] to [Robin] and do [Nothing] to [Nothing]",
-    "Take [Nothing] to [kitchen] and do [find] to [coke]",
+    *(BRING.format("Nothing", place) for place in ("kitchen", "hall", "start", "Sam")),
+    GRASP.format("kitchen", "drink"),
+    *(BRING.format("drink", place) for place in ("bedroom", "Robin")),
+    FIND.format("kitchen", "coke"),
     "Take [Nothing] to [Nothing] and do [wait] to [3 second]",
     "Take [Nothing] to [Nothing] and do [charge] to [Nothing]",
 )
 PAIRS = tuple(
-    (
-        f"Take [Nothing] to [{source}] and do [grasp] to [{thing}]",
-        f"Take [{thing}] to [{goal}] and do [Nothing] to [Nothing]",
-    )
+    (GRASP.format(source, thing), BRING.format(thing, goal))
     for source, thing, goal in (
         ("kitchen", "drink", "bedroom"),
         ("counter", "coke", "shelf"),
@@ -77,11 +71,7 @@ PAIRS = tuple(
         ("kitchen", "2 drink", "bedroom"),
     )
 )
-LOOKS = (
-    "Take [Nothing] to [kitchen] and do [find] to [beer]",
-    "Take [Nothing] to [hall] and do [find] to [person]",
-    "Take [Nothing] to [bedroom] and do [find] to [coke]",
-)
+LOOKS = (FIND.format("kitchen", "beer"), FIND.format("hall", "person"), FIND.format("bedroom", "coke"))
 NUMBERS = ("n", "n + 1", "n * 2 - 3", "min(n, 4)", "7 // (n + 1)", "battery * 10", "1 / n", "elapsed", "length(word)")
 TRUTHS = (
     "n > 2", "n == 0 or flag", "not flag", "word == 'tea'", "battery < 0.3", "localised", "holding", "elapsed < 20",
@@ -98,11 +88,10 @@ REQUEST = Request("at random", seed=3, name="random", world_name="flat", robot="
 class MissionMaker:
     """Maker of a random mission of about so many steps; those that are `still` use no part of the robot."""
 
-    def __init__(self, rng: random.Random, steps: int) -> None:
+    def __init__(self, rng, steps):
         self.rng, self.left = rng, steps
 
-    def mission(self) -> Mission:
-        """Makes the mission."""
+    def mission(self):
         rng = self.rng
         watched = self.watched(2) if rng.random() < 0.4 else {}
         steps = self.steps(0)
@@ -110,13 +99,11 @@ class MissionMaker:
         values = {"n": rng.choice([0, 1, 2.5]), "word": "tea", "flag": False}
         return Mission(name="random", robot="Alice", steps=steps, variables=values, **watched).with_policy(policy)
 
-    def steps(self, depth: int, still: bool = False) -> Steps:
-        """Some steps in a row."""
+    def steps(self, depth, still=False):
         many = self.rng.choice([1, 1, 2, 2, 3]) if depth else max(1, min(self.left, self.rng.randint(1, 8)))
         return tuple(self.step(depth, still) for _ in range(many))
 
-    def step(self, depth: int, still: bool = False) -> Step:
-        """A step, perhaps under a policy."""
+    def step(self, depth, still=False):
         rng = self.rng
         self.left -= 1
         policy = self.policy(still=still) if rng.random() < 0.35 else Policy()
@@ -125,8 +112,7 @@ class MissionMaker:
             return made(depth + 1, still).with_policy(policy)
         return self.small(still).with_policy(policy)
 
-    def small(self, still: bool) -> Step:
-        """A step that holds no others."""
+    def small(self, still):
         rng = self.rng
         kind = rng.randrange(10) if not still else rng.randrange(4)
         if kind > 7:
@@ -150,13 +136,13 @@ class MissionMaker:
             return CallSkill(skill=rng.choice(SKILLS))
         return Do.from_command(parse_command(rng.choice(COMMANDS)))
 
-    def wait(self, still: bool) -> Wait:
+    def wait(self, still):
         """A wait for what may never come: a time limit stands around some."""
         if self.rng.random() < 0.2:
             return Wait(awaited=Awaited(until_clock=self.rng.choice(["08:00", "08:01"])))
         return Wait(awaited=Awaited(condition=self.condition(instant=still), every_s=self.rng.choice([1.0, 15.0])))
 
-    def condition(self, *, instant: bool, depth: int = 0) -> Condition:
+    def condition(self, *, instant, depth=0):
         """A condition; an `instant` one takes no look."""
         rng = self.rng
         kind, deeper = rng.randrange(8), partial(self.condition, instant=instant, depth=depth + 1)
@@ -172,11 +158,11 @@ class MissionMaker:
             return DoorOpen(door=("hall", "kitchen"))
         return ValueIs(text=rng.choice(TRUTHS))
 
-    def choose(self, depth: int, still: bool) -> Step:
+    def choose(self, depth, still):
         otherwise = self.steps(depth, still) if self.rng.random() < 0.6 else ()
         return Choose(condition=self.condition(instant=still), then=self.steps(depth, still), otherwise=otherwise)
 
-    def repeat(self, depth: int, still: bool) -> Step:
+    def repeat(self, depth, still):
         """A loop, always with a number of rounds at most."""
         kind = self.rng.randrange(3)
         until = self.condition(instant=still) if kind == 0 else None
@@ -185,36 +171,35 @@ class MissionMaker:
         loop = Loop(times=self.rng.randint(1, 3), until=until, while_=while_, every_s=every_s)
         return Repeat(loop=loop, steps=self.steps(depth, still))
 
-    def try_(self, depth: int, still: bool) -> Step:
+    def try_(self, depth, still):
         return Try(steps=self.steps(depth, still), otherwise=self.steps(depth, still))
 
-    def together(self, depth: int, still: bool) -> Step:
+    def together(self, depth, still):
         """One step that may move, and some that use no part of the robot."""
         steps = [self.step(depth, still), *(self.step(depth, True) for _ in range(self.rng.randint(1, 2)))]
         self.rng.shuffle(steps)
         return Together(steps=tuple(steps), done_when=self.rng.choice([None, 1, 2]))
 
-    def group(self, depth: int, still: bool) -> Step:
+    def group(self, depth, still):
         steps = self.steps(depth, still)
         return Group(steps=steps, name=self.rng.choice([None, "a group"]), **self.watched(depth, still))
 
-    def watched(self, depth: int, still: bool = False) -> dict[str, Any]:
+    def watched(self, depth, still=False):
         """Some of what a group or a mission can have around its steps."""
         rng = self.rng
         always = self.steps(depth + 2, still) if rng.random() < 0.6 else ()
         holds = While(holds=self.condition(instant=True)) if rng.random() < 0.2 else None
-        when = list[Handler]()
+        when = []
         for _ in range(rng.choice([0, 0, 1, 2])):
             condition, steps = self.condition(instant=True), self.steps(depth + 2, still)
             when.append(Handler(condition=condition, steps=steps, times=rng.randint(1, 3)))
         return {"always": always, "while_": holds, "when": tuple(when) or None}
 
-    def asking(self, depth: int, still: bool) -> Step:
-        """A question with steps for its answers."""
+    def asking(self, depth, still):
         texts = ("tea", "the coffee", "no!")
         return self.question({text: self.steps(depth, still) if self.rng.random() < 0.7 else () for text in texts})
 
-    def question(self, choices: Mapping[str, Steps]) -> Ask:
+    def question(self, choices):
         """A question, with choices or without."""
         rng = self.rng
         asked = {"ask": rng.choice(["which?", "{n} {word}?", "{1 / n}?"]), "limit_s": rng.choice([2.0, 20.0])}
@@ -226,15 +211,14 @@ class MissionMaker:
         answer = {"answer": gives} if gives else None
         return Ask(**asked, match=match, default=rng.choice([None, usual]), gives=answer)
 
-    def used(self, depth: int, still: bool) -> Step:
-        """Another mission."""
+    def used(self, depth, still):
         steps = self.steps(depth, still)
         watched = self.watched(depth, still) if self.rng.random() < 0.4 else {}
         values = {"n": 1, "word": "tea", "flag": True}
         used = Mission(name="used", robot="Alice", steps=steps, variables=values, **watched)
         return UseMission(use="used.yaml").with_mission(used)
 
-    def policy(self, *, whole: bool = False, still: bool = False) -> Policy:
+    def policy(self, *, whole=False, still=False):
         """A policy; that of a whole mission skips nothing."""
         rng = self.rng
         ways = [OnFailure.STOP, OnFailure.STOP, OnFailure.RETRY, OnFailure.RETURN, OnFailure.ASK, OnFailure.SKIP]
@@ -253,21 +237,18 @@ class MissionMaker:
 
 @dataclass
 class Robotics:
-    """The robot's side of one run: which skills are under way, and how they end."""
-
     rng: random.Random
-    robot: ScriptedRobot
+    robot: StandingRobot
     failing: float
     world: ScriptedWorld | None = None
     active: list[Any] = field(default_factory=list)
     raised: int = 0
 
-    def registry(self) -> dict[str, type[Skill[Any]]]:
-        """The skills by name."""
+    def registry(self):
         ports = {**PORTS, "check_door": (CheckDoorInputs, {"open": bool})}
         return {name: self._skill(name, *both) for name, both in ports.items()}
 
-    def _skill(self, skill_name: str, inputs: type, outputs_: Mapping[str, type]) -> type[Skill[Any]]:
+    def _skill(self, skill_name, inputs, outputs_):
         mine = self
 
         class Scripted(Skill[Any]):
@@ -278,25 +259,24 @@ class Robotics:
             uses = {"speak": frozenset({Part.VOICE})}.get(skill_name, WHOLE_ROBOT)
             default_timeout_s = 30.0
 
-            def begin(self, inputs: Any) -> None:
+            def begin(self, inputs):
                 self.inputs, self.left = inputs, mine.rng.choice([1, 2, 3] if mine.world is None else [2, 3])
                 mine.active.append(self)
 
-            def step(self) -> Running | Succeeded | Failed:
+            def step(self):
                 robot, lease = self.context.robot, self.context.lease
                 robot.drive(0.1, 0.0, 0.0, until_s=self.context.clock.now() + 1.0, lease=lease)
                 self.left -= 1
                 return Running(f"{skill_name} goes on") if self.left > 0 else mine.end_of(self, skill_name)
 
-            def end(self) -> None:
+            def end(self):
                 if self in mine.active:
                     mine.active.remove(self)
                     self.context.robot.stop(lease=self.context.lease)
 
         return Scripted
 
-    def end_of(self, skill: Any, name: str) -> Succeeded | Failed:
-        """End of an attempt."""
+    def end_of(self, skill, name):
         if self.rng.random() < self.failing:
             if self.rng.random() < 0.05:
                 self.raised += 1
@@ -319,7 +299,7 @@ class Robotics:
             self.robot.holding = False
         return usual_end(Script(steps=2), name)(skill)
 
-    def _in_world(self, skill: Any, name: str, world: ScriptedWorld) -> Succeeded | Failed | None:
+    def _in_world(self, skill, name, world):
         """End of an attempt that acts on the world; None where a skill does not."""
         now_s, inputs = self.robot.clock.now(), skill.inputs
         if name == "speak" and world.says(now_s, inputs.text):
@@ -337,9 +317,7 @@ class Operator(RunVisitor):
     A `calm` one leaves what is in the gripper alone.
     """
 
-    def __init__(
-        self, rng: random.Random, control: Control, robot: ScriptedRobot, other: CompiledTree, *, calm: bool = False
-    ) -> None:
+    def __init__(self, rng, control, robot, other, *, calm=False):
         self.calm = calm
         self.rng, self.control, self.robot, self.other = rng, control, robot, other
         cancels = [None, None, None, rng.randint(0, 10), rng.randint(0, 80)]
@@ -347,17 +325,16 @@ class Operator(RunVisitor):
         self.insist_after = rng.choice([None, None, rng.randint(0, 6)])
         self.busy = rng.choice([0.0, 0.02, 0.1])
         self.cancelled = self.insisted = self.preempted = False
-        self.asked: list[Any] = []
+        self.asked = []
         asking = control.ask
 
-        def ask(question: Any, clock: Any, robot: str) -> Any:
+        def ask(question, clock, robot):
             self.asked.append(asking(question, clock, robot))
             return self.asked[-1]
 
-        control.ask = ask  # type: ignore[method-assign]
+        control.ask = ask
 
-    def tick(self, progress: Progress) -> None:
-        """Look at the run after a tick, and perhaps do something."""
+    def tick(self, progress):
         rng, control, ticks = self.rng, self.control, progress.ticks
         if ticks > MOST_TICKS:
             raise RuntimeError("the run does not end")
@@ -378,7 +355,7 @@ class Operator(RunVisitor):
             control.resume()
             control.release_stop_button()
 
-    def _interfere(self) -> None:
+    def _interfere(self):
         rng, control, robot = self.rng, self.control, self.robot
         what = rng.randrange(8)
         if what < 3:
@@ -397,37 +374,7 @@ class Operator(RunVisitor):
             control.preempt(self.other)
 
 
-@dataclass(frozen=True)
-class Ran:
-    """One run: its result, log and number of nodes, and what is wrong with it."""
-
-    result: RunResult
-    log: tuple[tuple[str, str], ...]
-    wrong: tuple[str, ...]
-    nodes: int
-
-
-@dataclass(frozen=True)
-class Claimed:
-    """One run in the scripted world: what the tree claims, the referee's verdict, and what was right; what lied."""
-
-    claim: bool
-    verdict: bool | None
-    right: bool | None
-    lies: tuple[tuple[float, str], ...]
-    why: str
-
-    @property
-    def wrong(self) -> str:
-        """Defect of the verdict; empty if it is right."""
-        if self.verdict is not (self.right if self.claim else False):
-            return f"claim {self.claim}, verdict {self.verdict}, right {self.right}: {self.why}"
-        denied = self.claim and self.verdict is False
-        return f"nothing lied, and the claim is denied: {self.why}" if denied and not self.lies else ""
-
-
-def made_mission(seed: int) -> Mission:
-    """The mission of a seed: of 1 to 60 steps, small ones more often."""
+def made_mission(seed):
     rng = random.Random(f"mission {seed}")
     return MissionMaker(rng, int(60 ** rng.random())).mission()
 
@@ -438,8 +385,8 @@ class Trial:
     Raises InputError if the mission cannot be compiled.
     """
 
-    def __init__(self, seed: int, clock: ManualClock, world: ScriptedWorld | None = None) -> None:
-        self.seed, self.clock, self.robot = seed, clock, ScriptedRobot(clock)
+    def __init__(self, seed, clock, world=None):
+        self.seed, self.clock, self.robot = seed, clock, StandingRobot(clock)
         rng = random.Random(f"run {seed}")
         failing = rng.choice([0.0, 0.1, 0.4] if world is None else [0.0, 0.02, 0.1])
         self.robotics = Robotics(rng, self.robot, failing, world)
@@ -448,11 +395,10 @@ class Trial:
         between = Mission(name="between", robot="Alice", steps=(CallSkill(skill="stow"),))
         self.other = compile_mission(between, knowledge=WORLD, registry=registry)
 
-    def run(self, *visitors: RunVisitor) -> Ran:
-        """Runs the tree to its end."""
+    def run(self, *visitors):
         control = Control(pace=None)
         operator = Operator(self.robotics.rng, control, self.robot, self.other, calm=self.robotics.world is not None)
-        log: list[tuple[str, str]] = []
+        log = []
         logging = OnMessage(lambda topic, message: log.append((topic, repr(message))))
         with LockStepWorker(self.clock) as worker:
             result = run(
@@ -471,10 +417,9 @@ class Trial:
             )
         told = tuple(entry for entry in log if entry[0] != "wall")
         wrong = (*self._wrong(result, told, operator), *self._not_done(result.worst.message, told, operator))
-        return Ran(result, told, wrong, len(self.tree.path_ids))
+        return SimpleNamespace(result=result, log=told, wrong=wrong, nodes=len(self.tree.path_ids))
 
-    def _wrong(self, result: RunResult, log: tuple[tuple[str, str], ...], operator: Operator) -> list[str]:
-        """What must not be so at the end of a run."""
+    def _wrong(self, result, log, operator):
         robot, worst, active = self.robot, result.worst, self.robotics.active
         errors = [message for topic, message in log if topic == "errors" and INJECTED not in message]
         running = [path for path, state in worst.states.items() if state.status.value == "RUNNING"]
@@ -494,7 +439,7 @@ class Trial:
         }
         return [what for what, so in found.items() if so]
 
-    def _not_done(self, message: str, log: tuple[tuple[str, str], ...], operator: Operator) -> Iterator[str]:
+    def _not_done(self, message, log, operator):
         """What is always to be done in the end, and was not begun although its steps were."""
         if operator.insisted or "in the end, broken off" in message:
             return
@@ -511,34 +456,30 @@ class Trial:
                     yield f"not done in the end: {node.path_id}"
 
 
-def ran(seed: int) -> Ran:
+def ran(seed):
     """Makes the mission of a seed and runs it to its end. Raises InputError if it cannot be compiled."""
-    return Trial(seed, ManualClock()).run()
+    return Trial(seed, VirtualClock()).run()
 
 
 class KilledError(BaseException):
-    """The process is gone."""
-
     stops_run = True
 
 
 @dataclass
 class KillingJournal(RunVisitor):
-    """Visitor that passes notes on, and kills after some of them."""
-
     journal: Any
     left: int
 
-    def tick(self, progress: Progress) -> None:
+    def tick(self, progress):
         self.journal.tick(progress)
         self.left -= 1
         if self.left <= 0:
             raise KilledError
 
 
-def resumed(seed: int, folder: Path) -> Ran | None:
+def resumed(seed, folder):
     """The same, killed in some tick and taken up again; None when it ended before. Raises InputError as `ran`."""
-    trial = Trial(seed, ManualClock())
+    trial = Trial(seed, VirtualClock())
     kill_after = int(80 ** trial.robotics.rng.random())
     with MissionStore(folder / f"{seed}.sqlite") as store:
         mission = store.add(REQUEST, queued=False)
@@ -553,11 +494,11 @@ def resumed(seed: int, folder: Path) -> Ran | None:
         journal.use_recollection(recollection)
         store.begin(mission.id)
         trial.robotics.active.clear()
-        trial.robot.holder, trial.robot.driving = None, False
+        trial.robot.holder = None
         return trial.run(journal)
 
 
-def claimed(seed: int) -> Claimed:
+def claimed(seed):
     """Makes the mission of a seed and runs it in the scripted world; in every odd one some skills lie.
 
     Raises InputError if it cannot be compiled.
@@ -565,29 +506,29 @@ def claimed(seed: int) -> Claimed:
     lying, accidents = (LYING, ACCIDENTS) if seed % 2 else (0.0, 0.0)
     world = ScriptedWorld(random.Random(f"world {seed}"), lying, accidents)
     clock = Clock(world)
-    trial, transitions = Trial(seed, clock, world), list[Mapping[str, Any]]()
+    trial, transitions = Trial(seed, clock, world), []
     watch = OnMessage(lambda topic, message: transitions.append(message) if topic == "transitions" else None)
     result = trial.run(watch).result.worst
     clock.over = True
     clock.advance(TICK_S)  # what was let go in the last tick comes to rest
     verdict = verdict_of(trial.tree, result, lambda conditions: world.judge(conditions, clock.now()))
     right = expected(trial.tree, result, transitions, world)
-    return Claimed(result.outcome is Outcome.SUCCESS, verdict.success, right, tuple(world.lies), verdict.why)
+    claim, said, wrong = result.outcome is Outcome.SUCCESS, verdict.success, ""
+    if said is not (right if claim else False):
+        wrong = f"claim {claim}, verdict {said}, right {right}: {verdict.why}"
+    elif claim and said is False and not world.lies:
+        wrong = f"nothing lied, and the claim is denied: {verdict.why}"
+    return SimpleNamespace(claim=claim, verdict=said, lies=tuple(world.lies), wrong=wrong)
 
 
-Judged = tuple[str, str, int, int]
-"""How a mission ended, what is wrong with that, and its nodes and ticks."""
-
-
-def judge_claim(number: int) -> Judged:
-    """Judges a claim and its verdict."""
+def judge_claim(number):
     one = claimed(number)
     words = {True: "fulfilled", False: "denied", None: "not judged"}[one.verdict]
     ended = f"{words}, {'some lied' if one.lies else 'none lied'}" if one.claim else "not claimed"
     return ended, one.wrong, 0, 0
 
 
-def judge_run(number: int, folder: Path | None) -> Judged:
+def judge_run(number, folder):
     """Judges a run, with a folder one that is killed and resumed; every tenth must give the same log again."""
     one = ran(number) if folder is None else resumed(number, folder)
     if one is None:
@@ -598,11 +539,11 @@ def judge_run(number: int, folder: Path | None) -> Judged:
     return one.result.outcome.value, wrong, one.nodes, one.result.ticks
 
 
-def measure(trees: int = 20_000, seed: int = 1, limit: float = 480.0, kill: bool = False, claims: bool = False) -> int:
+def measure(trees: int = 20_000, seed: int = 1, limit: float = 480.0, kill: bool = False, claims: bool = False):
     """Judges so many missions, or as many as the time (s) allows; returns 1 when something is wrong."""
-    begun, ends, bad, nodes, ticks = time.perf_counter(), Counter[str](), 0, 0, 0
+    begun, ends, bad, nodes, ticks = time.perf_counter(), Counter(), 0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
-        judge: Callable[[int], Judged] = partial(judge_run, folder=Path(folder) if kill else None)
+        judge = partial(judge_run, folder=Path(folder) if kill else None)
         for number in range(seed * 1_000_000, seed * 1_000_000 + trees):
             if time.perf_counter() - begun > limit:
                 break

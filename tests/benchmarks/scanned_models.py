@@ -5,18 +5,14 @@ brings them as binary STL files without colours. They stay where they are; nothi
 """
 
 import struct
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from errand_train.dataset.objects.draft import Draft
-from errand_train.dataset.objects.model import ObjectModel
 from plant.models.builder.mesh import Colour
-from skills.robot import FloatArray
 from tests.benchmarks.foreign_models import kept_model
 
 _HEADER_BYTES = 80
@@ -35,7 +31,7 @@ class Paint:
     share: float = 1.0
 
 
-SCANS: Mapping[str, tuple[str, Sequence[Paint]]] = {
+SCANS = {
     name: (category, [Paint(*(COLOURS.get(each, each) for each in paint)) for paint in paints])
     for category, files in FACTS["scans"].items()
     for name, paints in files.items()
@@ -43,7 +39,7 @@ SCANS: Mapping[str, tuple[str, Sequence[Paint]]] = {
 """Files by name, the class of each, and its paints."""
 
 
-def read_stl(data: bytes) -> FloatArray:
+def read_stl(data):
     """The triangles (N, 3, 3) of a binary STL file, in metres as they are told. Raises ValueError."""
     count = struct.unpack_from("<I", data, _HEADER_BYTES)[0] if len(data) >= _HEADER_BYTES + 4 else -1
     if len(data) != _HEADER_BYTES + 4 + max(count, 0) * _TRIANGLE.itemsize or count < 1:
@@ -51,7 +47,7 @@ def read_stl(data: bytes) -> FloatArray:
     return np.frombuffer(data, _TRIANGLE, offset=_HEADER_BYTES + 4)["corners"].astype(float)
 
 
-def smooth_normals(triangles: FloatArray) -> FloatArray:
+def smooth_normals(triangles):
     """Unit normals (N, 3, 3) of corners: means of those of the faces that meet there, larger ones counting more."""
     points = triangles.reshape(-1, 3)
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
@@ -63,8 +59,7 @@ def smooth_normals(triangles: FloatArray) -> FloatArray:
     return np.asarray(made / np.maximum(np.linalg.norm(made, axis=1, keepdims=True), 1e-12)).reshape(-1, 3, 3)
 
 
-def painted(triangles: FloatArray, paint: Paint) -> Iterator[tuple[Colour, NDArray[np.bool_]]]:
-    """Colours, and which triangles (N,) have each."""
+def painted(triangles, paint):
     middles = triangles.mean(axis=1)
     along = int(np.ptp(triangles.reshape(-1, 3), axis=0).argmax())
     share = (middles[:, along] - middles[:, along].min()) / max(np.ptp(middles[:, along]), 1e-12)
@@ -73,7 +68,7 @@ def painted(triangles: FloatArray, paint: Paint) -> Iterator[tuple[Colour, NDArr
             yield colour, chosen
 
 
-def written_scan(file: Path, category: str, paint: Paint, number: int, folder: Path) -> ObjectModel:
+def written_scan(file, category, paint, number, folder):
     """The model of a file in a folder of its own. Raises ValueError."""
     try:
         triangles = read_stl(file.read_bytes())
@@ -89,9 +84,9 @@ def written_scan(file: Path, category: str, paint: Paint, number: int, folder: P
     return kept_model(draft, category, number, file.stem, folder)
 
 
-def scanned(folder: Path, scans: Path) -> dict[str, list[ObjectModel]]:
+def scanned(folder, scans):
     """All models by category, written to a folder. Raises FileNotFoundError where a file is missing, ValueError."""
-    made: dict[str, list[ObjectModel]] = {}
+    made = {}
     for name, (category, paints) in SCANS.items():
         file = scans / f"{name}.stl"
         if not file.is_file():

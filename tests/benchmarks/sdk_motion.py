@@ -14,11 +14,10 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 from unittest import mock
 
 import numpy as np
@@ -96,28 +95,21 @@ class Judge:
     simulation: Simulation
     asked: list[Asked] = field(default_factory=list)
 
-    def X_WB(self) -> RigidTransform:
-        """True pose of the body."""
-        return self._pose("body")
-
-    def X_WH(self) -> RigidTransform:
-        """True pose of the hand."""
-        return self._pose("hand")
-
-    def _pose(self, link: str) -> RigidTransform:
+    def X_W(self, link):
+        """True pose of a link."""
         engine = self.simulation.engine
         body = getattr(engine.world.robots["Alice"], link)
         return engine.world.plant.EvalBodyPoseInWorld(engine.context, body)
 
-    def read(self, command: Any, number: int) -> None:
+    def read(self, command, number):
         """Notes what a command asks, between two steps of the plant. Frames are those of the server's last state."""
         snapshot = self.server.computer.snapshot
         tree, named = frame_tree(snapshot.frames), command.synchronized_command
-        X_WO = self.X_WB() @ snapshot.X_AB("body", "odom")
+        X_WO = self.X_W("body") @ snapshot.X_AB("body", "odom")
         goals = (*self._base(named.mobility_command, tree, X_WO), *self._arm(named.arm_command, tree, X_WO))
         self.asked += [Asked(number, *each) for each in goals]
 
-    def _base(self, base: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
+    def _base(self, base, tree, X_WO):
         if base.HasField("se2_trajectory_request"):
             request = base.se2_trajectory_request
             odom = get_a_tform_b(tree, "odom", request.se2_frame_name)
@@ -131,7 +123,7 @@ class Judge:
             wanted_m = can.standing_height_m + (points[0].pose.position.z if points else 0.0)
             wanted_m = float(np.clip(wanted_m, *can.height_range_m))
             done = basic_command_pb2.StandCommand.Feedback.STATUS_IS_STANDING
-            yield "height", lambda: abs(float(self.X_WB().translation()[2]) - wanted_m), "stand_feedback", done
+            yield "height", lambda: abs(float(self.X_W("body").translation()[2]) - wanted_m), "stand_feedback", done
         if base.HasField("se2_velocity_request") and base.se2_velocity_request.se2_frame_name in ("body", "flat_body"):
             request = base.se2_velocity_request
             lasts_s = seconds(request.end_time) - self.server.computer.now_s()
@@ -140,12 +132,12 @@ class Judge:
             along, aside = (math.sin(turned) / w, (1.0 - math.cos(turned)) / w) if abs(w) > 1e-6 else (lasts_s, 0.0)
             moved = np.array([along * x - aside * y, aside * x + along * y, 0.0])
             done = basic_command_pb2.RobotCommandFeedbackStatus.STATUS_COMMAND_TIMED_OUT
-            yield "velocity", self._base_error(self.X_WB() @ moved), "", done
+            yield "velocity", self._base_error(self.X_W("body") @ moved), "", done
 
-    def _base_error(self, at_W: Any) -> Error:
-        return lambda: float(np.linalg.norm(self.X_WB().translation()[:2] - at_W[:2]))
+    def _base_error(self, at_W):
+        return lambda: float(np.linalg.norm(self.X_W("body").translation()[:2] - at_W[:2]))
 
-    def _arm(self, arm: Any, tree: Any, X_WO: RigidTransform) -> Iterator[tuple[Any, ...]]:
+    def _arm(self, arm, tree, X_WO):
         if arm.HasField("arm_cartesian_command"):
             request, one = arm.arm_cartesian_command, SE3Pose.from_identity()
             tool, task = SE3Pose(HAND_M, 0.0, 0.0, one.rot), one
@@ -161,8 +153,8 @@ class Judge:
             done = arm_command_pb2.ArmCartesianCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
             on_path = self._off_path(trajectory, path_W, lambda p_W: self._hand_error_m(p_W, X_HT)) if stays else None
 
-            def error() -> float:
-                X_WF = X_WO if stays else self.X_WB()
+            def error():
+                X_WF = X_WO if stays else self.X_W("body")
                 return self._hand_error_m((X_WF @ X_FT[-1]).translation(), X_HT)
 
             yield "hand", error, "arm_cartesian_feedback", done, on_path
@@ -170,8 +162,8 @@ class Judge:
             trajectory, model = arm.arm_joint_move_command.trajectory, arm_model(self.server.computer.capabilities)
             q = [np.array([getattr(each.position, name).value for name in JOINTS]) for each in trajectory.points]
 
-            def joint_error(wanted: Any) -> float:
-                return self._hand_error_m((self.X_WB() @ model.X_BH(wanted)).translation())
+            def joint_error(wanted):
+                return self._hand_error_m((self.X_W("body") @ model.X_BH(wanted)).translation())
 
             done = arm_command_pb2.ArmJointMoveCommand.Feedback.STATUS_COMPLETE
             on_path = self._off_path(trajectory, q, joint_error)
@@ -183,10 +175,10 @@ class Judge:
             done = arm_command_pb2.GazeCommand.Feedback.STATUS_TRAJECTORY_COMPLETE
             yield "gaze", self._gaze_error(X_WO @ np.array(target)), "arm_gaze_feedback", done
 
-    def _hand_error_m(self, p_W: Any, X_HT: RigidTransform = RigidTransform()) -> float:  # noqa: B008
-        return float(np.linalg.norm((self.X_WH() @ X_HT).translation() - p_W))
+    def _hand_error_m(self, p_W, X_HT=RigidTransform()):  # noqa: B008
+        return float(np.linalg.norm((self.X_W("hand") @ X_HT).translation() - p_W))
 
-    def _off_path(self, trajectory: Any, values: Sequence[Any], error: Callable[[Any], float]) -> Error | None:
+    def _off_path(self, trajectory, values, error):
         """Error from the point of a timed path at the present time; None for a path without times."""
         if not trajectory.HasField("reference_time"):
             return None
@@ -195,18 +187,18 @@ class Judge:
         columns = np.array(values).T
         return lambda: error(np.array([np.interp(self.server.computer.now_s(), times_s, each) for each in columns]))
 
-    def _gaze_error(self, target_W: Any) -> Error:
-        def error() -> float:
-            away = (self.X_WH() @ RigidTransform([HAND_M, 0.0, 0.0])).inverse() @ target_W
+    def _gaze_error(self, target_W):
+        def error():
+            away = (self.X_W("hand") @ RigidTransform([HAND_M, 0.0, 0.0])).inverse() @ target_W
             return float(math.atan2(math.hypot(away[1], away[2]), away[0]))
 
         return error
 
-    def look(self, service: RobotCommandService) -> None:
+    def look(self, service):
         """Compares what is done now; called before each step of the plant."""
         for each in (each for each in self.asked if each.error_then is None and each.cut is None):
             request = robot_command_pb2.RobotCommandFeedbackRequest(robot_command_id=each.command)
-            told = service.RobotCommandFeedback(request, None).feedback.synchronized_feedback  # type: ignore[arg-type]
+            told = service.RobotCommandFeedback(request, None).feedback.synchronized_feedback
             part = told.mobility_command_feedback if each.kind in BASE else told.arm_command_feedback
             if (getattr(part, each.feedback) if each.feedback else part).status == each.status:
                 each.error_then = each.error()
@@ -215,16 +207,16 @@ class Judge:
 
 
 @contextmanager
-def judged(seed: int) -> Iterator[Judge]:
+def judged(seed):
     """Serves a simulated Spot whose commands are judged; the caller runs `server.computer`."""
     opened = open_world("flat")
     compile_first()
     robots = {"Alice": only_robot("Alice", opened, seed=seed, start=START)}
     simulation = simulate(opened, robots, seed=seed, record=False)
-    robot, judges = simulation.robots["Alice"], list[Judge]()
+    robot, judges = simulation.robots["Alice"], []
     take = RobotCommandService.RobotCommand
 
-    def taken(service: RobotCommandService, request: Any, call: Any) -> Any:
+    def taken(service, request, call):
         answer = take(service, request, call)
         if answer.robot_command_id:
             judges[0].server.computer.do(lambda: judges[0].read(request.command, answer.robot_command_id)).result()
@@ -240,16 +232,16 @@ def judged(seed: int) -> Iterator[Judge]:
             yield judges[0]
 
 
-def run(program: str, *, seed: int = 1) -> Mapping[str, Any]:
+def run(program, *, seed=1):
     """Runs one program, a script with its arguments, to its end; returns its exit code and the errors by kind."""
     script, *arguments = program.split()
-    code, ended = list[int](), threading.Event()
+    code, ended = [], threading.Event()
     with judged(seed) as judge:
         server = judge.server
         user = {"BOSDYN_CLIENT_USERNAME": "user", "BOSDYN_CLIENT_PASSWORD": "simulated"}
         launch = [sys.executable, "-m", "plant.spot_api.launch", str(server.certificate), str(server.port), "real"]
 
-        def execute() -> None:
+        def execute():
             line, environment = [*launch, script, *arguments, "127.0.0.1"], {**os.environ, **user}
             try:
                 with tempfile.TemporaryDirectory() as folder:
@@ -283,8 +275,7 @@ def measure(
     examples: Path | None = Path(os.environ[EXAMPLES]) if EXAMPLES in os.environ else None,
     only: str = "",
     seed: int = 1,
-) -> dict[str, int]:
-    """Runs our program, and those of a folder whose name holds a text."""
+):
     programs = [str(OWN), *(f"{examples}/{each}" for each in PROGRAMS if examples)]
     results = []
     for program in (each for each in programs if only in each):

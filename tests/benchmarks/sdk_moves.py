@@ -15,8 +15,7 @@ from bosdyn.client.robot_command import RobotCommandBuilder as Build
 from bosdyn.client.robot_command import block_for_trajectory_cmd, block_until_arm_arrives, blocking_stand
 
 
-def main() -> None:
-    """Connects, stands up, moves and sits down."""
+def main():
     robot = bosdyn.client.create_standard_sdk("sdk-moves").create_robot(sys.argv[1])
     bosdyn.client.util.authenticate(robot)
     robot.time_sync.wait_for_sync()

@@ -1,7 +1,6 @@
 """Boxes, cylinders and blocks of random size and proportion, as imported objects of a class that no detector knows."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -21,7 +20,7 @@ class Shape:
     density_kg_m3: float
 
 
-def random_shape(seed: int) -> Shape:
+def random_shape(seed):
     """The shape of a seed: 20 to 100 mm wide and 20 to 300 mm long, none more than four times as high as wide."""
     rng = np.random.default_rng([seed, 11])
     kind, width = KINDS[int(rng.integers(len(KINDS)))], float(rng.uniform(*WIDTH_M))
@@ -33,7 +32,7 @@ def random_shape(seed: int) -> Shape:
     return Shape(kind, (*across, high), density)
 
 
-def written_shape(seed: int, folder: Path) -> Path:
+def written_shape(seed, folder):
     """Writes the shape of a seed as an imported object into a folder of its own within a folder; returns the former."""
     shape = random_shape(seed)
     x, y, z = shape.size_m

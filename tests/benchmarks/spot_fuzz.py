@@ -14,10 +14,8 @@ import tempfile
 import threading
 import time
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import grpc
 from bosdyn.api import estop_pb2, header_pb2
@@ -27,7 +25,7 @@ from google.protobuf.message_factory import GetMessageClass
 
 from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.server.calls import service_calls
-from plant.spot_api.server.computer import Computer, Motors
+from plant.spot_api.server.computer import Motors
 from plant.spot_api.server.identity import credentials
 from plant.spot_api.server.server import SERVICES
 from tests.benchmarks.harness import command
@@ -43,26 +41,22 @@ _COMMAND = ("bosdyn.api.RobotCommandService", "RobotCommand")
 
 
 class Errors(logging.Handler):
-    """Counts what is logged as an error."""
-
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__(logging.WARNING)
-        self.texts: list[str] = []
+        self.texts = []
 
-    def emit(self, record: logging.LogRecord) -> None:
-        """Keeps the text of a record, with its traceback."""
+    def emit(self, record):
         self.texts.append(logging.Formatter().format(record))
 
 
 class Fuzz:
     """Malformed messages for all calls of a server, by a seed."""
 
-    def __init__(self, connection: Connection, seed: int) -> None:
+    def __init__(self, connection, seed):
         self._connection, self._rng = connection, random.Random(seed)
         self.calls = [(each.type, call) for each in SERVICES for call in service_calls(each)]
 
-    def message(self, input_type: Any) -> bytes:
-        """A message, of a kind that chance chooses."""
+    def message(self, input_type):
         rng, kind = self._rng, self._rng.randrange(5)
         if kind == 0:
             return rng.randbytes(rng.randrange(80))
@@ -73,7 +67,7 @@ class Fuzz:
             del data[rng.randrange(len(data)) if rng.random() < 0.3 else len(data) :]
         return bytes(data)
 
-    def _filled(self, described: Any, depth: int) -> Any:
+    def _filled(self, described, depth):
         """A message with random values in random fields; of fields that exclude each other it has one."""
         made, rng = GetMessageClass(described)(), self._rng
         usual = rng.random() > _STRANGE
@@ -102,8 +96,7 @@ class Fuzz:
                 setattr(made, field.name, values[0])
         return made
 
-    def _value(self, field: Any, depth: int) -> Any:
-        """A value of a field: a usual one, or a strange one."""
+    def _value(self, field, depth):
         rng, usual = self._rng, self._rng.random() > _STRANGE
         if field.message_type is not None:
             return self._filled(field.message_type, depth + 1)
@@ -120,7 +113,7 @@ class Fuzz:
         return rng.random() < 0.5 if field.cpp_type == field.CPPTYPE_BOOL else rng.choice(INTEGERS)
 
 
-def revive(computer: Computer, connection: Connection) -> None:
+def revive(computer, connection):
     """Releases the E-stop, takes the lease, and switches the motors on, whatever messages have done to them."""
     computer.estop.level = lambda: int(estop_pb2.ESTOP_LEVEL_NONE)
     connection.acquire(take=True)
@@ -128,11 +121,9 @@ def revive(computer: Computer, connection: Connection) -> None:
     computer.do(computer.step).result()
 
 
-def fuzz(
-    computer: Computer, connection: Connection, channel: grpc.Channel, count: int, seed: int
-) -> tuple[Counter[str], list[str]]:
+def fuzz(computer, connection, channel, count, seed):
     """Sends messages, half of them commands; returns the kinds of the answers, and the calls that failed inside."""
-    made, codes, inside = Fuzz(connection, seed), Counter[str](), list[str]()
+    made, codes, inside = Fuzz(connection, seed), Counter(), []
     for number in range(count):
         if number % _REVIVED_EVERY == 0:
             revive(computer, connection)
@@ -152,8 +143,7 @@ def fuzz(
     return codes, inside
 
 
-def large_request(channel: grpc.Channel) -> str:
-    """Sends a message that is too large; returns the code of the answer."""
+def large_request(channel):
     try:
         channel.unary_unary("/bosdyn.api.DataBufferService/RecordDataBlobs")(bytes(LARGE), timeout=30.0)
     except grpc.RpcError as error:
@@ -161,7 +151,7 @@ def large_request(channel: grpc.Channel) -> str:
     return "OK"
 
 
-def idle_clients(port: int, certificate: Path, count: int) -> list[grpc.Channel]:
+def idle_clients(port, certificate, count):
     """Opens connections, each of a client of its own, that stay idle."""
     trusted = grpc.ssl_channel_credentials(certificate.read_bytes())
     options = (("grpc.ssl_target_name_override", "api.spot.robot"), ("grpc.use_local_subchannel_pool", 1))
@@ -172,7 +162,7 @@ def idle_clients(port: int, certificate: Path, count: int) -> list[grpc.Channel]
 
 
 @contextmanager
-def standing() -> Iterator[tuple[Any, Connection, grpc.Channel]]:
+def standing():
     """A server with a robot that stands, stepped in a thread; a connection with its lease, and a channel."""
     with tempfile.TemporaryDirectory() as folder:
         held, stopping = credentials(Path(folder)), threading.Event()
@@ -193,8 +183,7 @@ def standing() -> Iterator[tuple[Any, Connection, grpc.Channel]]:
                 stepping.join()
 
 
-def measure(messages: int = 10_000, clients: int = 1000, seed: int = 1) -> dict[str, object]:
-    """Sends all, and counts the answers."""
+def measure(messages: int = 10_000, clients: int = 1000, seed: int = 1):
     logging.getLogger().addHandler(errors := Errors())
     with standing() as (server, connection, channel):
         begun_s = time.monotonic()

@@ -15,11 +15,9 @@ import multiprocessing
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
 from contextlib import redirect_stdout, suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -33,32 +31,12 @@ ENDINGS = ("killed", "reset", "silenced")
 ARM_RAD = ((0.0, -0.9, 1.8, 0.0, -0.9, 0.0), (0.0, -1.6, 2.3, 0.0, -0.7, 0.0))
 
 
-@dataclass(frozen=True)
-class Trial:
-    """Result of a trial; `off` says whether the motors went off by policy, None without one."""
-
-    number: int
-    client: str
-    ending: str
-    driving: bool
-    still: bool
-    moved_m: float
-    free_s: float | None
-    off: bool | None
-
-    @property
-    def free(self) -> bool:
-        """True if the lease was free in time."""
-        return self.free_s is not None and self.free_s < FREE_S
-
-
-def velocity(number: int) -> tuple[float, float, float]:
-    """Velocity of a client's drives (m/s, m/s, rad/s)."""
+def velocity(number):
     sign = 1.0 if number % 4 < 2 else -1.0
     return 0.4 * sign, 0.0, 0.3 * sign
 
 
-def sdk_client(port: int, certificate: str, number: int, end_s: Any) -> None:
+def sdk_client(port, certificate, number, end_s):
     """Drives and moves the arm with the SDK; `end_s` gets the end of each drive (robot's time) first."""
     import bosdyn.client
     from bosdyn.client.keepalive import KeepaliveClient, Policy
@@ -90,7 +68,7 @@ def sdk_client(port: int, certificate: str, number: int, end_s: Any) -> None:
         time.sleep(0.1)
 
 
-def adapter_client(port: int, certificate: str, number: int, end_s: Any) -> None:
+def adapter_client(port, certificate, number, end_s):
     """Drives and moves the arm with the adapter; `end_s` gets the end of each drive (robot's time) first."""
     from plant.robots.spot.kind import spot_capabilities
     from plant.spot_api.adapter.connection import Address, Connection, WallClock
@@ -119,22 +97,20 @@ def adapter_client(port: int, certificate: str, number: int, end_s: Any) -> None
         clock.advance(0.05)
 
 
-def quiet(client: Callable[..., None], *arguments: Any) -> None:
+def quiet(client, *arguments):
     """Runs a client, whose errors after its connection is cut nobody reads."""
     with Path("/dev/null").open("w") as nowhere, redirect_stdout(nowhere), suppress(Exception):
         client(*arguments)
 
 
 class Trials:
-    """Trials against one server, which another thread steps."""
-
-    def __init__(self, server: Any, certificate: Path, seed: int) -> None:
+    def __init__(self, server, certificate, seed):
         self._server, self._certificate = server, str(certificate)
         self._rng, self._context = np.random.default_rng(seed), multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(PRELOADED)
 
-    def run(self, number: int) -> Trial:
-        """Runs one trial."""
+    def run(self, number):
+        """Runs a trial; `off` says whether the motors went off by policy, None without one."""
         from tests.plant.spot_api.proxy import Proxy
 
         client, ending = (sdk_client, adapter_client)[number % 2], ENDINGS[number % 3]
@@ -161,9 +137,11 @@ class Trials:
         proxy.cut()
         self._recover()
         kind = client.__name__.removesuffix("_client")
-        return Trial(number, kind, ending, driving, moved_m < STILL_M, round(moved_m, 4), free_s, off)
+        made = {"number": number, "client": kind, "ending": ending, "driving": driving}
+        right = {"still": moved_m < STILL_M, "free": free_s is not None and free_s < FREE_S, "off": off}
+        return SimpleNamespace(**made, **right, moved_m=round(moved_m, 4), free_s=free_s)
 
-    def _motion_m(self, during_s: float) -> float:
+    def _motion_m(self, during_s):
         """Motion of the base in a while (m, and rad as m)."""
         before = self._server.computer.snapshot.odometry.pose
         time.sleep(during_s)
@@ -171,8 +149,7 @@ class Trials:
         far_m = math.hypot(after.x_m - before.x_m, after.y_m - before.y_m)
         return max(far_m, abs(math.remainder(after.yaw_rad - before.yaw_rad, math.tau)))
 
-    def _recover(self) -> None:
-        """Removes what the client has left behind."""
+    def _recover(self):
         computer = self._server.computer
         computer.leases.make_stale(["body"])
         for watch in computer.watchers:
@@ -180,15 +157,14 @@ class Trials:
                 watch.__self__._live.clear()
 
 
-def _waited(true: Callable[[], bool], most_s: float = WAIT_S) -> bool:
+def _waited(true, most_s=WAIT_S):
     until_s = time.monotonic() + most_s
     while not true() and time.monotonic() < until_s:
         time.sleep(0.02)
     return true()
 
 
-def server_of(scripted: bool, credentials: Any) -> Any:
-    """Server of a robot in the plant, or of a scripted one."""
+def server_of(scripted, credentials):
     from plant.robots.spot.kind import spot_capabilities
     from plant.spot_api.server.server import Options, SpotServer
     from skills.manipulation.arm.kinematics import arm_model
@@ -197,8 +173,8 @@ def server_of(scripted: bool, credentials: Any) -> Any:
         from skills.testing.clock import VirtualClock
         from skills.testing.robot import ScriptedRobot
 
-        clock: Any = VirtualClock()
-        robot: Any = ScriptedRobot(clock, capabilities=spot_capabilities())
+        clock = VirtualClock()
+        robot = ScriptedRobot(clock, capabilities=spot_capabilities())
     else:
         from executive.app.placed_robots import only_robot
         from executive.app.simulated import compile_first, simulate
@@ -212,8 +188,7 @@ def server_of(scripted: bool, credentials: Any) -> Any:
     return SpotServer(robot, clock, arm_model(robot.capabilities()), credentials, Options({USER: PASSWORD}))
 
 
-def summary(trials: Sequence[Trial]) -> dict[str, Any]:
-    """Counts of all trials, and those that went wrong."""
+def summary(trials):
     policy = [each for each in trials if each.off is not None]
     return {
         "trials": len(trials),
@@ -225,16 +200,15 @@ def summary(trials: Sequence[Trial]) -> dict[str, Any]:
     }
 
 
-def measure(trials: int = 50, seed: int = 1, scripted: bool = False) -> dict[str, Any]:
-    """Runs all trials in a thread, and the robot in this one."""
+def measure(trials: int = 50, seed: int = 1, scripted: bool = False):
     from plant.spot_api.server.identity import credentials
 
     with tempfile.TemporaryDirectory() as folder:
         held = credentials(Path(folder))
-        server, stopping, done = server_of(scripted, held), threading.Event(), list[Trial]()
+        server, stopping, done = server_of(scripted, held), threading.Event(), []
         against = Trials(server, held.certificate, seed)
 
-        def run() -> None:
+        def run():
             try:
                 for number in range(trials):
                     done.append(against.run(number))

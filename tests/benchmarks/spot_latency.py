@@ -13,9 +13,7 @@ import multiprocessing
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -30,24 +28,24 @@ DRIVE_S = 0.6
 class Times:
     """Times (s, monotonic) at which commands are answered and begun, and the plant's steps with the robot's clock."""
 
-    def __init__(self, server: Any) -> None:
-        self.begun: list[float] = []
-        self.steps: list[tuple[float, float]] = []
+    def __init__(self, server):
+        self.begun = []
+        self.steps = []
         computer = server.computer
         move, advance = computer.move, computer.clock.advance
 
-        def timed_move(motions: Any) -> None:
+        def timed_move(motions):
             move(motions)
             self.begun.append(time.monotonic())
 
-        def timed_advance(dt_s: float) -> None:
+        def timed_advance(dt_s):
             self.steps.append((time.monotonic(), computer.clock.now()))
             advance(dt_s)
 
         computer.move, computer.clock.advance = timed_move, timed_advance
 
 
-def serve(scripted: bool, folder: str, port: Any, stopping: Any, results: Any) -> None:
+def serve(scripted, folder, port, stopping, results):
     """Serves a robot, and sends the times of its commands and steps at the end."""
     from plant.spot_api.server.identity import credentials
 
@@ -60,24 +58,21 @@ def serve(scripted: bool, folder: str, port: Any, stopping: Any, results: Any) -
 
 
 class Client:
-    """Client whose calls are timed, each kind in a thread of its own."""
-
-    def __init__(self, port: int, certificate: Path) -> None:
+    def __init__(self, port, certificate):
         from bosdyn.api import image_pb2, point_cloud_pb2
 
         from plant.spot_api.adapter.connection import Address, Connection
 
         self.connection = Connection(Address("127.0.0.1", port, certificate), USER, PASSWORD)
         self.connection.synchronise()
-        self.took_s: dict[str, list[float]] = {}
-        self.answered_s: list[float] = []
+        self.took_s = {}
+        self.answered_s = []
         self._images, self._cloud = image_pb2.GetImageRequest(), point_cloud_pb2.GetPointCloudRequest()
         for name in ("hand_color_image", "hand_depth_in_hand_color_frame"):
             self._images.image_requests.add(image_source_name=name, quality_percent=95.0)
         self._cloud.point_cloud_requests.add(point_cloud_source_name="velodyne-point-cloud", cloud_type=1)
 
-    def stand_up(self) -> None:
-        """Switches the motors on and stands."""
+    def stand_up(self):
         from bosdyn.client.robot_command import RobotCommandBuilder
 
         self.connection.acquire()
@@ -87,8 +82,7 @@ class Client:
         self.connection.command(RobotCommandBuilder.synchro_stand_command())
         time.sleep(3.0)
 
-    def calls(self) -> dict[str, Callable[[], Any]]:
-        """The calls by kind."""
+    def calls(self):
         call = self.connection.call
         return {
             "state": self.connection.state,
@@ -97,8 +91,7 @@ class Client:
             "command": self._drive,
         }
 
-    def _drive(self) -> None:
-        """Turns to and fro."""
+    def _drive(self):
         from bosdyn.client.robot_command import RobotCommandBuilder
 
         sign = 1.0 if len(self.answered_s) // 10 % 2 else -1.0
@@ -110,7 +103,7 @@ class Client:
         assert answer.status == 1, answer
         self.answered_s.append(time.monotonic())
 
-    def run(self, kinds: Sequence[str], seconds: float) -> tuple[float, float]:
+    def run(self, kinds, seconds):
         """Makes calls of some kinds at their rates for a while; returns when it began and ended (s, monotonic)."""
         self.took_s = {kind: [] for kind in kinds}
         since_s, calls = time.monotonic(), self.calls()
@@ -121,7 +114,7 @@ class Client:
             each.join()
         return since_s, time.monotonic()
 
-    def _repeat(self, kind: str, call: Callable[[], Any], until_s: float) -> None:
+    def _repeat(self, kind, call, until_s):
         period_s, due_s = 1.0 / RATES_HZ[kind], time.monotonic()
         while due_s < until_s:
             time.sleep(max(0.0, due_s - time.monotonic()))
@@ -131,13 +124,12 @@ class Client:
             due_s = max(due_s + period_s, time.monotonic() - period_s)
 
 
-def milliseconds(times_s: Sequence[float]) -> dict[str, float | None]:
-    """Median, 99th percentile and number of times."""
+def milliseconds(times_s):
     times_ms = [1000.0 * each for each in times_s]
     return {"median_ms": quantile(times_ms, digits=1), "p99_ms": quantile(times_ms, 0.99, 1), "count": len(times_ms)}
 
 
-def in_plant_s(answered_s: Sequence[float], begun_s: Sequence[float], steps_s: Sequence[float]) -> list[float]:
+def in_plant_s(answered_s, begun_s, steps_s):
     """Times from each command's answer to the plant's first step after it has begun."""
     steps = np.array(steps_s)
     first = np.searchsorted(steps, np.array(begun_s))
@@ -145,7 +137,7 @@ def in_plant_s(answered_s: Sequence[float], begun_s: Sequence[float], steps_s: S
     return [max(0.0, float(steps[step]) - answer_s) for step, answer_s in pairs]
 
 
-def pace(steps: Sequence[tuple[float, float]], since_s: float, until_s: float) -> dict[str, float]:
+def pace(steps, since_s, until_s):
     """Robot's time over wall time, and the most that the robot was behind since it was least so."""
     wall, clock = np.array([step for step in steps if since_s <= step[0] <= until_s]).T
     behind = (wall - wall[0]) - (clock - clock[0])
@@ -156,8 +148,7 @@ def pace(steps: Sequence[tuple[float, float]], since_s: float, until_s: float) -
     }
 
 
-def measure(seconds: float = 120.0, scripted: bool = False) -> dict[str, object]:
-    """Serves in another process, and measures both phases."""
+def measure(seconds: float = 120.0, scripted: bool = False):
     from plant.spot_api.server.identity import credentials
 
     context = multiprocessing.get_context("spawn")
@@ -168,7 +159,7 @@ def measure(seconds: float = 120.0, scripted: bool = False) -> dict[str, object]
         server.start()
         while not port.value and server.is_alive():
             time.sleep(0.1)
-        client, phases = Client(port.value, held.certificate), dict[str, Any]()
+        client, phases = Client(port.value, held.certificate), {}
         client.stand_up()
         for name, kinds in PHASES.items():
             span_s = client.run(kinds, seconds / 2.0)
@@ -177,7 +168,7 @@ def measure(seconds: float = 120.0, scripted: bool = False) -> dict[str, object]
         begun_s, steps = results.get(timeout=60.0)
         server.join()
     answered_s, begun_s = client.answered_s, begun_s[-len(client.answered_s) :]
-    figures = dict[str, object]()
+    figures = {}
     for name, ((since_s, until_s), times) in phases.items():
         chosen = [k for k, at_s in enumerate(answered_s) if since_s <= at_s <= until_s]
         own_s = [answered_s[k] for k in chosen], [begun_s[k] for k in chosen]

@@ -8,11 +8,9 @@ run in process is left out.
 """
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
-from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 from executive.app.goal_conditions import verdict_of
 from executive.app.mission_run import run_request
@@ -22,7 +20,6 @@ from executive.app.real_spot import ApiBackend
 from executive.app.served_spot import SpotPerception
 from executive.app.simulated import simulate
 from executive.mission.request import Request
-from plant.simulation import Simulation
 from plant.spot_api.server.identity import credentials
 from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.harness import benchmark
@@ -34,55 +31,26 @@ TIME_OF_DAY = "08:29"
 """Missions that wait for a time begin shortly before it."""
 
 
-@dataclass(frozen=True)
-class Ended:
-    """End of a mission: its outcome, the referee's verdict with its reason, robot time and time of the computer (s)."""
-
-    outcome: str
-    verdict: bool | None
-    why: str
-    robot_s: float
-    took_s: float
-
-
-@dataclass(frozen=True)
-class Pair:
-    """The same mission through the API and in process."""
-
-    name: str
-    api: Ended
-    in_process: Ended | None
-
-    @property
-    def same(self) -> bool:
-        """True if both have the same outcome and verdict."""
-        ends = [(each.outcome, each.verdict) for each in (self.api, self.in_process) if each is not None]
-        return len(ends) == 2 and ends[0] == ends[1]
-
-
 class Judged(ApiBackend):
     """Backend of a real Spot, with the referee of the plant behind the server."""
 
-    def __init__(self, step: LockStep, simulation: Simulation, prepared: Any) -> None:
+    def __init__(self, step, simulation, prepared):
         stack = robot_stack(prepared.robots[step.robot.name])
         super().__init__(step.robot, step, prepared.world, stack, prepared.world.start)
         self._simulation = simulation
 
-    def judge(self, tree, result, *, before=(), since_s=0.0):  # type: ignore[no-untyped-def]
-        """Judges the run by the plant."""
+    def judge(self, tree, result, *, before=(), since_s=0.0):
         return verdict_of(tree, result, self._simulation.referee.judge, before=before, since_s=since_s)
 
 
-def through_api(
-    request: Request, folder: Path, options: Callable[[LockStep], Mapping[str, Any]] = lambda _: {}
-) -> Ended:
+def through_api(request, folder, options=lambda _: {}):
     """Runs a request through adapter and server in lock-step; the server's credentials lie in the folder.
 
     `options` are more options of `run_request`.
     """
-    prepared, made = prepare(request), list[Simulation]()
+    prepared, made = prepare(request), []
 
-    def build() -> tuple[Any, Any]:
+    def build():
         made.append(simulate(prepared.world, prepared.robots, seed=request.seed, record=False))
         return made[0].robots["Alice"], made[0].clock
 
@@ -96,31 +64,28 @@ def through_api(
         step.close()
 
 
-def _ended(report: Any, began_s: float) -> Ended:
+def _ended(report, began_s):
     why, took_s = f"{report.message}; {report.seen.why}", round(time.monotonic() - began_s, 1)
-    return Ended(str(report.outcome), report.seen.success, why, round(report.sim_time_s, 1), took_s)
+    ended = {"outcome": str(report.outcome), "verdict": report.seen.success, "why": why}
+    return SimpleNamespace(**ended, robot_s=round(report.sim_time_s, 1), took_s=took_s)
 
 
-def cases(
-    missions: tuple[str, ...] = SHIPPED, seed: int = 1, seeds: int = 1, api_only: bool = False
-) -> Iterable[tuple[str, int, bool]]:
-    """Names of shipped missions, or sentences, with so many seeds."""
+def cases(missions: tuple[str, ...] = SHIPPED, seed: int = 1, seeds: int = 1, api_only: bool = False):
     return product(missions, range(seed, seed + seeds), [api_only])
 
 
-def run_case(name: str, seed: int, api_only: bool, folder: Path) -> Pair:
-    """Runs a mission, or a sentence, through the API and in process."""
-    what: dict[str, Any] = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
+def run_case(name, seed, api_only, folder):
+    what = {"sentence": name} if " " in name else {"file": MISSIONS / f"{name}.yaml"}
     request = Request(**what, seed=seed, record=False, time_of_day=TIME_OF_DAY, out=folder / "run")
     api, here = through_api(request, folder / "credentials"), None
     if not api_only:
         began_s = time.monotonic()
         here = _ended(run_request(prepare(replace(request, out=folder / "in_process"))).report, began_s)
-    return Pair(f"{name} {seed}", api, here)
+    same = here is not None and (api.outcome, api.verdict) == (here.outcome, here.verdict)
+    return {"name": f"{name} {seed}", "same": same, "api": api, "in_process": here}
 
 
-def summary(pairs: Sequence[Pair]) -> dict[str, object]:
-    """Figures of all missions."""
+def summary(pairs):
     robot_s, took_s = (sum(getattr(each.api, name) for each in pairs) for name in ("robot_s", "took_s"))
     return {
         "same": sum(each.same for each in pairs),

@@ -60,18 +60,19 @@ def test_pictures_per_second(benchmark, pictures):
     assert per_second >= PICTURES_PER_SECOND
 
 
+def run_fresh(program):
+    """Number that a program prints last, in a process of its own."""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    return float(run.stdout.splitlines()[-1])
+
+
 def test_the_model_loads_in_a_fresh_process(benchmark):
     program = (
         "import time; from skills.perception.detector.onnx_detector import load_detector\n"
         "begun = time.process_time(); load_detector(); print(time.process_time() - begun)"
     )
-
-    def loaded():
-        run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        return float(run.stdout)
-
     times_s = []
-    benchmark.pedantic(lambda: times_s.append(loaded()), rounds=3, iterations=1)
+    benchmark.pedantic(lambda: times_s.append(run_fresh(program)), rounds=3, iterations=1)
     benchmark.extra_info["loading, s"] = round(min(times_s), 3)
     assert min(times_s) <= LOADING_S
 
@@ -85,12 +86,6 @@ def test_memory_of_errand_detect(benchmark, files):
         "except SystemExit as end: assert not end.code, end.code\n"
         "print([line.split()[1] for line in open('/proc/self/status') if line.startswith('VmHWM')][0])"
     )
-
-    def most_mb():
-        run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-        return int(run.stdout.splitlines()[-1]) / 1024
-
-    used = []
-    benchmark.pedantic(lambda: used.append(most_mb()), rounds=1, iterations=1)
-    benchmark.extra_info["memory, MB"] = round(used[0])
-    assert used[0] <= MEMORY_MB
+    used_mb = benchmark.pedantic(run_fresh, args=(program,), rounds=1) / 1024
+    benchmark.extra_info["memory, MB"] = round(used_mb)
+    assert used_mb <= MEMORY_MB

@@ -1,5 +1,7 @@
 """What two runs are compared by."""
 
+import pytest
+
 from executive.record.history import Event
 from tests.benchmarks.equal_logs import differences, lines, steady
 
@@ -10,23 +12,19 @@ def test_equal_runs_have_no_differences():
     assert list(differences(RUN, RUN)) == []
 
 
-# what is changed                      told
-# exit                                 exit
-# result                               result
-# an event                             event 2
-# an event is missing                  event 2
-# a log is missing                     1 logs
-def test_each_difference_is_told_with_its_place():
-    changed = {
-        "exit": {**RUN, "exit": 1},
-        "result": {**RUN, "result": {"outcome": "failure"}},
-        "log 0, event 2": {**RUN, "logs": [["0.050 state abc", "0.100 state xyz"]]},
-        "log 0, event 2 of 2 and 1": {**RUN, "logs": [["0.050 state abc"]]},
-        "1 logs": {**RUN, "logs": []},
-    }
-    for told, run in changed.items():
-        (found,) = differences(RUN, run)
-        assert found.startswith(told), found
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"exit": 1}, "exit"),
+        ({"result": {"outcome": "failure"}}, "result"),
+        ({"logs": [["0.050 state abc", "0.100 state xyz"]]}, "log 0, event 2"),
+        ({"logs": [["0.050 state abc"]]}, "log 0, event 2 of 2 and 1"),
+        ({"logs": []}, "1 logs"),
+    ],
+)
+def test_a_difference_is_told_with_its_place(changed, told):
+    (found,) = differences(RUN, RUN | changed)
+    assert found.startswith(told)
 
 
 def test_differences_between_equal_runs_are_left_out():
@@ -34,12 +32,7 @@ def test_differences_between_equal_runs_are_left_out():
     assert steady(result) == {"outcome": "success", "robots": [{"ticks": 3}]}
 
 
-# topic         what it tells            line
-# transitions   a node                   whole
-# pose          a position               a digest of twelve digits
-# wall          processor time           none
-# detections    with a picture           none
-def test_a_line_tells_the_moment_and_what_happened():
+def test_a_line_tells_a_transition_whole_a_pose_as_a_digest_and_no_pictures_and_processor_times():
     events = [
         Event("transitions", 0.05, {"node": "alice/fetch", "file": "OUT"}),
         Event("pose", 0.1, {"x": 1.0}),

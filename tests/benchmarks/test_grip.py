@@ -14,19 +14,13 @@ def test_gripper_holds_a_thing_beside_its_centre_of_mass(name):
     assert result["held"] and result["shaken_deg"] < 12.0, result
 
 
-def test_round_handle_settles_between_sparse_dots():
-    result = held("dots", BY_NAME["round handle"], 100.0, TIME_STEP_S)
-    assert result["turned_deg"] > 30.0, result
-
-
-def test_gripper_lets_a_long_heavy_bar_turn():
-    result = held("grid", BY_NAME["sledge bar"], 40.0, TIME_STEP_S)
-    assert result["turned_deg"] > 30.0, result
+@pytest.mark.parametrize(("pads", "name", "force_n"), [("dots", "round handle", 100.0), ("grid", "sledge bar", 40.0)])
+def test_a_round_handle_turns_between_sparse_dots_and_a_long_heavy_bar_in_the_gripper(pads, name, force_n):
+    assert held(pads, BY_NAME[name], force_n, TIME_STEP_S)["turned_deg"] > 30.0
 
 
 def test_gripper_lets_a_greasy_bar_slip():
-    result = held("grid", BY_NAME["greasy bar"], 40.0, TIME_STEP_S)
-    assert not result["held"], result
+    assert not held("grid", BY_NAME["greasy bar"], 40.0, TIME_STEP_S)["held"]
 
 
 @pytest.mark.parametrize("name", ["hammer bar", "25 mm peg", "block"])

@@ -1,6 +1,6 @@
 """Figures of the manipulation benchmark: spots, failures, sheets, shapes, ways through doors."""
 
-from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -9,13 +9,27 @@ import pytest
 from plant.models.catalogue import read_imported
 from plant.worlds.seeding import place_objects, place_people
 from tests.benchmarks.carry import doors, entered
-from tests.benchmarks.manipulation import TimedWorker, Trial, failures, is_false_claim, place_error_m, write_sheet
+from tests.benchmarks.manipulation import (
+    TimedWorker,
+    failure,
+    failures,
+    is_false_claim,
+    near_upright,
+    place_error_m,
+    write_sheet,
+)
 from tests.benchmarks.manipulation_room import PERSON, room
 from tests.benchmarks.shapes import DENSITY_KG_M3, SLENDER, random_shape, written_shape
 
-GOOD = Trial("coke", "coke.sdf", "floor", 0, 7, True, True, True, True, 0.02, 0, False, 0, "", 60.0, 10.0)
-FALLEN = replace(GOOD, placed_upright=False)
-UNSEEN = replace(GOOD, cause="PLANNING: no path", placed=False, placed_upright=None, place_error_m=None)
+RIGHT = dict.fromkeys(("lifted", "held_10s", "placed", "placed_upright"), True) | {"place_error_m": 0.02, "cause": ""}
+
+
+def trial(**other):
+    return SimpleNamespace(**{"name": "coke", "surface": "floor", "seed": 7, "ending": None, **RIGHT, **other})
+
+
+GOOD, FAR, FALLEN = trial(), trial(place_error_m=0.06), trial(placed_upright=False)
+UNSEEN = {"cause": "PLANNING: no path", "placed": False, "placed_upright": None, "place_error_m": None}
 
 
 class DoneAtOnce:
@@ -28,26 +42,22 @@ class DoneAtOnce:
         return work(read())
 
 
-def test_a_place_error_is_measured_along_the_surface():
+def test_a_place_error_is_measured_along_the_surface_from_a_spot():
     assert place_error_m((1.0, 2.0), np.array([1.03, 2.04, 0.8])) == pytest.approx(0.05)
-
-
-def test_without_a_spot_there_is_no_place_error():
     assert place_error_m(None, np.zeros(3)) is None
 
 
 @pytest.mark.parametrize(
-    ("trial", "near"), [(GOOD, True), (replace(GOOD, place_error_m=0.06), False), (FALLEN, False), (UNSEEN, False)]
+    ("trial", "near", "why"),
+    [
+        (GOOD, True, ""),
+        (FAR, False, ""),
+        (FALLEN, False, "fell over on the second table"),
+        (trial(**UNSEEN), False, "PLANNING: no path"),
+    ],
 )
-def test_only_what_stands_upright_within_5_cm_counts_as_near(trial, near):
-    assert trial.near_upright is near
-
-
-@pytest.mark.parametrize(
-    ("trial", "why"), [(GOOD, ""), (FALLEN, "fell over on the second table"), (UNSEEN, "PLANNING: no path")]
-)
-def test_a_failure_is_told_by_the_mission_or_else_by_the_truth(trial, why):
-    assert trial.failure == why
+def test_a_trial_is_near_upright_within_5_cm_or_tells_why_it_failed(trial, near, why):
+    assert (near_upright(trial), failure(trial)) == (near, why)
 
 
 # claimed, lifted, held (s) -> a false claim
@@ -66,21 +76,17 @@ def test_a_false_claim_is_of_what_was_never_lifted_or_none_of_what_was_held(clai
 
 
 def test_failures_are_counted_by_class_and_cause():
-    lines = [line.split() for line in failures([GOOD, UNSEEN, FALLEN, UNSEEN])]
+    lines = [line.split() for line in failures([GOOD, trial(**UNSEEN), FALLEN, trial(**UNSEEN)])]
     assert [line[:2] for line in lines] == [["2", "coke"], ["1", "coke"]]
 
 
-def test_a_sheet_has_a_picture_for_each_failure(tmp_path):
+def test_a_sheet_has_a_picture_for_each_failure_and_is_not_written_without(tmp_path):
     ending, path = tmp_path / "ending.png", tmp_path / "made" / "sheet.png"
     cv2.imwrite(str(ending), np.zeros((60, 80, 3), np.uint8))
-    assert "2 failed trials" in write_sheet(path, [GOOD, *[replace(UNSEEN, ending=ending)] * 2])
+    assert "2 failed trials" in write_sheet(path, [GOOD, *[trial(**UNSEEN, ending=ending)] * 2])
     assert cv2.imread(str(path)).shape[1] == 2 * 400
-
-
-def test_without_failures_no_sheet_is_written(tmp_path):
-    path = tmp_path / "sheet.png"
-    assert "no trial failed" in write_sheet(path, [GOOD])
-    assert not path.exists()
+    assert "no trial failed" in write_sheet(tmp_path / "none.png", [GOOD])
+    assert not (tmp_path / "none.png").exists()
 
 
 def test_work_is_timed_by_name_also_when_it_fails():
@@ -92,7 +98,7 @@ def test_work_is_timed_by_name_also_when_it_fails():
     assert {name: len(spent_s) for name, spent_s in worker.spent_s.items()} == {"plan": 2, "look": 1}
 
 
-def test_shapes_stay_within_what_the_gripper_takes():
+def test_the_shape_of_a_seed_stays_within_what_the_gripper_takes():
     for seed in range(200):
         shape = random_shape(seed)
         x, y, z = shape.size_m
@@ -100,10 +106,7 @@ def test_shapes_stay_within_what_the_gripper_takes():
         assert 0.02 <= min(x, z) <= max(x, z) <= 0.30
         assert shape.kind == "block" or z <= SLENDER * min(x, y)
         assert DENSITY_KG_M3[0] <= shape.density_kg_m3 <= DENSITY_KG_M3[1]
-
-
-def test_a_seed_gives_the_same_shape_again():
-    assert random_shape(501) == random_shape(501) != random_shape(502)
+        assert random_shape(seed) == shape != random_shape(seed + 1)
 
 
 def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path):
@@ -113,15 +116,12 @@ def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path):
     assert sorted(made.size_m) == pytest.approx(sorted(random_shape(502).size_m), rel=0.02)
 
 
-def test_a_room_is_entered_once_and_a_doorway_is_none():
-    rooms = list[str]()
+def test_a_room_is_entered_once_and_neither_a_doorway_nor_an_opening_counts():
+    rooms = []
     for name in ("kitchen", "kitchen", None, "hall", "hall", "bedroom", None, "hall"):
         rooms = entered(rooms, name)
     assert rooms == ["kitchen", "hall", "bedroom", "hall"]
     assert doors(rooms) == 3
-
-
-def test_the_opening_between_hall_and_living_room_is_no_door():
     assert doors(["hall", "living room", "kitchen"]) == 1
 
 

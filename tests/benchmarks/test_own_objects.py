@@ -1,6 +1,7 @@
 """The measure of own objects asks and counts."""
 
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ pytest.importorskip("trimesh")
 from skills.detection import NoDetector
 from skills.perception.model_detector import ModelDetector
 from tests.benchmarks import own_objects
-from tests.benchmarks.own_objects import Asked, ask, by_photographs, generated, imported, scene, summary
+from tests.benchmarks.own_objects import ask, by_photographs, generated, imported, scene, summary
 
 
 def test_a_generated_object_is_asked_for_among_others(tmp_path, monkeypatch):
@@ -38,7 +39,8 @@ def test_photographs_of_an_object_become_a_model_of_its_size(tmp_path, monkeypat
 
 
 def test_shares_count_found_and_mistaken_objects():
-    rows = [("mug", True, True, False), ("mug", True, False, True), ("cup", False, False, False)]
-    counts = summary([Asked(name, 0, there, found, wrong, "", 1.0) for name, there, found, wrong in rows])
+    names = ("name", "there", "found", "mistaken", "wall_s")
+    rows = [("mug", True, True, False, 1.0), ("mug", True, False, True, 1.0), ("cup", False, False, False, 1.0)]
+    counts = summary([SimpleNamespace(**dict(zip(names, row, strict=True))) for row in rows])
     assert (counts["asked"], counts["found"], counts["mistaken_of_there"]) == (2, 0.5, 0.5)
     assert (counts["absent"], counts["mistaken_of_absent"], counts["by_object"]) == (1, 0.0, {"mug": "1/2"})

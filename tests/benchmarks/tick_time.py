@@ -11,7 +11,6 @@ import itertools
 import statistics
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +18,11 @@ import numpy as np
 from executive.mission.request import Request
 from executive.record.event_log import EventLog
 from executive.run.control import Control
-from executive.run.outcome import RunResult
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
-from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.compiler import compile_mission
 from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge
 from executive.words.leaf_steps import steps_of_commands
@@ -38,7 +36,7 @@ FIRST = 5
 """Ticks in which much begins."""
 
 
-def fetch(steps_each: int, more: int = 0, robot: str = "Alice") -> CompiledTree:
+def fetch(steps_each, more=0, robot="Alice"):
     """Tree of a fetch, whose leaves drive for some ticks and say something new in each; `more` follow."""
     script = scripted.Script(steps=steps_each, says=lambda name, left: f"{name}, {left} to go")
     registry = {name: scripted.scripted_skill(script, name, *ports) for name, ports in scripted.PORTS.items()}
@@ -47,17 +45,15 @@ def fetch(steps_each: int, more: int = 0, robot: str = "Alice") -> CompiledTree:
     return compile_mission(mission, knowledge=Knowledge.model_validate(scripted.KNOWLEDGE), registry=registry)
 
 
-def ticks_of_a_run(
-    trees: Sequence[CompiledTree], folder: Path, most: int | None = None
-) -> tuple[RunResult, list[float]]:
+def ticks_of_a_run(trees, folder, most=None):
     """Runs a mission for each robot with log and journals, for so many ticks at most.
 
     Returns the result, and the CPU time of each cycle (s): the trees' ticks and all around them.
     """
-    clock, ends, control = scripted.ManualClock(), [], Control(pace=None)
+    clock, ends, control = scripted.VirtualClock(), [], Control(pace=None)
     log, entries, journals = EventLog(folder / "log.mcap", clock), [], []
 
-    def observe(_: object) -> None:
+    def observe(_):
         ends.append(time.thread_time())
         if len(ends) == most:
             control.cancel("enough")
@@ -68,7 +64,7 @@ def ticks_of_a_run(
             request = Request(name="fetch", world_name="flat", robot=name, out=folder, commands=scripted.FETCH)
             journals.append(store.journal(store.add(request, queued=False).id, name))
             entries.append(
-                RunEntry(tree, scripted.ScriptedRobot(clock, name), scripted.StillLocaliser(), scripted.EmptyCostmap())
+                RunEntry(tree, scripted.StandingRobot(clock, name), scripted.StillLocaliser(), scripted.EmptyCostmap())
             )
         visitors, settings = [log, *journals, OnTick(observe)], RunSettings(tick_period_s=TICK_S)
         result = run(entries, clock=clock, worker=worker, visitors=visitors, settings=settings, control=control)
@@ -76,9 +72,9 @@ def ticks_of_a_run(
     return result, [after - before for before, after in itertools.pairwise(ends)]
 
 
-def measure(more: tuple[int, ...] = (0, 2, 5, 10, 20), ticks: int = 300, rounds: int = 3) -> dict[str, object]:
+def measure(more: tuple[int, ...] = (0, 2, 5, 10, 20), ticks: int = 300, rounds: int = 3):
     """Times the median tick of the quietest round by the tree's size."""
-    took_us = dict[int, float]()
+    took_us = {}
     for tree in [fetch(ticks + 1, each) for each in more]:
         medians = []
         for _ in range(rounds):

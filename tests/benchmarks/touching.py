@@ -11,26 +11,22 @@ two segments hold a fifth or more each. `--sheet` writes pictures with the segme
 
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from errand_train.dataset.views import camera_specs
-from plant.models.catalogue import ModelForm, load_catalogue, read_imported
+from plant.models.catalogue import load_catalogue, read_imported
 from plant.scene_pictures import look_at, save_png
 from plant.worlds.seeding import outline_W
-from skills.api import Surface
 from skills.geometry import inside_polygon
 from skills.perception.point_cloud import camera_pose_W
 from skills.perception.surface_segmentation import segment_surface, split_touching
-from skills.robot import FloatArray, Image, Picture
 from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.harness import command, quantile, share
 from tests.benchmarks.shapes import written_shape
@@ -40,36 +36,11 @@ ON = tuple(name for name in SURFACES if name != "bathroom cabinet")
 GAPS_M = (0.0, 0.01, 0.02, 0.03, 0.05, 0.07, 0.10)
 VIEWS = {"near": (0.42, 0.73), "far": (0.95, 0.61)}
 RIM_M, TRIES, FEWEST_POINTS, SHARE, SHAPES = 0.02, 300, 60, 0.2, 8
-Pixels = Sequence[NDArray[np.int64]]
-"""Pixels (N, 2) of each segment."""
 
 
-@dataclass(frozen=True)
-class Laid:
-    """An object that was laid on a surface, and its distance from the nearest other (m)."""
-
-    name: str
-    form: ModelForm
-    X_WO: RigidTransform
-    outline: FloatArray
-    gap_m: float = 1.0
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Result for an object in a picture."""
-
-    view: str
-    name: str
-    gap_m: float
-    iou: float
-    merged: bool
-    split: bool
-
-
-def lay(rng: np.random.Generator, forms: Sequence[tuple[str, ModelForm]], surface: Surface) -> list[Laid]:
-    """Lays forms on a surface, the first near its middle, each other beside an earlier one."""
-    middle, placed = np.mean(surface.polygon_W, axis=0), list[Laid]()
+def lay(rng, forms, surface):
+    """Lays forms on a surface, the first near its middle, each other beside an earlier one, at a `gap_m`."""
+    middle, placed = np.mean(surface.polygon_W, axis=0), []
     for name, form in forms:
         for _ in range(TRIES):
             yaw, gap_m, turn = rng.uniform(-np.pi, np.pi), float(rng.choice(GAPS_M)), rng.uniform(-np.pi, np.pi)
@@ -82,19 +53,20 @@ def lay(rng: np.random.Generator, forms: Sequence[tuple[str, ModelForm]], surfac
             if any(_distance_m(outline, each.outline) < max(gap_m, 1e-4) - 5e-5 for each in placed):
                 continue
             p_W = [*centre, surface.height_m + form.rest_height_m]
-            placed.append(Laid(name, form, RigidTransform(RollPitchYaw(0, 0, yaw), p_W), outline))
+            X_WO = RigidTransform(RollPitchYaw(0, 0, yaw), p_W)
+            placed.append(SimpleNamespace(name=name, form=form, X_WO=X_WO, outline=outline))
             break
-    gaps_m = [[_distance_m(one.outline, other.outline) for other in placed if other is not one] for one in placed]
-    return [replace(one, gap_m=min(each, default=1.0)) for one, each in zip(placed, gaps_m, strict=True)]
+    for one in placed:
+        gaps_m = (_distance_m(one.outline, other.outline) for other in placed if other is not one)
+        one.gap_m = min(gaps_m, default=1.0)
+    return placed
 
 
-def _distance_m(one: FloatArray, other: FloatArray) -> float:
+def _distance_m(one, other):
     return float(shapely.distance(shapely.Polygon(one), shapely.Polygon(other)))
 
 
-def _moved_off(
-    form: ModelForm, start: FloatArray, direction: FloatArray, yaw: float, anchor: Laid | None, gap_m: float
-) -> tuple[FloatArray, FloatArray]:
+def _moved_off(form, start, direction, yaw, anchor, gap_m):
     """Outline and centre of a form moved along a direction until it is a gap away from the anchor."""
     low, high = 0.0, 0.0 if anchor is None else 0.8
     for _ in range(24):
@@ -108,7 +80,7 @@ def _moved_off(
     return outline_W(form, tuple(centre), yaw), centre
 
 
-def shots(seed: int, count: int, *, alone: bool) -> Iterator[tuple[str, Image, np.ndarray, list[Laid], Surface]]:
+def shots(seed, count, *, alone):
     """Pictures of scenes from each view with the numbers of their pixels' objects, -1 for none."""
     spec = camera_specs()["hand"]
     with tempfile.TemporaryDirectory() as folder:
@@ -116,7 +88,7 @@ def shots(seed: int, count: int, *, alone: bool) -> Iterator[tuple[str, Image, n
         shapes = [read_imported(each).form(each) for each in written]
         for number in range(count):
             rng = np.random.default_rng([seed, number, 17])
-            surface, forms = surface_of(str(rng.choice(ON))), list[tuple[str, ModelForm]]()
+            surface, forms = surface_of(str(rng.choice(ON))), []
             for k in range(1 if alone else int(rng.integers(3, 7))):
                 which = CLASSES[int(rng.integers(len(CLASSES)))] if alone or rng.random() < 0.65 else "shape"
                 own = [*load_catalogue()[which].forms.values()] if which != "shape" else shapes
@@ -137,8 +109,7 @@ def shots(seed: int, count: int, *, alone: bool) -> Iterator[tuple[str, Image, n
                 yield view, flat.image(rng, spec, X_WC), numbers, objects, surface
 
 
-def judge(view: str, segments: Pixels, image: Image, numbers: np.ndarray, objects: Sequence[Laid]) -> Iterator[Judged]:
-    """Judges each object that the picture shows whole."""
+def judge(view, segments, image, numbers, objects):
     rim = {*numbers[:3].flat, *numbers[-3:].flat, *numbers[:, :3].flat, *numbers[:, -3:].flat}
     own = [np.bincount(numbers[p[:, 1], p[:, 0]] + 1, minlength=len(objects) + 1)[1:] for p in segments]
     counts, sizes = np.array(own).reshape(-1, len(objects)), np.array([len(p) for p in segments])
@@ -151,19 +122,18 @@ def judge(view: str, segments: Pixels, image: Image, numbers: np.ndarray, object
         ious = counts[:, number] / np.maximum(sizes + area - counts[:, number], 1)
         merged = bool(len(ious)) and bool(np.any(np.delete(holds[int(np.argmax(ious))], number) > SHARE))
         split = int(np.count_nonzero(holds[:, number] > SHARE)) > 1
-        yield Judged(view, each.name, round(each.gap_m, 3), round(float(ious.max(initial=0.0)), 3), merged, split)
+        own = {"view": view, "name": each.name, "gap_m": round(each.gap_m, 3)}
+        yield SimpleNamespace(**own, iou=round(float(ious.max(initial=0.0)), 3), merged=merged, split=split)
 
 
-def segments_of(image: Image, surface: Surface) -> Pixels:
-    """Pixels of the segments on a surface, with those split that touch."""
+def segments_of(image, surface):
     here = RigidTransform()
     view = segment_surface(image, here, surface, margin_m=0.0)
     split = None if view is None else split_touching(view, camera_pose_W(image, here).translation())
     return [] if split is None else [each.points.pixels for each in split.clusters]
 
 
-def drawn(image: Image, segments: Pixels) -> Picture:
-    """The picture with its segments in colours."""
+def drawn(image, segments):
     assert image.colour is not None
     shown = image.colour.copy()
     for k, p in enumerate(segments):
@@ -172,17 +142,16 @@ def drawn(image: Image, segments: Pixels) -> Picture:
     return shown
 
 
-def rates(judged: Sequence[Judged]) -> dict[str, float | None]:
-    """Shares over some objects."""
+def rates(judged):
     if not judged:
         return {"objects": 0}
     found = {"found": share([each.iou > 0.5 for each in judged])}
     return {"objects": len(judged), **found, **{n: share([getattr(e, n) for e in judged]) for n in ("merged", "split")}}
 
 
-def measure(scenes: int = 20, seed: int = 1, alone: bool = False, sheet: Path | None = None) -> dict[str, object]:
+def measure(scenes: int = 20, seed: int = 1, alone: bool = False, sheet: Path | None = None):
     """Rates by distance from the camera and by gap, names of split objects, time of the segmentation (ms)."""
-    judged, spent_ms = list[Judged](), list[float]()
+    judged, spent_ms = [], []
     for shot, (view, image, numbers, objects, surface) in enumerate(shots(seed, scenes, alone=alone)):
         begun_s = time.perf_counter()
         segments = segments_of(image, surface)

@@ -10,24 +10,20 @@ still for 60 s, or ran out of time.
 """
 
 import math
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from itertools import groupby, product
-from operator import attrgetter
-from pathlib import Path
+from itertools import product
 
 import numpy as np
 
 from executive.app.worlds import knowledge_of, open_world
-from executive.run.visitor import Progress, RunVisitor
-from executive.words.knowledge import Door, Knowledge
+from executive.run.visitor import RunVisitor
 from executive.words.robot_config import RobotConfig
 from plant.robots.robot_kind import robot_kind
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.grid_map import load_grid_map
 from skills.navigate.footprint import Footprint, footprint_clearance_m
 from skills.robot import Pose2D
-from tests.benchmarks.harness import benchmark, totals
+from tests.benchmarks.harness import benchmark, for_each, totals
 from tests.benchmarks.plant_mission import PlantMission
 
 STILL_S, MOVED_M, TIME_LIMIT_S = 60.0, 0.1, 400.0
@@ -45,19 +41,15 @@ FETCHING = {
 }
 FETCHES = 0.3
 """Share of the missions of a Spot that are to fetch something."""
-Drawn = tuple[str, str, tuple[RobotConfig, ...]]
-"""A world, what is said, and the robots."""
 
 
 @dataclass
 class Standing(RunVisitor):
-    """Visitor that measures for how long no robot has moved (s)."""
-
     longest_s: float = 0.0
     _last: dict[str, Pose2D] = field(default_factory=dict)
     _moved_s: float = 0.0
 
-    def tick(self, progress: Progress) -> None:
+    def tick(self, progress):
         for name, status in progress.robots.items():
             pose, last = status.pose, self._last.get(name)
             if pose is None:
@@ -67,25 +59,7 @@ class Standing(RunVisitor):
         self.longest_s = max(self.longest_s, progress.now_s - self._moved_s)
 
 
-@dataclass(frozen=True)
-class Result:
-    """Result of one run."""
-
-    what: str
-    number: int
-    world: str
-    kinds: tuple[str, ...]
-    sentence: str
-    resolved: bool
-    contacts: int
-    collisions: int
-    deadlock: bool
-    stood_s: float
-    sim_time_s: float
-    messages: tuple[str, ...]
-
-
-def meeting(number: int) -> Drawn:
+def meeting(number):
     """Two robots head-on at a door that one fits through, each on its way to the place where the other one begins."""
     rng = np.random.default_rng([number, 30])
     world = open_world(WORLDS[number % len(WORLDS)])
@@ -93,7 +67,7 @@ def meeting(number: int) -> Drawn:
     grid = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     doors, costmap = doors_for_one(knowledge), LayeredCostmap(grid)
 
-    def start(kind: str, place: str, door: Door) -> Pose2D | None:
+    def start(kind, place, door):
         """Free pose in a place near a door, about facing it; None where there is none."""
         footprint = Footprint.of(robot_kind(kind).capabilities())
         low, high = (bound(knowledge.places[place].polygon, axis=0) for bound in (np.min, np.max))
@@ -106,7 +80,7 @@ def meeting(number: int) -> Drawn:
                 return Pose2D(round(float(x), 3), round(float(y), 3), round(math.remainder(pose[0, 2], math.tau), 3))
         return None
 
-    starts: list[Pose2D | None] = [None]
+    starts = [None]
     while None in starts:
         door = doors[rng.integers(len(doors))]
         kinds = PAIRS[rng.integers(len(PAIRS))]
@@ -120,18 +94,17 @@ def meeting(number: int) -> Drawn:
     return world.name, ", and ".join(asked), robots
 
 
-def doors_for_one(knowledge: Knowledge) -> Sequence[Door]:
+def doors_for_one(knowledge):
     """Doors that one robot fits through, with both places near."""
 
-    def near(door: Door, place: str) -> bool:
+    def near(door, place):
         pose = knowledge.place_pose(place)
         return math.dist(door.at, (pose.x, pose.y)) < NEAR_M
 
     return [d for d in knowledge.doors if d.width < FOR_ONE_M and all(near(d, place) for place in d.between)]
 
 
-def missions(number: int) -> Drawn:
-    """A mission for each of two robots."""
+def missions(number):
     rng = np.random.default_rng([number, 31])
     world = WORLDS[number % len(WORLDS)]
     kinds = PAIRS[rng.integers(len(PAIRS))]
@@ -145,49 +118,38 @@ def missions(number: int) -> Drawn:
     return world, f"Alice, {first}, and Bob, {second}", robots
 
 
-def cases(what: tuple[str, ...] = ("door",), first: int = 0, count: int = 5) -> Iterable[tuple[str, int]]:
-    """Kinds of cases with their numbers."""
+def cases(what: tuple[str, ...] = ("door",), first: int = 0, count: int = 5):
     return product(what, range(first, first + count))
 
 
-def run_case(what: str, number: int, folder: Path) -> Result:
-    """Runs one case."""
+def run_case(what, number, folder):
     world, sentence, robots = {"door": meeting, "missions": missions}[what](number)
-    mission = PlantMission(
-        folder,
-        number,
-        change=lambda prepared: prepared.world if what == "missions" else prepared.world.without_people(),
-        sentence=sentence,
-        world=world,
-        time_limit_s=TIME_LIMIT_S,
-        robots=robots,
-    )
+    asked = {"sentence": sentence, "world": world, "time_limit_s": TIME_LIMIT_S, "robots": robots}
+
+    def change(prepared):
+        return prepared.world if what == "missions" else prepared.world.without_people()
+
+    mission = PlantMission(folder, number, change=change, **asked)
     standing = Standing()
     report = mission.run(standing)
     seen = [each.referee for each in report.robots.values() if each.referee is not None]
-    return Result(
-        what,
-        number,
-        world,
-        tuple(robot.kind for robot in robots),
-        sentence,
-        resolved=all(each.achieved for each in report.robots.values()),
-        contacts=max(each.robots_hit for each in seen),
-        collisions=max(each.collisions for each in seen),
-        deadlock=standing.longest_s >= STILL_S or report.sim_time_s >= TIME_LIMIT_S,
-        stood_s=round(standing.longest_s, 1),
-        sim_time_s=report.sim_time_s,
-        messages=tuple(each.message for each in report.robots.values()),
-    )
+    return {
+        "what": what,
+        "number": number,
+        "world": world,
+        "kinds": [robot.kind for robot in robots],
+        "sentence": sentence,
+        "resolved": all(each.achieved for each in report.robots.values()),
+        "contacts": max(each.robots_hit for each in seen),
+        "collisions": max(each.collisions for each in seen),
+        "deadlock": standing.longest_s >= STILL_S or report.sim_time_s >= TIME_LIMIT_S,
+        "stood_s": round(standing.longest_s, 1),
+        "sim_time_s": report.sim_time_s,
+        "messages": [each.message for each in report.robots.values()],
+    }
 
 
-def summary(results: Sequence[Result]) -> dict[str, object]:
-    """Figures of each kind of case."""
-    return {what: figures(list(each)) for what, each in groupby(results, attrgetter("what"))}
-
-
-def figures(results: Sequence[Result]) -> dict[str, object]:
-    """Figures of one kind of case."""
+def figures(results):
     return {
         "runs": len(results),
         **totals(results, "resolved", "contacts", "collisions"),
@@ -197,4 +159,4 @@ def figures(results: Sequence[Result]) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    benchmark(cases, run_case, summary)
+    benchmark(cases, run_case, for_each("what", figures))

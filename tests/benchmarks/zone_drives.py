@@ -11,9 +11,7 @@ that leave no path are drawn again, most of them; a drive that they refuse count
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -27,7 +25,6 @@ from skills.navigate.planner import plan_path
 from skills.navigate.zone_map import KeepOut, zone_map
 from skills.navigate.zones import FilterType, Zone, ZoneKind, ZoneMask
 from skills.ports import NavigateInputs
-from skills.robot import Pose2D
 from tests.benchmarks.driving import SPOT, TICK_S, Driver, free_poses, maps_of
 from tests.benchmarks.goals import from_people
 from tests.benchmarks.harness import benchmark, tell
@@ -35,48 +32,27 @@ from tests.benchmarks.harness import benchmark, tell
 CELL_M, OVER_M_S, FULL_M_S = 0.05, 0.05, 0.8
 INSIDE_EVERY, TRIES, BLOCKED_SHARE = 8, 8, 0.02
 AT_GOAL_M, LEAST_M = 0.15, 2.0
-Ground = tuple[Zone, shapely.Geometry, float | None]
-"""A zone with its ground and its limit of speed (m/s)."""
 
 
-@dataclass(frozen=True)
-class Judged:
-    """One drive: its end, what it broke, and what it was told."""
-
-    succeeded: bool
-    named: bool
-    entered: bool
-    deepest_m: float
-    over_ticks: int
-    most_over_m_s: float
-    against_m: float
-    hits: int
-    message: str
-
-
-def rectangle(middle: np.ndarray, size: np.ndarray, yaw: float) -> shapely.Polygon:
-    """A turned rectangle."""
+def rectangle(middle, size, yaw):
     corners = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) * size
     return outline_at(np.array([*middle, yaw]), corners)
 
 
-def outline_at(pose: np.ndarray, corners: np.ndarray) -> shapely.Polygon:
-    """Outline with some corners at a pose."""
+def outline_at(pose, corners):
     c, s = math.cos(pose[2]), math.sin(pose[2])
     return shapely.Polygon(corners @ [[c, s], [-s, c]] + pose[:2])
 
 
-def draw_zones(
-    rng: np.random.Generator, path: np.ndarray, body: shapely.Polygon, at_goal: shapely.Polygon, *, inside: bool
-) -> list[tuple[Zone, shapely.Polygon]]:
+def draw_zones(rng, path, body, at_goal, *, inside):
     """Zones about a path (N, 3); keep-out zones stay off the goal, and off the start unless it is to be inside."""
 
-    def place(low: float, high: float, aside: float) -> shapely.Polygon:
+    def place(low, high, aside):
         point = path[rng.integers(len(path))]
         size = rng.uniform(low, high, 2)
         return rectangle(point[:2] + rng.uniform(-aside, aside, 2), size, float(rng.uniform(0.0, math.pi)))
 
-    found: list[tuple[Zone, shapely.Polygon]] = []
+    found = []
     kinds = [ZoneKind.KEEP_OUT] * int(rng.integers(1, 4)) + [ZoneKind.SPEED_LIMIT] * int(rng.integers(1, 4))
     kinds += [kind for kind in (ZoneKind.PREFERRED, ZoneKind.ONE_WAY) if rng.random() < 0.3]
     for number, kind in enumerate(kinds):
@@ -95,7 +71,7 @@ def draw_zones(
     return found
 
 
-def as_mask(zone: Zone, polygon: shapely.Polygon, file: Path) -> Ground:
+def as_mask(zone, polygon, file):
     """The same zone as a filter mask of Nav2, with the ground of its cells."""
     x0, y0, x1, y1 = polygon.buffer(0.2).bounds
     columns, rows = math.ceil((x1 - x0) / CELL_M), math.ceil((y1 - y0) / CELL_M)
@@ -112,8 +88,8 @@ def as_mask(zone: Zone, polygon: shapely.Polygon, file: Path) -> Ground:
     return masked, cells, None if keep_out else FULL_M_S * (1.0 - value / 100.0)
 
 
-def judge(poses: np.ndarray, grounds: Sequence[Ground], corners: np.ndarray) -> tuple[bool, float, int, float, float]:
-    """Entered, deepest (m), ticks too fast, most too fast (m/s), metres against a one-way zone."""
+def judge(poses, grounds, corners):
+    """What a drive breaks of the zones, each with its ground and its limit of speed (m/s)."""
     bodies, steps = [outline_at(pose, corners) for pose in poses], np.diff(poses[:, :2], axis=0)
     speeds = np.hypot(*steps.T) / TICK_S
     entered, deepest_m, over, most, against_m = False, 0.0, 0, 0.0, 0.0
@@ -133,11 +109,11 @@ def judge(poses: np.ndarray, grounds: Sequence[Ground], corners: np.ndarray) -> 
             inside = shapely.contains_xy(ground.buffer(-0.1), 0.5 * (poses[1:, :2] + poses[:-1, :2]))
             along = steps @ (math.cos(zone.direction_rad), math.sin(zone.direction_rad))
             against_m += float(-along[inside & (along < 0.0)].sum())
-    return entered, deepest_m, over, most, against_m
+    fast = {"over_ticks": over, "most_over_m_s": most}
+    return {"entered": entered, "deepest_m": deepest_m, "against_m": against_m, **fast}
 
 
-def leaves_a_path(driver: Driver, zones: tuple[Zone, ...], start: Pose2D, goal: Pose2D) -> bool:
-    """True if the planner finds a path among the keep-out zones."""
+def leaves_a_path(driver, zones, start, goal):
     try:
         plan_path(KeepOut(zone_map(zones, FULL_M_S)).space(driver.context.costmap, SPOT, start), SPOT, start, goal)
     except PlanningError:
@@ -145,9 +121,7 @@ def leaves_a_path(driver: Driver, zones: tuple[Zone, ...], start: Pose2D, goal: 
     return True
 
 
-def drive(
-    driver: Driver, goal: Pose2D, path: np.ndarray, rng: np.random.Generator, number: int, folder: Path
-) -> Judged:
+def drive(driver, goal, path, rng, number, folder):
     """Draws zones about the path (N, 3) that leads to the goal, drives, and judges."""
     corners = np.array(driver.context.robot.capabilities().footprint_m)
     here = driver.simulation.true_pose("Alice")
@@ -156,7 +130,7 @@ def drive(
         drawn = draw_zones(rng, path, at_start, at_goal, inside=number % INSIDE_EVERY == INSIDE_EVERY - 1)
         if rng.random() < BLOCKED_SHARE or leaves_a_path(driver, tuple(zone for zone, _ in drawn), here, goal):
             break
-    grounds: list[Ground] = []
+    grounds = []
     for index, (zone, polygon) in enumerate(drawn):
         masked = zone.kind in (ZoneKind.KEEP_OUT, ZoneKind.SPEED_LIMIT) and rng.random() < 0.5
         file = folder / f"{100 * number + index}.yaml"
@@ -164,17 +138,15 @@ def drive(
     driver.context = replace(driver.context, zones=tuple(zone for zone, _, _ in grounds))
     trip = driver.go(NavigateInputs(goal))
     broken = judge(trip.poses, grounds, corners)
-    message = f"{trip.time_s:.0f} s: {trip.message}"
-    return Judged(trip.succeeded, "zone" in trip.message, *broken, len(trip.hits), message)
+    told = {"named": "zone" in trip.message, "message": f"{trip.time_s:.0f} s: {trip.message}"}
+    return {"succeeded": trip.succeeded, "hits": len(trip.hits), **broken, **told}
 
 
-def cases(drives: int = 100, seed: int = 9600, worlds: tuple[str, ...] = ("flat",)) -> list[tuple[str, int, int]]:
-    """Worlds, with the number of drives and the seed of each."""
+def cases(drives: int = 100, seed: int = 9600, worlds: tuple[str, ...] = ("flat",)):
     return [(world, drives // len(worlds), seed) for world in worlds]
 
 
-def run_case(world_name: str, count: int, seed: int, folder: Path) -> list[Judged]:
-    """Drives so many times in a world."""
+def run_case(world_name, count, seed, folder):
     world = load_world(world_name)
     maps = maps_of(world)
     driver, rng, judged = Driver(world, load_stack(None), maps, seed=seed), np.random.default_rng([seed, 51]), []
@@ -193,8 +165,7 @@ def run_case(world_name: str, count: int, seed: int, folder: Path) -> list[Judge
     return judged
 
 
-def summary(worlds: Sequence[Sequence[Judged]]) -> dict[str, object]:
-    """Figures of the drives in all worlds."""
+def summary(worlds):
     judged = [each for world in worlds for each in world]
     failed = [each for each in judged if not each.succeeded]
     return {

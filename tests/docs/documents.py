@@ -24,25 +24,25 @@ class Block:
     line: int
 
 
-def blocks(page: Path) -> list[Block]:
+def blocks(page):
     """All code blocks of a page."""
     text = page.read_text(encoding="utf-8")
     found = _BLOCK.finditer(text)
     return [Block(m["kind"], m["text"], m["mark"] or "", text[: m.start()].count("\n") + 1) for m in found]
 
 
-def commands(page: Path) -> list[str]:
+def commands(page):
     """The lines of a page's shell blocks that call `errand`."""
     lines = [line for block in blocks(page) if block.kind == "sh" for line in block.text.splitlines()]
     return [line for line in lines if line.startswith("errand ")]
 
 
-def links(page: Path) -> list[tuple[str, str]]:
+def links(page):
     """The links of a page that stay with us: file and anchor, each empty when it is not said."""
     return _LINK.findall(page.read_text(encoding="utf-8"))
 
 
-def unknown_command(line: str) -> str | None:
+def unknown_command(line):
     """What is wrong with a command line of ours, or None."""
     words = shlex.split(line, comments=True)
     if words[1] in ("--version", "--install-completion"):  # of no command

@@ -14,20 +14,20 @@ _HIATUS = re.compile(
 )
 
 
-def prose(markdown: str) -> str:
+def prose(markdown):
     """The text without headings, code blocks, tables and the targets of links; words in backticks stay."""
     lines = _BLOCKS.sub("", markdown).splitlines()
     kept = ["" if line.startswith(("#", "    ", "|")) else line for line in lines]
     return re.sub(r"[`*_]", "", _LINK.sub(r"\1", "\n".join(kept)))
 
 
-def syllables(word: str) -> int:
+def syllables(word):
     """The syllables of an English word: its groups of vowels without a silent e, and one more where two sound apart."""
     heard = word if _SOUNDED.search(word) else _SILENT.sub("", word)
     return max(1, len(_GROUP.findall(heard)) + len(_HIATUS.findall(word)))
 
 
-def reading_ease(markdown: str) -> float:
+def reading_ease(markdown):
     """Flesch's reading ease: 60 and more is plain English."""
     sentences = [words for part in _ENDS.split(prose(markdown)) if (words := _WORD.findall(part.lower()))]
     words = [word for sentence in sentences for word in sentence]

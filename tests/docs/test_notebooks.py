@@ -3,13 +3,10 @@
 import importlib.util
 import json
 import re
-import sys
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from documents import DOCS
+from tests.docs.documents import DOCS
 
 SPEC = importlib.util.spec_from_file_location("run_notebook", DOCS / "run_notebook.py")
 assert SPEC is not None

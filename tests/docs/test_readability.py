@@ -1,22 +1,15 @@
 """The README is short and easy to read, and the measure of that is right."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-from documents import ROOT
-from readability import prose, reading_ease, syllables
+from tests.docs.documents import ROOT
+from tests.docs.readability import prose, reading_ease, syllables
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def test_the_readme_is_short():
+def test_the_readme_is_short_and_plain_english():
     assert len(README.split()) <= 900
-
-
-def test_the_readme_is_plain_english():
     assert reading_ease(README) >= 60
 
 

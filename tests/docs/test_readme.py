@@ -2,16 +2,12 @@
 
 import re
 import shlex
-import sys
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).parent))
-from documents import DOCS, ROOT, commands
-
 from executive.cli.entry import app
+from tests.docs.documents import DOCS, ROOT, commands
 
 PAGES = (ROOT / "README.md", DOCS / "how-to" / "commands.md")
 QUICK_COMMANDS = {"parse", "tree", "check", "stack"}

@@ -3,18 +3,15 @@
 import importlib.util
 import json
 import sys
-from pathlib import Path
 
 import pytest
 from pydantic import TypeAdapter
 from typer.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).parent))
-from documents import DOCS, blocks
-
 from executive.cli.entry import app
 from executive.words.condition import Condition
 from executive.words.steps import BLOCKS
+from tests.docs.documents import DOCS, blocks
 
 SPEC = importlib.util.spec_from_file_location("make_reference", DOCS / "make_reference.py")
 assert SPEC is not None
@@ -74,18 +71,16 @@ def test_every_condition_is_explained():
     assert {key for key in keys - {"expression"} if f"`{key}`" not in told.replace(", ", "` `")} == set()
 
 
-def test_the_examples_of_the_kinds_of_steps_pass_the_check(tmp_path):
-    files = [tmp_path / f"{number}.yaml" for number in range(len(CONSTRUCTS))]
-    for file, one in zip(files, CONSTRUCTS, strict=True):
-        file.write_text(mission_constructs.file_of(one), encoding="utf-8")
-    result = CliRunner().invoke(app, ["check", *map(str, files)])
-    assert result.exit_code == 0, result.output
+SHOWN = [block.text for block in blocks(DOCS / "coming-from.md") if block.text.startswith("name: ")]
 
 
-def test_our_side_of_the_page_on_other_tools_passes_the_check(tmp_path):
-    shown = [block.text for block in blocks(DOCS / "coming-from.md") if block.text.startswith("name: ")]
-    files = [tmp_path / f"{number}.yaml" for number in range(len(shown))]
-    for file, text in zip(files, shown, strict=True):
-        file.write_text(text, encoding="utf-8")
-    result = CliRunner().invoke(app, ["check", *map(str, files)])
-    assert (result.exit_code, len(files)) == (0, 9), result.output
+@pytest.mark.parametrize(
+    ("texts", "count"),
+    [([mission_constructs.file_of(one) for one in CONSTRUCTS], len(CONSTRUCTS)), (SHOWN, 9)],
+    ids=["kinds of steps", "our side of the page on other tools"],
+)
+def test_the_examples_pass_the_check(texts, count, tmp_path):
+    for number, text in enumerate(texts):
+        (tmp_path / f"{number}.yaml").write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(app, ["check", *map(str, tmp_path.iterdir())])
+    assert (result.exit_code, len(texts)) == (0, count), result.output

@@ -13,12 +13,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "plant/robots/urdf_robot"))
-from documents import DOCS, Block, blocks
 from rover_urdf import write_package
 
 from executive.cli.entry import app
+from tests.docs.documents import DOCS, Block, blocks
 
 TUTORIALS = sorted((DOCS / "tutorials").glob("[0-9]*.md"))
 HOW_TO = [DOCS / "how-to" / name for name in ("own-world.md", "own-object.md", "own-robot.md")]
@@ -31,12 +30,12 @@ class Reader:
     `here` the commands run in this process and environment.
     """
 
-    def __init__(self, folder: Path, *, here: bool = False) -> None:
+    def __init__(self, folder, *, here=False):
         self.folder, self.output, self.old = folder / "work", "", ""
         self.folder.mkdir()
         self.bin = None if here else self._environment(folder / "env")
 
-    def _environment(self, folder: Path) -> Path:
+    def _environment(self, folder):
         """A virtual environment that also sees all that this one has."""
         venv.create(folder, with_pip=False, symlinks=True)
         (site,) = folder.glob("lib/python*/site-packages")
@@ -48,7 +47,7 @@ class Reader:
             script.chmod(0o755)
         return folder / "bin"
 
-    def follow(self, block: Block) -> None:
+    def follow(self, block):
         """Do what a block asks for, or look whether it shows what came."""
         kind, _, rest = block.mark.partition(": ")
         {"file": self.write, "old": self.remember, "new": self.change}.get(kind, lambda block, rest: None)(block, rest)
@@ -57,18 +56,18 @@ class Reader:
         if block.kind == "text":
             self.compare(block)
 
-    def write(self, block: Block, name: str) -> None:
+    def write(self, block, name):
         (self.folder / name).write_text(block.text)
 
-    def remember(self, block: Block, name: str) -> None:
+    def remember(self, block, name):
         assert block.text in (self.folder / name).read_text(), f"{name} does not hold what line {block.line} shows"
         self.old = block.text
 
-    def change(self, block: Block, name: str) -> None:
+    def change(self, block, name):
         path = self.folder / name
         path.write_text(path.read_text().replace(self.old, block.text))
 
-    def run(self, block: Block) -> None:
+    def run(self, block):
         self.output, failed = "", False
         if self.bin is None:
             for line in block.text.splitlines():
@@ -80,7 +79,7 @@ class Reader:
             failed = self.start(block.text)
         assert failed == (block.mark == "fails"), f"line {block.line}: {self.output}"
 
-    def start(self, script: str) -> bool:
+    def start(self, script):
         """Runs a script in the reader's environment; returns whether it failed."""
         path = os.pathsep.join([str(self.bin), os.environ["PATH"]])
         environment = {**os.environ, "PATH": path, "COLUMNS": "200", "PIP_NO_INDEX": "1", "PYTHONPATH": ""}
@@ -89,7 +88,7 @@ class Reader:
         self.output = f"status {done.returncode}\n{done.stdout}{done.stderr}"
         return done.returncode != 0
 
-    def compare(self, block: Block) -> None:
+    def compare(self, block):
         came = squeezed(self.output)
         for line in block.text.splitlines():
             assert line == "..." or squeezed(line) in came, f"line {block.line}: {line!r} is not in\n{self.output}"

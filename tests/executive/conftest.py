@@ -1,10 +1,9 @@
-"""A scripted robot, a clock that is moved by hand, and scripted skills: whole missions without a plant."""
-
-from __future__ import annotations
+"""A scripted robot that stands, and scripted skills: whole missions without a plant."""
 
 import gc
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import count
@@ -16,12 +15,13 @@ import pytest
 from pydrake.math import RigidTransform
 
 from executive.app import prepare, worlds
+from executive.record.event_log import EventLog
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.store.database import Database
 from executive.tree.board import Board
-from executive.tree.compiler import CompiledTree, compile_mission
+from executive.tree.compiler import compile_mission
 from executive.tree.context import RunContext
 from executive.tree.node import Change, TreeObserver
 from executive.tree.registry import installed_skills
@@ -29,7 +29,7 @@ from executive.words.command import parse_command
 from executive.words.knowledge import Knowledge, load_knowledge
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
-from plant.worlds.world import WORLDS_FOLDER, World, known_worlds, load_world
+from plant.worlds.world import WORLDS_FOLDER, known_worlds, load_world
 from skills.api import (
     Cause,
     Failed,
@@ -42,165 +42,108 @@ from skills.api import (
     Surface,
 )
 from skills.api import Step as SkillStep
-from skills.quantities import Coordinate
-from skills.robot import (
-    Battery,
-    Capabilities,
-    CommandId,
-    CommandState,
-    CommandStatus,
-    Gripper,
-    Joints,
-    Lease,
-    LeaseError,
-    Odometry,
-    Pose2D,
-    Scan,
-)
-from skills.testing.robot import BASE_ONLY
+from skills.files.yaml_source import read_yaml
+from skills.robot import CommandState, CommandStatus, Lease
+from skills.testing.clock import VirtualClock
+from skills.testing.robot import ScriptedRobot
 from tests.visitors import OnMessage, OnTick
 
-
-class ManualClock:
-    """Time that only `advance` moves."""
-
-    def __init__(self) -> None:
-        self.time_s = 0.0
-
-    def now(self) -> float:
-        return self.time_s
-
-    def advance(self, dt_s: float) -> None:
-        self.time_s = round(self.time_s + dt_s, 9)
+SENSES = {"battery", "faults", "gripper", "imu", "joints", "odometry", "own_localisation", "scan"}
 
 
-class ScriptedRobot:
-    """Remembers what was asked of it; `raising` maps a verb to the exception that it raises."""
+class Verbs(list[str]):
+    """Verbs that act, as they are used; each verb in `raising` raises its exception."""
 
-    def __init__(self, clock: ManualClock, name: str = "Alice") -> None:
-        self.name = name
-        self.clock = clock
-        self.holding = False
-        self.opening, self.empty_rad = 0.3, 0.0
-        self.clamps_n: list[float] = []
-        self.driving = self.silent = False
-        self.charge = 0.9
-        self.standing = Pose2D(0.0, 0.0, 0.0)
-        self.lease: Lease | None = None
-        self.leases = 0
-        self.calls: list[str] = []
+    def __init__(self):
+        super().__init__()
         self.raising: dict[str, BaseException] = {}
-        self._odometry: tuple[object, Odometry] | None = None
 
-    def _called(self, verb: str) -> CommandId:
-        self.calls.append(verb)
+    def append(self, verb):
+        if verb not in SENSES:
+            super().append(verb)
         if verb in self.raising:
             raise self.raising[verb]
-        return CommandId(len(self.calls))
 
-    def odometry(self) -> Odometry:
-        if "odometry" in self.raising:
-            raise self.raising["odometry"]
-        now = self.clock.now(), self.standing
-        if self._odometry is None or (
-            self._odometry[0] != now and not self.silent
-        ):  # one reading for all who ask at one time
-            self._odometry = now, Odometry(now[0], self.standing.transform(), (0.0, 0.0, 0.0))
-        return self._odometry[1]
 
-    def gripper(self) -> Gripper:
-        opening = self.opening if self.holding else self.empty_rad
-        return Gripper(self.clock.now(), opening, 10.0 * self.holding, self.holding)
+class StandingRobot(ScriptedRobot):
+    """The scripted robot, which stands and holds as a test says; `raising` is that of its `Verbs`."""
 
-    def joints(self) -> Joints:
-        return Joints(self.clock.now(), {"elbow": 0.5}, {"elbow": 0.1}, {"elbow": 2.0})
+    def __init__(self, clock, name="Alice"):
+        super().__init__(clock, name=name)
+        self.clock, self.calls, self.lidar, self.silent = clock, Verbs(), (8, 0.0), False
+        self.raising, self.clamp_force_n, self._holding = self.calls.raising, 10.0, False
 
-    def scan(self) -> Scan:
-        """A wall 2 m away on all sides, without a return straight behind."""
-        ranges, azimuths = np.full((2, 8), 2.0, np.float32), np.linspace(-np.pi, np.pi, 8, endpoint=False)
-        ranges[:, 0] = np.nan
-        X_BL = RigidTransform([0.1, 0.0, 0.4])
-        return Scan(self.clock.now(), ranges, np.array([-0.3, 0.0]), azimuths, X_BL, self.standing.transform())
+    def _pass_time(self, dt_s):
+        pass
 
-    def let_go(self) -> None:
-        """Open the gripper, as a skill that puts something down does."""
-        self.holding, self.empty_rad = False, 1.0
+    def odometry(self):
+        if not self.silent:
+            self._reading = super().odometry()
+        return self._reading
 
-    def capabilities(self) -> Capabilities:
-        return BASE_ONLY
+    @property
+    def standing(self):
+        return self.odometry_pose
 
-    def set_gripper(self, opening: float, force_n: float, *, until_s: float, lease: Lease) -> CommandId:
-        self.clamps_n.append(force_n)
-        return self._called("set_gripper")
+    @standing.setter
+    def standing(self, pose):
+        self.odometry_pose = pose
 
-    def carry(self, holding: bool, *, lease: Lease) -> None:
-        self._called("carry")
+    @property
+    def driving(self):
+        return "drive" in self._commands.moving_parts
 
-    def battery(self) -> Battery:
-        return Battery(self.clock.now(), self.charge)
+    @property
+    def holding(self):
+        return self._holding
 
-    def drive(self, vx: float, vy: float, wz: float, *, until_s: float, lease: Lease) -> CommandId:
-        command = self._called("drive")
-        self.driving = True
-        return command
+    @holding.setter
+    def holding(self, holding):
+        self._holding, self.opening = holding, 0.3 if holding else 0.0
 
-    def stop(self, *, lease: Lease, only: CommandId | None = None) -> CommandId:
-        command = self._called("stop")
-        self.driving = False
-        return command
+    def let_go(self):
+        """Opens the gripper, as a skill that puts something down does."""
+        self.holding, self.opening = False, 1.0
 
-    def command_status(self, command: CommandId) -> CommandStatus:
+    def command_status(self, command):
         return CommandStatus(CommandState.DONE)
 
     @property
-    def holder(self) -> str | None:
+    def lease(self):
+        return self._lease
+
+    @lease.setter
+    def lease(self, lease):
+        self._commands.stop(None)
+        self._lease = lease
+
+    @property
+    def holder(self):
         return self.lease.holder if self.lease else None
 
     @holder.setter
-    def holder(self, name: str | None) -> None:
-        self.leases += 1
-        self.lease = Lease(self.name, name, self.leases) if name else None
-
-    def lease_holder(self) -> Lease | None:
-        return self.lease
-
-    def acquire_lease(self, holder: str) -> Lease:
-        if self.holder is not None:
-            raise LeaseError(f"{self.holder} holds the lease of {self.name}")
-        self.holder = holder
-        assert self.lease is not None
-        return self.lease
-
-    def return_lease(self, lease: Lease) -> None:
-        self._called("return_lease")
-        if lease == self.lease:
-            self.lease, self.driving = None, False
-
-
-ORIGIN = RigidTransform()
+    def holder(self, name):
+        self.lease = self.take_lease(name) if name else None
 
 
 class StillLocaliser:
     """Stands at the origin of the world."""
 
-    def __init__(self) -> None:
-        self.localised = True
-        self.updates = 0
-        self.stamp_s = 0.0
+    def __init__(self):
+        self.localised, self.stamp_s = True, 0.0
 
-    def estimate(self) -> LocalisationEstimate:
-        return LocalisationEstimate(self.stamp_s, ORIGIN, np.zeros((3, 3)), self.localised)
+    def estimate(self):
+        return LocalisationEstimate(self.stamp_s, RigidTransform(), np.zeros((3, 3)), self.localised)
 
-    def update(self, robot: Any) -> None:
-        self.updates += 1
+    def update(self, robot):
         self.stamp_s = robot.odometry().stamp_s
 
 
 class EmptyCostmap:
-    def clearance_m(self, points_W: Any) -> Any:
+    def clearance_m(self, points_W):
         return np.full(len(points_W), 9.0)
 
-    def update(self, robot: Any, localisation: LocalisationEstimate) -> None:
+    def update(self, robot, localisation):
         pass
 
 
@@ -222,9 +165,7 @@ class Script:
 COKE = ObjectObservation(0.0, ObjectKind("coke"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.0, 0.9, "counter")
 
 
-def scripted_skill(
-    script: Script, skill_name: str, inputs_type: type, outputs_: Mapping[str, type]
-) -> type[Skill[Any]]:
+def scripted_skill(script, skill_name, inputs_type, outputs_):
     """A skill that drives for a few steps and then ends as the script says."""
 
     class Scripted(Skill[Any]):
@@ -234,11 +175,11 @@ def scripted_skill(
         default_timeout_s: ClassVar[float] = 30.0
         gripper_before, gripper_after = GRIPPER.get(skill_name, (None, None))
 
-        def begin(self, inputs: Any) -> None:
+        def begin(self, inputs):
             script.begun.append(skill_name)
             self.inputs, self.left, self.open = inputs, script.steps, True
 
-        def step(self) -> SkillStep:
+        def step(self):
             robot, lease = self.context.robot, self.context.lease
             robot.drive(0.1, 0.0, 0.0, until_s=self.context.clock.now() + 0.5, lease=lease)
             self.left -= 1
@@ -246,7 +187,7 @@ def scripted_skill(
                 return Running(script.says(skill_name, self.left))
             return script.ends.get(skill_name, default_end(script, skill_name))(self)
 
-        def end(self) -> None:
+        def end(self):
             if getattr(self, "open", False):
                 script.ended.append(skill_name)
                 self.open = False
@@ -255,10 +196,10 @@ def scripted_skill(
     return Scripted
 
 
-def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
+def default_end(script, name):
     """What a scripted skill does when nothing else was said."""
 
-    def detect(skill: Any) -> SkillStep:
+    def detect(skill):
         seen = any(surface.name in script.seen_on for surface in skill.inputs.surfaces)
         return (
             Succeeded("seen", {"observation": COKE, "observations": (COKE,)})
@@ -266,11 +207,11 @@ def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
             else Failed(Cause.POSTCONDITION, "not seen")
         )
 
-    def grasp(skill: Any) -> SkillStep:
+    def grasp(skill):
         skill.context.robot._robot.holding = True
         return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
 
-    def release(skill: Any) -> SkillStep:
+    def release(skill):
         return Succeeded(f"{name} done", {"released_W": (0.0, 0.0, 0.9)})
 
     special = {"detect": detect, "grasp": grasp, "approach": lambda s: Succeeded("near", {"observation": COKE})}
@@ -279,13 +220,9 @@ def default_end(script: Script, name: str) -> Callable[[Any], SkillStep]:
 
 
 @dataclass(frozen=True)
-class NavigateInputs:
-    goal: Pose2D
-    position_tolerance_m: float = 0.15
-
-
-@dataclass(frozen=True)
 class DetectInputs:
+    """What to look for, and where: a skill that cannot be told a position."""
+
     classes: tuple[str, ...]
     attributes: tuple[str, ...]
     surfaces: tuple[Surface, ...]
@@ -295,133 +232,29 @@ class DetectInputs:
 
 
 @dataclass(frozen=True)
-class ApproachInputs:
-    observation: ObjectObservation
-    surfaces: tuple[Surface, ...]
-
-
-@dataclass(frozen=True)
 class GraspInputs:
+    """What to grasp, and the numbers of the grasps that were tried before."""
+
     observation: ObjectObservation
     avoid: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
-class PlaceInputs:
-    surface: Surface
-
-
-@dataclass(frozen=True)
-class HandOverInputs:
-    person: str
-
-
-@dataclass(frozen=True)
-class FindPeopleInputs:
-    area_W: tuple[tuple[float, float], ...]
-    place: str
-    person: str
-    count: int
-    avoid: tuple[ObjectObservation, ...] = ()
-    moves: bool = False
-
-
-@dataclass(frozen=True)
-class MeetPersonInputs:
-    person: str
-    place_W: tuple[Coordinate, Coordinate] | None = None
-    place: str = ""
-
-
-@dataclass(frozen=True)
-class FollowPersonInputs(MeetPersonInputs):
-    until_W: tuple[tuple[float, float], ...] | None = None
-    until: str = ""
-
-
-@dataclass(frozen=True)
-class GuidePersonInputs(MeetPersonInputs):
-    goal: Pose2D | None = None
-    place: str = ""
-    area_W: tuple[tuple[float, float], ...] = ()
-
-
-@dataclass(frozen=True)
-class SpeakInputs:
-    text: str
-
-
-@dataclass(frozen=True)
-class ChargeInputs:
-    level: float
-
-
-@dataclass(frozen=True)
-class NoInputs:
-    pass
-
-
-PORTS: dict[str, tuple[type, dict[str, type]]] = {
-    "navigate": (NavigateInputs, {}),
-    "detect": (DetectInputs, {"observation": ObjectObservation, "observations": tuple[ObjectObservation, ...]}),
-    "find_people": (
-        FindPeopleInputs,
-        {"observation": ObjectObservation, "observations": tuple[ObjectObservation, ...]},
-    ),
-    "meet_person": (MeetPersonInputs, {"person": ObjectObservation}),
-    "follow_person": (FollowPersonInputs, {}),
-    "guide_person": (GuidePersonInputs, {}),
-    "speak": (SpeakInputs, {}),
-    "approach": (ApproachInputs, {"observation": ObjectObservation}),
-    "grasp": (GraspInputs, {"tried": tuple[int, ...]}),
-    "place": (PlaceInputs, {}),
-    "hand_over": (HandOverInputs, {}),
-    "stow": (NoInputs, {}),
-    "clear_costmap": (NoInputs, {}),
-    "back_off": (NoInputs, {}),
-    "relocalise": (NoInputs, {}),
-    "charge": (ChargeInputs, {}),
+SKILLS = (
+    *("approach", "back_off", "charge", "clear_costmap", "detect", "find_people", "follow_person", "grasp"),
+    *("guide_person", "hand_over", "meet_person", "navigate", "place", "relocalise", "speak", "stow"),
+)
+SELDOM = {"in_the_way", "released_W"}
+"""Outputs of skills that the scripted ones lack."""
+REAL = installed_skills()
+PORTS: dict[str, tuple[type, dict[str, Any]]] = {
+    name: (REAL[name].Inputs, {port: kind for port, kind in REAL[name].outputs.items() if port not in SELDOM})
+    for name in SKILLS
 }
-
+PORTS["detect"] = (DetectInputs, PORTS["detect"][1])
+PORTS["grasp"] = (GraspInputs, {"tried": tuple[int, ...]})
+KNOWLEDGE = read_yaml(Path(__file__).with_name("knowledge.yaml")).data
 GRIPPER = {"grasp": (False, True), "place": (True, False), "hand_over": (True, None)}  # held before, held after
 
-KNOWLEDGE = {
-    "robot": {"name": "Alice"},
-    "start": {"x": 0, "y": 0},
-    "dock": {"x": 0, "y": -1},
-    "places": {
-        "kitchen": {"pose": {"x": 4, "y": 0}, "polygon": [[3, -2], [6, -2], [6, 2]]},
-        "bedroom": {"pose": {"x": -4, "y": 0}, "polygon": [[-3, -2], [-6, -2], [-6, 2]]},
-        "hall": {"pose": {"x": 0, "y": 0}, "polygon": [[-2, -2], [2, -2], [2, 2], [-2, 2]]},
-        "bathroom": {"pose": {"x": 0, "y": 4}, "polygon": [[0, 3], [1, 3], [1, 5]]},
-    },
-    "surfaces": {
-        "shelf": {
-            "place": "kitchen",
-            "height": 1.0,
-            "polygon": [[5, 1], [6, 1], [6, 2]],
-            "viewpoints": [{"x": 4.5, "y": 1}],
-        },
-        "counter": {
-            "place": "kitchen",
-            "height": 0.9,
-            "polygon": [[5, -2], [6, -2], [6, -1]],
-            "viewpoints": [{"x": 4.5, "y": -1}, {"x": 5, "y": -0.5}],
-        },
-        "bedside table": {
-            "place": "bedroom",
-            "height": 0.5,
-            "polygon": [[-5, 1], [-6, 1], [-6, 2]],
-            "viewpoints": [{"x": -4.5, "y": 1}],
-        },
-    },
-    "things": {
-        "coke": {"categories": ["drink"], "usual": ["counter"]},
-        "beer": {"categories": ["drink"], "usual": ["counter"]},
-        "hammer": {},
-    },
-    "people": {"Sam": {"at": "bathroom", "pose": {"x": 0.5, "y": 4.5}}, "Robin": {"at": "hall"}},
-}
 
 FETCH = (
     "Take [Nothing] to [kitchen] and do [grasp] to [drink]",
@@ -430,15 +263,15 @@ FETCH = (
 
 
 @pytest.fixture(autouse=True, scope="session")
-def what_is_shipped_is_read_once() -> Iterator[None]:
+def what_is_shipped_is_read_once():
     """Worlds of the project, their knowledge, and the installed skills; a world elsewhere is read each time."""
     world, knowledge = cache(load_world), cache(load_knowledge)
     names = known_worlds()
 
-    def load(name: str) -> World:
+    def load(name):
         return world(name) if name in names else load_world(name)
 
-    def know(path: Path, own: tuple[str, ...] = ()) -> Knowledge:
+    def know(path, own=()):
         return knowledge(path, own) if path.is_relative_to(WORLDS_FOLDER) else load_knowledge(path, own)
 
     with pytest.MonkeyPatch.context() as patch:
@@ -449,11 +282,11 @@ def what_is_shipped_is_read_once() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def stores_do_not_wait_for_the_disk() -> Iterator[None]:
+def stores_do_not_wait_for_the_disk():
     """What a killed process has written stays without that, too; no test here takes the power from the machine."""
     prepared = Database._prepare
 
-    def unsynchronised(self: Database) -> None:
+    def unsynchronised(self):
         prepared(self)
         self._connection.execute("PRAGMA synchronous = OFF")
 
@@ -463,7 +296,7 @@ def stores_do_not_wait_for_the_disk() -> Iterator[None]:
 
 
 @pytest.fixture(autouse=True, scope="session")
-def missions_collect_no_garbage() -> Iterator[None]:
+def missions_collect_no_garbage():
     """A collection of all that the tests of a process hold takes longer than most of the missions here."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(gc, "get_freeze_count", lambda: 0)
@@ -481,11 +314,11 @@ class ChangesMissed:
 
 
 @pytest.fixture(scope="session")
-def changes_missed() -> Iterator[ChangesMissed]:
+def changes_missed():
     """Looks at all nodes after every third tick, since a change that is missed stays so."""
     looked, missed, number = TreeObserver.changes, ChangesMissed(), count()
 
-    def checked(self: TreeObserver, *, of_all: bool = False) -> Sequence[Change]:
+    def checked(self, *, of_all=False):
         found = looked(self, of_all=of_all)
         if missed.wanted and next(number) % 3 == 0:
             missed.found.extend(looked(self, of_all=True))
@@ -497,7 +330,7 @@ def changes_missed() -> Iterator[ChangesMissed]:
 
 
 @pytest.fixture(autouse=True)
-def no_change_is_missed(changes_missed: ChangesMissed) -> Iterator[None]:
+def no_change_is_missed(changes_missed):
     """In every run of every test: the nodes that are not looked at after a tick say what they said before."""
     changes_missed.wanted, changes_missed.found = True, []
     yield
@@ -506,22 +339,22 @@ def no_change_is_missed(changes_missed: ChangesMissed) -> Iterator[None]:
 
 
 @pytest.fixture
-def clock() -> ManualClock:
-    return ManualClock()
+def clock():
+    return VirtualClock()
 
 
 @pytest.fixture
-def robot(clock: ManualClock) -> ScriptedRobot:
-    return ScriptedRobot(clock)
+def robot(clock):
+    return StandingRobot(clock)
 
 
 @pytest.fixture
-def published() -> list[tuple[str, Mapping[str, Any]]]:
+def published():
     return []
 
 
 @pytest.fixture
-def context(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> RunContext:
+def context(clock, robot, published):
     """What nodes share; messages go to `published`."""
     return RunContext(
         robot=robot,  # type: ignore[arg-type]
@@ -537,25 +370,25 @@ def context(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> R
 
 
 @pytest.fixture
-def knowledge() -> Knowledge:
+def knowledge():
     return Knowledge.model_validate(KNOWLEDGE)
 
 
 @pytest.fixture
-def script() -> Script:
+def script():
     return Script()
 
 
 @pytest.fixture
-def registry(script: Script) -> dict[str, type[Skill[Any]]]:
+def registry(script):
     return {name: scripted_skill(script, name, *ports) for name, ports in PORTS.items()}
 
 
 @pytest.fixture
-def compiled(knowledge: Knowledge, registry: dict[str, type[Skill[Any]]]) -> Callable[..., CompiledTree]:
+def compiled(knowledge, registry):
     """Compile commands given in their text form."""
 
-    def compile_texts(*texts: str, name: str = "fetch drink") -> CompiledTree:
+    def compile_texts(*texts, name="fetch drink"):
         steps = steps_of_commands(list(map(parse_command, texts)))
         return compile_mission(Mission(name=name, robot="Alice", steps=steps), knowledge=knowledge, registry=registry)
 
@@ -563,10 +396,10 @@ def compiled(knowledge: Knowledge, registry: dict[str, type[Skill[Any]]]) -> Cal
 
 
 @pytest.fixture
-def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> Callable[..., Any]:
+def run_tree(clock, robot, published):
     """Run a compiled tree with the scripted robot."""
 
-    def runner(tree: CompiledTree, **options: Any) -> Any:
+    def runner(tree, **options):
         settings = replace(RunSettings(seed=3), **options.pop("settings", {}))
         localiser = options.pop("localiser", None) or StillLocaliser()
         costmap, real = EmptyCostmap(), options.pop("real", False)
@@ -581,10 +414,35 @@ def run_tree(clock: ManualClock, robot: ScriptedRobot, published: list[Any]) -> 
 
 
 @pytest.fixture
-def make() -> types.SimpleNamespace:
+def write_log(tmp_path, clock):
+    """Writes messages to a log."""
+
+    def write(*messages, name="log.mcap", **options):
+        with closing(EventLog(tmp_path / name, clock, **options)) as log:
+            for topic, message in messages:
+                log(topic, message)
+        return log.path
+
+    return write
+
+
+@pytest.fixture
+def log_run(tmp_path, clock, run_tree):
+    """Runs a tree with a log; returns the path of the log and the result."""
+
+    def run_with_log(tree):
+        with closing(EventLog(tmp_path / "log.mcap", clock)) as log:
+            result = run_tree(tree, log=log)
+        return log.path, result
+
+    return run_with_log
+
+
+@pytest.fixture
+def make():
     """The scripted classes, for tests that build their own."""
     return types.SimpleNamespace(
         default_end=default_end,
-        FETCH=FETCH, COKE=COKE, ScriptedRobot=ScriptedRobot, StillLocaliser=StillLocaliser,
+        FETCH=FETCH, COKE=COKE, StandingRobot=StandingRobot, StillLocaliser=StillLocaliser,
         EmptyCostmap=EmptyCostmap, scripted_skill=scripted_skill, Script=Script, PORTS=PORTS,
     )  # fmt: skip

@@ -1,9 +1,6 @@
 """Missions in the flat, without a command line and visual meshes, with robots in the pipeline as in `errand run`."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import Any
 
 from executive.app.goal_conditions import verdict_of
 from executive.app.simulated import run_entry
@@ -31,23 +28,16 @@ FETCH = (
 class FlatMission:
     """A mission in the flat, with what happened in it."""
 
-    def __init__(self, texts, *, seed=1, **plant: Any) -> None:
+    def __init__(self, texts, *, seed=1, **plant):
         self.world = open_world("flat")
         self.knowledge = knowledge_of(self.world)
-        steps = [Do.from_command(parse_command(text)) for text in texts]
-        self.tree = compile_mission(
-            Mission(name="m", robot="Alice", steps=tuple(steps)), knowledge=self.knowledge, registry=built_in_skills()
-        )
+        mission = Mission(name="m", robot="Alice", steps=tuple(Do.from_command(parse_command(text)) for text in texts))
+        self.tree = compile_mission(mission, knowledge=self.knowledge, registry=built_in_skills())
         self.simulation = Simulation(self.world, seed=seed, visuals=False, **plant)
         self.clock = Pipeline(self.simulation.engine)
-        self.entry = run_entry(
-            self.clock.robots[self.tree.robot_name],
-            self.world,
-            self.tree,
-            start=self.simulation.starts[self.tree.robot_name],
-        )
-        self.transitions: list[dict[str, Any]] = []
-        self.seed = seed
+        robot, start = self.clock.robots["Alice"], self.simulation.starts["Alice"]
+        self.entry = run_entry(robot, self.world, self.tree, start=start)
+        self.transitions, self.seed = [], seed
 
     def _publish(self, topic, message):
         if topic == "transitions":
@@ -65,15 +55,14 @@ class FlatMission:
         ).worst
         return result, verdict_of(self.tree, result, self.simulation.referee.judge)
 
-    def running(self) -> set[str]:
+    def running(self):
         """Names of the leaves that work now."""
         last = {t["node"]: t["to"] for t in self.transitions}
         return {node.rsplit("/", 1)[-1].replace("-", "_") for node, status in last.items() if status == "RUNNING"}
 
-    def ended(self, part: str) -> list[str]:
+    def ended(self, part):
         """How the nodes with `part` in their path ids ended, in order."""
-        done = ("SUCCESS", "FAILURE")
-        return [t["to"] for t in self.transitions if part in t["node"] and t["to"] in done]
+        return [t["to"] for t in self.transitions if part in t["node"] and t["to"] in ("SUCCESS", "FAILURE")]
 
 
 def honest(result, verdict):

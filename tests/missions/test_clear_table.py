@@ -1,7 +1,5 @@
 """One table of the flat is cleared onto another, object by object, by one sentence."""
 
-from __future__ import annotations
-
 import shutil
 
 import pytest
@@ -31,15 +29,9 @@ def world(tmp_path):
 
 
 def test_three_objects_are_moved_and_nothing_is_left(world, tmp_path):
-    request = Request(
-        sentence="clear the coffee table onto the sideboard",
-        world=str(world),
-        seed=1,
-        out=tmp_path / "out",
-        record=False,
-    )
+    sentence = "clear the coffee table onto the sideboard"
+    request = Request(sentence=sentence, world=str(world), seed=1, out=tmp_path / "out", record=False)
     report = run_request(prepare(request)).report
     assert report.achieved, (report.message, report.referee.why)
     assert report.referee.success, report.referee.why
-    assert report.referee.drops == 0
-    assert "nothing is left on the coffee table" in report.message
+    assert report.referee.drops == 0 and "nothing is left on the coffee table" in report.message

@@ -1,7 +1,5 @@
 """Whether a door is open, looked at in the plant from where the compiler sends the robot."""
 
-from __future__ import annotations
-
 import shutil
 import threading
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -38,14 +36,8 @@ def test_a_door_that_is_open_is_found_so(tmp_path):
 def test_a_door_that_bars_the_way_to_where_it_is_looked_at_is_found_closed(tmp_path):
     (tmp_path / "look.yaml").write_text(LOOK.replace("kitchen", "bathroom"))
     (tmp_path / "closed.yaml").write_text("events:\n  - {door: [hall, bathroom], opens: 900}\n")
-    request = Request(
-        file=tmp_path / "look.yaml",
-        scenario_files=(tmp_path / "closed.yaml",),
-        start=Pose2D(5.2, 6.35, 1.57),
-        out=tmp_path,
-        record=False,
-    )
-    report = run_request(prepare(request)).report
+    given = {"file": tmp_path / "look.yaml", "scenario_files": (tmp_path / "closed.yaml",)}
+    report = run_request(prepare(Request(**given, start=Pose2D(5.2, 6.35, 1.57), out=tmp_path, record=False))).report
     assert "the door between hall and bathroom is closed" in report.message, report.message
     assert report.referee.collisions == 0
 
@@ -80,14 +72,8 @@ def test_a_door_opens_by_a_call_and_the_robot_goes_through(tmp_path, flat_with_o
     world, server = flat_with_opener
     (tmp_path / "go.yaml").write_text("name: go\nsteps:\n  - open: {door: bathroom}\n  - to: bathroom\n")
     (tmp_path / "closed.yaml").write_text("events:\n  - {door: [hall, bathroom], opens: 900}\n")
-    request = Request(
-        file=tmp_path / "go.yaml",
-        world=str(world),
-        scenario_files=(tmp_path / "closed.yaml",),
-        start=Pose2D(5.2, 4.5, 0.0),
-        out=tmp_path / "out",
-        record=False,
-    )
+    given = {"file": tmp_path / "go.yaml", "world": str(world), "scenario_files": (tmp_path / "closed.yaml",)}
+    request = Request(**given, start=Pose2D(5.2, 4.5, 0.0), out=tmp_path / "out", record=False)
     prepared = prepare(request)
     robots = {"Alice": only_robot("Alice", prepared.world, start=request.start)}
     backend = SimulatedBackend(prepared.world, robots, seed=1, record=False)

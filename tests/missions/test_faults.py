@@ -1,7 +1,5 @@
 """Faults by name in the plant: no kind of fault is a defect of the run, and no claim becomes false by one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 
@@ -11,22 +9,9 @@ from executive.run.outcome import Outcome
 from skills.faults.fault_kinds import STANDARD_FAULTS
 from skills.faults.faulty_robot import parse_fault
 from tests.missions.flat_mission import FETCH, FlatMission, honest
+from tests.tables import table
 
 pytestmark = pytest.mark.mission
-
-SHORT_FAULTS = (
-    ("base is stopped", "navigate", 0.5),
-    ("lidar: dropout", "navigate", 0.5),
-    ("odometry jumps 0.05 m", "navigate", 2.0),
-    ("camera.frontleft: is black", "navigate", 2.0),
-    ("battery falls to 60 %", "navigate", math.inf),
-    ("arm refuses", "detect", 0.5),
-    ("camera.hand: returns no depth", "detect", 1.0),
-    ("drive never ends", "approach", 0.5),
-    ("gripper is stopped", "grasp", 0.5),
-    ("gripper reports holding nothing", "grasp", 0.2),
-)
-"""Ten faults of a fetch: words, the skill in which they begin, and how long they last (s)."""
 
 MISSIONS = {
     "navigate": (FETCH[0].replace("grasp", "Nothing").replace("drink", "Nothing"),),
@@ -77,7 +62,7 @@ class FaultInSkill:
 
 def test_a_fetch_survives_short_faults_of_ten_kinds():
     mission = FlatMission(FETCH[:1])
-    faults = [FaultInSkill(mission, *each) for each in SHORT_FAULTS]
+    faults = [FaultInSkill(mission, *each) for each in table(__file__, "short_faults")[1]]
     result, verdict = mission.run(faults=[each.fault() for each in faults])
     assert [each.words for each in faults if not each.effects] == []
     assert result.outcome is Outcome.SUCCESS, result.message

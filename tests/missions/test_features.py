@@ -3,10 +3,14 @@
 import json
 import math
 import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
+from websockets.sync.client import connect
 
 from executive import run_mission
 from executive.app.mission_run import run_request
@@ -15,9 +19,12 @@ from executive.cli.entry import app
 from executive.mission.request import Request
 from executive.record.history import read_events
 from executive.run.control import Control
+from executive.view.foxglove import LiveServer
 from plant.worlds.seeding import add_answers
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
+from tests.benchmarks import errand_process
+from tests.executive.view.test_foxglove import PROTOCOL, Client
 from tests.visitors import OnTick
 
 pytestmark = [pytest.mark.mission, pytest.mark.nightly]
@@ -110,10 +117,8 @@ def test_a_run_is_stopped_stepped_broken_off_at_a_node_and_cancelled(tmp_path):
             control.cancel()
 
     finished = run_request(prepared, visitors=[OnTick(observe)], control=control)
-    stood = [
-        math.dist((places[a].x_m, places[a].y_m), (places[b].x_m, places[b].y_m)) for a, b in ((2.5, 3.0), (3.2, 3.5))
-    ]
-    assert max(stood) < 0.02
+    at = {now_s: (places[now_s].x_m, places[now_s].y_m) for now_s in (2.5, 3.0, 3.2, 3.5)}
+    assert max(math.dist(at[2.5], at[3.0]), math.dist(at[3.2], at[3.5])) < 0.02
     assert finished.report.outcome == "cancelled"
     spoken = [event.data for event in read_events(tmp_path / "out" / "log.mcap") if event.topic == "speech"]
     assert [each["text"] for each in spoken] == ["Bye"]
@@ -160,20 +165,56 @@ def test_a_moved_dock_is_found_by_its_tag(tmp_path):
         )
     with (world / "knowledge.yaml").open("a") as file:
         file.write("tags:\n  - {id: 520, size: 0.146, on: dock, at: [11.8, 4.95, 0.4], yaw: 3.1416}\n")
-    report = run_file(
-        tmp_path, "name: dock\nsteps: [{say: charge}]\n", world=str(world), start=Pose2D(9.2, 4.0, 3.1416)
-    )
+    here = {"world": str(world), "start": Pose2D(9.2, 4.0, 3.1416)}
+    report = run_file(tmp_path, "name: dock\nsteps: [{say: charge}]\n", **here)
     assert report.achieved, report.message
     events = [event.data for event in read_events(tmp_path / "out" / "log.mcap") if event.topic == "transitions"]
-    assert any(
-        "locate" in each["node"] and each["to"] == "SUCCESS" and "tag shows the dock" in each["message"]
-        for each in events
-    )
+    located = [each["message"] for each in events if "locate" in each["node"] and each["to"] == "SUCCESS"]
+    assert any("tag shows the dock" in message for message in located)
 
 
 def test_the_arm_is_posed_as_a_file_says(tmp_path):
-    report = run_file(
-        tmp_path,
-        "name: pose\nsteps:\n  - skill: pose_arm\n    with: {joints: [0.0, -1.6, 1.8, 0.0, 0.4, 0.0], opening: 0.5}\n",
-    )
+    posture = "{joints: [0.0, -1.6, 1.8, 0.0, 0.4, 0.0], opening: 0.5}"
+    report = run_file(tmp_path, f"name: pose\nsteps:\n  - skill: pose_arm\n    with: {posture}\n")
     assert report.achieved, report.message
+
+
+def test_a_robot_backs_off_forgets_its_obstacles_and_goes_on(tmp_path):
+    back_off = "{skill: back_off, with: {distance_m: 0.5}}"
+    file = written(tmp_path, f"name: back\nsteps:\n  - {back_off}\n  - {{skill: clear_costmap}}\n  - {{to: hall}}\n")
+    report = run_request(prepare(Request(file=file, seed=1, out=tmp_path / "out", record=False))).report
+    assert (report.achieved, report.seen.collisions) == (True, 0), report.message
+    events = read_events(tmp_path / "out" / "log.mcap")
+    changes = [each.data for each in events if each.topic == "transitions" and each.data["to"] == "SUCCESS"]
+    done_s = {each["node"].rsplit("/", 1)[-1]: each["t"] for each in changes}
+    assert done_s["1-back-off"] < done_s["2-clear-costmap"] < done_s["3-hall"]
+    places = [(each.stamp_s, each.data["pose"]["position"].values()) for each in events if each.topic == "pose"]
+    _, there = min(places, key=lambda place: abs(place[0] - done_s["1-back-off"]))
+    assert math.dist(places[0][1], there) == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_viewer_follows_a_mission_in_the_plant(tmp_path):
+    pytest.importorskip("foxglove")
+    prepared, reading = prepare(Request(sentence="go to the hall", seed=1, out=tmp_path, record=False)), []
+    with (
+        closing(LiveServer("127.0.0.1:0")) as server,
+        ThreadPoolExecutor(1) as thread,
+        connect(server.url, subprotocols=[PROTOCOL], max_size=None) as socket,
+    ):
+        view = OnTick(lambda progress: reading or reading.append(thread.submit(Client(socket).messages, 100)))
+        assert run_request(prepared, visitors=[view], live=server).report.achieved
+        topics = {topic for topic, *_ in reading[0].result(timeout=10.0)}
+    assert topics >= {"map", "pose", "tree", "transitions"}, topics
+
+
+def test_a_run_with_faults_and_a_recording_is_killed_and_goes_on(tmp_path):
+    asked = ("--say", "Hey Alice, fetch me a drink from the kitchen", "--seed", 2, "--random-faults", 2)
+    with (tmp_path / "told.txt").open("wb") as told:
+        process = subprocess.Popen(
+            errand_process.errand("run", *asked, "--out", tmp_path, "--quiet"), stdout=told, stderr=told
+        )
+        assert errand_process.kill_at(process, tmp_path, 20.0)
+    ended = errand_process.run_errand("resume", "--out", tmp_path, "--quiet", "--json")
+    report = errand_process.report_of(ended.stdout)
+    assert (report["outcome"], report["referee"]["success"]) == ("success", True), ended.stderr
+    assert (tmp_path / "recording.html").stat().st_size > 10_000

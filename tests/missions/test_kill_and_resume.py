@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -23,7 +22,7 @@ TELL = "Hey Alice, go to the living room, say hello, then go to the kitchen"
 CARRIED, TOLD = {"detect": 1, "grasp": 1}, {"speak": 1, "navigate": 2}
 
 
-def kill_in(leaf: str, after_s: float, process: subprocess.Popen, out: Path) -> None:
+def kill_in(leaf, after_s, process, out):
     """Kill the process when its robot has worked at a leaf of this name for so long."""
     begun_s = None
     while begun_s is None or clock_s(out) < begun_s + after_s:
@@ -34,14 +33,14 @@ def kill_in(leaf: str, after_s: float, process: subprocess.Popen, out: Path) -> 
     process.wait()
 
 
-def clock_s(out: Path) -> float:
+def clock_s(out):
     try:
         return read_snapshot(out / ".errand" / "missions.plant").values["engine"]["steps"] * TIME_STEP_S
     except SnapshotError:
         return 0.0
 
 
-def began_s(leaf: str, out: Path) -> float | None:
+def began_s(leaf, out):
     log = out / "log.mcap"
     events = read_events(log) if log.is_file() and log.stat().st_size > 2000 else ()
     for event in events:
@@ -50,7 +49,7 @@ def began_s(leaf: str, out: Path) -> float | None:
     return None
 
 
-def done_leaves(out: Path) -> list[str]:
+def done_leaves(out):
     """The leaves that came to a good end by their own work, in both lives."""
     events = [event.data for log in sorted(out.glob("log*.mcap")) for event in read_events(log) if "node" in event.data]
     good = [event for event in events if event.get("to") == "SUCCESS" and not is_from_before(event["message"])]

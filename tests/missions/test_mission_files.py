@@ -1,7 +1,5 @@
 """Mission files that come with the project, run as they stand in the plant."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ from executive.app.mission_run import run_request
 from executive.app.prepare import prepare
 from executive.mission.request import Request
 from skills.robot import Pose2D
+from tests.tables import table
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 
@@ -38,34 +37,18 @@ def test_it_is_achieved_and_takes_about_as_long_as_estimated(name, seed, tmp_pat
         assert 0.6 < report.sim_time_s / Checker().check_file(file).estimate.duration_s < 1.6
 
 
-DECIDING = {
-    "beer_else_coke": (2, None),
-    "charge_then_go": (1, None),
-    "count_drinks": (1, "I counted 2 drinks."),
-    "find_hammer": (2, "The hammer is in the workshop."),
-    "guarded_round": (1, "Half a minute so far."),
-    "patrol_and_report": (1, "2 of 2 rooms are empty."),
-    "retry_elsewhere": (1, None),
-    "speak_while_driving": (1, "On my way to the hall."),
-    "tea_or_coffee": (1, "1 tea, please."),
-    "timed_visit": (1, "Good morning. It is 08:30."),
-    "wait_for_button": (1, "Nobody pressed the button. I am going now."),
-    "watch_the_door": (1, "I looked 1 time. The bathroom door is open."),
-}
-"""The missions that decide, repeat, wait and speak: the seed, and what the robot says last."""
-
-
 KEPT, NEAR = "watch_the_door", Pose2D(4.8, 4.5, 0.0)
 """The one that stands for all in `make test`: it goes, looks, counts and says what it found. It starts in the hall."""
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[NIGHTLY] * (name != KEPT)) for name in DECIDING])
-def test_a_mission_decides_right_and_says_so(name, tmp_path):
-    seed, said = DECIDING[name]
-    file = MISSIONS / f"{name}.yaml"
+COLUMNS, DECIDING = table(__file__, "deciding")
+
+
+@pytest.mark.parametrize(COLUMNS, [pytest.param(*row, marks=[NIGHTLY] * (row[0] != KEPT)) for row in DECIDING])
+def test_a_mission_decides_right_and_says_so(name, seed, said, tmp_path):
     start = {"start": NEAR} if name == KEPT else {}
-    request = Request(file=file, seed=seed, out=tmp_path, record=False, time_of_day="08:29", **start)
-    report = run_request(prepare(request)).report
+    file, options = MISSIONS / f"{name}.yaml", {"out": tmp_path, "record": False, "time_of_day": "08:29", **start}
+    report = run_request(prepare(Request(file=file, seed=seed, **options))).report
     assert report.outcome == "success", report.message
     assert report.referee.success, report.referee.why
     assert (report.referee.collisions, report.referee.drops) == (0, 0)

@@ -1,7 +1,5 @@
 """A coke on a shelf stands right behind a beer, which is moved aside where the mission allows it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -72,10 +70,8 @@ def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
     assert result.outcome is Outcome.SUCCESS, result.message
     verdict = verdict_of(tree, result, plant.referee.judge)
     assert verdict.success, verdict.why
-    assert verdict.drops == 0
-    assert "the coke is behind the beer" in said
+    assert verdict.drops == 0 and "the coke is behind the beer" in said
     assert "the beer is in the way of the coke; it is moved aside" in said
     beer = plant.referee.objects["other_0"]
-    assert beer.resting
-    assert abs(beer.last.p_WO[0] - MIDDLE_X) > 0.25
+    assert beer.resting and abs(beer.last.p_WO[0] - MIDDLE_X) > 0.25
     assert beer.last.p_WO[2] > shelf.surfaces[TAKEN].height_m

@@ -1,13 +1,4 @@
-"""Missions through Spot's API: adapter and server in lock-step, judged by the plant's referee.
-
-go a metre          fulfilled, as in process
-go to the kitchen   fulfilled, as in process (nightly)
-fetch a drink       fulfilled, as in process (nightly)
-graph_nav           localised by the robot, fulfilled (nightly)
-navigation          by the API, within 0.2 m
-cut for 4.5 s       paused; goes on by itself (nightly)
-lease taken         paused with the taker's name; goes on when it is back and the operator resumes the run (nightly)
-"""
+"""Missions through Spot's API: adapter and server in lock-step, judged by the plant's referee."""
 
 from contextlib import ExitStack
 
@@ -17,13 +8,7 @@ pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-er
 
 import bosdyn.client
 import grpc
-from bosdyn.api.graph_nav import nav_pb2
-from bosdyn.api.graph_nav.graph_nav_pb2 import (
-    NavigateToRequest,
-    NavigationFeedbackRequest,
-    NavigationFeedbackResponse,
-    SetLocalizationRequest,
-)
+from bosdyn.api.graph_nav import graph_nav_pb2, nav_pb2
 from bosdyn.client.graph_nav import GraphNavClient
 from bosdyn.client.lease import LeaseClient
 
@@ -60,18 +45,24 @@ def test_a_mission_through_the_api_is_fulfilled(what, tmp_path):
     assert (ended.outcome, ended.verdict) == ("success", True), ended
 
 
-def localised_by_a_person(step):
-    """Uploads a map of the flat and localises the robot at its start, as a person does with a tablet."""
+def tablet_at(step):
+    """The SDK's robot, as a tablet has it."""
     sdk = bosdyn.client.create_standard_sdk("tablet", cert_resource_glob=str(step.certificate))
     robot = sdk.create_robot("127.0.0.1")
     robot.update_secure_channel_port(step.server.port)
     robot.authenticate("user", "right")
+    return robot
+
+
+def localised_by_a_person(step):
+    """Uploads a map of the flat and localises the robot at its start, as a person does with a tablet."""
+    robot = tablet_at(step)
     client, flat = robot.ensure_client(GraphNavClient.default_service_name), world_map(open_world("flat"), "spot")
     client.upload_graph(graph=flat.graph)
     for snapshot in flat.waypoint_snapshots.values():
         client.upload_waypoint_snapshot(snapshot)
     at_start = nav_pb2.Localization(waypoint_id="start", waypoint_tform_body={"rotation": {"w": 1.0}})
-    client.set_localization(at_start, fiducial_init=SetLocalizationRequest.FIDUCIAL_INIT_NO_FIDUCIAL)
+    client.set_localization(at_start, fiducial_init=graph_nav_pb2.SetLocalizationRequest.FIDUCIAL_INIT_NO_FIDUCIAL)
     return {}
 
 
@@ -99,18 +90,18 @@ def test_graph_nav_takes_the_robot_into_another_room(tmp_path):
         step.stand_up()
         localised_by_a_person(step)
         spot = step.connection
-        request = NavigateToRequest(destination_waypoint_id="kitchen", clock_identifier=spot.clock_identifier)
-        request.leases.add().CopyFrom(spot.lease)
-        request.end_time.CopyFrom(timestamp(spot.robot_time_s() + 60.0))
+        by = {"clock_identifier": spot.clock_identifier, "end_time": timestamp(spot.robot_time_s() + 60.0)}
+        request = graph_nav_pb2.NavigateToRequest(destination_waypoint_id="kitchen", leases=[spot.lease], **by)
         number = spot.call(GRAPH_NAV, "NavigateTo", request).command_id
 
         def status():
-            request = NavigationFeedbackRequest(command_id=number)
+            request = graph_nav_pb2.NavigationFeedbackRequest(command_id=number)
             return spot.call(GRAPH_NAV, "NavigationFeedback", request, checked=False).status
 
-        step.until(lambda: status() != NavigationFeedbackResponse.STATUS_FOLLOWING_ROUTE, 60.0, every_s=0.2)
+        Status = graph_nav_pb2.NavigationFeedbackResponse
+        step.until(lambda: status() != Status.STATUS_FOLLOWING_ROUTE, 60.0, every_s=0.2)
         truth, there = made[0].true_pose("Alice"), world_map(world, "spot").poses("start")["kitchen"].translation()
-        assert status() == NavigationFeedbackResponse.STATUS_REACHED_GOAL
+        assert status() == Status.STATUS_REACHED_GOAL
         assert (truth.x_m, truth.y_m) == pytest.approx((there[0], there[1]), abs=0.14)  # 0.2 m in all
     finally:
         made.clear()
@@ -120,12 +111,8 @@ def test_graph_nav_takes_the_robot_into_another_room(tmp_path):
 class Tablet(RunVisitor):
     """Person with a tablet: takes the lease at tick 140, gives it back at 200, and resumes the run when it is free."""
 
-    def __init__(self, port, certificate, control):
-        sdk = bosdyn.client.create_standard_sdk("tablet", cert_resource_glob=str(certificate))
-        robot = sdk.create_robot("127.0.0.1")
-        robot.update_secure_channel_port(port)
-        robot.authenticate("user", "right")
-        self._client, self._control = robot.ensure_client(LeaseClient.default_service_name), control
+    def __init__(self, step, control):
+        self._client, self._control = tablet_at(step).ensure_client(LeaseClient.default_service_name), control
         self._lease, self.seen, self.poses = None, [], {}
 
     def tick(self, progress):
@@ -178,7 +165,7 @@ def test_a_run_whose_lease_is_taken_goes_on_when_the_operator_resumes_it(tmp_pat
     tablets = []
 
     def with_tablet(step):
-        tablets.append(Tablet(step.server.port, step.certificate, control))
+        tablets.append(Tablet(step, control))
         return {"visitors": tablets, "control": control}
 
     request = Request(sentence="go to the kitchen", seed=3, record=False, out=tmp_path / "out")

@@ -1,7 +1,5 @@
 """A mission that starts where the robot was not told to be."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

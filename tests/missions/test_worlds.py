@@ -1,7 +1,5 @@
 """A far room in each of the larger worlds: through aisles and doors, through narrow corridors and a door of 0.75 m."""
 
-from __future__ import annotations
-
 import pytest
 
 from executive.app.mission_run import run_request

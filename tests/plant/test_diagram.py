@@ -1,5 +1,8 @@
 """Scenery belongs to the world body, shape for shape, and keeps its names."""
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pydrake.geometry import Role
@@ -16,27 +19,12 @@ from plant.robots.spot.kind import SPOT
 from plant.worlds.world import load_world
 from skills.robot import Pose2D
 
-DOOR = """<sdf version="1.9"><model name="cupboard"><link name="frame"><collision name="frame"><geometry><box>
-<size>0.5 0.5 1</size></box></geometry></collision></link><link name="door"><pose>0.3 0 0 0 0 0</pose>
-<collision name="door"><geometry><box><size>0.02 0.5 1</size></box></geometry></collision></link>
-<joint name="hinge" type="revolute"><parent>frame</parent><child>door</child><axis><xyz>0 0 1</xyz></axis></joint>
-</model></sdf>"""
-WALL = """<sdf version="1.9"><model name="wall"><link name="wall"><collision name="wall"><geometry><box>
-<size>0.2 4 2</size></box></geometry></collision></link></model></sdf>"""
-DIRECTIVES = """directives:
-- add_model: {name: north_wall, file: "FOLDER/wall.sdf"}
-- add_weld: {parent: world, child: "north_wall::wall", X_PC: {translation: [1.5, 0, 1.2]}}
-- add_model: {name: cupboard, file: "FOLDER/cupboard.sdf"}
-- add_weld: {parent: world, child: "cupboard::frame", X_PC: {translation: [-3, 0, 0.5]}}
-"""
-
 
 @pytest.fixture
 def directives(tmp_path):
-    (tmp_path / "wall.sdf").write_text(WALL)
-    (tmp_path / "cupboard.sdf").write_text(DOOR)
-    (tmp_path / "world.dmd.yaml").write_text(DIRECTIVES.replace("FOLDER", tmp_path.as_uri()))
-    return tmp_path / "world.dmd.yaml"
+    directives = shutil.copytree(Path(__file__).with_name("diagram_files"), tmp_path / "home") / "world.dmd.yaml"
+    directives.write_text(directives.read_text().replace("FOLDER", directives.parent.as_uri()))
+    return directives
 
 
 def shapes(plant, scene_graph):
@@ -58,8 +46,7 @@ def test_every_shape_of_the_flat_stands_where_the_directives_put_it():
     plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(), DiagramBuilder())
     ProcessModelDirectives(LoadModelDirectives(world.directives_path), parser_of(plant))
     plant.Finalize()
-    assert shapes(built.plant, built.scene_graph) == shapes(plant, scene_graph)
-    assert built.plant.num_bodies() == 1
+    assert (shapes(built.plant, built.scene_graph), built.plant.num_bodies()) == (shapes(plant, scene_graph), 1)
     assert {"fridge", "kitchen_table", "sofa"} <= set(built.scenery.values())
 
 
@@ -74,21 +61,13 @@ def test_a_model_with_a_part_that_moves_stays_a_model(directives):
 
 
 def test_a_bump_into_scenery_names_the_piece(directives):
-    built = build_diagram(
-        DiagramConfig(
-            directives=directives,
-            robots=[PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))],
-            visuals=False,
-            render=False,
-        )
-    )
+    alice = PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))
+    built = build_diagram(DiagramConfig(directives=directives, robots=[alice], visuals=False, render=False))
     engine = Engine(built)
     referee = Referee(built.plant, [], robots={"Alice": SPOT}, scenery=built.scenery)
     engine.observe(lambda now_s: referee.observe(engine.context, now_s), every=5)
     robot = engine.robots["Alice"]
     robot.drive(0.8, 0.0, 0.0, until_s=3.0, lease=robot.acquire_lease("test"))
     engine.advance(2.0)
-    assert referee.collisions
-    assert {"the north_wall"} == {
-        bump.sentence.partition(" hit ")[2].partition(" at ")[0] for bump in referee.collisions
-    }
+    hit = {bump.sentence.partition(" hit ")[2].partition(" at ")[0] for bump in referee.collisions}
+    assert hit == {"the north_wall"}

@@ -34,9 +34,17 @@ def engine(kept):
     return kept.again()
 
 
-def test_a_command_begins_when_the_step_under_way_is_done(engine):
-    pipeline = Pipeline(engine)
-    robot = pipeline.robots["Alice"]
+@pytest.fixture
+def pipeline(engine):
+    return Pipeline(engine)
+
+
+@pytest.fixture
+def robot(pipeline):
+    return pipeline.robots["Alice"]
+
+
+def test_a_command_begins_when_the_step_under_way_is_done(engine, pipeline, robot):
     lease = robot.acquire_lease("test")
     pipeline.advance(TICK_S)
     stood_m = _x_m(engine)
@@ -56,7 +64,7 @@ def test_a_thread_and_steps_in_turn_give_the_same_run(kept):
 
 
 def test_pictures_and_scans_show_the_world_as_of_the_last_readings(kept):
-    pictures, scans = [], []
+    seen = []
     for piped in (True, False):
         engine = kept.again()
         robot = engine.robots["Alice"]
@@ -64,17 +72,15 @@ def test_pictures_and_scans_show_the_world_as_of_the_last_readings(kept):
         clock = Pipeline(engine) if piped else engine
         for _ in range(8):
             clock.advance(TICK_S)
-        pictures.append(robot.image("frontleft", visual=False))
-        scans.append(robot.scan())
-    assert pictures[0].stamp_s == pictures[1].stamp_s == pytest.approx(8 * TICK_S)
-    assert np.array_equal(pictures[0].depth_m, pictures[1].depth_m)
-    assert scans[0].stamp_s == scans[1].stamp_s
-    assert np.array_equal(scans[0].ranges_m, scans[1].ranges_m, equal_nan=True)
+        seen.append((robot.image("frontleft", visual=False), robot.scan()))
+    (picture, scan), (other, other_scan) = seen
+    assert (picture.stamp_s, scan.stamp_s) == (other.stamp_s, other_scan.stamp_s)
+    assert picture.stamp_s == pytest.approx(8 * TICK_S)
+    assert np.array_equal(picture.depth_m, other.depth_m)
+    assert np.array_equal(scan.ranges_m, other_scan.ranges_m, equal_nan=True)
 
 
-def test_lease_verbs_do_not_advance_the_time(engine):
-    pipeline = Pipeline(engine)
-    robot = pipeline.robots["Alice"]
+def test_lease_verbs_do_not_advance_the_time(pipeline, robot):
     pipeline.advance(TICK_S)
     lease = robot.acquire_lease("test")
     assert pipeline.now() == pytest.approx(TICK_S)
@@ -86,9 +92,7 @@ def test_lease_verbs_do_not_advance_the_time(engine):
     assert pipeline.now() == pytest.approx(2 * TICK_S) == robot.odometry().stamp_s
 
 
-def test_commands_before_the_return_of_the_lease_begin_first(engine):
-    pipeline = Pipeline(engine)
-    robot = pipeline.robots["Alice"]
+def test_commands_before_the_return_of_the_lease_begin_first(pipeline, robot):
     lease = robot.acquire_lease("test")
     pipeline.advance(TICK_S)
     command = robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=lease)
@@ -98,9 +102,7 @@ def test_commands_before_the_return_of_the_lease_begin_first(engine):
     assert (status.state, status.reason) == (CommandState.STOPPED, "the lease was returned")
 
 
-def test_a_refusal_is_known_at_the_next_tick(engine):
-    pipeline = Pipeline(engine)
-    robot = pipeline.robots["Alice"]
+def test_a_refusal_is_known_at_the_next_tick(pipeline, robot):
     pipeline.advance(TICK_S)
     command = robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=Lease("Alice", "nobody", 7))
     assert robot.command_status(command).state is CommandState.RUNNING
@@ -110,10 +112,8 @@ def test_a_refusal_is_known_at_the_next_tick(engine):
         robot.command_status(command + 1)
 
 
-def test_the_time_of_a_trajectory_counts_from_its_command(engine):
-    pipeline = Pipeline(engine)
-    robot, servos = pipeline.robots["Alice"], engine.robots["Alice"]._arm
-    lease = robot.acquire_lease("test")
+def test_the_time_of_a_trajectory_counts_from_its_command(engine, pipeline, robot):
+    servos, lease = engine.robots["Alice"]._arm, robot.acquire_lease("test")
     pipeline.advance(TICK_S)
     rest_rad = servos.goal_rad
     turned_rad = rest_rad + np.array([0.2, *[0.0] * (len(rest_rad) - 1)])
@@ -126,9 +126,7 @@ def test_the_time_of_a_trajectory_counts_from_its_command(engine):
     assert servos.goal_rad[0] - rest_rad[0] == pytest.approx(0.2 * (set_s - commanded_s))
 
 
-def test_stopping_one_command_leaves_the_others(engine):
-    pipeline = Pipeline(engine)
-    robot = pipeline.robots["Alice"]
+def test_stopping_one_command_leaves_the_others(pipeline, robot):
     lease = robot.acquire_lease("test")
     drive = robot.drive(1.0, 0.0, 0.0, until_s=10.0, lease=lease)
     stand = robot.stand(0.5, 0.2, until_s=10.0, lease=lease)
@@ -139,8 +137,7 @@ def test_stopping_one_command_leaves_the_others(engine):
     assert states == [CommandState.STOPPED, CommandState.RUNNING]
 
 
-def test_events_of_the_step_under_way_appear_at_the_next_tick(engine):
-    pipeline = Pipeline(engine)
+def test_events_of_the_step_under_way_appear_at_the_next_tick(engine, pipeline):
     pipeline.advance(TICK_S)
     engine.record_event("the lamp falls over")  # the engine is a tick ahead by now
     assert list(pipeline.events) == []
@@ -163,8 +160,7 @@ def test_advance_raises_the_exception_of_a_step(engine):
     thread.close(10.0)
 
 
-def test_a_tick_shorter_than_the_step_under_way_is_refused(engine):
-    pipeline = Pipeline(engine)
+def test_a_tick_shorter_than_the_step_under_way_is_refused(pipeline):
     pipeline.advance(0.2)
     with pytest.raises(ValueError, match="beyond"):
         pipeline.advance(TICK_S)

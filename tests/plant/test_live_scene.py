@@ -49,8 +49,7 @@ def test_the_camera_follows_the_robot_on_request(simulation, monkeypatch):
         scene.publish()
     start = load_world("flat").start
     beside, whole = cameras
-    assert beside[:2] == pytest.approx((start.x_m, start.y_m), abs=0.05)
-    assert whole[2] == 0.0
+    assert (beside[:2], whole[2]) == (pytest.approx((start.x_m, start.y_m), abs=0.05), 0.0)
 
 
 def test_it_shows_the_plant_as_it_is(simulation):

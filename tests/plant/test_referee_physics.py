@@ -1,6 +1,6 @@
 """The referee sees a grasp by friction, and a drop, in a plant that really moves."""
 
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,12 +19,6 @@ FRICTION = CoulombFriction(0.9, 0.9)
 TABLE = Region("the table", ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)), 0.7, 1.0)
 GRASPED = GoalCondition(GoalKind.GRASPED, ("coke",), source=(TABLE,), when=When.SOME_TIME)
 ON_TABLE = GoalCondition(GoalKind.ANSWERED, ("coke",), source=(TABLE,), answer=True)
-
-
-@dataclass(frozen=True)
-class Placement:
-    name: str
-    class_name: str
 
 
 class Press:
@@ -54,12 +48,12 @@ class Press:
         plant.RegisterCollisionGeometry(coke, RigidTransform(), Box(0.06, 0.06, 0.1), "coke", FRICTION)
         plant.Finalize()
         plant.SetDefaultFloatingBaseBodyPose(coke, RigidTransform([0, 0, 0.81]))
-        diagram = builder.Build()
-        self.simulator = Simulator(diagram)
+        self.simulator = Simulator(builder.Build())
         self.context = plant.GetMyContextFromRoot(self.simulator.get_mutable_context())
         self.desired = plant.get_desired_state_input_port(alice)
         plant.SetPositions(self.context, alice, [0.0, 0.12])
-        self.referee = Referee(plant, [Placement("coke", "coke")], robots={"alice": SPOT})
+        placement = SimpleNamespace(name="coke", class_name="coke")
+        self.referee = Referee(plant, [placement], robots={"alice": SPOT})
 
     def run(self, lift_m, jaw_m, seconds):
         """Move lift and jaw towards positions; the referee looks on at 20 Hz."""
@@ -71,34 +65,26 @@ class Press:
         return self
 
 
-@pytest.fixture(scope="module")
-def grasped():
-    """A block taken up by friction."""
-    return Press().run(0.0, 0.12, 0.5).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8)
+PLACED = GoalCondition(GoalKind.PLACED, ("coke",), source=(TABLE,), goal=(TABLE,))
+TAKEN_UP = [(0.0, 0.12, 0.5), (0.0, 0.07, 0.5), (0.2, 0.07, 0.8)]
+SET_DOWN = [(0.0, 0.07, 0.8), (0.0, 0.14, 0.4), (0.3, 0.14, 0.8)]
 
 
-def test_block_taken_up_by_friction_is_grasped(grasped):
-    verdict = grasped.referee.judge([GRASPED])
-    assert verdict.success, verdict.why
-    assert (verdict.collisions, verdict.drops) == (0, 0)
-
-
-def test_block_that_only_lies_there_is_seen_at_rest_and_not_grasped():
-    press = Press().run(0.0, 0.12, 0.6)
-    assert press.referee.judge([ON_TABLE]).success
-    assert not press.referee.judge([GRASPED]).success
-
-
-def test_block_let_go_in_the_air_is_dropped_once():
-    press = Press().run(0.0, 0.12, 0.3).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8).run(0.2, 0.14, 0.8)
-    assert press.referee.drops == 1
-    assert press.referee.judge([ON_TABLE]).success
-
-
-def test_block_set_down_and_let_go_is_not_dropped():
-    press = Press().run(0.0, 0.12, 0.3).run(0.0, 0.07, 0.5).run(0.2, 0.07, 0.8).run(0.0, 0.07, 0.8)
-    press.run(0.0, 0.14, 0.4).run(0.3, 0.14, 0.8)
-    placed = GoalCondition(GoalKind.PLACED, ("coke",), source=(TABLE,), goal=(TABLE,))
-    verdict = press.referee.judge([GRASPED, placed])
-    assert verdict.success, verdict.why
-    assert verdict.drops == 0
+# motions: lift (m), jaw (m), seconds -> conditions that hold, one that does not, and drops
+@pytest.mark.parametrize(
+    ("motions", "holds", "denied", "drops"),
+    [
+        ([(0.0, 0.12, 0.6)], [ON_TABLE], [GRASPED], 0),
+        (TAKEN_UP, [GRASPED], [ON_TABLE], 0),
+        ([*TAKEN_UP, (0.2, 0.14, 0.8)], [ON_TABLE], [], 1),
+        ([*TAKEN_UP, *SET_DOWN], [GRASPED, PLACED], [], 0),
+    ],
+    ids=["only lies there", "taken up by friction", "let go in the air", "set down and let go"],
+)
+def test_a_block_taken_up_by_friction_is_grasped_and_dropped_when_let_go_in_the_air(motions, holds, denied, drops):
+    press = Press()
+    for motion in motions:
+        press.run(*motion)
+    verdicts = [press.referee.judge([condition]) for condition in (*holds, *denied)]
+    assert [each.success for each in verdicts] == [*[True] * len(holds), *[False] * len(denied)], verdicts
+    assert (press.referee.drops, len(press.referee.collisions)) == (drops, 0)

@@ -25,8 +25,7 @@ print(sum(each.read_text().startswith("llvmpipe") for each in Path("/proc/self/t
 def test_a_dim_light_dims_each_beam_and_the_sky():
     day, dim = lights(DAY_LIGHT), lights(LIGHTS["dim"])
     assert [each.intensity for each in dim] == pytest.approx([0.4 * each.intensity for each in day])
-    sky = render_parameters(LIGHTS["dim"]).default_clear_color
-    assert np.max(sky) < 0.5
+    assert np.max(render_parameters(LIGHTS["dim"]).default_clear_color) < 0.5
 
 
 def test_a_low_sun_is_one_beam_more():

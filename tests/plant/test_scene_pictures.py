@@ -8,16 +8,8 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from plant.scene_pictures import (
-    PATH_COLOUR,
-    best_view,
-    draw_detection,
-    draw_map,
-    look_at,
-    render_view,
-    save_png,
-    top_view,
-)
+from plant import scene_pictures
+from plant.scene_pictures import PATH_COLOUR, best_view, draw_map, look_at, render_view, top_view
 
 RED, GREY, BLUE = (np.array(rgba) for rgba in ([0.9, 0.05, 0.05, 1], [0.6, 0.6, 0.6, 1], [0.1, 0.1, 0.9, 1]))
 
@@ -39,8 +31,7 @@ def scene():
     plant.Finalize()
     diagram = builder.Build()
     root = diagram.CreateDefaultContext()
-    query = scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(root))
-    return diagram, root, query
+    return diagram, root, scene_graph.get_query_output_port().Eval(scene_graph.GetMyContextFromRoot(root))
 
 
 def red_centre(picture):
@@ -62,12 +53,10 @@ def test_the_map_is_cut_below_the_ceiling_and_to_scale(scene):
 def test_the_path_is_drawn_at_its_place_on_the_map(scene):
     view = top_view(scene[2], (-4, -3, 4, 3), width=800)
     path = np.array([[-3.0, -2.0], [0.0, -2.0], [0.0, 2.0]])
-    picture = draw_map(
-        view, {"path of Alice": (path, PATH_COLOUR)}, labels={"hall": (-2, 1)}, marks={"coke": (1.0, -1.0)}
-    )
+    paths, marks = {"path of Alice": (path, PATH_COLOUR)}, {"coke": (1.0, -1.0)}
+    picture = draw_map(view, paths, labels={"hall": (-2, 1)}, marks=marks)
     x, y = np.round(view.pixels(np.array([[-1.5, -2.0]]))[0]).astype(int)
-    assert picture[y, x, 0] > 200
-    assert picture[y, x, 1] < 100
+    assert picture[y, x, 0] > 200 and picture[y, x, 1] < 100
     assert picture.shape[0] > view.picture.shape[0]
     assert (picture[: view.picture.shape[0]] != view.picture).any()
     assert (view.picture == top_view(scene[2], (-4, -3, 4, 3), width=800).picture).all()
@@ -80,26 +69,22 @@ def test_short_paths_are_drawn_too(scene, points):
     assert drawn.shape[1:] == view.picture.shape[1:]
 
 
-def test_flat_bounds_are_refused(scene):
+def test_flat_bounds_and_a_view_from_the_target_itself_are_refused(scene):
     with pytest.raises(ValueError, match="bounds"):
         top_view(scene[2], (1, 0, 1, 3))
+    with pytest.raises(ValueError, match="same point"):
+        look_at((1, 1, 1), (1, 1, 1))
+
+
+def test_view_straight_down_is_possible_and_the_horizon_is_level_with_up_at_the_top():
+    assert look_at((0, 0, 2), (0, 0, 0)).rotation().matrix()[2, 2] == pytest.approx(-1.0)
+    right_z, down_z, _ = look_at((0, 0, 1), (5, 2, 0.5)).rotation().matrix()[2]
+    assert right_z == pytest.approx(0.0) and down_z < 0.0
 
 
 def test_a_free_view_faces_its_target(scene):
     picture = render_view(scene[2], look_at((-1.0, -1.0, 1.6), (2.0, 1.0, 0.5)), (320, 240))
     np.testing.assert_allclose(red_centre(picture), [160, 120], atol=4)
-
-
-def test_view_straight_down_is_possible_and_from_the_target_itself_is_not():
-    assert look_at((0, 0, 2), (0, 0, 0)).rotation().matrix()[2, 2] == pytest.approx(-1.0)
-    with pytest.raises(ValueError, match="same point"):
-        look_at((1, 1, 1), (1, 1, 1))
-
-
-def test_horizon_is_level_with_up_at_the_top():
-    R_WC = look_at((0, 0, 1), (5, 2, 0.5)).rotation().matrix()
-    assert R_WC[2, 0] == pytest.approx(0.0)
-    assert R_WC[2, 1] < 0.0
 
 
 def test_best_view_avoids_the_screen_and_keeps_to_the_wanted_side_when_it_is_clear(scene):
@@ -114,14 +99,14 @@ def test_best_view_avoids_the_screen_and_keeps_to_the_wanted_side_when_it_is_cle
 @pytest.mark.parametrize("box", [(100, 80, 180, 160), (0, 0, 40, 30), (600, 440, 639, 479)])
 def test_detection_box_is_drawn_on_a_copy(box):
     picture = np.full((480, 640, 3), 90, dtype=np.uint8)
-    drawn = draw_detection(picture, box, "coke", 0.87)
+    drawn = scene_pictures.draw_detection(picture, box, "coke", 0.87)
     assert (picture == 90).all()
-    assert drawn[(box[1] + box[3]) // 2, box[0]].tolist() == [255, 190, 0]
-    assert drawn[(box[1] + box[3]) // 2, (box[0] + box[2]) // 2].tolist() == [90, 90, 90]
+    row = drawn[(box[1] + box[3]) // 2]
+    assert [row[box[0]].tolist(), row[(box[0] + box[2]) // 2].tolist()] == [[255, 190, 0], [90, 90, 90]]
 
 
 def test_saved_picture_reads_back_the_same(tmp_path):
     picture = np.random.default_rng(0).integers(0, 255, (20, 30, 3), dtype=np.uint8)
-    save_png(tmp_path / "deep" / "p.png", picture)
+    scene_pictures.save_png(tmp_path / "deep" / "p.png", picture)
     read = cv2.cvtColor(cv2.imread(str(tmp_path / "deep" / "p.png")), cv2.COLOR_BGR2RGB)
     np.testing.assert_array_equal(read, picture)

@@ -20,19 +20,22 @@ def content(number, value):
     return encode(number, {"value": value}, {"x": (array.shape, array.tobytes())})
 
 
-def test_the_newest_is_read(path):
+def file_with(path, *values):
+    """A snapshot file in which values were written one after another."""
     file = SnapshotFile(path)
-    for value in (1, 2, 3):
+    for value in values:
         file.write(content(file.next_number, value))
+    return file
+
+
+def test_the_newest_is_read(path):
+    file_with(path, 1, 2, 3)
     snapshot = read_snapshot(path)
     assert (snapshot.number, snapshot.values, snapshot.arrays["x"].tolist()) == (3, {"value": 3}, [[3.0] * 3] * 2)
 
 
 def test_a_write_that_was_cut_off_leaves_the_one_before(path):
-    file = SnapshotFile(path)
-    for value in (1, 2):
-        file.write(content(file.next_number, value))
-    third = content(file.next_number, 3)
+    third = content(file_with(path, 1, 2).next_number, 3)
     for size in range(0, len(third), 7):
         slot = path.with_name("kept.plant.a")
         slot.write_bytes(third[:size] + slot.read_bytes()[size:])
@@ -72,10 +75,7 @@ def test_a_shorter_one_over_a_longer_one_is_read(path):
 
 
 def test_another_process_goes_on_counting_and_spares_the_newest(path):
-    file = SnapshotFile(path)
-    for value in (1, 2, 3):
-        file.write(content(file.next_number, value))
-    file.close()
+    file_with(path, 1, 2, 3).close()
     again = SnapshotFile(path)
     again.write(content(again.next_number, 4)[:30])
     assert read_snapshot(path).values["value"] == 3
@@ -94,42 +94,33 @@ def rows(*values):
     return np.array([[value, value] for value in values], dtype=np.float64)
 
 
-def write_with_rows(file, value):
-    file.append(rows(value))
-    file.write(encode(file.next_number, {"value": value}, {}, file.rows))
+def with_rows(path, *values):
+    """A snapshot file in which rows were written, one with each snapshot."""
+    file = SnapshotFile(path, width=2)
+    for value in values:
+        file.append(rows(value))
+        file.write(encode(file.next_number, {"value": value}, {}, file.rows))
+    return file
 
 
 def test_rows_are_appended_and_read_up_to_the_snapshots_count(path):
-    file = SnapshotFile(path, width=2)
-    for value in (1, 2, 3):
-        write_with_rows(file, value)
-    file.append(rows(4))
+    with_rows(path, 1, 2, 3).append(rows(4))
     assert read_snapshot(path).rows.tolist() == rows(1, 2, 3).tolist()
 
 
-def test_the_size_of_a_snapshot_does_not_grow_with_its_rows(path):
-    file, written = SnapshotFile(path, width=2), []
-    for _ in range(5):
-        write_with_rows(file, 1)
-        written.append(file.bytes_written)
+def test_the_size_of_a_snapshot_does_not_grow_with_its_rows(tmp_path):
+    written = [with_rows(tmp_path / f"{count}.plant", *[1] * count).bytes_written for count in range(1, 6)]
     assert np.ptp(np.diff(written)) <= 4  # digits of numbers
 
 
 def test_damaged_rows_leave_the_snapshot_before_them(path):
-    file = SnapshotFile(path, width=2)
-    for value in (1, 2):
-        write_with_rows(file, value)
-    kept = path.with_name(path.name + file.rows.file)
-    content = kept.read_bytes()
-    kept.write_bytes(content[:16] + b"\xff" * 16)
+    kept = path.with_name(path.name + with_rows(path, 1, 2).rows.file)
+    kept.write_bytes(kept.read_bytes()[:16] + b"\xff" * 16)
     assert read_snapshot(path).rows.tolist() == rows(1).tolist()
 
 
 def test_another_process_spares_the_rows_of_the_last_snapshot_until_it_has_written_one(path):
-    file = SnapshotFile(path, width=2)
-    for value in (1, 2, 3):
-        write_with_rows(file, value)
-    file.close()
+    with_rows(path, 1, 2, 3).close()
     again = SnapshotFile(path, width=2)
     again.append(rows(4))
     assert read_snapshot(path).rows.tolist() == rows(1, 2, 3).tolist()

@@ -1,6 +1,7 @@
 """People for the planar robot: boxes that a detector finds wherever they are in the picture."""
 
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 from planar_robot import BODY_HEIGHT_M, LENS, X_BC, Bench, Box
@@ -11,6 +12,26 @@ from skills.detection import Detection
 def person_at(x_m, y_m):
     """Somebody who stands upright at a place."""
     return Box(x_m - 0.15, y_m - 0.25, x_m + 0.15, y_m + 0.25, 0.0, 1.7)
+
+
+class LateAnswer:
+    """Answer to a question or a remark at a time; keeps what was asked."""
+
+    def __init__(self, clock, answer, at_s):
+        self.clock, self.answer, self.at_s, self.question, self.withdrawn = clock, answer, at_s, None, False
+
+    def __call__(self, question):
+        self.question = question
+        return self
+
+    def done(self):
+        return self.clock.now() >= self.at_s
+
+    def result(self):
+        return self.answer
+
+    def withdraw(self):
+        self.withdrawn = True
 
 
 @dataclass
@@ -29,9 +50,7 @@ class PeopleDetector:
         return [tuple(one for one in found if one is not None) for _ in pictures]
 
     def _seen(self, person):
-        corners = np.array(
-            [(x, y, z) for x in (person.x0, person.x1) for y in (person.y0, person.y1) for z in (0, 1.7)]
-        )
+        corners = np.array(list(product((person.x0, person.x1), (person.y0, person.y1), (0, 1.7))))
         p_C = (self.bench.robot.pose.transform(BODY_HEIGHT_M) @ X_BC).inverse().multiply(corners.T)
         if np.any(p_C[2] < 0.2):
             return None

@@ -1,5 +1,3 @@
-"""Planar geometry of the skills."""
-
 import numpy as np
 import pytest
 
@@ -13,15 +11,10 @@ class Wall:
         return np.where((np.abs(points_W[:, 0] - 1.0) < 0.1) & (np.abs(points_W[:, 1]) < 1.0), -0.1, 1.0)
 
 
-# point seen from the origin | obstacles count from | visible
-# before the wall            | 0.3 m                | yes
-# behind the wall            | 0.3 m                | no
-# beside the wall            | 0.3 m                | yes
-# behind the wall            | 1.2 m                | yes
+# point seen from the origin, distance (m) from which obstacles count -> visible
 @pytest.mark.parametrize(
     ("point", "beyond_m", "visible"),
     [((0.8, 0.0), 0.3, True), ((2.0, 0.0), 0.3, False), ((1.0, 2.0), 0.3, True), ((2.0, 0.0), 1.2, True)],
 )
 def test_a_wall_blocks_the_line_of_sight_unless_it_is_nearer_than_obstacles_count(point, beyond_m, visible):
-    seen = line_of_sight(Wall(), np.zeros(2), np.array([point]), beyond_m=beyond_m)
-    assert seen.tolist() == [visible]
+    assert line_of_sight(Wall(), np.zeros(2), np.array([point]), beyond_m=beyond_m).tolist() == [visible]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scripted_robot import ScriptedRobot, context_of
+from table_robot import TableRobot, context_of
 
 from skills.api import Cause, Failed, PlanningError, Running, Succeeded
 from skills.robot import ArmTrajectory, CommandCause
@@ -46,30 +46,30 @@ def _no_way():
 
 
 def test_end_stops_only_the_skills_own_running_command():
-    robot = ScriptedRobot()
-    other = robot.move_arm(TRAJECTORY, until_s=9.0, lease=None)
+    robot = TableRobot()
     skill = _Moves(context_of(robot))
+    robot.stand(0.55, 0.0, until_s=9.0, lease=robot.lease_holder())
     skill.begin(None)
     skill.step()
-    skill.end()
-    assert robot.stopped == [other + 1]
-    skill.end()
-    assert robot.stopped == [other + 1]
+    assert robot.moving_parts == ("stand", "move_arm")
+    for _ in range(2):
+        skill.end()
+        assert (robot.moving_parts, robot.calls.count("stop")) == (("stand",), 1)
 
 
 def test_a_command_that_is_done_is_not_stopped():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     skill = _Moves(context_of(robot))
     skill.begin(None)
     skill.step()
     robot.advance(0.1)
     assert skill.step() == Succeeded("moved")
     skill.end()
-    assert robot.stopped == []
+    assert "stop" not in robot.calls
 
 
 def test_a_planning_error_is_a_failure_with_cause_planning_after_the_latency():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     skill = _Plans(context_of(robot))
     skill.begin(None)
     assert isinstance(skill.step(), Running)
@@ -77,8 +77,13 @@ def test_a_planning_error_is_a_failure_with_cause_planning_after_the_latency():
     assert skill.step() == Failed(Cause.PLANNING, "no way")
 
 
+def test_a_step_before_begin_is_a_defect():
+    with pytest.raises(RuntimeError, match="step before begin"):
+        _Moves(context_of(TableRobot())).step()
+
+
 def test_a_skill_within_a_skill_passes_on_its_outcome_and_is_ended():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     skill = _Nests(context_of(robot))
     skill.begin(None)
     while isinstance(step := skill.step(), Running):
@@ -87,7 +92,7 @@ def test_a_skill_within_a_skill_passes_on_its_outcome_and_is_ended():
 
 
 def test_ending_the_outer_skill_stops_the_inner_ones_command():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     skill = _Nests(context_of(robot))
     skill.begin(None)
     for _ in range(4):
@@ -96,17 +101,12 @@ def test_ending_the_outer_skill_stops_the_inner_ones_command():
             break
         robot.advance(0.1)
     skill.end()
-    assert len(robot.stopped) == 1
-
-
-def test_a_step_before_begin_is_a_defect():
-    with pytest.raises(RuntimeError, match="step before begin"):
-        _Moves(context_of(ScriptedRobot())).step()
+    assert robot.calls.count("stop") == 1
 
 
 @pytest.mark.parametrize(("lost", "attempts"), [(1, 2), (9, 2)])
 def test_a_command_without_the_lease_is_given_again_once(lost, attempts):
-    robot, made = ScriptedRobot(), []
+    robot, made = TableRobot(), []
 
     def attempt():
         made.append(robot.now_s)

@@ -22,6 +22,7 @@ from skills.stack import (
     stack_of,
     stack_schema,
 )
+from tests.tables import table
 
 
 def test_missing_parts_of_a_file_come_from_the_default():
@@ -49,31 +50,11 @@ def test_a_skill_takes_its_options_from_the_stack():
     assert Navigate(context).options.stuck_s == Navigate.Options().stuck_s
 
 
-# data                                                       where it is wrong                        what would fit
-@pytest.mark.parametrize(
-    ("data", "path", "hint"),
-    [
-        ({"localizer": {}}, ("localizer",), "localiser"),
-        ({"planner": {"use": "magic"}}, ("planner", "use"), "lattice"),
-        ({"planner": {"margin": 0.1}}, ("planner", "margin"), "margin_m"),
-        ({"planner": {"margin_m": "wide"}}, ("planner", "margin_m"), "'wide'"),
-        ({"planner": {"margin_m": float("nan")}}, ("planner", "margin_m"), "nan"),
-        ({"skills": {"hand_over": {"gaps_m": [0.5, 1e9]}}}, ("skills", "hand_over", "gaps_m", 1), "1e+09"),
-        (
-            {"localiser": {"use": "scan_matching", "matching": {"sigma": 1}}},
-            ("localiser", "matching", "sigma"),
-            "did you mean 'sigma_m'?",
-        ),
-        ({"skills": {"fly": {}}}, ("skills", "fly"), "known are "),
-        ({"skills": {"navigate": {"people": {"periods": 1}}}}, ("skills", "navigate", "people", "periods"), "period_s"),
-        ({"costmap": 3}, ("costmap",), "use"),
-        ([], (), "localiser"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "wrong_values"))
 def test_a_wrong_value_is_refused_with_its_place(data, path, hint):
     with pytest.raises(StackError) as error:
         stack_of(data)
-    assert error.value.path == path
+    assert error.value.path == tuple(path)
     assert hint in error.value.hint
 
 

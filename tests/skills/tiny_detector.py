@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from pathlib import Path
 
 import numpy as np
 import onnx
@@ -16,7 +15,7 @@ STEP_PX = 2.5
 
 def model_bytes(
     *, classes=CLASSES, form="errand-detector-1", names=None, output="scores", size=(480, 640), metadata=None
-) -> bytes:
+):
     """A network that reads its answer from the picture's first two rows (red): scores, then boxes."""
     nodes = [
         helper.make_node("Gather", ["images", "red"], ["plane"], axis=3),
@@ -66,7 +65,7 @@ def _rows(name, row, length, shape):
     }
 
 
-def write_model(file: Path, **changes) -> Path:
+def write_model(file, **changes):
     """Such a network in a file."""
     file.write_bytes(model_bytes(**changes))
     return file
@@ -85,8 +84,8 @@ def picture_of(*things, size=(480, 640), classes=CLASSES):
 
 
 def refinement_bytes(
-    first: bytes, *, classes=CLASSES, form="errand-regions-1", key="first", told=None, size=128, left_only=False
-) -> bytes:
+    first, *, classes=CLASSES, form="errand-regions-1", key="first", told=None, size=128, left_only=False
+):
     """A refinement network: boxes a tenth smaller than the regions; the first class's score is the share of red.
 
     It tells as `key` the digest of the file of the one before it.
@@ -135,19 +134,19 @@ def refinement_bytes(
     return model.SerializeToString()
 
 
-def write_pair(file: Path, **changes) -> Path:
+def write_pair(file, **changes):
     """Both networks, beside each other; `changes` are the refinement network's."""
     write_model(file)
     file.with_name(f"{file.stem}_refinement.onnx").write_bytes(refinement_bytes(file.read_bytes(), **changes))
     return file
 
 
-def classifier_bytes(second: bytes, **changes) -> bytes:
+def classifier_bytes(second, **changes):
     """A classifier network that sees and tells what such a second one does."""
     return refinement_bytes(second, **{"form": "errand-third-1", "key": "second", **changes})
 
 
-def write_cascade(file: Path, **changes) -> Path:
+def write_cascade(file, **changes):
     """All three networks, beside each other; `changes` are the classifier network's."""
     second = write_pair(file).with_name(f"{file.stem}_refinement.onnx")
     file.with_name(f"{file.stem}_classifier.onnx").write_bytes(classifier_bytes(second.read_bytes(), **changes))

@@ -3,10 +3,7 @@
 What they do is what `navigate` makes of the others' ways; so a meeting takes a few seconds instead of minutes.
 """
 
-from __future__ import annotations
-
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,13 +11,13 @@ import numpy as np
 from executive.run.resting import SteppingAside
 from executive.run.traffic_table import TrafficTable
 from executive.run.worker import LockStepWorker
-from skills.api import Failed, LocalisationEstimate, SkillContext, Step, Succeeded
+from skills.api import Failed, SkillContext, Step, Succeeded
 from skills.estimate.grid_map import GridMap
 from skills.navigate.footprint import Footprint, disc_centres, pose_array
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import BaseKind, Capabilities, FloatArray, Pose2D, Robot
+from skills.robot import BaseKind, Pose2D
 from skills.testing.clock import VirtualClock
-from skills.testing.estimators import KnownPlace
+from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import BASE_ONLY, ScriptedRobot, Start
 
 ROUND = tuple((0.28 * math.cos(a), 0.28 * math.sin(a)) for a in np.arange(12) * math.tau / 12)
@@ -28,31 +25,18 @@ TICK_S = 0.05
 ATTEMPTS = 3
 
 
-def capabilities_of(base_kind: BaseKind) -> Capabilities:
+def capabilities_of(base_kind):
     """An oblong that can go sideways, or a round one that cannot; no arm, no camera."""
     outline = ROUND if base_kind is BaseKind.DIFFERENTIAL else BASE_ONLY.footprint_m
     return replace(BASE_ONLY, footprint_m=outline, base_kind=base_kind, cameras=())
 
 
-@dataclass(frozen=True)
-class Surveyed:
+class Surveyed(BlockCostmap):
     """A costmap of what was surveyed."""
 
-    grid: GridMap
-
-    def clearance_m(self, points_W: FloatArray) -> FloatArray:
-        """As the grid has it."""
-        return self.grid.distance_m(points_W)
-
-    def update(self, robot: Robot, localisation: LocalisationEstimate) -> None:
-        """Nothing is seen."""
-
-    def add_points(self, points_W: FloatArray, stamp_s: float) -> None:
-        """Nothing is seen."""
-
-    def clear_obstacles(self, within_W: FloatArray | None = None) -> int:
-        """There is nothing to forget."""
-        return 0
+    def __init__(self, grid):
+        super().__init__()
+        self.clearance_m = grid.distance_m
 
 
 @dataclass
@@ -68,7 +52,7 @@ class Trip:
     aside: SteppingAside | None = None
     last: Step | None = None
 
-    def step(self, table: TrafficTable) -> None:
+    def step(self, table):
         """One tick; before and after its trip a robot steps aside where it is asked to."""
         rests = self.ended is not None or self.context.clock.now() < self.after_s
         table.rest(self.context.robot.name, idle=rests)
@@ -100,11 +84,11 @@ class Floor:
     trips: dict[str, Trip] = field(default_factory=dict)
     apart_m: float = math.inf
 
-    def __post_init__(self) -> None:
+    def __post_init__(self):
         self.table = TrafficTable({}, self.clock.now)
         self.worker = LockStepWorker(self.clock)
 
-    def add(self, name: str, start: Pose2D, base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL) -> SkillContext:
+    def add(self, name, start, base_kind=BaseKind.OMNIDIRECTIONAL):
         """One more robot; what its skills may use."""
         robot = ScriptedRobot(self.clock, name=name, capabilities=capabilities_of(base_kind), start=Start(start))
         self.robots[name] = robot
@@ -122,19 +106,11 @@ class Floor:
             traffic=self.table.view_of(name),
         )
 
-    def send(
-        self,
-        name: str,
-        start: Pose2D,
-        goal: Pose2D,
-        *,
-        base_kind: BaseKind = BaseKind.OMNIDIRECTIONAL,
-        after_s: float = 0.0,
-    ) -> None:
+    def send(self, name, start, goal, *, base_kind=BaseKind.OMNIDIRECTIONAL, after_s=0.0):
         """One more robot that goes somewhere."""
         self.trips[name] = Trip(self.add(name, start, base_kind), goal, after_s)
 
-    def tick(self) -> None:
+    def tick(self):
         """One tick, robots in the order of their names."""
         self.clock.advance(TICK_S)
         for name, robot in sorted(self.robots.items()):
@@ -143,14 +119,14 @@ class Floor:
             trip.step(self.table)
         self.apart_m = min(self.apart_m, least_apart_m(self.robots))
 
-    def run(self, until_s: float) -> bool:
+    def run(self, until_s):
         """Tick until all have ended; whether all are there within the time."""
         while self.clock.now() < until_s and any(trip.ended is None for trip in self.trips.values()):
             self.tick()
         return all(isinstance(trip.ended, Succeeded) for trip in self.trips.values())
 
 
-def least_apart_m(robots: Mapping[str, ScriptedRobot]) -> float:
+def least_apart_m(robots):
     """The least distance between the outlines of two robots; negative where they overlap."""
     placed = []
     for robot in robots.values():

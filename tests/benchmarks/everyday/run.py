@@ -8,8 +8,6 @@ and the log in the folder.
 """
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
@@ -21,37 +19,25 @@ from tests.benchmarks.harness import benchmark
 VERDICTS = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 
 
-@dataclass(frozen=True)
-class Ended:
-    """Claim and verdict of a sentence, with their reasons."""
-
-    number: int
-    said: str
-    claim: str
-    verdict: str
-    words: str
-
-
-def cases(world: str = "flat", only: str = "") -> list[tuple[int, str, int, str]]:
-    """Numbers, sentences and seeds of the runs in a world."""
+def cases(world: str = "flat", only: str = ""):
     rows = yaml.safe_load(Path(__file__).with_name(f"{world}.yaml").read_text(encoding="utf-8"))
     chosen = seed_range(only) if only else range(1, len(rows) + 1)
     return [(number, rows[number - 1]["say"], rows[number - 1]["seed"], world) for number in chosen]
 
 
-def run_case(number: int, said: str, seed: int, world: str, folder: Path) -> Ended:
-    """Runs a sentence."""
+def run_case(number, said, seed, world, folder):
     quiet = ["--no-wake", "--quiet", "--no-record", "--json", "--questions", "first"]
     done = run_errand("run", "--say", said, "--world", world, "--seed", seed, "--out", folder, *quiet)
     if not (report := report_of(done.stdout)):
         kind = "refused" if done.returncode == 2 else "crashed"
-        return Ended(number, said, kind, "", "".join(done.stderr.strip().splitlines()[-1:]))
+        words = "".join(done.stderr.strip().splitlines()[-1:])
+        return {"number": number, "said": said, "claim": kind, "verdict": "", "words": words}
     seen, words = report["referee"], f"{report['message']} / {report['referee']['why']}"
-    return Ended(number, said, report["outcome"], VERDICTS[seen["success"]], words)
+    ended = {"claim": report["outcome"], "verdict": VERDICTS[seen["success"]], "words": words}
+    return {"number": number, "said": said, **ended}
 
 
-def summary(ends: Sequence[Ended]) -> dict[str, object]:
-    """A line for each sentence, and the counts of claims with their verdicts."""
+def summary(ends):
     counts = Counter(f"{each.claim} {each.verdict}".strip() for each in ends)
     return {
         "runs": [" | ".join(map(str, vars(each).values())) for each in ends],

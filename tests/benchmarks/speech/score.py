@@ -12,7 +12,6 @@ import tempfile
 import time
 import wave
 from collections import Counter
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
@@ -25,7 +24,7 @@ from executive.words.knowledge import load_knowledge
 from plant.worlds.world import load_world
 from tests.benchmarks.harness import command, tell
 from tests.benchmarks.speech.sentences import Spoken, make_chatter, make_requests
-from tests.benchmarks.speech.voices import DEVELOPMENT, Voice, installed
+from tests.benchmarks.speech.voices import DEVELOPMENT, installed
 
 NO_VOICE = 3
 NOISES = ("white", "pink", "babble")
@@ -41,8 +40,7 @@ class Case:
     wav: Path
 
 
-def spoken(group: str, said: Sequence[Spoken], voices: Mapping[str, Voice], folder: Path) -> list[Case]:
-    """Sentences spoken by the voices in turn."""
+def spoken(group, said, voices, folder):
     cases = []
     for number, (each, voice) in enumerate(zip(said, cycle(voices.values()), strict=False)):
         cases.append(Case(group, voice.name, each, folder / f"{group}-{number}.wav"))
@@ -50,7 +48,7 @@ def spoken(group: str, said: Sequence[Spoken], voices: Mapping[str, Voice], fold
     return cases
 
 
-def noise(kind: str, count: int, draw: np.random.Generator, talkers: Sequence[np.ndarray]) -> np.ndarray:
+def noise(kind, count, draw, talkers):
     """Noise as strong at all frequencies, with a power that falls as one over the frequency, or of several voices."""
     if kind == "white":
         return draw.standard_normal(count)
@@ -61,7 +59,7 @@ def noise(kind: str, count: int, draw: np.random.Generator, talkers: Sequence[np
     return np.sum([sound / max(np.std(sound), 1e-9) for sound in rolled], axis=0)
 
 
-def with_noise(clear: Sequence[Case], folder: Path, ratio_db: float, seed: int) -> list[Case]:
+def with_noise(clear, folder, ratio_db, seed):
     """The same sentences in noise, so strong that the mean power of the speech lies `ratio_db` above it."""
     draw, cases = np.random.default_rng(seed), []
     for number, (case, kind) in enumerate(zip(clear, cycle(NOISES), strict=False)):
@@ -87,7 +85,7 @@ def score(
     seed: int = 2,
     voices: str = "held-out",
     show: bool = False,
-) -> dict[str, object] | int:
+):
     """Shares of sentences that are right, by group and voice, with times and memory."""
     own = {"held-out": lambda name: name not in DEVELOPMENT, "development": DEVELOPMENT.__contains__}
     takes = own.get(voices, voices.split(",").__contains__)
@@ -99,7 +97,7 @@ def score(
     begun = time.perf_counter()
     listener = listener_for(knowledge)
     loading_s = time.perf_counter() - begun
-    counts, heard_s, spent_s = Counter[tuple[str, str]](), 0.0, 0.0
+    counts, heard_s, spent_s = Counter(), 0.0, 0.0
     with tempfile.TemporaryDirectory() as made:
         folder = Path(made)
         clear = spoken("clear", make_requests(knowledge, sentences, seed), found, folder)
@@ -122,12 +120,12 @@ def score(
     }
 
 
-def _figures(counts: Counter[tuple[str, str]]) -> dict[str, object]:
-    def share(kind: str, *groups: str) -> float | None:
+def _figures(counts):
+    def share(kind, *groups):
         every = sum(counts[group, "all"] for group in groups)
         return round(sum(counts[group, kind] for group in groups) / every, 4) if every else None
 
-    def missed(*groups: str) -> float | None:
+    def missed(*groups):
         called = share("called", *groups)
         return None if called is None else round(1.0 - called, 4)
 
@@ -141,7 +139,7 @@ def _figures(counts: Counter[tuple[str, str]]) -> dict[str, object]:
     }
 
 
-def _peak_mb() -> int:
+def _peak_mb():
     status = Path("/proc/self/status").read_text(encoding="utf-8")
     return int(next(line.split()[1] for line in status.splitlines() if line.startswith("VmHWM"))) // 1024
 

@@ -7,7 +7,6 @@ from pathlib import Path
 import yaml
 
 from executive.words.command import Task
-from executive.words.knowledge import Knowledge
 
 PATTERNS = yaml.safe_load(Path(__file__).with_name("patterns.yaml").read_text(encoding="utf-8"))
 
@@ -21,12 +20,11 @@ class Spoken:
     addressed: bool = True
 
 
-def make_requests(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
-    """Makes different sentences to the robot."""
+def make_requests(knowledge, count, seed):
     return _different(_Maker(knowledge, random.Random(seed)).request, count)
 
 
-def make_chatter(knowledge: Knowledge, count: int, seed: int) -> list[Spoken]:
+def make_chatter(knowledge, count, seed):
     """Makes different sentences that are not said to the robot, many of them with its words."""
     return _different(_Maker(knowledge, random.Random(seed)).chatter, count)
 
@@ -42,18 +40,18 @@ def _different(make, count):
 class _Maker:
     """Draws names of the world and puts them into the patterns."""
 
-    def __init__(self, knowledge: Knowledge, draw: random.Random) -> None:
+    def __init__(self, knowledge, draw):
         self.knowledge, self.draw = knowledge, draw
         self.kinds = (self._fetch, self._two, self._deliver, self._move, self._put, self._find, self._pick, self._go)
         self.kinds += (self._give, self._told)
 
-    def request(self) -> Spoken:
+    def request(self):
         text, commands = self.draw.choice(self.kinds)()
         greeting = self.draw.choice(PATTERNS["greetings"]).format(robot=self.knowledge.robot.name)
         polite = "" if text.startswith("there") else self.draw.choice(PATTERNS["polite"])
         return Spoken(f"{greeting}{polite}{text}", tuple(commands))
 
-    def chatter(self) -> Spoken:
+    def chatter(self):
         thing, _ = self._thing()
         text = self.draw.choice(PATTERNS["not_addressed"]).format(
             thing=thing,
@@ -111,7 +109,7 @@ class _Maker:
         (thing, name), (source, taken) = self._thing(), self._surface()
         return self._text("told", thing, source=source), [_take(taken, name), _carry(name, "start")]
 
-    def _text(self, kind, thing, **words) -> str:
+    def _text(self, kind, thing, **words):
         article = self.draw.choice(("the", "an" if thing[0] in "aeiou" else "a"))
         return self.draw.choice(PATTERNS[kind]).format(article=article, thing=thing, **words)
 
@@ -147,9 +145,9 @@ def _named(group):
     return [(spoken, name) for name, facts in group.items() for spoken in (name, *facts.aliases)]
 
 
-def _take(place, name) -> str:
+def _take(place, name):
     return f"Take [Nothing] to [{place}] and do [grasp] to [{name}]"
 
 
-def _carry(name, goal) -> str:
+def _carry(name, goal):
     return f"Take [{name}] to [{goal}] and do [Nothing] to [Nothing]"

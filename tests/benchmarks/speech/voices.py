@@ -9,7 +9,6 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 DEVELOPMENT = ("flite-kal16", "flite-rms", "espeak-us", "espeak-gb", "festival-kal")
 """Voices that served in development; figures are taken with the others."""
@@ -25,15 +24,13 @@ class Voice:
     name: str
     command: Sequence[str]
 
-    def speak(self, text: str, wav: Path) -> None:
-        """Writes `text` as sound to `wav`."""
+    def speak(self, text, wav):
         made = [part.format(wav=wav) for part in self.command]
         subprocess.run(made, input=text.encode(), check=True, capture_output=True)
 
 
-def installed() -> dict[str, Voice]:
-    """All voices of this machine by name."""
-    found = dict[str, Sequence[str]]()
+def installed():
+    found = {}
     if shutil.which("espeak-ng"):
         for name, accent in ESPEAK.items():
             found[f"espeak-{name}"] = ("espeak-ng", "-v", accent, "-s", "150", "-w", "{wav}", "--stdin")

@@ -1,5 +1,7 @@
 """What is said in a run with several robots: who of them is meant."""
 
+from pathlib import Path
+
 import pytest
 
 from executive.app.conversations import Conversations
@@ -9,6 +11,9 @@ from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.words.robot_config import RobotConfig
+from skills.files.yaml_source import read_yaml
+
+SAID = read_yaml(Path(__file__).with_name("remarks_to_robots.yaml")).data
 
 TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
 
@@ -36,17 +41,7 @@ def modes(control):
     return {name: each.mode.value for name, each in control.state.robots.items()}
 
 
-# What is said (to whom, on whose panel), and what each robot then does.
-REMARKS = [
-    ("Hey Bob, wait", None, {"Alice": "running", "Bob": "paused"}),
-    ("wait", "Alice", {"Alice": "paused", "Bob": "running"}),
-    ("stop", None, {"Alice": "stopped", "Bob": "stopped"}),
-    ("Hey everyone, stop", None, {"Alice": "stopped", "Bob": "stopped"}),
-    ("Alice and Bob, wait", None, {"Alice": "paused", "Bob": "paused"}),
-]
-
-
-@pytest.mark.parametrize(("text", "robot", "expected"), REMARKS)
+@pytest.mark.parametrize(("text", "robot", "expected"), SAID["remarks"])
 def test_a_remark_is_for_the_robot_that_it_names_and_without_a_name_for_all(talk, control, text, robot, expected):
     assert talk.hear(text, robot).kind is ReplyKind.DONE
     assert modes(control) == expected
@@ -55,8 +50,7 @@ def test_a_remark_is_for_the_robot_that_it_names_and_without_a_name_for_all(talk
 
 def test_one_robot_is_told_to_go_on_and_the_other_stays(talk, control):
     talk.hear("wait")
-    assert talk.hear("Bob, go on").text == "I go on"
-    assert modes(control) == {"Alice": "paused", "Bob": "running"}
+    assert (talk.hear("Bob, go on").text, modes(control)) == ("I go on", {"Alice": "paused", "Bob": "running"})
 
 
 def test_one_robot_does_not_go_on_while_all_are_paused(talk, control):
@@ -67,12 +61,7 @@ def test_one_robot_does_not_go_on_while_all_are_paused(talk, control):
 
 @pytest.mark.parametrize(
     ("text", "robot", "expected"),
-    [
-        ("Bob, go to the bathroom", None, {"Bob": "bathroom"}),
-        ("go to the bathroom", "Bob", {"Bob": "bathroom"}),
-        ("go to the bathroom", None, {"Alice": "bathroom"}),
-        ("Hey everyone, go to the bathroom", None, {"Alice": "bathroom", "Bob": "bathroom"}),
-    ],
+    SAID["requests"],
 )
 def test_a_request_becomes_a_mission_of_the_robot_that_is_meant(talk, control, text, robot, expected):
     talk.hear(text, robot)

@@ -5,14 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from executive.app.feasibility import (
-    RouteCache,
-    abilities_in,
-    abilities_of,
-    reached_heights_m,
-    route_cache_of,
-    route_planner_of,
-)
+from executive.app import feasibility
+from executive.app.feasibility import RouteCache, abilities_in, abilities_of, reached_heights_m
 from executive.app.placed_robots import only_robot
 from executive.app.worlds import open_world
 from executive.tree.estimate import Route
@@ -23,10 +17,12 @@ from skills.testing.robot import BASE_ONLY
 
 
 @pytest.mark.parametrize("kind", ["spot", "fetch"])
-def test_both_kinds_reach_the_floor_and_a_counter_but_not_the_ceiling(kind):
-    low_m, high_m = reached_heights_m(robot_kind(kind).capabilities())
+def test_both_kinds_reach_the_floor_and_a_counter_but_not_the_ceiling_and_lift_what_they_can(kind):
+    capabilities, able = robot_kind(kind).capabilities(), abilities_of(kind)
+    low_m, high_m = reached_heights_m(capabilities)
     assert low_m < 0.02
     assert 0.9 < high_m < 2.2
+    assert (able.lift_kg, able.opens_m) == (capabilities.arm.max_payload_kg, capabilities.gripper.max_grasp_m)
 
 
 def test_a_torso_on_a_lift_reaches_higher_than_legs():
@@ -37,18 +33,11 @@ def test_without_an_arm_no_height_is_said():
     assert reached_heights_m(BASE_ONLY) == (float("-inf"), float("inf"))
 
 
-def test_the_payload_and_the_gripper_are_those_of_the_kind():
-    for kind in ("spot", "fetch"):
-        capabilities = robot_kind(kind).capabilities()
-        able = abilities_of(kind)
-        assert (able.lift_kg, able.opens_m) == (capabilities.arm.max_payload_kg, capabilities.gripper.max_grasp_m)
-
-
 # how far (m) the start lies aside: the planner's grid begins there
 @pytest.mark.parametrize("aside_m", [0.0, 0.02, 0.04, 0.06, 0.08])
 def test_a_fetch_gets_through_the_narrowest_door_of_a_world_wherever_it_begins(aside_m):
     world = load_world("lab")
-    planner = route_planner_of(world, only_robot("Alice", world, kind="fetch"), cached=False)
+    planner = feasibility.route_planner_of(world, only_robot("Alice", world, kind="fetch"), cached=False)
     route = planner.route(Pose2D(14.38 + aside_m, 10.52, -2.671), Pose2D(15.0, 9.1, 0.0))
     assert 3.0 < route.length_m < 5.0
 
@@ -105,5 +94,5 @@ def test_routes_are_planned_again_when_a_file_that_they_depend_on_has_changed(tm
     robot, planner = tmp_path / "robot.yaml", Planner()
     for text, asked in (("a", 1), ("a", 1), ("b", 2)):
         robot.write_text(text)
-        route_cache_of(open_world("flat"), planner, robot).route(HERE, THERE)
+        feasibility.route_cache_of(open_world("flat"), planner, robot).route(HERE, THERE)
         assert planner.asked == asked

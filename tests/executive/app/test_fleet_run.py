@@ -5,6 +5,7 @@ import signal
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -30,6 +31,7 @@ from executive.words.steps import lines_of_steps
 from plant.robots.robot_kind import PlacedRobot
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 from tests.benchmarks.fleet import begun_again
 from tests.executive.conftest import COKE, default_end
@@ -74,7 +76,7 @@ class Fleet:
         battery = knowledge.battery.model_copy(update={"low": 0.05})
         self.knowledge = knowledge.model_copy(update={"battery": battery})
         self.unable, self.cannot = set(), lambda name, command: False
-        self.robots = {name: make.ScriptedRobot(clock, name) for name in ROBOTS}
+        self.robots = {name: make.StandingRobot(clock, name) for name in ROBOTS}
         self.faults, self.make, self.missions, self.judged = {}, make, {}, []
         self.shares, self.since_s, self.ended = [], [], []
         self.tables, self.slower_s = None, 0.5
@@ -99,7 +101,12 @@ class Fleet:
         asked = replace(request, commands=lines_of_steps(tree.steps))
         return ScriptedMission(asked, mission, world, self.knowledge, tree, {}, registry=self.registry)
 
-    def queue(self, *lines):
+    def queue(self, *missions):
+        """Queues missions, each a line or several."""
+        for lines in missions:
+            self._add((lines,) if isinstance(lines, str) else lines)
+
+    def _add(self, lines):
         request = Request(commands=lines, name="work", world_name="scripted")
         stored = self.store.add(request, queued=True)
         steps = steps_of_commands(tuple(map(parse_command, lines)))
@@ -124,15 +131,8 @@ class Fleet:
     def run(self, page=None, live=None):
         placed = {name: PlacedRobot(name, "spot", START) for name in ROBOTS}
         docks = {name: self._docking(name) for name in ROBOTS}
-        dispatch = Dispatch(
-            self.store,
-            dict(self.missions),
-            placed,
-            self,
-            self.faults,
-            docks,
-            offers=lambda *of: ScriptedOffers(self, *of),
-        )
+        bidding = partial(ScriptedOffers, self)
+        dispatch = Dispatch(self.store, dict(self.missions), placed, self, self.faults, docks, offers=bidding)
         ended = partial(self._note_end, dispatch)
         run_fleet(dispatch, out=self.out, seed=3, page=page, live=live, ended=ended)
         self.rows = rows = missions_json(self.store, list(self.missions))
@@ -171,13 +171,16 @@ class Fleet:
 
 @pytest.fixture
 def fleet(tmp_path, clock, knowledge, registry, make, script):
+    for name in ("grasp", "place"):
+        registry[name].changes_world = True
     with MissionStore(tmp_path / "missions.sqlite") as store:
-        yield Fleet(store, clock, knowledge, registry, make, script, tmp_path / "out")
+        fleet = Fleet(store, clock, knowledge, registry, make, script, tmp_path / "out")
+        script.ends.update(grasp=fleet.hold, place=fleet.put_down, charge=fleet.charge)
+        yield fleet
 
 
 def test_three_missions_are_done_by_two_robots(fleet, script):
-    for line in (KITCHEN, BEDROOM, KITCHEN):
-        fleet.queue(line)
+    fleet.queue(KITCHEN, BEDROOM, KITCHEN)
     assert fleet.run() == [("Alice", "success", 0), ("Bob", "success", 0), ("Alice", "success", 0)]
     assert script.begun == ["navigate"] * 3
     assert fleet.ended == [1, 2, 3] or fleet.ended == [2, 2, 3]
@@ -185,26 +188,37 @@ def test_three_missions_are_done_by_two_robots(fleet, script):
     assert [robot.holder for robot in fleet.robots.values()] == [None, None]
 
 
-def test_the_log_of_a_fleet_is_sent_live(fleet):
-    fleet.queue(KITCHEN)
-    followed = []
-    fleet.run(live=SimpleNamespace(follow=followed.append))
-    assert [log.path for log in followed] == [fleet.out / "log.mcap"]
+FLEETS = read_yaml(Path(__file__).with_name("fleets.yaml")).data
+MISSIONS = {"go bedroom": BEDROOM, "go kitchen": KITCHEN, "take": TAKE, "take and put": (TAKE, PUT)}
 
 
-def test_the_mission_of_a_robot_that_dies_is_done_by_the_other(fleet, script):
-    fleet.queue(KITCHEN)
-    fleet.queue(BEDROOM)
-    fleet.faults["Alice"] = ["robot dies at 0.08 s"]
-    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
-    assert script.begun == ["navigate"] * 3
+@pytest.mark.parametrize("case", FLEETS, ids=lambda case: case["name"])
+def test_missions_go_to_the_robots_that_can_do_them(fleet, script, case):
+    def detect(skill):
+        blind = skill.context.robot.name in case.get("blind", ())
+        return Failed(Cause.POSTCONDITION, "no coke was seen") if blind else default_end(script, "detect")(skill)
+
+    script.ends["detect"] = detect
+    for name, (cause, message) in {name: said.split(" ", 1) for name, said in case.get("ends", {}).items()}.items():
+        script.ends[name] = lambda skill, why=(Cause[cause], message): Failed(*why)
+    fleet.faults, fleet.unable = case.get("faults", {}), {case.get("unable")}
+    if "low" in case:
+        fleet.robots[case["low"]].charge = 0.1
+    if "lease" in case:
+        fleet.robots[case["lease"]].holder = "the tablet"
+    fleet.queue(*(MISSIONS[name] for name in case["missions"]))
+    done = [list(row) for row in fleet.run()]
+    assert done == case.get("done", done)
+    assert [outcome for _, outcome, _ in done] == case.get("outcomes", [outcome for _, outcome, _ in done])
+    assert script.begun == case.get("begun", script.begun)
+    assert script.begun.count("charge") == case.get("charges", script.begun.count("charge"))
+    assert case.get("message", "") in (fleet.message(1) or "")
+    holders = {robot.holder for robot in fleet.robots.values()}
+    assert "faults" in case or holders == ({None, "the tablet"} if "lease" in case else {None})
 
 
-def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    fleet.queue(TAKE, PUT, KITCHEN)
-    script.ends["grasp"], script.ends["place"] = fleet.hold, fleet.put_down
+def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script):
+    fleet.queue((TAKE, PUT, KITCHEN))
     script.ends["navigate"] = lambda skill: fleet.die_once_after("place", skill)
     assert fleet.run() == [("Bob", "success", 1)]
     assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
@@ -214,7 +228,7 @@ def test_commands_that_are_done_are_not_done_again_by_the_other(fleet, script, r
 
 
 def test_a_command_that_was_begun_again_after_it_was_done_is_found_in_the_log(fleet, script):
-    fleet.queue(KITCHEN, BEDROOM)
+    fleet.queue((KITCHEN, BEDROOM))
     fleet.run()
     (event,) = (each for each in read_events(fleet.out / "log.mcap") if _begins_first_command(each))
     events = list(read_events(fleet.out / "log.mcap"))
@@ -226,32 +240,15 @@ def _begins_first_command(event):
     return event.topic == "transitions" and event.data["node"].endswith("/1-kitchen") and event.data["to"] == "RUNNING"
 
 
-def test_an_object_in_a_dead_robots_gripper_is_named_and_not_fetched_again(fleet, script, registry):
-    registry["grasp"].changes_world = True
-    script.ends["grasp"] = fleet.hold
+def test_an_object_in_a_dead_robots_gripper_is_named_and_not_fetched_again(fleet, script):
     script.ends["navigate"] = lambda skill: fleet.die_once_after("grasp", skill)
-    fleet.queue(TAKE, PUT)
-    assert fleet.run() == [("Alice", "error", 0)]
-    assert script.begun.count("grasp") == 1
+    fleet.queue((TAKE, PUT))
+    assert (fleet.run(), script.begun.count("grasp")) == ([("Alice", "error", 0)], 1)
     assert fleet.message(1).endswith("; the coke is in Alice's gripper")
 
 
-def test_without_another_robot_the_mission_fails_and_later_ones_stay_queued(fleet):
-    for line in (KITCHEN, BEDROOM, KITCHEN):
-        fleet.queue(line)
-    fleet.faults = {"Alice": ["robot dies at 0.08 s"], "Bob": ["robot dies at 0.08 s"]}
-    assert [outcome for _, outcome, _ in fleet.run()] == ["failure", "error", "queued"]
-
-
-def test_a_robot_whose_lease_is_anothers_is_left_out(fleet):
-    fleet.queue(KITCHEN)
-    fleet.robots["Alice"].holder = "the tablet"
-    assert fleet.run() == [("Bob", "success", 1)]
-
-
 def test_status_shows_what_runs_and_what_waits_while_it_does(fleet, script):
-    for line in (KITCHEN, BEDROOM, KITCHEN):
-        fleet.queue(line)
+    fleet.queue(KITCHEN, BEDROOM, KITCHEN)
     told_then = []
 
     def ask(skill):
@@ -266,59 +263,33 @@ def test_status_shows_what_runs_and_what_waits_while_it_does(fleet, script):
     assert states[1] == [("Alice", "success"), ("Bob", "success"), ("Alice", "running")]
 
 
-def test_the_store_has_the_robot_of_each_mission(fleet):
+def test_the_store_has_the_robot_of_each_mission_and_the_log_is_sent_live(fleet):
     fleet.queue(KITCHEN)
-    fleet.run()
+    followed = []
+    fleet.run(live=SimpleNamespace(follow=followed.append))
     given = GivenMissions(fleet.store).all()[1]
     assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)
+    assert [log.path for log in followed] == [fleet.out / "log.mcap"]
 
 
 def test_each_mission_is_judged_from_its_own_beginning(fleet):
-    fleet.queue(KITCHEN)
-    fleet.queue(KITCHEN)
+    fleet.queue(KITCHEN, KITCHEN)
     fleet.unable = {"Bob"}
     fleet.run()
     first_s, second_s = fleet.since_s
     assert first_s == 0.0 < second_s
 
 
-def test_a_robot_that_is_low_gives_its_mission_back_and_charges(fleet, script):
-    fleet.queue(KITCHEN)
-    fleet.queue(BEDROOM)
-    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
-    assert fleet.run() == [("Bob", "success", 1), ("Bob", "success", 0)]
-    assert script.begun.count("charge") == 1
-    assert [robot.holder for robot in fleet.robots.values()] == [None, None]
-
-
-def test_a_robot_that_is_low_puts_down_what_it_holds_before_it_gives_the_rest_back(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    fleet.queue(TAKE, PUT, KITCHEN)
+def test_a_robot_that_is_low_puts_down_what_it_holds_before_it_gives_the_rest_back(fleet, script):
+    fleet.queue((TAKE, PUT, KITCHEN))
 
     def hold(skill):
         fleet.robots["Alice"].charge = 0.1
         return fleet.hold(skill)
 
-    script.ends.update(grasp=hold, place=fleet.put_down, charge=fleet.charge)
+    script.ends["grasp"] = hold
     assert fleet.run() == [("Bob", "success", 1)]
-    assert (script.begun.count("grasp"), script.begun.count("place")) == (1, 1)
-    assert fleet.shares == [("Alice", 2)]
-
-
-def test_a_mission_that_only_the_low_robot_can_do_goes_on_when_it_has_charged(fleet, script):
-    fleet.queue(KITCHEN)
-    fleet.unable = {"Bob"}
-    fleet.robots["Alice"].charge, script.ends["charge"] = 0.1, fleet.charge
-    assert fleet.run() == [("Alice", "success", 0)]
-    assert script.begun == ["navigate", "navigate", "charge", "navigate"]
-
-
-def test_a_robot_that_gets_no_current_at_its_dock_leaves_its_mission_to_the_other(fleet, script):
-    fleet.queue(KITCHEN)
-    fleet.robots["Alice"].charge = 0.1
-    script.ends["charge"] = lambda skill: Failed(Cause.EXECUTION, "no current")
-    assert fleet.run() == [("Bob", "success", 1)]
+    assert (script.begun.count("grasp"), script.begun.count("place"), fleet.shares) == (1, 1, [("Alice", 2)])
 
 
 def test_a_robot_that_is_lost_is_left_out_and_its_mission_done_by_the_other(fleet, script):
@@ -342,22 +313,16 @@ def only_alice_takes_and_only_bob_goes_to_the_bedroom(name, command):
 
 
 @pytest.fixture
-def chain(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    script.ends.update(grasp=fleet.hold, place=fleet.put_down)
+def chain(fleet):
     fleet.cannot = only_alice_takes_and_only_bob_goes_to_the_bedroom
-    fleet.queue(TAKE, PUT)
+    fleet.queue((TAKE, PUT))
     return fleet
 
 
 def test_a_mission_that_no_robot_can_do_alone_is_split_at_a_table(chain, script):
     assert chain.run() == [("Bob", "success", 0), ("Alice", "success", 0), ("Bob", "success", 0)]
-    assert [(row["id"], row["part_of"], row["after"]) for row in chain.rows] == [
-        (1, None, None),
-        (2, 1, None),
-        (3, 1, 2),
-    ]
+    parts = [(row["id"], row["part_of"], row["after"]) for row in chain.rows]
+    assert parts == [(1, None, None), (2, 1, None), (3, 1, 2)]
     first, second = (chain.store.mission(number).request.commands for number in (2, 3))
     take = first[1].replace("[coke] to", "[Nothing] to").replace("do [Nothing] to [Nothing]", "do [grasp] to [coke]")
     assert (first[0], second) == (TAKE, (take, PUT))
@@ -371,7 +336,6 @@ def test_a_chain_is_judged_as_a_whole_from_the_beginning_of_its_first_part(chain
 
 
 def test_the_first_robot_leaves_the_table_to_the_second_and_goes_to_its_dock(chain, script):
-    script.ends["charge"] = chain.charge
     chain.run()
     assert script.begun.count("charge") == 1
     assert [robot.holder for robot in chain.robots.values()] == [None, None]
@@ -422,19 +386,14 @@ def test_the_log_has_the_robot_of_each_mission_whenever_it_changes(fleet):
     fleet.run()
     events = read_events(fleet.out / "log.mcap")
     told = [event.data["missions"][0] for event in events if event.topic == "missions"]
-    assert [(each["robot"], each["outcome"], each["reassigned"]) for each in told] == [
-        ("Alice", "running", 0),
-        ("Alice", "queued", 0),
-        ("Bob", "running", 1),
-        ("Bob", "success", 1),
-    ]
+    states = [(each["robot"], each["outcome"], each["reassigned"]) for each in told]
+    assert states == [("Alice", "running", 0), ("Alice", "queued", 0), ("Bob", "running", 1), ("Bob", "success", 1)]
     assert {each["sentence"] for each in told} == {"work"}
     assert {"Alice", "Bob"} <= {event.data.get("robot") for event in events if event.topic == "transitions"}
 
 
 def test_the_report_has_each_mission_and_the_steps_of_each_robot(fleet):
-    for line in (KITCHEN, BEDROOM):
-        fleet.queue(line)
+    fleet.queue(KITCHEN, BEDROOM)
     fleet.run()
     html = (fleet.out / "report.html").read_text(encoding="utf-8")
     assert "2 of 2 missions done" in html
@@ -443,8 +402,7 @@ def test_the_report_has_each_mission_and_the_steps_of_each_robot(fleet):
 
 
 def test_a_mission_that_is_cancelled_on_its_robots_panel_is_over_and_the_robot_goes_on(fleet, script):
-    for line in (KITCHEN, BEDROOM, KITCHEN):
-        fleet.queue(line)
+    fleet.queue(KITCHEN, BEDROOM, KITCHEN)
 
     class CancellingPage(PageView):
         def tick(self, progress):
@@ -478,33 +436,13 @@ def test_a_robot_that_gave_up_finding_its_place_is_lost_whatever_it_believes_aft
     assert fleet.run() == [("Bob", "success", 1)]
 
 
-def sees_nothing(script, *names):
-    """Only robots that are not named see the object."""
-
-    def detect(skill):
-        if skill.context.robot.name in names:
-            return Failed(Cause.POSTCONDITION, "no coke was seen")
-        return default_end(script, "detect")(skill)
-
-    return detect
-
-
-def test_the_other_robot_searches_for_an_object_that_one_did_not_find(fleet, script):
-    fleet.queue(TAKE)
-    script.ends.update(detect=sees_nothing(script, "Alice"), grasp=fleet.hold)
-    assert fleet.run() == [("Bob", "success", 1)]
-
-
-def test_a_dropped_object_is_taken_by_the_other_robot(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    fleet.queue(TAKE, PUT)
+def test_a_dropped_object_is_taken_by_the_other_robot(fleet, script):
+    fleet.queue((TAKE, PUT))
 
     def lose(skill):
         fleet.robots[skill.context.robot.name].let_go()
         return Failed(Cause.EXECUTION, "it slipped")
 
-    script.ends["grasp"] = fleet.hold
     script.ends["place"] = lambda skill: (lose if skill.context.robot.name == "Alice" else fleet.put_down)(skill)
     assert fleet.run() == [("Bob", "success", 1)]
     assert fleet.robots["Alice"].holding is fleet.robots["Bob"].holding is False
@@ -534,10 +472,8 @@ def test_the_other_robot_looks_first_where_the_object_was_seen(fleet, script):
     assert looks[0] == ("bedside table", True)
 
 
-def test_the_other_robot_looks_first_at_the_floor_where_the_object_fell(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    fleet.queue(TAKE, PUT)
+def test_the_other_robot_looks_first_at_the_floor_where_the_object_fell(fleet, script):
+    fleet.queue((TAKE, PUT))
     looks = looks_of(script)
     lost = []
 
@@ -550,54 +486,28 @@ def test_the_other_robot_looks_first_at_the_floor_where_the_object_fell(fleet, s
             return Failed(Cause.POSTCONDITION, "it slipped")
         return fleet.put_down(skill)
 
-    script.ends.update(grasp=fleet.hold, place=lose)
+    script.ends["place"] = lose
     assert fleet.run() == [("Bob", "success", 1)]
     assert lost
     assert looks[0] == ("floor", False)
 
 
-def test_an_object_that_was_let_go_is_not_placed_by_another_robot(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    registry["place"].outputs = {"released_W": tuple[float, float, float]}
-    fleet.queue(TAKE, PUT)
+def test_an_object_that_was_let_go_is_not_placed_by_another_robot(fleet, script):
+    fleet.registry["place"].outputs = {"released_W": tuple[float, float, float]}
+    fleet.queue((TAKE, PUT))
 
     def lose(skill):
         fleet.robots[skill.context.robot.name].let_go()
         script.seen_on = set()
         return Failed(Cause.POSTCONDITION, "it is not seen where it was put down", {"released_W": (1.5, 2.0, 0.8)})
 
-    script.ends.update(grasp=fleet.hold, place=lose)
+    script.ends["place"] = lose
     assert fleet.run() == [("Alice", "failure", 0)]
     assert "; the coke was let go at (1.50, 2.00) m" in fleet.message(1)
 
 
-def test_a_mission_stays_with_a_robot_that_holds_its_object(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    fleet.queue(TAKE, PUT)
-    script.ends.update(grasp=fleet.hold, place=lambda skill: Failed(Cause.PLANNING, "no place"))
-    assert [outcome for _, outcome, _ in fleet.run()] == ["failure"]
-    assert fleet.rows[0]["reassigned"] == 0
-
-
-def test_a_mission_that_both_robots_fail_ends_with_both_reasons(fleet, script):
-    fleet.queue(TAKE)
-    script.ends["detect"] = sees_nothing(script, "Alice", "Bob")
-    assert fleet.run() == [("Bob", "failure", 1)]
-    assert "; Alice before: it tried: " in fleet.message(1)
-
-
-def test_a_mission_that_the_other_cannot_do_stays_with_the_first(fleet, script):
-    fleet.queue(TAKE)
-    fleet.unable = {"Bob"}
-    script.ends["detect"] = sees_nothing(script, "Alice")
-    assert fleet.run() == [("Alice", "failure", 0)]
-
-
 def test_a_mission_does_not_wait_for_a_robot_that_is_late(fleet, script):
-    for line in (KITCHEN, KITCHEN, KITCHEN):
-        fleet.queue(line)
+    fleet.queue(KITCHEN, KITCHEN, KITCHEN)
     fleet.slower_s = 1.5
 
     def arrive(skill):
@@ -608,19 +518,15 @@ def test_a_mission_does_not_wait_for_a_robot_that_is_late(fleet, script):
     assert [robot for robot, *_ in fleet.run()] == ["Alice", "Bob", "Bob"]
 
 
-def test_two_robots_do_not_put_things_on_one_surface_at_once(fleet, script, registry):
-    for name in ("grasp", "place"):
-        registry[name].changes_world = True
-    fleet.queue(TAKE, ON_TABLE)
-    fleet.queue(TAKE, ON_TABLE)
-    fleet.queue(BEDROOM)
+def test_two_robots_do_not_put_things_on_one_surface_at_once(fleet, script):
+    fleet.queue((TAKE, ON_TABLE), (TAKE, ON_TABLE), BEDROOM)
     at_work = []
 
     def put_down(skill):
         at_work.append({row["robot"] for row in missions_json(fleet.store, [1, 2]) if row["outcome"] == "running"})
         return fleet.put_down(skill)
 
-    script.ends.update(grasp=fleet.hold, place=put_down)
+    script.ends["place"] = put_down
     assert [robot for robot, *_ in fleet.run()] == ["Alice", "Alice", "Bob"]
     assert at_work == [{"Alice"}, {"Alice"}]
 
@@ -640,8 +546,7 @@ def interrupted_at(fleet, skill_ends):
 
 
 def test_after_ctrl_c_the_next_run_goes_on_with_what_was_under_way(fleet, script):
-    for line in (KITCHEN, BEDROOM, KITCHEN):
-        fleet.queue(line)
+    fleet.queue(KITCHEN, BEDROOM, KITCHEN)
     script.ends["navigate"] = interrupted_at(fleet, lambda skill: Succeeded("there"))
     assert [outcome for _, outcome, _ in fleet.run()] == ["queued", "success", "queued"]
     assert resumable_lines(fleet.store, fleet.out) == [
@@ -652,12 +557,8 @@ def test_after_ctrl_c_the_next_run_goes_on_with_what_was_under_way(fleet, script
     assert [outcome for _, outcome, _ in fleet.run()] == ["success"] * 2
 
 
-def test_after_ctrl_c_with_something_in_the_gripper_the_mission_is_cancelled_and_can_be_resumed(
-    fleet, script, registry
-):
-    registry["grasp"].changes_world = True
-    fleet.queue(TAKE, PUT)
-    script.ends["grasp"] = fleet.hold
+def test_after_ctrl_c_with_something_in_the_gripper_the_mission_is_cancelled_and_can_be_resumed(fleet, script):
+    fleet.queue((TAKE, PUT))
     at_goal = interrupted_at(fleet, lambda skill: Succeeded("there"))
     script.ends["navigate"] = lambda skill: at_goal(skill) if "grasp" in script.begun else Succeeded("there")
     assert fleet.run() == [("Alice", "cancelled", 0)]

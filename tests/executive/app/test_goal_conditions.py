@@ -1,6 +1,7 @@
 """The goal conditions of missions, and what the referee is told of them."""
 
-import dataclasses
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +14,7 @@ from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.steps import Loop, Repeat
+from skills.files.yaml_source import read_yaml
 from skills.speak.skill import Speak as SpeakSkill
 
 
@@ -20,11 +22,25 @@ def conditions(knowledge, *texts):
     return tuple(command_goal(parse_command(text), knowledge) for text in texts)
 
 
-def test_fetch_asks_for_a_grasp_in_the_kitchen_and_a_hand_over(knowledge, make):
-    grasp, hand_over = conditions(knowledge, *make.FETCH)
-    assert (grasp.kind, grasp.classes) == (GoalKind.GRASPED, ("coke", "beer"))
-    assert {region.name for region in grasp.source} == {"counter", "shelf"}
-    assert (hand_over.kind, hand_over.classes, hand_over.person) == (GoalKind.HANDED_OVER, ("coke", "beer"), None)
+def facts_of(condition, expected):
+    """The facts of a condition that are expected, in their form in YAML."""
+    names = {key: [one.name for one in getattr(condition, key) or ()] for key in ("goal", "maybe", "source")}
+    facts = {"kind": condition.kind.name, "person": condition.person, "classes": list(condition.classes)}
+    facts |= {"goal": sorted(names["goal"]), "maybe": names["maybe"], "source": sorted(names["source"])}
+    facts |= {"rooms": names["source"], "at": expected.get("at")}
+    return {key: facts[key] for key in expected}
+
+
+CONDITIONS = read_yaml(Path(__file__).with_name("conditions.yaml")).data
+
+
+@pytest.mark.parametrize("case", CONDITIONS, ids=lambda case: case["commands"][-1])
+def test_commands_have_goal_conditions(knowledge, case):
+    found = conditions(knowledge, *case["commands"])
+    assert [*map(facts_of, found, case["conditions"])] == case["conditions"]
+    for one, expected in zip(found, case["conditions"], strict=True):
+        if "at" in expected:
+            assert (one.goal[0].contains(expected["at"]), one.goal[0].contains((-9.0, 9.0, 0.5))) == (True, False)
 
 
 def test_surface_regions_begin_at_the_top(knowledge, make):
@@ -32,52 +48,6 @@ def test_surface_regions_begin_at_the_top(knowledge, make):
     counter = next(region for region in grasp.source if region.name == "counter")
     assert (round(counter.z_min_m, 3), round(counter.z_max_m, 3)) == (0.85, 1.2)
     assert counter.contains((5.8, -1.8, 0.95))
-
-
-def test_a_room_as_goal_means_any_surface_in_it(knowledge):
-    (placed,) = conditions(knowledge, "Take [coke] to [kitchen] and do [Nothing] to [Nothing]")
-    assert (placed.kind, {region.name for region in placed.goal}) == (GoalKind.PLACED, {"counter", "shelf"})
-
-
-# room asked for  who       the person of the condition  its rooms, the usual one first
-@pytest.mark.parametrize(
-    ("goal", "who", "person", "rooms"),
-    [
-        ("kitchen", "person", None, ["kitchen"]),
-        ("kitchen", "Sam", "Sam", ["kitchen"]),
-        ("Nothing", "Sam", "Sam", ["bathroom", "kitchen", "bedroom", "hall"]),
-    ],
-)
-def test_a_question_about_people_asks_for_them_in_rooms(knowledge, goal, who, person, rooms):
-    (asked,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [find] to [{who}]")
-    assert (asked.kind, asked.classes, asked.person) == (GoalKind.ANSWERED, ("person",), person)
-    assert [region.name for region in asked.source] == rooms
-
-
-@pytest.mark.parametrize(("goal", "floors"), [("kitchen", ["the floor of the kitchen"]), ("counter", [])])
-def test_a_question_about_a_room_may_count_what_lies_on_its_floor(knowledge, goal, floors):
-    (asked,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [find] to [coke]")
-    assert [region.name for region in asked.maybe] == floors
-
-
-def test_a_person_is_named(knowledge):
-    (condition,) = conditions(knowledge, "Take [coke] to [Sam] and do [Nothing] to [Nothing]")
-    assert (condition.kind, condition.person) == (GoalKind.HANDED_OVER, "Sam")
-
-
-def test_going_to_a_person_asks_for_that_person(knowledge):
-    (condition,) = conditions(knowledge, "Take [Nothing] to [Sam] and do [Nothing] to [Nothing]")
-    assert (condition.kind, condition.person) == (GoalKind.MET, "Sam")
-
-
-@pytest.mark.parametrize(
-    ("goal", "point"), [("kitchen", (5.9, -1.9, 0.5)), ("counter", (4.5, -1.0, 0.5)), ("start", (0, 0, 0.5))]
-)
-def test_going_asks_for_the_body_there(knowledge, goal, point):
-    (condition,) = conditions(knowledge, f"Take [Nothing] to [{goal}] and do [Nothing] to [Nothing]")
-    assert condition.kind is GoalKind.WENT
-    assert condition.goal[0].contains(point)
-    assert not condition.goal[0].contains((-9.0, 9.0, 0.5))
 
 
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"
@@ -185,23 +155,18 @@ def test_a_mission_that_failed_is_never_fulfilled(verdict_on, script):
 
 @pytest.fixture
 def spoken(knowledge, registry, run_tree):
-    """The verdict on steps that say something, with the real skill; `forgets`: what was said is not on record."""
+    """The verdict on steps that speak with the real skill, and what was judged; `heard` changes what was said."""
 
-    def after_running(*steps, forgets=False):
-        tree = compile_mission(
-            Mission(name="tell", robot="Alice", steps=steps),
-            knowledge=knowledge,
-            registry={**registry, "speak": SpeakSkill},
-        )
-        result = run_tree(tree).worst
-        asked = []
+    def after_running(*steps, heard=lambda said: said, **variables):
+        mission = Mission(name="tell", robot="Alice", steps=steps, **variables)
+        tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
+        result, asked = run_tree(tree).worst, []
 
         def judge(given):
             asked.extend(given)
             return RefereeReport(True if given else None, "", 0, 0)
 
-        verdict = verdict_of(tree, dataclasses.replace(result, said=()) if forgets else result, judge)
-        return verdict, asked
+        return verdict_of(tree, replace(result, said=tuple(heard(result.said))), judge), asked
 
     return after_running
 
@@ -215,39 +180,25 @@ def test_speech_does_not_end_the_condition_on_the_robots_place(spoken):
     assert [(one.kind, one.when) for one in asked] == [(GoalKind.WENT, When.END_OF_MISSION)]
 
 
-@pytest.mark.parametrize("block", [HELLO, Speak(speak="Hello")])
-def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block):
-    verdict, _ = spoken(Repeat(loop=Loop(times=2), steps=(block,)))
-    assert (verdict.success, verdict.why) == (True, 'It said "Hello".')
-    verdict, _ = spoken(Repeat(loop=Loop(times=2), steps=(block,)), forgets=True)
-    assert (verdict.success, verdict.why) == (False, 'It did not say "Hello".')
+def each_with(**facts):
+    return lambda said: [replace(one, **facts) for one in said]
 
 
-# Was "Hello" a question that was asked while a step was to say it? Then the step has not said it.
-@pytest.mark.parametrize("asked", [False, True])
-def test_a_question_does_not_count_as_the_text_of_a_step(knowledge, registry, run_tree, asked):
-    mission = Mission(name="tell", robot="Alice", steps=(HELLO,))
-    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
-    result = run_tree(tree).worst
-    heard = dataclasses.replace(result, said=tuple(dataclasses.replace(each, asked=asked) for each in result.said))
-    verdict = verdict_of(tree, heard, lambda given: RefereeReport(None, "", 0, 0))
-    assert verdict.success is not asked
+TWICE = [Repeat(loop=Loop(times=2), steps=(block,)) for block in (HELLO, Speak(speak="Hello"))]
+# What is to be said, what becomes of what was said, and the verdict.
+SPEECH = [
+    ((TWICE[0],), list, True, 'It said "Hello".'),
+    ((TWICE[0],), lambda said: (), False, 'It did not say "Hello".'),
+    ((TWICE[1],), list, True, 'It said "Hello".'),
+    ((TWICE[1],), lambda said: (), False, 'It did not say "Hello".'),
+    ((HELLO,), each_with(asked=False), True, 'It said "Hello".'),
+    ((HELLO,), each_with(asked=True), False, 'It did not say "Hello".'),
+    ((HELLO,), each_with(silent="bedroom"), True, 'It showed "Hello" in the silent zone bedroom.'),
+    ((HELLO, Speak(speak="{n}")), lambda said: said[:1], False, 'It said "Hello". It did not say "{n}".'),
+]
 
 
-def test_a_text_shown_in_a_silent_zone_counts_and_the_verdict_says_so(knowledge, registry, run_tree):
-    mission = Mission(name="tell", robot="Alice", steps=(HELLO,))
-    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
-    result = run_tree(tree).worst
-    shown = dataclasses.replace(result, said=tuple(dataclasses.replace(one, silent="bedroom") for one in result.said))
-    verdict = verdict_of(tree, shown, lambda given: RefereeReport(None, "", 0, 0))
-    assert (verdict.success, verdict.why) == (True, 'It showed "Hello" in the silent zone bedroom.')
-
-
-def test_one_sentence_counts_for_one_step(knowledge, registry, run_tree):
-    anything = Speak(speak="{n}")
-    mission = Mission(name="tell", robot="Alice", steps=(HELLO, anything), variables={"n": 1})
-    tree = compile_mission(mission, knowledge=knowledge, registry={**registry, "speak": SpeakSkill})
-    result = run_tree(tree).worst
-    heard = dataclasses.replace(result, said=result.said[:1])
-    verdict = verdict_of(tree, heard, lambda given: RefereeReport(None, "", 0, 0))
-    assert (verdict.success, verdict.why) == (False, 'It said "Hello". It did not say "{n}".')
+@pytest.mark.parametrize(("steps", "heard", "success", "why"), SPEECH)
+def test_steps_that_speak_are_judged_by_what_was_said_and_a_question_does_not_count(spoken, steps, heard, success, why):
+    verdict, _ = spoken(*steps, heard=heard, variables={"n": 1})
+    assert (verdict.success, verdict.why) == (success, why)

@@ -62,37 +62,29 @@ def before_the_table():
     return robot, pick
 
 
-def test_the_can_at_a_point_is_picked_up(before_the_table):
+def is_stuck(*_):
+    raise SkillFailure(Cause.PLANNING, "no free path was found for the arm")
+    yield
+
+
+ANY, NONE = (lambda R_OH: True), (lambda R_OH: False)
+# Whether the can is there and can be carried; the point, and how the hand may turn -> is it held, had it a plan?
+PICKS = [
+    (True, True, (0.90, 0.0, 0.80), ANY, True, True),
+    (True, True, (0.90, 0.0, 0.80), NONE, False, False),
+    (False, True, (0.90, 0.3, 0.76), ANY, False, True),
+    (True, False, (0.90, 0.0, 0.80), ANY, True, True),
+]
+
+
+@pytest.mark.parametrize(("there", "carried", "point_O", "allows", "holds", "planned"), PICKS)
+def test_an_object_at_a_point_is_picked_up_where_that_is_allowed(
+    before_the_table, monkeypatch, there, carried, point_O, allows, holds, planned
+):
     robot, pick = before_the_table
-    _, held = pick((0.90, 0.0, 0.80))
-    assert held
-    assert robot.held == TABLE_CAN
-
-
-def test_a_hand_that_may_turn_nowhere_has_no_plan(before_the_table):
-    robot, pick = before_the_table
-    picker, held = pick((0.90, 0.0, 0.80), lambda R_OH: False)
-    assert held is False
-    assert picker.no_plan
-    assert robot.held is None
-
-
-def test_a_point_without_an_object_is_no_grasp_and_no_lack_of_a_plan(before_the_table):
-    robot, pick = before_the_table
-    robot.blocks.remove(TABLE_CAN)
-    picker, held = pick((0.90, 0.3, 0.76))
-    assert held is False
-    assert not picker.no_plan
-
-
-def test_an_object_that_is_held_but_not_carried_counts_as_picked(before_the_table, monkeypatch):
-    def fail(*_):
-        raise SkillFailure(Cause.PLANNING, "no free path was found for the arm")
-        yield
-
-    monkeypatch.setattr(Grasp, "_carry", fail)
-    robot, pick = before_the_table
-    picker, held = pick((0.90, 0.0, 0.80))
-    assert held
-    assert not picker.no_plan
-    assert robot.held == TABLE_CAN
+    if not there:
+        robot.blocks.remove(TABLE_CAN)
+    if not carried:
+        monkeypatch.setattr(Grasp, "_carry", is_stuck)
+    picker, held = pick(point_O, allows)
+    assert (held, not picker.no_plan, robot.held) == (holds, planned, TABLE_CAN if holds else None)

@@ -28,10 +28,19 @@ def refused(file):
     return error.value.message
 
 
-@pytest.mark.parametrize("ending", [".png", ".bmp", ".tiff"])
-def test_colour_is_read_as_rgb(tmp_path, ending):
-    picture = noise(30, 40, 3)
-    assert np.array_equal(read_picture(written(tmp_path / f"a{ending}", picture[:, :, ::-1])), picture)
+# What is written under which name -> what is read.
+READ = [
+    *((f"a{ending}", noise(30, 40, 3), lambda picture: picture[:, :, ::-1]) for ending in (".png", ".bmp", ".tiff")),
+    ("grey.png", noise(30, 40), lambda picture: np.repeat(picture[:, :, None], 3, axis=2)),
+    ("long.png", np.zeros((10, 20_000), np.uint8), lambda picture: np.zeros((10, 20_000, 3), np.uint8)),
+    ("one.png", np.zeros((1, 1), np.uint8), lambda picture: np.zeros((1, 1, 3), np.uint8)),
+    ("transparent.png", noise(30, 40, 4), lambda picture: picture[:, :, 2::-1]),
+]
+
+
+@pytest.mark.parametrize(("name", "picture", "read"), READ, ids=[name for name, *_ in READ])
+def test_a_picture_is_read_as_rgb(tmp_path, name, picture, read):
+    assert np.array_equal(read_picture(written(tmp_path / name, picture)), read(picture))
 
 
 @pytest.mark.parametrize("ending", [".jpg", ".webp"])
@@ -41,25 +50,10 @@ def test_lossy_forms_are_read(tmp_path, ending):
     assert np.abs(read.astype(int) - picture).max() < 12
 
 
-def test_grey_is_the_same_in_all_channels(tmp_path):
-    picture = noise(30, 40)
-    read = read_picture(written(tmp_path / "a.png", picture))
-    assert np.array_equal(read, np.repeat(picture[:, :, None], 3, axis=2))
-
-
-def test_transparency_is_dropped(tmp_path):
-    picture = noise(30, 40, 4)
-    assert np.array_equal(read_picture(written(tmp_path / "a.png", picture)), picture[:, :, 2::-1])
-
-
 def test_sixteen_bits_become_eight(tmp_path):
     picture = noise(30, 40, 3, dtype=np.uint16)
     read = read_picture(written(tmp_path / "a.png", picture))
     assert np.abs(read[:, :, ::-1].astype(int) - picture / 257).max() <= 1
-
-
-def test_a_picture_of_one_pixel_is_read(tmp_path):
-    assert read_picture(written(tmp_path / "a.png", np.zeros((1, 1), np.uint8))).shape == (1, 1, 3)
 
 
 @pytest.mark.parametrize("ending", [".png", ".jpg", ".bmp", ".tiff", ".webp"])
@@ -73,21 +67,23 @@ def test_a_wrong_byte_is_damage(tmp_path, capfd):
     content = bytearray(written(tmp_path / "a.png", noise(100, 100, 3)).read_bytes())
     content[len(content) // 2] ^= 255
     (tmp_path / "a.png").write_bytes(content)
-    assert refused(tmp_path / "a.png") == "the picture is damaged or cut off"
-    assert capfd.readouterr().err == ""
+    assert (refused(tmp_path / "a.png"), capfd.readouterr().err) == ("the picture is damaged or cut off", "")
 
 
-@pytest.mark.parametrize("name", ["a.txt", "a.png"])
-def test_a_text_is_no_picture(tmp_path, name):
-    (tmp_path / name).write_text("a thousand words")
-    assert refused(tmp_path / name) == "it is no picture"
+# What lies there -> what the refusal says.
+NO_PICTURES = [
+    ("a.png", lambda file: file.touch(), "it is empty"),
+    ("a.png", lambda file: file.write_text("a thousand words"), "it is no picture"),
+    ("a.txt", lambda file: file.write_text("a thousand words"), "it is no picture"),
+    ("b", lambda file: file.mkdir(), "it is a folder"),
+    ("b.png", lambda file: None, "there is no such file"),
+]
 
 
-def test_empty_missing_and_folder(tmp_path):
-    (tmp_path / "a.png").touch()
-    assert refused(tmp_path / "a.png") == "it is empty"
-    assert "no such file" in refused(tmp_path / "b.png")
-    assert refused(tmp_path) == "it is a folder"
+@pytest.mark.parametrize(("name", "put", "says"), NO_PICTURES)
+def test_a_file_without_a_picture_is_refused(tmp_path, name, put, says):
+    put(tmp_path / name)
+    assert refused(tmp_path / name) == says
 
 
 def chunk(kind, data):
@@ -105,10 +101,6 @@ def test_a_jpeg_that_would_fill_the_memory_is_refused_by_its_head(tmp_path):
     size = struct.pack(">HH", 16, 16)
     (tmp_path / "a.jpg").write_bytes(content.replace(size, struct.pack(">HH", 30_000, 40_000), 1))
     assert "40000 x 30000 pixels" in refused(tmp_path / "a.jpg")
-
-
-def test_a_long_picture_is_read(tmp_path):
-    assert read_picture(written(tmp_path / "a.png", np.zeros((10, 20_000), np.uint8))).shape == (10, 20_000, 3)
 
 
 def test_a_written_picture_is_read_again(tmp_path):

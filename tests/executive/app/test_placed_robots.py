@@ -47,6 +47,7 @@ REFUSED = [
     ((RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot", start=Pose2D(9.5, 4.05, 0.0))), "overlap"),
     ((RobotConfig("Alice", "spot", start=Pose2D(50.0, 50.0, 0.0)),), "stands in an obstacle"),
     ((RobotConfig("Alice", "spot", dock="moon"),), "is no place"),
+    ([RobotConfig(f"Robot {number}", "spot") for number in range(60)], "no free place"),
 ]
 
 
@@ -54,11 +55,6 @@ REFUSED = [
 def test_a_start_or_dock_that_cannot_be_is_refused(setups, words):
     with pytest.raises(InputError, match=words):
         placed_robots(WORLD, KNOWN, setups)
-
-
-def test_a_robot_without_a_free_place_is_refused():
-    with pytest.raises(InputError, match="no free place"):
-        placed_robots(WORLD, KNOWN, [RobotConfig(f"Robot {number}", "spot") for number in range(60)])
 
 
 def test_a_robot_knows_its_own_name_start_and_dock_and_the_names_of_the_others():

@@ -1,5 +1,6 @@
 """What several robots are asked for becomes a mission for each."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -11,37 +12,25 @@ from executive.cli.run_command import refuse_unaddressed
 from executive.mission.request import Request
 from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 
-TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
+MEANT = read_yaml(Path(__file__).with_name("sentences_to_robots.yaml")).data
 
-# Sentence, and the commands of each robot.
-MEANT = [
-    ("Hey Bob, go to the kitchen", {"Bob": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"]}),
-    (
-        "Alice, go to the kitchen, and Bob, go to the office",
-        {
-            "Alice": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"],
-            "Bob": ["Take [Nothing] to [office] and do [Nothing] to [Nothing]"],
-        },
-    ),
-    (
-        "Hey everyone, go to the kitchen",
-        {
-            "Alice": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"],
-            "Bob": ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"],
-        },
-    ),
-]
+TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
 
 
 def asked(sentence, robots=TWO):
     return prepare(Request(sentence, robots=robots), ask=None)
 
 
-@pytest.mark.parametrize(("sentence", "expected"), MEANT)
-def test_each_robot_that_is_meant_gets_its_part(sentence, expected):
+@pytest.mark.parametrize(("sentence", "goals"), MEANT.items())
+def test_each_robot_that_is_meant_gets_its_part(sentence, goals):
     prepared = asked(sentence)
+    expected = {
+        name: [f"Take [Nothing] to [{goal}] and do [Nothing] to [Nothing]" for goal in each]
+        for name, each in goals.items()
+    }
     assert {each.mission.robot_name: [*map(str, each.tree.commands)] for each in prepared.all} == expected
 
 
@@ -170,24 +159,15 @@ def test_any_of_the_robots_of_the_option_may_be_called():
     refuse_unaddressed(Request("Hey Bob, go to the kitchen", require_wake=True, robots=robots))
 
 
-# What is changed in the file with parts; the line, and what is told.
-REFUSED = [
-    ("bob:\n    after", "carl:\n    after", 6, "'carl' is no robot of this run"),
-    ("after: alice", "after: carl", 7, "'carl' has no part to wait for"),
-    ("after: alice", "after: bob", 7, "Bob would wait for itself"),
-    ("alice:\n    steps", "alice:\n    after: bob\n    steps", 10, "Alice and Bob would wait for each other"),
-    ("bob: fetch", "bob: {kind: fetch, at: [9.5, 4.05, 0]}", 4, "the starts of Bob and Alice overlap"),
-    ("bob: fetch", "bob: {kind: fetch, dock: moon}", 4, "the dock of Bob, 'moon', is no place"),
-    ("to: kitchen", "to: kichen", 10, "did you mean 'kitchen'?"),
-]
+REFUSED = read_yaml(Path(__file__).with_name("refused_parts.yaml")).data
 
 
-@pytest.mark.parametrize(("said", "instead", "line", "words"), REFUSED)
-def test_errors_in_the_robots_of_a_file_name_their_line(asked_file, said, instead, line, words):
-    assert said in PARTS
-    with pytest.raises(InputError) as error:
-        asked_file(PARTS.replace(said, instead))
-    assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
+@pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])
+def test_errors_in_the_robots_of_a_file_name_their_line(asked_file, case):
+    assert case["old"] in PARTS
+    with pytest.raises(InputError, match=re.escape(case["message"])) as error:
+        asked_file(PARTS.replace(case["old"], case["new"]))
+    assert error.value.line == case["line"]
 
 
 def test_all_parts_that_are_wrong_are_told_at_once(asked_file):

@@ -15,15 +15,7 @@ from typer.testing import CliRunner
 
 from executive.app import queue_server as listeners_module
 from executive.app.prepare import prepare
-from executive.app.queue_server import (
-    MOST_STARTS,
-    CallAddress,
-    CallToken,
-    Listeners,
-    QueueServer,
-    TriggerCalls,
-    call_token,
-)
+from executive.app.queue_server import CallAddress, CallToken, Listeners, QueueServer, TriggerCalls, call_token
 from executive.app.runs import MissionResult
 from executive.cli.entry import app
 from executive.mission.request import Request
@@ -33,6 +25,7 @@ from executive.store.standing_missions import MOST_WAITING, StandingMissions
 from executive.store.triggers import Missed, OnCall, OnTopic, trigger_of
 from executive.view.serving import CallError
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 
 TOKEN = "a-token-of-the-test"
 
@@ -91,8 +84,18 @@ def world():
 
 
 @pytest.fixture
-def store(tmp_path, world):
-    with MissionStore(tmp_path / "missions.sqlite", now=lambda: world.now) as store:
+def lines():
+    return []
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "missions.sqlite"
+
+
+@pytest.fixture
+def store(path, world):
+    with MissionStore(path, now=lambda: world.now) as store:
         world.store = store
         yield store
 
@@ -113,52 +116,41 @@ def server(store, standing, world, lines, followed):
     return QueueServer(store, standing, world, world, follow=follow, tell=lines.append)
 
 
+def queue_two(store):
+    for _ in range(2):
+        store.add(REQUEST, queued=True)
+
+
 def states(store):
     return [each.state.value for each in store.missions() if each.state is not MissionState.STANDING]
 
 
-def test_the_server_waits_until_a_mission_is_due_and_runs_it(server, standing, world, lines):
-    standing.add(REQUEST, trigger_of("every day 09:00"))
-    standing.add(REQUEST, trigger_of("every 40m"))
-    server.serve(end=START + 1.5 * HOUR)
-    assert world.runs == [
-        ("08:40", 3, "every 40m, due 2026-11-24 08:40"),
-        ("09:00", 4, "every day 09:00, due 2026-11-24 09:00"),
-        ("09:20", 5, "every 40m, due 2026-11-24 09:20"),
-    ]
-    assert world.waits == [START + timedelta(minutes=minutes) for minutes in (40, 60, 80, 90)]
-    assert lines[0] == "Mission 3 is queued: go kitchen (every 40m, due 2026-11-24 08:40)"
+SERVERS = read_yaml(Path(__file__).with_name("servers.yaml")).data
+
+
+@pytest.mark.parametrize("case", SERVERS, ids=lambda case: case["name"])
+def test_the_server_runs_what_is_queued_and_due(server, store, standing, world, lines, case):
+    for trigger in case.get("stand", []):
+        standing.add(REQUEST, trigger_of(trigger), Missed(case.get("missed", "skip")))
+    for _ in range(case.get("queue", 0)):
+        store.add(REQUEST, queued=True)
+    for number in case.get("interrupted", []):
+        store.begin(number)
+    world.takes, world.now = timedelta(minutes=case.get("takes", 0)), START + timedelta(minutes=case.get("late", 0))
+    end = START + timedelta(minutes=case["minutes"]) if "minutes" in case else None
+    results = server.serve(end=end, until_idle=end is None)
+    found = {"runs": [list(run) for run in world.runs], "states": states(store), "line": lines[0] if lines else None}
+    found |= {"begun": [begun for begun, *_ in world.runs], "ran": [number for _, number, _ in world.runs]}
+    found |= {"outcomes": [[each.mission, each.outcome, each.achieved] for each in results]}
+    found |= {"waits": [(until - START) / timedelta(minutes=1) for until in world.waits]}
+    found |= {"message": store.mission(1).message}
+    assert found == found | {key: value for key, value in case.items() if key in found}
 
 
 def test_the_server_runs_queued_missions_and_later_ones(server, store, world):
     store.add(REQUEST, queued=True)
     world.meanwhile = [lambda: store.add(REQUEST, queued=True), lambda: server.stop("enough")]
     assert [each.mission for each in server.serve()] == [1, 2]
-
-
-def test_until_idle_it_ends_when_nothing_is_queued(server, store, standing, world):
-    standing.add(REQUEST, trigger_of("every 1h"))
-    store.add(REQUEST, queued=True)
-    store.add(REQUEST, queued=True)
-    assert server.serve(until_idle=True) == [MissionResult(2, "success", True), MissionResult(3, "success", True)]
-    assert world.waits == []
-
-
-@pytest.mark.parametrize(("missed", "expected"), [(Missed.SKIP, ["08:10", "08:40"]), (Missed.ONCE, ["08:10", "08:35"])])
-def test_times_during_a_mission_count_as_missed(server, standing, world, missed, expected):
-    """Missions take 25 minutes: 08:20 and 08:30 pass while that of 08:10 runs."""
-    world.takes = timedelta(minutes=25)
-    standing.add(REQUEST, trigger_of("every 10m"), missed)
-    server.serve(end=START + HOUR)
-    assert [begun for begun, *_ in world.runs] == expected
-
-
-@pytest.mark.parametrize(("missed", "runs"), [(Missed.SKIP, 0), (Missed.ONCE, 1)])
-def test_times_before_the_servers_start_count_as_missed(server, standing, world, missed, runs):
-    standing.add(REQUEST, trigger_of("every 10m"), missed)
-    world.now += 5 * HOUR
-    server.serve(until_idle=True)
-    assert len(world.runs) == runs
 
 
 def test_a_server_that_is_killed_between_firing_and_running_runs_it_when_it_is_started_again(
@@ -177,22 +169,6 @@ def test_a_server_that_is_killed_between_firing_and_running_runs_it_when_it_is_s
     assert world.runs == [("10:00", 2, "every day 09:00, due 2026-11-24 09:00")]
 
 
-def test_an_interrupted_mission_is_resumed_first(server, store, world):
-    store.add(REQUEST, queued=True)
-    store.begin(store.add(REQUEST, queued=True).id)
-    server.serve(until_idle=True)
-    assert [number for _, number, _ in world.runs] == [2, 1]
-
-
-def test_a_mission_that_ends_the_process_each_time_is_set_aside_and_the_next_one_runs(server, store, world):
-    store.add(REQUEST, queued=True)
-    store.add(REQUEST, queued=True)
-    for _ in range(MOST_STARTS):
-        store.begin(1)
-    assert [each.outcome for each in server.serve(until_idle=True)] == ["error", "success"]
-    assert store.mission(1).message == "it was started 3 times and interrupted"
-
-
 def test_an_interrupted_run_is_left_to_the_user(server, store, world):
     store.begin(store.add(REQUEST, queued=False).id)
     with pytest.raises(InputError, match=r"mission 1 \(go kitchen\) was interrupted; `errand resume`"):
@@ -201,17 +177,10 @@ def test_an_interrupted_run_is_left_to_the_user(server, store, world):
 
 
 def test_stopping_the_server_cancels_the_mission_and_keeps_the_queue(server, store, world):
-    store.add(REQUEST, queued=True), store.add(REQUEST, queued=True)
+    queue_two(store)
     world.during = [lambda: server.stop("cancelled by SIGTERM")]
     assert len(server.serve()) == 1
     assert (world.cancelled, states(store)) == ("cancelled by SIGTERM", ["success", "queued"])
-
-
-def test_after_its_time_no_mission_begins(server, store, world):
-    world.takes = HOUR
-    store.add(REQUEST, queued=True), store.add(REQUEST, queued=True)
-    server.serve(end=START + timedelta(minutes=1))
-    assert states(store) == ["success", "queued"]
 
 
 def test_a_battery_that_a_mission_has_charged_fires_at_its_end(server, store, standing, world):
@@ -291,18 +260,8 @@ def sources(monkeypatch, notes):
 
 
 @pytest.fixture
-def lines():
-    return []
-
-
-@pytest.fixture
-def path(tmp_path):
-    return tmp_path / "missions.sqlite"
-
-
-@pytest.fixture
-def listeners(tmp_path, lines, sources):
-    with Listeners(tmp_path / "missions.sqlite", CallAddress(port=0, token=TOKEN), lines.append) as listeners:
+def listeners(path, lines, sources):
+    with Listeners(path, CallAddress(port=0, token=TOKEN), lines.append) as listeners:
         yield listeners
 
 
@@ -326,27 +285,23 @@ def test_the_port_is_open_only_while_a_mission_waits_for_a_call(listeners, lines
         status(port)
 
 
-def test_a_token_that_is_made_is_told_once(tmp_path, lines, sources):
+def test_a_token_that_is_made_is_told_once(path, lines, sources):
     for _ in range(2):
-        with Listeners(tmp_path / "missions.sqlite", CallAddress(port=0), lines.append) as listeners:
+        with Listeners(path, CallAddress(port=0), lines.append) as listeners:
             listeners.follow([OnCall("x")])
-    token = (tmp_path / "missions.sqlite-token").read_text().strip()
+    token = path.with_name("missions.sqlite-token").read_text().strip()
     assert [token in line for line in lines] == [False, True, False, False]
 
 
-def test_a_plug_in_hears_the_topics_that_missions_wait_for(listeners, notes):
+def test_a_plug_in_hears_the_topics_that_missions_wait_for(listeners, notes, sources, lines):
     listeners.follow([OnTopic("bell", "a"), OnTopic("bell", "b"), OnTopic("bell", "a")])
     listeners.follow([OnTopic("bell", "a"), OnTopic("bell", "b")])
     assert notes == [("start", "a", "b")]
+    sources[0].fire("a", b"")
+    assert lines[0].startswith("topic bell:a: ")  # there is no store
     listeners.follow([OnTopic("bell", "b")])
     listeners.follow([])
     assert notes == [("start", "a", "b"), ("stop",), ("start", "b"), ("stop",)]
-
-
-def test_a_plug_in_queues_only_missions_of_its_kind(listeners, sources, lines):
-    listeners.follow([OnTopic("bell", "a")])
-    sources[0].fire("a", b"")
-    assert lines[0].startswith("topic bell:a: ")  # there is no store
 
 
 def test_a_missing_plug_in_is_told_once_and_others_go_on(listeners, notes, lines):
@@ -367,7 +322,7 @@ def test_a_plug_in_that_does_not_start_is_named(listeners, lines, monkeypatch):
     assert "'bell' does not start (ConnectionError: no broker)" in lines[0]
 
 
-def test_a_plug_in_that_hangs_at_its_start_is_named_and_not_asked_again(tmp_path, sources, lines, monkeypatch):
+def test_a_plug_in_that_hangs_at_its_start_is_named_and_not_asked_again(path, sources, lines, monkeypatch):
     asked, over, stopped = [], threading.Event(), threading.Event()
 
     def start(self, topics, fire):
@@ -377,7 +332,7 @@ def test_a_plug_in_that_hangs_at_its_start_is_named_and_not_asked_again(tmp_path
 
     monkeypatch.setattr(Source, "start", start)
     monkeypatch.setattr(Source, "stop", lambda self: stopped.set())
-    with Listeners(tmp_path / "missions.sqlite", CallAddress(port=0), lines.append, limit_s=0.1) as hearing:
+    with Listeners(path, CallAddress(port=0), lines.append, limit_s=0.1) as hearing:
         hearing.follow([OnTopic("bell", "a")])
         hearing.follow([OnTopic("bell", "a")])
         assert (len(asked), len(lines)) == (1, 1)
@@ -385,12 +340,6 @@ def test_a_plug_in_that_hangs_at_its_start_is_named_and_not_asked_again(tmp_path
         over.set()
         assert stopped.wait(10)
     assert len(lines) == 1
-
-
-@pytest.mark.parametrize("host", ["", "a b", "x" * 300, "[::1]", "h\u00f6st", "..", "-"])
-def test_a_bad_host_is_refused_with_its_option(host, tmp_path, lines):
-    with pytest.raises(InputError, match="--host"):
-        Listeners(tmp_path / "m", CallAddress(host, 0, TOKEN), lines.append).follow([OnCall("beer")])
 
 
 def test_a_plug_in_that_does_not_stop_is_named_and_the_others_stop(listeners, notes, lines, monkeypatch):
@@ -407,28 +356,26 @@ def test_a_plug_in_that_does_not_stop_is_named_and_the_others_stop(listeners, no
     assert lines[0] == "trigger source 'bell' does not stop (ConnectionError: gone already)"
 
 
-@pytest.mark.parametrize("host", ["192.0.2.1", "no-host-at-all", "::ffff:zz"])
-def test_an_address_that_cannot_be_served_is_refused(tmp_path, lines, host):
-    with (
-        pytest.raises(InputError, match=f"cannot serve calls at {host} port 0 .*; name another --host or --port"),
-        Listeners(tmp_path / "missions.sqlite", CallAddress(host, 0, TOKEN), lines.append) as listeners,
-    ):
-        listeners.follow([OnCall("x")])
+UNSERVED = ("192.0.2.1", "no-host-at-all", "::ffff:zz")
+BAD_HOSTS = {host: f"cannot serve calls at {host} port 0 .*; name another --host or --port" for host in UNSERVED}
+BAD_HOSTS |= dict.fromkeys(("", "a b", "x" * 300, "[::1]", "h\u00f6st", "..", "-"), "--host")
 
 
-def test_a_token_is_made_once_and_kept_for_its_owner_only(path):
+@pytest.mark.parametrize("host", BAD_HOSTS)
+def test_an_address_that_cannot_be_served_is_refused_with_its_option(path, lines, host):
+    with pytest.raises(InputError, match=BAD_HOSTS[host]):
+        Listeners(path, CallAddress(host, 0, TOKEN), lines.append).follow([OnCall("x")])
+
+
+def test_a_token_of_a_store_is_made_once_and_kept_for_its_owner_only(path):
     made = call_token(None, path)
     assert (made.new, len(made.text) >= 32, stat.S_IMODE(made.file.stat().st_mode)) == (True, True, 0o600)
     assert call_token(None, path) == CallToken(made.text, made.file)
-
-
-def test_each_store_has_a_token_of_its_own(path):
-    assert call_token(None, path).text != call_token(None, path.with_name("other.sqlite")).text
+    assert call_token(None, path.with_name("other.sqlite")).text != made.text
 
 
 def test_a_token_that_is_given_is_kept_nowhere(path):
-    assert call_token("given-by-hand", path) == CallToken("given-by-hand")
-    assert list(path.parent.iterdir()) == []
+    assert (call_token("given-by-hand", path), list(path.parent.iterdir())) == (CallToken("given-by-hand"), [])
 
 
 @pytest.mark.parametrize("given", ["", "short", "two words here", "line\nbreak-in-it", "ümlauts-in-it"])
@@ -437,16 +384,16 @@ def test_a_token_that_no_header_bears_is_refused(path, given):
         call_token(given, path)
 
 
-def test_a_token_that_others_can_read_is_refused(path):
-    made = call_token(None, path)
-    made.file.chmod(0o640)
-    with pytest.raises(InputError, match="other users can read the token; chmod 600"):
-        call_token(None, path)
-
-
-def test_an_empty_file_is_refused(path):
-    call_token(None, path).file.write_text("")
-    with pytest.raises(InputError, match="cannot be used"):
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda file: file.chmod(0o640), "other users can read the token; chmod 600"),
+        (lambda file: file.write_text(""), "cannot be used"),
+    ],
+)
+def test_a_file_of_a_token_that_others_can_read_or_that_is_empty_is_refused(path, spoil, says):
+    spoil(call_token(None, path).file)
+    with pytest.raises(InputError, match=says):
         call_token(None, path)
 
 
@@ -538,26 +485,23 @@ def test_values_that_do_not_fit_are_refused_and_nothing_is_queued(calls, stand, 
     assert (refusal.value.status, queued()) == (400, [])
 
 
-def test_a_name_that_nothing_waits_for_is_not_found(calls, stand):
-    stand("call a")
-    with pytest.raises(CallError, match="no standing mission waits for 'call b'") as refusal:
-        calls.called("b", b"")
-    assert refusal.value.status == 404
+# The missions that stand by, the call, how often it was made before -> the status and the words of the refusal.
+REFUSED_CALLS = [
+    ([], "a", 0, 503, "there is no store"),
+    (["call a"], "a", MOST_WAITING, 429, "wait already"),
+    (["call a"], "b", 0, 404, "no standing mission waits for 'call b'"),
+]
 
 
-def test_too_many_calls_are_told_to_come_later(calls, stand):
-    stand("call a")
-    for _ in range(MOST_WAITING):
-        calls.called("a", b"")
-    with pytest.raises(CallError, match="wait already") as refusal:
-        calls.called("a", b"")
-    assert refusal.value.status == 429
-
-
-def test_a_store_that_cannot_be_used_is_no_fault_of_the_caller(calls):
-    with pytest.raises(CallError, match="there is no store") as refusal:
-        calls.called("a", b"")
-    assert refusal.value.status == 503
+@pytest.mark.parametrize(("triggers", "name", "before", "status", "says"), REFUSED_CALLS)
+def test_a_call_that_nothing_can_take_is_refused_with_its_status(calls, stand, triggers, name, before, status, says):
+    if triggers:
+        stand(*triggers)
+    for _ in range(before):
+        calls.called(name, b"")
+    with pytest.raises(CallError, match=says) as refusal:
+        calls.called(name, b"")
+    assert refusal.value.status == status
 
 
 def test_a_message_queues_what_waits_for_its_topic(calls, stand, queued):

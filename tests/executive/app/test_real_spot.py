@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -46,6 +47,20 @@ def serve(credentials, monkeypatch, request):
         yield SimpleNamespace(server=server, robot=robot, access=Access(address, USER, PASSWORD, power_on=True))
 
 
+@contextmanager
+def ready(serve, **changes):
+    """The connection of a robot that is made ready."""
+    with connected("Alice", replace(serve.access, **changes)) as made:
+        made.make_ready()
+        yield made
+
+
+def beat(made, times):
+    """Lets the run beat so often."""
+    for _ in range(times):
+        made.clock.advance(0.05)
+
+
 def other_client(serve):
     return Connection(serve.access.address, USER, PASSWORD)
 
@@ -66,8 +81,7 @@ def is_as_before(serve):
 
 
 def test_a_ready_robot_stands_and_is_left_as_it_was(serve):
-    with connected("Alice", serve.access) as made:
-        made.make_ready()
+    with ready(serve):
         assert serve.robot.height_m == pytest.approx(0.52, abs=0.02)
         assert (serve.server.computer.motors, holder(serve), len(policies(serve))) == (Motors.ON, "errand", 1)
     assert is_as_before(serve)
@@ -84,8 +98,7 @@ def test_motors_that_were_on_stay_on(serve):
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
 def test_an_error_ends_as_a_run_that_is_done(serve, error):
-    with pytest.raises(error), connected("Alice", serve.access) as made:
-        made.make_ready()
+    with pytest.raises(error), ready(serve):
         raise error
     assert is_as_before(serve)
 
@@ -99,12 +112,10 @@ def test_a_signal_before_the_run_ends_as_a_run_that_is_done(serve, number):
 
 
 def test_the_motors_are_switched_on_only_with_a_yes(serve):
-    access = replace(serve.access, power_on=False)
-    with pytest.raises(InputError, match="--power-on"), connected("Alice", access) as made:
-        made.make_ready()
+    with pytest.raises(InputError, match="--power-on"), ready(serve, power_on=False):
+        pass
     asked = []
-    with connected("Alice", replace(access, confirm=lambda question: asked.append(question) or True)) as made:
-        made.make_ready()
+    with ready(serve, power_on=False, confirm=lambda question: asked.append(question) or True):
         assert serve.server.computer.motors is Motors.ON
     assert "Switch them on?" in asked[0]
 
@@ -115,14 +126,11 @@ def test_a_docked_robot_leaves_its_dock_only_when_that_is_allowed(serve):
         if serve.server.computer.docked():
             break
         time.sleep(0.05)
-    with (
-        pytest.raises(InputError, match=r"stands on its dock.*--power-on"),
-        connected("Alice", replace(serve.access, power_on=False, confirm=lambda question: True)) as made,
-    ):
-        made.make_ready()
+    refused = pytest.raises(InputError, match=r"stands on its dock.*--power-on")
+    with refused, ready(serve, power_on=False, confirm=lambda question: True):
+        pass
     assert is_as_before(serve)
-    with connected("Alice", serve.access) as made:
-        made.make_ready()
+    with ready(serve):
         assert serve.robot.pose.x_m > 0.7
         assert serve.robot.height_m == pytest.approx(0.52, abs=0.02)
 
@@ -164,14 +172,12 @@ class TestOwnEstop:
     """A robot without a tablet."""
 
     def test_without_an_estop_the_robot_is_not_ready(self, serve):
-        with pytest.raises(InputError, match="--estop own"), connected("Alice", serve.access) as made:
-            made.make_ready()
+        with pytest.raises(InputError, match="--estop own"), ready(serve):
+            pass
 
     def test_our_own_is_released_while_the_run_beats_and_gone_afterwards(self, serve):
-        with connected("Alice", replace(serve.access, own_estop=True)) as made:
-            made.make_ready()
-            for _ in range(40):
-                made.clock.advance(0.05)
+        with ready(serve, own_estop=True) as made:
+            beat(made, 40)
             assert other_client(serve).estop_trouble() is None
         assert is_as_before(serve)
         assert serve.server.computer.estop._held == {}
@@ -179,32 +185,25 @@ class TestOwnEstop:
     def test_our_own_stops_a_run_that_hangs(self, serve, monkeypatch):
         monkeypatch.setattr(heartbeat, "ESTOP_S", 1.2)
         monkeypatch.setattr(heartbeat, "CUT_S", 1.6)
-        with connected("Alice", replace(serve.access, own_estop=True)) as made:
-            made.make_ready()
+        with ready(serve, own_estop=True) as made:
             time.sleep(2.0)
             assert serve.server.computer.motors is Motors.OFF
             with pytest.raises(RobotStoppedError, match="E-stop"):
                 made.clock.advance(0.05)
 
     def test_it_does_not_replace_another_while_the_motors_are_on(self, serve):
-        access = replace(serve.access, own_estop=True)
-        with connected("Alice", access) as made:
+        with ready(serve, own_estop=True) as made, pytest.raises(InputError, match="motors are on"):
             made.make_ready()
-            with pytest.raises(InputError, match="motors are on"):
-                made.make_ready()
 
     def test_a_run_whose_estop_another_program_replaces_ends_by_that_cause(self, serve):
-        with connected("Alice", replace(serve.access, own_estop=True)) as made:
-            made.make_ready()
+        with ready(serve, own_estop=True) as made:
             serve.server.computer.estop._held.clear()
             with pytest.raises(RobotStoppedError, match=r"another program has changed|E-stop is pressed"):
-                for _ in range(60):
-                    made.clock.advance(0.05)
+                beat(made, 60)
 
 
 def test_the_robot_does_not_act_alone_while_another_client_moves_it(serve):
-    with connected("Alice", serve.access) as made:
-        made.make_ready()
+    with ready(serve) as made:
         other = other_client(serve)
         other.acquire(take=True)
         assert in_time(made.clock, lambda: policies(serve) == {})
@@ -226,20 +225,17 @@ def in_time(clock, true):
 
 
 def test_a_pressed_estop_ends_the_run(serve):
-    with connected("Alice", serve.access) as made:
-        made.make_ready()
+    with ready(serve) as made:
         serve.server.computer.estop._held["tablet"].level = 1
         with pytest.raises(RobotStoppedError, match="the E-stop is pressed"):
-            for _ in range(20):
-                made.clock.advance(0.05)
+            beat(made, 20)
         assert serve.server.computer.motors is Motors.OFF
 
 
 def test_a_robot_acts_alone_when_the_run_falls_silent(serve, monkeypatch):
     monkeypatch.setattr(heartbeat, "LEASE_STALE_S", 1.5)
     monkeypatch.setattr(heartbeat, "MOTORS_OFF_S", 3.0)
-    with connected("Alice", serve.access) as made:
-        made.make_ready()
+    with ready(serve):
         time.sleep(1.8)
         other_client(serve).acquire()
         time.sleep(2.5)

@@ -159,8 +159,7 @@ def test_pictures_of_answers_from_before_a_restart_are_found_in_the_log(tmp_path
     artifacts = Artifacts()
     for _ in range(2):
         artifacts.recall(mission_events(tmp_path / "log.mcap"))
-    assert artifacts.numbers == {("alice/q", 4.0): 0}
-    assert len(artifacts.pictures) == 1
+    assert (artifacts.numbers, len(artifacts.pictures)) == ({("alice/q", 4.0): 0}, 1)
 
 
 class TwoRobots(ScriptedBackend):

@@ -64,8 +64,7 @@ def test_an_unknown_start_is_free_ground_that_the_seed_chooses():
     world = load_world("flat")
     keepout = load_grid_map(world.surveyed.keepout_map_path).with_unknown_blocked()
     poses = [stand_at(world, "unknown", seed) for seed in range(20)]
-    assert poses[3] == stand_at(world, "unknown", 3)
-    assert len(set(poses)) == 20
+    assert (poses[3], len(set(poses))) == (stand_at(world, "unknown", 3), 20)
     for seed, pose in enumerate(poses):
         here = np.array([[pose.x_m, pose.y_m]])
         assert keepout.distance_m(here)[0] > TURNING_M - 0.03

@@ -1,9 +1,5 @@
 """A request's variation in its world and plant."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 from executive.app.mission_run import mentioned_classes
 from executive.app.prepare import prepare
 from executive.mission.request import Request
@@ -13,15 +9,9 @@ from plant.worlds.seeding import place_people
 BEER = "Hey Alice, bring me a beer"
 
 
-def asked(folder: Path, variation: Variation) -> Request:
-    return Request(sentence=BEER, world="flat", seed=2, out=folder / "out", variation=variation)
-
-
-def test_clutter_spares_the_classes_that_are_asked_for(tmp_path: Path) -> None:
-    assert "beer" in mentioned_classes(prepare(asked(tmp_path, Variation(clutter=5)), ask=None))
-
-
-def test_people_of_a_variation_walk_in_the_world(tmp_path: Path) -> None:
-    prepared = prepare(asked(tmp_path, Variation(people=2)), ask=None)
+def test_clutter_spares_the_classes_that_are_asked_for_and_people_walk_in_the_world(tmp_path):
+    request = Request(BEER, world="flat", seed=2, out=tmp_path / "out", variation=Variation(clutter=5, people=2))
+    prepared = prepare(request, ask=None)
+    assert "beer" in mentioned_classes(prepared)
     walking = {each.name for each in place_people(prepared.world, 2) if each.route is not None}
     assert {"passer-by 1", "passer-by 2"} <= walking

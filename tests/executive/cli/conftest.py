@@ -1,12 +1,25 @@
 """Lets the tests here import the skills' small detector, the made speech of the speech's tests, and a backend."""
 
 import sys
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
-from executive.cli import entry
+from executive.app.evaluate import evaluation
+from executive.app.evaluate.workers import Pool
+from executive.app.evaluate.workers import WorkResult as Done
+from executive.app.mission_run import FinishedRun
+from executive.app.report import RunReport
+from executive.cli import entry, listen_command
+from executive.record.event_log import EventLog
+from executive.tree.node_view import node_view
+from executive.words.goal import RefereeReport
+from skills.testing.clock import VirtualClock
+from tests.executive.cli.calls import MAP, done, write_room
 
 sys.path[:0] = [str(Path(__file__).parents[2] / "skills"), str(Path(__file__).parents[1] / "speech")]
 sys.path.append(str(Path(__file__).parent))
@@ -18,3 +31,129 @@ def commands_are_built_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(entry, "shipped_command", cache(entry.shipped_command))
         yield
+
+
+@pytest.fixture
+def mesh(tmp_path):
+    """A box as large as a drill."""
+    trimesh = pytest.importorskip("trimesh")
+    trimesh.creation.box((0.2, 0.06, 0.04)).export(tmp_path / "drill.stl")
+    return tmp_path / "drill.stl"
+
+
+@pytest.fixture
+def drill(mesh, tmp_path):
+    """The folder of the imported drill."""
+    words = ("--name", "drill", "--mass", 1.2, "--class", "wrench", "--out", tmp_path / "drill")
+    done("object", "import", mesh, *words)
+    return tmp_path / "drill"
+
+
+@pytest.fixture
+def photographs(tmp_path):
+    """Five photographs of a box; the border cuts it in the last."""
+    folder = tmp_path / "photographs"
+    folder.mkdir()
+    for k in range(5):
+        picture = np.full((300, 300, 3), 200, np.uint8)
+        picture[90 : 300 if k == 4 else 210, 100:200] = (200, 60, 30)
+        cv2.imwrite(str(folder / f"{k}.png"), picture)
+    return folder
+
+
+@pytest.fixture
+def map_file(tmp_path):
+    """A map of a room of 6 x 5 m, turned."""
+    return write_room(tmp_path, yaw=0.3)
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Folder of a world of two rooms with a door of 0.9 m, a dock and Robin."""
+    rooms = np.full((120, 240), 0, np.uint8)
+    rooms[4:-4, 4:118] = rooms[4:-4, 122:-4] = 254
+    rooms[51:69, 118:122] = 254
+    cv2.imwrite(str(tmp_path / "room.pgm"), rooms)
+    (tmp_path / "room.yaml").write_text(MAP.format(yaw=0.0))
+    done("world", "from-map", tmp_path / "room.yaml", "--out", tmp_path / "own")
+    return tmp_path / "own"
+
+
+@pytest.fixture
+def own_table(own):
+    """The same world with a table."""
+    done("world", "add", "table", own, "table")
+    return own
+
+
+@pytest.fixture
+def two_robots(tmp_path, clock):
+    """The log of Alice and Bob, each with a tree of one node."""
+    log = EventLog(tmp_path / "log.mcap", clock, apart=True)
+    for name in ("Alice", "Bob"):
+        node = {"id": f"{name.lower()}/go", "type": "skill", "name": f"go as {name}", "children": []}
+        log("tree", {"robot": name, "root": node})
+        done = {"t": 1.0, "robot": name, "node": node["id"], "from": "RUNNING", "to": "SUCCESS", "cause": None}
+        log("transitions", {**done, "message": f"{name} is there"})
+    log("control", {"t": 1.0, "what": "pause", "message": "Bob: let me look"})
+    log.close()
+    return log.path
+
+
+@pytest.fixture
+def says(monkeypatch):
+    """Makes the recogniser hear the given texts one after another."""
+    from made_speech import LoudIsSpeech, ScriptedRecogniser
+
+    def script(*texts):
+        monkeypatch.setattr(listen_command, "load_whisper", lambda: ScriptedRecogniser(list(texts)))
+        monkeypatch.setattr(listen_command, "load_detector", LoudIsSpeech)
+
+    return script
+
+
+@pytest.fixture
+def wav(tmp_path, says):
+    """A recording in which the recogniser hears a request."""
+    from made_speech import speech_like, write_wav
+
+    says("Hey Alice, go to the kitchen.")
+    return write_wav(tmp_path / "a.wav", speech_like(0.5, 2.0, 0.5))
+
+
+class Here:
+    """Does the work in this process; the last run first."""
+
+    count = 1
+
+    def map_items(self, function, items):
+        return (Done(item, function(item)) for item in reversed(items))
+
+
+class Plant:
+    """Stands in for the plant: what was asked for, and how a run of a seed ends."""
+
+    def __init__(self):
+        self.asked = []
+        self.ends = lambda request: ("success", RefereeReport(True, "it is so", 0, 0))
+
+    def __call__(self, prepared):
+        request = prepared.request
+        self.asked.append(request)
+        EventLog(request.out / "log.mcap", VirtualClock()).close()
+        outcome, referee = self.ends(request)
+        facts = (prepared.world.name, request.seed, 9.0, 1.0, 9.0, 90, "log.mcap")
+        return FinishedRun(RunReport(outcome, None, "done", referee, (), *facts), node_view(prepared.tree.root))
+
+
+@pytest.fixture
+def plant(monkeypatch):
+    stand_in = Plant()
+
+    @contextmanager
+    def opened(_):
+        yield Here()
+
+    monkeypatch.setattr(evaluation, "run_request", stand_in)
+    monkeypatch.setattr(Pool, "opened", opened)
+    return stand_in

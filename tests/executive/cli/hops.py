@@ -12,7 +12,6 @@ import sys
 from itertools import groupby
 from pathlib import Path
 from types import CodeType, FrameType
-from typing import Any
 
 from executive.app import runs, simulated  # noqa: F401
 from executive.cli import entry, run_command, spot_command  # noqa: F401
@@ -27,7 +26,7 @@ DATA = frozenset({"Understanding", "Request", "Prepared", "StoredMission", "Miss
 MADE_OF_IT = DATA | {"Session", "RobotRun", "TreeRun"}
 
 
-def module_of(code: CodeType) -> str | None:
+def module_of(code):
     """The file of a function of the product."""
     path = Path(code.co_filename)
     if not path.is_relative_to(ROOT):
@@ -39,11 +38,11 @@ def module_of(code: CodeType) -> str | None:
 class Route:
     """The modules of the functions that were handed the request, in their order."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.modules: list[str] = []
         self._known: set[CodeType] = set()
 
-    def __call__(self, frame: FrameType, event: str, argument: Any) -> None:
+    def __call__(self, frame, event, argument):
         code = frame.f_code
         if event != "call" or code in self._known or code.co_name.startswith("<"):
             return
@@ -60,17 +59,17 @@ class Route:
             self.modules.append(module)
 
 
-def carries(value: Any) -> bool:
+def carries(value):
     """Whether a value is the sentence or what is made of it."""
     return type(value).__name__ in MADE_OF_IT or (isinstance(value, str) and SENTENCE in value)
 
 
-def stays(modules: list[str]) -> list[str]:
+def stays(modules):
     """The modules without the ones that follow themselves."""
     return [name for name, _ in groupby(modules)]
 
 
-def below_the_tick() -> list[str]:
+def below_the_tick():
     """The modules on the stack from the tick of a tree to whoever calls the caller of this."""
     found: list[str] = []
     frame: FrameType | None = sys._getframe(2)
@@ -81,7 +80,7 @@ def below_the_tick() -> list[str]:
     return found[::-1]
 
 
-def report(route: list[str]) -> None:
+def report(route):
     """Write the route and end the process."""
     sys.stdout.write(json.dumps({"hops": len(route), "route": route}) + "\n")
     sys.stdout.flush()
@@ -91,16 +90,16 @@ def report(route: list[str]) -> None:
 TICK = TreeRun.tick
 
 
-def main(out: str, to_gripper: bool) -> None:
+def main(out, to_gripper):
     route = Route()
 
-    def tick(run: TreeRun, breakpoints: frozenset[str]) -> bool:
+    def tick(run, breakpoints):
         sys.setprofile(None)
         if not to_gripper:
             report(stays(route.modules))
         return TICK(run, breakpoints)
 
-    def set_gripper(robot: Any, *given: Any, **named: Any) -> None:
+    def set_gripper(robot, *given, **named):
         report(stays(route.modules) + stays(below_the_tick()))
 
     TreeRun.tick = tick

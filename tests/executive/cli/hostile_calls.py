@@ -1,7 +1,5 @@
 """Calls of every command with a hostile text in one place, and what is wrong with how such a call ends."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os
@@ -9,11 +7,11 @@ import re
 import signal
 import sys
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from unittest.mock import patch
 
 import cv2
@@ -24,58 +22,14 @@ from executive.mission.request import Request
 from executive.store.missions import MissionStore
 from executive.store.standing_missions import StandingMissions
 from executive.store.triggers import Missed, OnCall
+from skills.files.yaml_source import read_yaml
 from tests.hostile_values import TEXTS
 
 __all__ = ["Place", "WorkBegins", "arguments", "called", "commands", "defect", "hostile_texts", "places", "prepare"]
 
 LIMIT_S: Final = 20
-GOOD: Final[Mapping[str, Mapping[str, str]]] = {
-    "run": {"--say": "go to the hall"},
-    "check": {"files": "good.yaml"},
-    "init": {"folder": "made"},
-    "parse": {"sentence": "go to the hall"},
-    "tree": {"file": "good.yaml"},
-    "listen": {"files": "good.wav"},
-    "log": {"file": "good.mcap"},
-    "replay": {"file": "good.mcap", "--view-for": "0"},
-    "queue add": {"--say": "go to the hall"},
-    "queue remove": {"number": "1"},
-    "queue serve": {"--store": "calls.sqlite", "--port": "0", "--token": "12345678", "--for": "0"},
-    "fleet run": {"queue": "queue", "--robots": "alice=spot,bob=spot"},
-    "fleet status": {"queue": "queue"},
-    "evaluate": {"--say": "go to the hall", "--seeds": "1-2"},
-    "report": {"results": "results.sqlite"},
-    "sdk": {"script": "good.py"},
-    "detect": {"images": "good.png"},
-    "dataset score": {"--data": "data/val.json"},
-    "dataset train": {"--data": "data", "--out": "made"},
-    "dataset refine": {"--data": "data", "--out": "made"},
-    "dataset render": {"--out": "made", "--images": "2"},
-    "map build": {"--world": "flat", "--out": "made"},
-    "world from-map": {"map_file": "map.yaml", "--out": "made"},
-    "world from-cylinders": {"file": "good.json", "--out": "made"},
-    "world show": {"folder": "flat"},
-    "world add": {"what": "person", "folder": "flat"},
-    "world zone add": {"folder": "flat", "name": "ramp", "--kind": "keep_out", "--in": "hall"},
-    "world zone list": {"folder": "flat"},
-    "world zone remove": {"folder": "flat", "name": "ramp"},
-    "object import": {"mesh": "good.stl", "--name": "tool", "--mass": "0.5", "--out": "made"},
-    "object show": {"folder": "object"},
-    "object tag": {"number": "7", "--out": "made.svg"},
-    "new skill": {"name": "wave", "folder": "made"},
-    "new robot": {"name": "rover", "--urdf": "good.urdf", "--out": "made"},
-}
-"""What each command is called with beside the hostile text; no key, no need."""
-WORK: Final = (
-    "executive.app.simulated.simulate",
-    "executive.cli.robot_command.simulate",
-    "executive.app.simulated.simulate",
-    "executive.app.evaluate.workers.Pool.opened",
-    "errand_train.dataset.shards.render",
-    "plant.worlds.builder.own.world_from_grid",
-    "plant.worlds.builder.own.world_from_cylinders",
-)
-"""Where what is asked for begins to be done, and no option is read any more."""
+CALLS: Final = read_yaml(Path(__file__).with_name("hostile_calls.yaml")).data
+GOOD: Final[Mapping[str, Mapping[str, str]]] = CALLS["good"]
 _UNTOLD: Final = re.compile(r"Traceback|<class|NoneType| object at 0x|\b[A-Z][A-Za-z]+Error\b|re\.compile|\(\?:|\\d")
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\x80-\x9f]")
 
@@ -93,7 +47,7 @@ class Place:
     is_option: bool
 
     @property
-    def title(self) -> str:
+    def title(self):
         """The command and the option, as people write them."""
         return f"{self.command} {self.name}"
 
@@ -107,7 +61,7 @@ class Ended:
     trace: str = ""
 
 
-def prepare(folder: Path) -> None:
+def prepare(folder):
     """Put the good files of the calls into a folder; all but the log, the results and the recording."""
     grey = np.full((60, 80), 254, np.uint8)
     grey[[0, -1]] = grey[:, [0, -1]] = 0
@@ -134,13 +88,13 @@ def prepare(folder: Path) -> None:
         StandingMissions(missions).add(request, OnCall("beer"), Missed.SKIP)
 
 
-def _facet(corners: tuple[int, int, int]) -> bytes:
+def _facet(corners):
     points = ("0 0 0", "0.1 0 0", "0 0.1 0", "0 0 0.1")
     lines = "\n".join(f"vertex {points[corner]}" for corner in corners)
     return f"facet normal 0 0 0\nouter loop\n{lines}\nendloop\nendfacet\n".encode()
 
 
-def places() -> list[Place]:
+def places():
     """Every option and argument of every command that takes a text."""
     return [
         Place(command, *typed_name(each))
@@ -151,14 +105,14 @@ def places() -> list[Place]:
 
 
 @cache
-def commands() -> Mapping[str, Any]:
+def commands():
     """All commands by the words that call them."""
     top = {name: entry.shipped_command(name) for name in entry.COMMANDS}
     top["dataset"] = entry.plugin_command("dataset")
     return {" ".join(words): found for name, each in top.items() for words, found in _below((name,), each)}
 
 
-def _below(words: tuple[str, ...], found: Any) -> Iterator[tuple[tuple[str, ...], Any]]:
+def _below(words, found):
     below = getattr(found, "commands", None)
     if below is None:
         yield words, found
@@ -167,25 +121,25 @@ def _below(words: tuple[str, ...], found: Any) -> Iterator[tuple[tuple[str, ...]
         yield from _below((*words, name), each)
 
 
-def typed_name(parameter: Any) -> tuple[str, bool]:
+def typed_name(parameter):
     """The name of a parameter as it is typed, and whether it is an option."""
     option = parameter.param_type_name == "option"
     return (parameter.opts[0] if option else parameter.name), option
 
 
-def hostile_texts() -> tuple[str, ...]:
+def hostile_texts():
     """The hostile texts that can stand on a command line."""
     return tuple(dict.fromkeys([*filter(_can_be_typed, TEXTS), "\udcff", "a\udcffb"]))
 
 
-def _can_be_typed(text: str) -> bool:
+def _can_be_typed(text):
     try:
         return b"\0" not in os.fsencode(text)
     except UnicodeEncodeError:
         return False
 
 
-def arguments(place: Place, text: str) -> list[str]:
+def arguments(place, text):
     """The words of a call with a text in a place, and with good values where else one is needed."""
     found = commands()[place.command]
     told = {**GOOD.get(place.command, {}), place.name: text}
@@ -198,12 +152,12 @@ def arguments(place: Place, text: str) -> list[str]:
     return [*place.command.split(), *options, *(["--", *plain] if plain else [])]
 
 
-def called(words: Sequence[str]) -> Ended:
+def called(words):
     """Call `errand` in this process with the words, in the folder that is current."""
     handlers = ("strict", "backslashreplace")
     streams = [io.TextIOWrapper(io.BytesIO(), "utf-8", errors, write_through=True) for errors in handlers]
     with contextlib.ExitStack() as stack:
-        for name in WORK:
+        for name in CALLS["work"]:
             stack.enter_context(patch(name, side_effect=WorkBegins))
         stack.enter_context(patch("executive.cli.listen_command.load_whisper", return_value=None))
         stack.enter_context(patch.object(sys, "argv", ["errand", *words]))
@@ -215,8 +169,8 @@ def called(words: Sequence[str]) -> Ended:
     return Ended(status, output, trace)
 
 
-def _status() -> tuple[int | None, str]:
-    def too_long(*_: object) -> None:
+def _status():
+    def too_long(*_):
         raise TimeoutError(f"it takes more than {LIMIT_S} s")
 
     before = signal.signal(signal.SIGALRM, too_long)
@@ -235,7 +189,7 @@ def _status() -> tuple[int | None, str]:
     return 0, ""
 
 
-def defect(words: Sequence[str]) -> str:
+def defect(words):
     """What is wrong with how a call ends; nothing where it is refused in plain words, or accepted."""
     ended = called(words)
     if ended.trace:

@@ -7,10 +7,10 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from executive.cli.entry import COMMANDS, EXIT_CODES, RENAMED, app, current, shipped_command
+from executive.cli.entry import COMMANDS, EXIT_CODES, RENAMED, current, shipped_command
 from executive.words.forms import OptionGroup
+from tests.executive.cli.calls import done, errand
 
 MISSIONS = Path(__file__).parents[3] / "missions"
 UNUSED_AT_RUN_TIME = ("errand_train", "plant.models.builder", "plant.worlds.builder")
@@ -52,7 +52,7 @@ print(*sorted(name for name in sys.modules if name.startswith("skills.") and nam
 def call_in_process(tmp_path_factory):
     """Calls commands in a process of its own; returns its lines and its errors. The paths of `check` are planned."""
     environment = {"XDG_CACHE_HOME": str(tmp_path_factory.mktemp("cache"))}
-    assert CliRunner().invoke(app, CHECK, env=environment).exit_code == 0
+    done(*CHECK, env=environment)
 
     def call(commands):
         command, variables = [sys.executable, "-c", PROGRAM % commands], {**os.environ, **environment}
@@ -105,12 +105,11 @@ def test_the_process_ends_with_its_exit_status_after_threads_and_exit_handlers(a
 def test_a_start_is_one_word_or_three_numbers(words, value):
     command = shipped_command("run")
     context = command.make_context("run", ["missions/go_to_pose.yaml", *words])
-    assert context.params["start"] == value
-    assert str(context.params["file"]) == "missions/go_to_pose.yaml"
+    assert (context.params["start"], str(context.params["file"])) == (value, "missions/go_to_pose.yaml")
 
 
 def test_the_version_is_that_of_the_distribution():
-    assert CliRunner().invoke(app, ["--version"]).stdout == f"errand {version('spot-errand')}\n"
+    assert errand("--version").stdout == f"errand {version('spot-errand')}\n"
 
 
 @pytest.mark.parametrize(
@@ -121,27 +120,26 @@ def test_the_shell_completes_commands_and_options(typed, offered, monkeypatch):
     monkeypatch.setenv("_ERRAND_COMPLETE", "complete_bash")
     monkeypatch.setenv("COMP_WORDS", typed)
     monkeypatch.setenv("COMP_CWORD", str(len(typed.split(" ")) - 1))
-    assert offered in CliRunner().invoke(app, [], prog_name="errand").stdout.split()
+    assert offered in errand(prog_name="errand").stdout.split()
 
 
 def test_completion_is_installed_for_a_shell(monkeypatch, tmp_path):
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setattr("typer.completion._get_shell_name", lambda: "fish", raising=False)
     monkeypatch.setattr("typer._completion_shared._get_shell_name", lambda: "fish", raising=False)
-    result = CliRunner().invoke(app, ["--install-completion"], prog_name="errand")
-    assert result.exit_code == 0, result.output
+    done("--install-completion", prog_name="errand")
     assert "_ERRAND_COMPLETE" in (tmp_path / ".config/fish/completions/errand.fish").read_text()
 
 
 @pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS), ["queue", "add"], ["world", "from-map"]])
 def test_every_help_ends_with_the_exit_codes_and_only_the_root_installs_completion(command):
-    shown = CliRunner().invoke(app, [*command, "--help"], env={"COLUMNS": "200"}).stdout
+    shown = errand(*command, "--help", env={"COLUMNS": "200"}).stdout
     assert " ".join(shown.split()).endswith(EXIT_CODES)
     assert ("--install-completion" in shown) == (not command)
 
 
 def test_the_help_of_run_has_a_heading_for_each_group_of_options():
-    shown = CliRunner().invoke(app, ["run", "--help"]).stdout
+    shown = errand("run", "--help").stdout
     headings = [line.removesuffix(":") for line in shown.splitlines() if line.endswith(":") and line[:1].isupper()]
     assert headings == ["Arguments", *OptionGroup, "Options"]
     assert shown.index("Robots:") < shown.index("--stack") < shown.index("Faults and variations:")
@@ -150,6 +148,5 @@ def test_the_help_of_run_has_a_heading_for_each_group_of_options():
 def test_former_options_stand_for_the_present_ones_and_warn(capsys):
     assert current("log", ["a.mcap", "--map", "m.png"]) == ["a.mcap", "--format", "map", "--out", "m.png"]
     assert current("report", ["r", "--html=p.html"]) == ["r", "--out", "p.html"]
-    assert current("run", ["--map", "m"]) == ["--map", "m"]
-    assert capsys.readouterr().err.count("is now") == 2
+    assert (current("run", ["--map", "m"]), capsys.readouterr().err.count("is now")) == (["--map", "m"], 2)
     assert {option for former in RENAMED.values() for option in former} >= {"--output", "--svg", "--html", "--draw"}

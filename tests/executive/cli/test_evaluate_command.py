@@ -1,71 +1,22 @@
 """`errand evaluate` of a mission at many seeds: what runs, what is shown, and where files land."""
 
 import json
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from executive.app.evaluate import evaluation
-from executive.app.evaluate.workers import Pool
-from executive.app.evaluate.workers import WorkResult as Done
-from executive.app.mission_run import FinishedRun
-from executive.app.report import RunReport
-from executive.cli import entry
-from executive.mission.request import Request
-from executive.record.event_log import EventLog
-from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
-from tests.executive.conftest import ManualClock
+from tests.executive.cli.calls import done, errand, json_of
 
 FETCH = "Hey Alice, can you fetch me a drink from the kitchen"
 AMBIGUOUS = "Hey Alice, put the cube on the table"
 FAULT = "camera.hand: dropout 5 s at 20 s"
 
 
-class Here:
-    """Does the work in this process; the last run first."""
-
-    count = 1
-
-    def map_items(self, function, items):
-        return (Done(item, function(item)) for item in reversed(items))
-
-
-class Plant:
-    """Stands in for the plant: what was asked for, and how a run of a seed ends."""
-
-    def __init__(self):
-        self.asked: list[Request] = []
-        self.ends = lambda request: ("success", RefereeReport(True, "it is so", 0, 0))
-
-    def __call__(self, prepared):
-        request = prepared.request
-        self.asked.append(request)
-        EventLog(request.out / "log.mcap", ManualClock()).close()
-        outcome, referee = self.ends(request)
-        facts = (prepared.world.name, request.seed, 9.0, 1.0, 9.0, 90, "log.mcap")
-        return FinishedRun(RunReport(outcome, None, "done", referee, (), *facts), node_view(prepared.tree.root))
-
-
-@pytest.fixture
-def plant(monkeypatch):
-    stand_in = Plant()
-
-    @contextmanager
-    def opened(_):
-        yield Here()
-
-    monkeypatch.setattr(evaluation, "run_request", stand_in)
-    monkeypatch.setattr(Pool, "opened", opened)
-    return stand_in
-
-
 @pytest.fixture
 def evaluate(tmp_path):
     def call(*words):
-        result = CliRunner().invoke(entry.app, ["evaluate", *words, "--json", "--out", str(tmp_path)])
+        result = errand("evaluate", *words, "--json", "--out", str(tmp_path))
         told = result.stdout.strip().splitlines()
         return result, json.loads(told[-1]) if told else None
 
@@ -104,9 +55,8 @@ def test_each_seed_leaves_its_log_in_a_folder_of_its_own(plant, evaluate, tmp_pa
 
 
 def report_of(file):
-    result = CliRunner().invoke(entry.app, ["report", str(file), "--json"])
-    assert result.exit_code == 0, result.output
-    return json.loads(result.stdout.splitlines()[-1])["runs"]
+    result = done("report", str(file), "--json")
+    return json_of(result)["runs"]
 
 
 def test_the_seeds_of_a_mission_leave_a_results_file_that_report_reads(plant, evaluate, tmp_path):

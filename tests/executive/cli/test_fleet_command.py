@@ -3,14 +3,13 @@
 from dataclasses import replace
 
 import pytest
-from typer.testing import CliRunner
 
 from executive.app import fleet_run
-from executive.cli import entry
 from executive.cli.fleet_command import _faults, _to_do
 from executive.mission.request import Request
 from executive.store.missions import GivenMissions, MissionState, MissionStore
 from skills.files.errors import InputError
+from tests.executive.cli.calls import errand
 
 GO = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 REQUEST = Request(commands=("Take ...",), name="work", world_name="flat")
@@ -79,7 +78,7 @@ def test_a_file_with_parts_for_several_robots_is_refused_and_stays_in_the_queue(
     part = "{steps: [{to: kitchen}]}"
     file.write_text(f"name: both\nrobots: {{alice: spot, bob: spot}}\nparts: {{alice: {part}, bob: {part}}}\n")
     store.add(Request(file=file, name="both", world_name="flat"), queued=True)
-    shown = CliRunner().invoke(entry.app, ["fleet", "run", str(store.path), "--robots", "alice=spot,bob=spot"])
+    shown = errand("fleet", "run", str(store.path), "--robots", "alice=spot,bob=spot")
     assert shown.exit_code == 2
     assert f"{file.name}:3: mission 1 (both): its parts are for several robots" in shown.stderr
     assert "run the file by `errand run`" in shown.stderr
@@ -93,7 +92,7 @@ def test_a_mission_that_cannot_be_prepared_is_left_out_with_its_cause_and_the_ot
     ran = []
     monkeypatch.setattr(fleet_run, "run_fleet", lambda dispatch, **_: ran.extend(dispatch.missions))
     command = ["fleet", "run", str(store.path), "--robots", "alice=spot", "--no-record"]
-    shown = CliRunner().invoke(entry.app, command)
+    shown = errand(*command)
     assert (shown.exit_code, ran) == (1, [2]), shown.output
     messages = [each.message for each in store.missions()]
     assert ["it is for the world" in message for message in messages] == [True, False, True]

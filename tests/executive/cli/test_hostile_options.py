@@ -9,7 +9,7 @@ TRIED, STRIDE = 1, 7
 PLACES = hostile_calls.places()
 
 
-def some(number: int) -> list[str]:
+def some(number):
     return [TEXTS[(number * STRIDE + more * len(TEXTS) // TRIED) % len(TEXTS)] for more in range(TRIED)]
 
 

@@ -2,44 +2,24 @@
 
 import io
 import json
+from types import SimpleNamespace
 
 import pytest
-from made_speech import LoudIsSpeech, ScriptedRecogniser, silence, speech_like, write_wav
+from made_speech import silence, speech_like, write_wav
 from rich.console import Console
-from typer.testing import CliRunner
 
 import executive.cli.listen_command as listen_command
-from executive.cli.entry import app
 from executive.cli.listen_command import answer_line, hear_request, show_hearing
 from executive.language.understand import Status, Understanding
 from executive.mission.request import Request
 from executive.speech.listener import follow
 from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
+from tests.executive.cli.calls import done, errand
 
 GO = "Hey Alice, go to the kitchen."
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 KEYS = {"file", "transcript", "addressed", "status", "commands", "reason"}
-
-
-@pytest.fixture
-def says(monkeypatch):
-    """Makes the recogniser hear the given texts one after another."""
-
-    def script(*texts):
-        monkeypatch.setattr(listen_command, "load_whisper", lambda: ScriptedRecogniser(list(texts)))
-        monkeypatch.setattr(listen_command, "load_detector", LoudIsSpeech)
-
-    return script
-
-
-@pytest.fixture
-def wav(tmp_path):
-    return write_wav(tmp_path / "a.wav", speech_like(0.5, 2.0, 0.5))
-
-
-def _listen(*arguments):
-    return CliRunner().invoke(app, ["listen", *map(str, arguments)])
 
 
 def _lines(result):
@@ -48,14 +28,13 @@ def _lines(result):
 
 def test_transcript_and_commands_are_shown(says, wav):
     says(GO)
-    result = _listen(wav)
-    assert result.exit_code == 0
+    result = done("listen", wav)
     assert GO in result.stdout and KITCHEN in result.stdout
 
 
 def test_each_file_is_one_line_for_scripts(says, wav):
     says(GO, "What a day.")
-    first, second = _lines(_listen(wav, wav, "--jsonl"))
+    first, second = _lines(errand("listen", wav, wav, "--jsonl"))
     assert set(first) >= KEYS
     assert (first["file"], first["addressed"], first["status"]) == (str(wav), True, "ok")
     assert (second["addressed"], second["status"], second["commands"]) == (False, "not_addressed", [])
@@ -63,18 +42,17 @@ def test_each_file_is_one_line_for_scripts(says, wav):
 
 def test_without_the_wake_phrase_only_when_it_may_be_left_out(says, wav):
     says("Go to the kitchen.")
-    assert _listen(wav).exit_code == 2
+    assert errand("listen", wav).exit_code == 2
     says("Go to the kitchen.")
-    assert _listen(wav, "--no-wake").exit_code == 0
+    done("listen", wav, "--no-wake")
 
 
 def test_open_words_stay_as_spoken_and_are_matched_to_the_vocabulary(says, wav, tmp_path):
     names = tmp_path / "names.txt"
     names.write_text("big dish\nwashing machine\n")
     says("Take the big fish to the washing machine.")
-    (told,) = _lines(_listen(wav, "--jsonl", "--open", "--no-wake", "--vocabulary", names))
-    assert told["commands"][-1]["item"] == "big dish"
-    assert told["commands"][-1]["goal"] == "washing machine"
+    (told,) = _lines(errand("listen", wav, "--jsonl", "--open", "--no-wake", "--vocabulary", names))
+    assert (told["commands"][-1]["item"], told["commands"][-1]["goal"]) == ("big dish", "washing machine")
 
 
 # What is heard; what each robot is to do there.
@@ -89,7 +67,7 @@ CALLED = [
 @pytest.mark.parametrize(("heard", "goals"), CALLED)
 def test_any_of_several_robots_may_be_called(says, wav, heard, goals):
     says(heard)
-    (told,) = _lines(_listen(wav, "--jsonl", "--robots", "alice=spot,bob=fetch"))
+    (told,) = _lines(errand("listen", wav, "--jsonl", "--robots", "alice=spot,bob=fetch"))
     assert (told["status"], told["addressed"]) == ("ok", True), told["reason"]
     found = {part["robot"]: part["meaning"]["commands"][0]["goal"] for part in told["parts"]}
     assert found == goals
@@ -97,29 +75,13 @@ def test_any_of_several_robots_may_be_called(says, wav, heard, goals):
 
 def test_the_commands_of_each_robot_are_shown(says, wav):
     says("Hey Bob, go to the kitchen.")
-    assert f"  Bob: {KITCHEN}" in _listen(wav, "--robots", "alice=spot,bob=fetch").stdout.splitlines()
+    assert f"  Bob: {KITCHEN}" in errand("listen", wav, "--robots", "alice=spot,bob=fetch").stdout.splitlines()
 
 
 def test_a_call_to_a_robot_that_is_not_there_is_to_none_of_them(says, wav):
     says("Hey Carl, go to the kitchen.")
-    (told,) = _lines(_listen(wav, "--jsonl", "--robots", "alice=spot,bob=fetch"))
+    (told,) = _lines(errand("listen", wav, "--jsonl", "--robots", "alice=spot,bob=fetch"))
     assert (told["status"], told["commands"], "Carl" in told["reason"]) == ("not_addressed", [], True)
-
-
-# Options, and what the refusal says.
-NOT_BY_VOICE = [
-    (("--robots", "alice=spot,alyce=fetch"), "Alice and Alyce sound alike"),
-    (("--robots", "alice=spot,bob2=fetch"), "'Bob2' cannot be called by voice"),
-    (("--robots", "alice=spot,bob=fetch", "--robot", "Eve"), "--robots stands without --robot"),
-    (("--robots", "alice=spot,bob=fetch", "--open"), "--robots stands without --robot and --open"),
-]
-
-
-@pytest.mark.parametrize(("options", "words"), NOT_BY_VOICE)
-def test_robots_that_cannot_be_called_by_voice_are_refused(says, wav, options, words):
-    says(GO)
-    result = _listen(wav, *options)
-    assert (result.exit_code, words in result.stderr) == (2, True), result.output
 
 
 def test_a_run_with_several_robots_hears_the_one_that_is_called(says, wav):
@@ -131,7 +93,7 @@ def test_a_run_with_several_robots_hears_the_one_that_is_called(says, wav):
 
 def test_the_robot_may_have_another_name(says, wav):
     says("Hey Bob, go to the kitchen.")
-    (told,) = _lines(_listen(wav, "--jsonl", "--robot", "Bob"))
+    (told,) = _lines(errand("listen", wav, "--jsonl", "--robot", "Bob"))
     assert told["addressed"] and told["status"] == "ok"
 
 
@@ -139,7 +101,7 @@ def test_a_broken_file_is_told_and_the_others_are_heard(says, wav, tmp_path):
     broken = tmp_path / "b.wav"
     broken.write_text("Hey Alice")
     says(GO)
-    result = _listen(broken, wav, "--jsonl")
+    result = errand("listen", broken, wav, "--jsonl")
     bad, good = _lines(result)
     assert result.exit_code == 2
     assert set(bad) >= KEYS and "no wav file" in bad["reason"] and str(broken) in result.stderr
@@ -148,20 +110,8 @@ def test_a_broken_file_is_told_and_the_others_are_heard(says, wav, tmp_path):
 
 def test_a_silent_file_is_refused(says, tmp_path):
     says()
-    (told,) = _lines(_listen(write_wav(tmp_path / "s.wav", silence(2.0)), "--jsonl"))
+    (told,) = _lines(errand("listen", write_wav(tmp_path / "s.wav", silence(2.0)), "--jsonl"))
     assert (told["status"], told["reason"]) == ("refused", "the recording is silent")
-
-
-@pytest.mark.parametrize("arguments", [(), ("--mic", "a.wav")])
-def test_files_or_the_microphone_are_wanted(arguments):
-    result = _listen(*arguments)
-    assert result.exit_code == 2 and "wav files or --mic" in result.stderr
-
-
-def test_a_missing_vocabulary_is_told(says, wav, tmp_path):
-    says(GO)
-    result = _listen(wav, "--vocabulary", tmp_path / "none.txt")
-    assert result.exit_code == 2 and "none.txt" in result.stderr
 
 
 def test_the_request_to_run_is_what_was_heard(says, wav):
@@ -179,28 +129,18 @@ def test_there_is_no_second_request_beside_the_one_heard(wav):
 def test_a_silent_request_is_refused_with_its_file(says, tmp_path):
     says()
     file = write_wav(tmp_path / "s.wav", silence(1.0))
-    result = CliRunner().invoke(app, ["run", "--listen", str(file), "--out", str(tmp_path / "out")])
+    result = errand("run", "--listen", str(file), "--out", str(tmp_path / "out"))
     assert result.exit_code == 2 and "silent" in result.stderr and str(file) in result.stderr
-
-
-class Heard:
-    """A voice that notes what it is to say."""
-
-    def __init__(self):
-        self.said = []
-
-    def say(self, text):
-        self.said.append(text)
 
 
 def test_the_microphones_sentences_are_answered_in_text_and_aloud(says, flat_listener):
     sound = speech_like(0.5, 2.0, 1.5, 2.0, 1.5)
-    console, voice = Console(file=io.StringIO(), width=120), Heard()
+    console, said = Console(file=io.StringIO(), width=120), []
     blocks = (sound[at : at + 1600] for at in range(0, len(sound), 1600))
-    show_hearing(follow(blocks, flat_listener(GO, "Go to the hall.")), console, voice)
+    show_hearing(follow(blocks, flat_listener(GO, "Go to the hall.")), console, SimpleNamespace(say=said.append))
     shown = console.file.getvalue()
     assert GO in shown and f"All right: {KITCHEN}" in shown and "name was not said" in shown
-    assert voice.said == ["All right."]
+    assert said == ["All right."]
 
 
 @pytest.fixture

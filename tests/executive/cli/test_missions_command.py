@@ -3,17 +3,12 @@
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from executive.app.mission_files import mission_file, shipped_missions
-from executive.cli import entry
 from skills.files.errors import InputError
+from tests.executive.cli.calls import done, errand
 
 MISSIONS = Path(__file__).parents[3] / "missions"
-
-
-def invoke(*arguments: object):
-    return CliRunner().invoke(entry.app, list(map(str, arguments)))
 
 
 @pytest.fixture(autouse=True)
@@ -24,19 +19,18 @@ def elsewhere(tmp_path, monkeypatch):
 
 
 def test_each_shipped_mission_has_a_line_that_says_what_it_shows():
-    _, *lines = invoke("missions").stdout.splitlines()
+    _, *lines = errand("missions").stdout.splitlines()
     assert [line.split()[0] for line in lines] == sorted(file.stem for file in MISSIONS.glob("*.yaml"))
     assert all(len(line.split()) > 2 for line in lines)
 
 
-@pytest.mark.parametrize("named", ["fetch_drink", "fetch_drink.yaml", "missions/fetch_drink.yaml"])
-def test_a_shipped_mission_is_found_by_name(named):
-    assert mission_file(Path(named)) == MISSIONS / "fetch_drink.yaml"
+FOUND = dict.fromkeys(("fetch_drink", "fetch_drink.yaml", "missions/fetch_drink.yaml"), MISSIONS / "fetch_drink.yaml")
+FOUND |= {named: Path(named) for named in ("absent.yaml", "there/fetch_drink.yaml", "fetch_drink.txt")}
 
 
-@pytest.mark.parametrize("named", ["absent.yaml", "there/fetch_drink.yaml", "fetch_drink.txt"])
-def test_a_path_that_names_no_shipped_mission_is_left_as_it_is(named):
-    assert mission_file(Path(named)) == Path(named)
+@pytest.mark.parametrize(("named", "file"), FOUND.items())
+def test_a_shipped_mission_is_found_by_name_and_another_path_is_left_as_it_is(named, file):
+    assert mission_file(Path(named)) == file
 
 
 def test_a_file_of_ones_own_goes_first(elsewhere):
@@ -51,20 +45,14 @@ def test_a_name_that_is_not_known_is_refused_with_what_is_near(named, hint):
 
 
 def test_check_and_tree_take_names():
-    assert invoke("check", "go_living_room").exit_code == 0
-    assert invoke("tree", "go_living_room", "--format", "json").stdout.startswith('{"id": "alice/go-living-room')
+    done("check", "go_living_room")
+    assert errand("tree", "go_living_room", "--format", "json").stdout.startswith('{"id": "alice/go-living-room')
 
 
 def test_init_copies_the_missions_and_overwrites_nothing(elsewhere):
     (elsewhere / "mine").mkdir()
     (elsewhere / "mine" / "patrol.yaml").write_text("name: mine\n")
-    assert invoke("init", "mine").exit_code == 0
+    done("init", "mine")
     assert {file.stem for file in (elsewhere / "mine").glob("*.yaml")} == set(shipped_missions())
     assert (elsewhere / "mine" / "mission.schema.json").read_bytes() == (MISSIONS / "mission.schema.json").read_bytes()
     assert (elsewhere / "mine" / "patrol.yaml").read_text() == "name: mine\n"
-
-
-def test_init_into_a_file_is_refused(elsewhere):
-    (elsewhere / "taken").write_text("")
-    result = invoke("init", "taken")
-    assert (result.exit_code, "taken" in result.stderr, len(result.stderr.splitlines())) == (2, True, 1)

@@ -1,7 +1,5 @@
 """The options of a request: each is read to the JSON form that is written down, and comes back by every way."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from pathlib import Path

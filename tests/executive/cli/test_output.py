@@ -5,17 +5,16 @@ import io
 import pytest
 import typer
 from rich.console import Console
-from typer.testing import CliRunner
 
-from executive.cli import entry
 from executive.cli.output import progress_bar, refuse
+from tests.executive.cli.calls import errand
 
 
 @pytest.mark.parametrize("option", ["--out", "--store", "--stack", "--world", ""])
 def test_a_name_of_endless_length_is_refused_in_one_line(option):
     name = "a" * 15_000
     file = [] if option == "" else ["go_to_pose"]
-    result = CliRunner().invoke(entry.app, ["queue", "add", *file, *filter(None, [option]), name])
+    result = errand("queue", "add", *file, *filter(None, [option]), name)
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
     assert result.stderr.startswith("errand: ") and len(result.stderr) < 1500
 

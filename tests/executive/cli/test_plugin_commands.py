@@ -7,9 +7,9 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from executive.cli.entry import app
+from tests.executive.cli.calls import done, errand
+from tests.executive.distribution import write_distribution
 
 ROOT = Path(__file__).parents[3]
 MODULE = """
@@ -40,24 +40,16 @@ def install(tmp_path, monkeypatch):
     monkeypatch.setattr("skills.files.plugins._all_installed", entry_points)
 
     def installed(name, commands, summary="Commands for ships."):
-        info = tmp_path / f"{name}-1.0.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\nSummary: {summary}\n")
-        (info / "entry_points.txt").write_text("\n".join(["[errand.commands]", *commands, ""]))
+        write_distribution(tmp_path, name, "errand.commands", *commands, summary=summary)
 
     (tmp_path / "ships.py").write_text(MODULE)
     yield installed
     sys.modules.pop("ships", None)
 
 
-def errand(*words):
-    return CliRunner().invoke(app, words)
-
-
 def test_the_help_lists_a_command_of_another_distribution_and_imports_none_of_it(install):
     install("ships", ["ports = no_such_module:count"])
-    ended = errand("--help")
-    assert ended.exit_code == 0
+    ended = done("--help")
     line = next(line for line in ended.stdout.splitlines() if line.split()[:1] == ["ports"])
     assert "Commands for ships." in line
 
@@ -114,11 +106,11 @@ def test_a_command_of_errand_is_not_replaced_by_one_of_its_name(install):
 
 def test_without_errand_train_its_command_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr("skills.files.plugins.installed_plugins", lambda _group: ())
-    ended = CliRunner().invoke(app, ["dataset", "render"])
+    ended = errand("dataset", "render")
     what = "'dataset' is a command of errand-train, which is not installed; run `make train` in a clone of Errand"
     assert (ended.exit_code, ended.stderr) == (2, f"errand: {what}\n")
 
 
 def test_errand_train_registers_the_commands_for_data_sets():
-    ended = CliRunner().invoke(app, ["--help"])
+    ended = errand("--help")
     assert any(line.split()[:1] == ["dataset"] for line in ended.stdout.splitlines())

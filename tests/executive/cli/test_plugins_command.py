@@ -1,6 +1,5 @@
 """`errand plugins`: what other distributions register, which of it is broken, and that none keeps a command waiting."""
 
-import json
 import os
 import subprocess
 import sys
@@ -8,22 +7,16 @@ from pathlib import Path
 
 import pytest
 
+from tests.executive.cli.calls import json_of
+from tests.executive.distribution import write_distribution
+
 ROOT = Path(__file__).parents[3]
-ENTRY_POINTS = """
-[errand.skills]
-exits = wavers_exits:Wave
-hangs = wavers_hangs:Wave
-[errand.triggers]
-bell = wavers_bell:Bell
-"""
 
 
 @pytest.fixture
 def errand(tmp_path):
-    info = tmp_path / "wavers-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: wavers\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text(ENTRY_POINTS)
+    skills = ("exits = wavers_exits:Wave", "hangs = wavers_hangs:Wave")
+    write_distribution(tmp_path, "wavers", "errand.skills", *skills, "[errand.triggers]", "bell = wavers_bell:Bell")
     (tmp_path / "wavers_exits.py").write_text("raise SystemExit(0)\n")
     (tmp_path / "wavers_hangs.py").write_text("import time\ntime.sleep(300)\n")
     (tmp_path / "wavers_bell.py").write_text("class Bell: pass\n")
@@ -39,7 +32,7 @@ def errand(tmp_path):
 
 def test_each_plug_in_is_listed_with_what_is_wrong_with_it(errand):
     ended = errand("plugins", "--limit", "2", "--json")
-    listed = json.loads(ended.stdout.splitlines()[-1])["plugins"]
+    listed = json_of(ended)["plugins"]
     told = [each for each in listed if each["distribution"] == "wavers"]
     assert [each["name"] for each in told] == ["exits", "hangs", "bell"]
     assert "cannot load wavers_exits:Wave (SystemExit: 0)" in told[0]["broken"]

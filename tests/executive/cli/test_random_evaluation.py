@@ -1,63 +1,28 @@
 """`errand evaluate --random-missions`: drawn, refused or run, kept, and reported."""
 
-import json
-from contextlib import contextmanager
-
 import pytest
-from typer.testing import CliRunner
 
 from executive.app.checker import prepare_checked
 from executive.app.evaluate import evaluation
 from executive.app.evaluate.random_missions import random_missions
-from executive.app.evaluate.workers import Pool
-from executive.app.evaluate.workers import WorkResult as Done
-from executive.app.mission_run import FinishedRun
-from executive.app.report import RunReport
-from executive.cli import entry
-from executive.record.event_log import EventLog
-from executive.tree.node_view import node_view
 from executive.words.goal import RefereeReport
 from skills.files.errors import InputError
-from tests.executive.conftest import ManualClock
+from tests.executive.cli.calls import errand, json_of
 
 ASKED = ("evaluate", "--random-missions", "6", "--worlds", "flat,lab", "--seeds", "8001-", "--jobs", "1")
 
 
-class Here:
-    """Does the work in this process."""
-
-    count = 1
-
-    def map_items(self, function, items):
-        return (Done(item, function(item)) for item in items)
-
-
 @pytest.fixture
-def ran(monkeypatch):
-    """The prepared missions that were run, with what becomes of them; no plant is built."""
-    seen = []
-
-    def run_request(prepared):
-        request = prepared.request
-        seen.append(request)
-        EventLog(request.out / "log.mcap", ManualClock()).close()
-        held = request.seed != 8002
-        referee = RefereeReport(held, "it is so" if held else "the cube is on the floor", 0, 0)
-        facts = (prepared.world.name, request.seed, 9.0, 1.0, 9.0, 90, "log.mcap")
-        return FinishedRun(RunReport("success", None, "done", referee, (), *facts), node_view(prepared.tree.root))
-
-    @contextmanager
-    def opened(_):
-        yield Here()
-
-    monkeypatch.setattr(evaluation, "run_request", run_request)
-    monkeypatch.setattr(Pool, "opened", opened)
-    return seen
+def ran(plant):
+    """The requests that were run; that of seed 8002 is a false claim."""
+    right, wrong = RefereeReport(True, "it is so", 0, 0), RefereeReport(False, "the cube is on the floor", 0, 0)
+    plant.ends = lambda request: ("success", wrong if request.seed == 8002 else right)
+    return plant.asked
 
 
 def evaluate(*more):
-    result = CliRunner().invoke(entry.app, [*ASKED, "--json", *more])
-    return result, json.loads(result.stdout.splitlines()[-1])
+    result = errand(*ASKED, "--json", *more)
+    return result, json_of(result)
 
 
 def test_the_table_names_each_run_that_is_not_claimed_and_fulfilled_with_the_folder_of_its_log(ran, tmp_path):
@@ -75,8 +40,7 @@ def test_the_table_names_each_run_that_is_not_claimed_and_fulfilled_with_the_fol
 def test_the_same_command_runs_only_what_is_missing(ran, tmp_path):
     first = evaluate("--out", str(tmp_path))[1]
     again = evaluate("--out", str(tmp_path))[1]
-    assert len(ran) == 6
-    assert first["standings"] == again["standings"]
+    assert (len(ran), first["standings"]) == (6, again["standings"])
 
 
 def test_an_impossible_random_mission_counts_as_refused(ran, tmp_path, monkeypatch):
@@ -97,29 +61,9 @@ def test_the_report_shows_the_same_table(ran, tmp_path):
     values = evaluate("--out", str(tmp_path))[1]
     page = tmp_path / "report.html"
     command = ["report", str(tmp_path / "results.sqlite"), "--out", str(page), "--json"]
-    told = json.loads(CliRunner().invoke(entry.app, command).stdout.splitlines()[-1])
+    told = json_of(errand(*command))
     assert (told["standings"], told["to_look_at"]) == (values["standings"], values["to_look_at"])
     assert "Claims against verdicts" in page.read_text()
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        (("--say", "go to the hall"), "--random-missions chooses the runs itself"),
-        (("--seeds", "1-3"), "'1-3' holds 3 seeds, fewer than 6"),
-        (("--seeds", "1,1-"), "names a seed twice"),
-        (("--worlds", "flat,flat"), "names a world twice"),
-        (("--worlds", "falt"), "unknown world 'falt'"),
-    ],
-)
-def test_errors_name_the_words_that_were_typed(options, says, tmp_path):
-    result = CliRunner().invoke(entry.app, [*ASKED, *options, "--out", str(tmp_path)])
-    assert (result.exit_code, says in result.output) == (2, True), result.output
-
-
-def test_only_random_missions_take_worlds(tmp_path):
-    result = CliRunner().invoke(entry.app, ["evaluate", "--say", "go to the hall", "--worlds", "flat"])
-    assert (result.exit_code, "--worlds is for --random-missions" in result.output) == (2, True), result.output
 
 
 def test_all_that_the_robot_lifts_is_drawn():

@@ -6,13 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.math import RollPitchYaw
-from typer.testing import CliRunner
 
 from executive.app.mission_files import save_pose
 from executive.app.placed_robots import only_robot
 from executive.app.simulated import simulate
 from executive.app.worlds import open_world
-from executive.cli.entry import app
 from executive.cli.robot_command import TerminalKeys, advance, context_for, page_actions
 from executive.mission.load import load_mission
 from executive.view.page_control import RefusedError
@@ -89,21 +87,6 @@ def test_a_folder_that_cannot_be_made_is_one_clear_line(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot write it"):
         save_pose(tmp_path / "file", "look", POSE, world="flat")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--world", "nowhere"], "unknown world 'nowhere'"),
-        (["--robot", ""], "is not a name for a robot"),
-        (["--start", "500", "500", "0"], "stands in an obstacle or outside"),
-    ],
-)
-def test_bad_arguments_are_one_clear_line(arguments, said):
-    result = CliRunner().invoke(app, ["teleop", *arguments])
-    assert result.exit_code == 2
-    assert said in result.output
-    assert len(result.output.strip().splitlines()) == 1
 
 
 @pytest.mark.mission

@@ -43,9 +43,12 @@ def pressed(control, keys):
     return control.state
 
 
-def test_space_pauses_and_goes_on(control):
-    assert pressed(control, " ").mode is Mode.PAUSED
-    assert pressed(control, " ").mode is Mode.RUNNING
+@pytest.mark.parametrize(("key", "mode"), [(" ", Mode.PAUSED), ("x", Mode.STOPPED)])
+@pytest.mark.parametrize("asks", [False, True])
+def test_space_pauses_and_x_stops_until_the_key_is_pressed_again(control, key, mode, asks):
+    if asks:
+        control.ask(QUESTION, VirtualClock())
+    assert [pressed(control, key).mode for _ in range(2)] == [mode, Mode.RUNNING]
 
 
 def test_s_steps_from_a_running_mission(control):
@@ -53,11 +56,6 @@ def test_s_steps_from_a_running_mission(control):
     assert control.poll().hold is None
     control.note_tick(changed=True)
     assert control.poll().hold == "stepping"
-
-
-def test_x_is_the_stop_button(control):
-    assert pressed(control, "x").mode is Mode.STOPPED
-    assert pressed(control, "x").mode is Mode.RUNNING
 
 
 @pytest.mark.parametrize("key", ["c", "q"])
@@ -76,11 +74,6 @@ def test_a_digit_answers_the_question(control):
     assert pressed(control, "3").questions != ()
     pressed(control, "1")
     assert asked.result() == "retry"
-
-
-def test_keys_still_work_while_a_question_with_options_waits(control):
-    control.ask(QUESTION, VirtualClock())
-    assert pressed(control, " ").mode is Mode.PAUSED
 
 
 def test_free_text_is_typed_and_sent_with_enter(control):
@@ -140,24 +133,18 @@ def said_with(control, keys, answer="all right"):
     return said, board.typing
 
 
-def test_a_sentence_is_typed_behind_a_colon_and_answered(control):
-    said, typing = said_with(control, ":no, the x\x7fhammer\n")
-    assert said == ["no, the hammer"]
-    assert (typing.saying, typing.reply) == (False, "all right")
-    assert control.state.mode is Mode.RUNNING
+# Keys -> what is said, what is being typed, and the mode of the run afterwards.
+TYPED = [
+    ("\nstop\x1b", [], Typing(can_say=True), Mode.RUNNING),
+    (":  \n", [], Typing(can_say=True), Mode.RUNNING),
+    (":no, the x\x7fhammer\n", ["no, the hammer"], Typing(reply="all right", can_say=True), Mode.RUNNING),
+    (":where are you\n ", ["where are you"], Typing(reply="all right", can_say=True), Mode.PAUSED),
+]
 
 
-def test_enter_begins_a_sentence_too_and_escape_leaves_it(control):
-    assert said_with(control, "\nstop\x1b") == ([], Typing(can_say=True))
-
-
-def test_an_empty_sentence_is_not_said(control):
-    assert said_with(control, ":  \n")[0] == []
-
-
-def test_keys_act_again_after_a_sentence(control):
-    said_with(control, ":where are you\n ")
-    assert control.state.mode is Mode.PAUSED
+@pytest.mark.parametrize(("keys", "said", "typing", "mode"), TYPED)
+def test_a_sentence_is_typed_behind_a_colon_or_enter_and_escape_leaves_it(control, keys, said, typing, mode):
+    assert (*said_with(control, keys), control.state.mode) == (said, typing, mode)
 
 
 def test_a_sentence_being_typed_and_its_answer_stand_below_the_tree(control):

@@ -2,6 +2,7 @@
 
 import io
 import re
+from types import SimpleNamespace
 
 import pytest
 from py_trees.common import Status
@@ -18,19 +19,15 @@ from skills.api import Cause
 from skills.files.errors import InputError
 
 
-class Heard:
-    """A voice that remembers."""
-
-    def __init__(self):
-        self.texts = []
-
-    def say(self, text):
-        self.texts.append(text)
+def a_voice():
+    """A voice that remembers what it says."""
+    texts = []
+    return SimpleNamespace(texts=texts, say=texts.append)
 
 
 @pytest.mark.parametrize(("quiet", "shown"), [(False, "Alice: [bold]Hello\n"), (True, "")])
 def test_speech_is_printed_unless_quiet_and_said_by_the_voice(quiet, shown):
-    told, voice = io.StringIO(), Heard()
+    told, voice = io.StringIO(), a_voice()
     speech = SpeechOutput(Console(file=told, width=80), voice, quiet)
     speech.message("speech", {"robot": "Alice", "text": "[bold]Hello", "t": 1.0})
     speech.message("pose", {"robot": "Alice"})
@@ -39,7 +36,7 @@ def test_speech_is_printed_unless_quiet_and_said_by_the_voice(quiet, shown):
 
 
 def test_the_voice_keeps_silent_in_a_silent_zone():
-    told, voice = io.StringIO(), Heard()
+    told, voice = io.StringIO(), a_voice()
     SpeechOutput(Console(file=told, width=80), voice, False).message(
         "speech", {"robot": "Alice", "text": "Hello", "silent": "bedroom"}
     )
@@ -99,11 +96,24 @@ def test_the_bar_of_a_queue_stands_above_the_tree(compiled, make):
     assert "0/3" in rows[0] and "at it" in rows[-1] and len(rows) <= console.height
 
 
-def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compiled, make):
-    tree = compiled(*make.FETCH)
-    drive = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/navigate"))
-    detect = drive.replace("navigate", "detect")
+@pytest.fixture
+def tree(compiled, make):
+    return compiled(*make.FETCH)
+
+
+@pytest.fixture
+def show(tree):
+    """Shows states of nodes of the tree at a time, whose other nodes are idle."""
     idle = {path_id: NodeState() for path_id in tree.path_ids}
+    return lambda view, now_s, states: view.tick(Progress(now_s, 20, 0, {"Alice": {**idle, **states}}, {"Alice": tree}))
+
+
+def node_of(tree, end):
+    return next(node.path_id for node in tree.root.walk() if node.path_id.endswith(end))
+
+
+def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(tree, show):
+    drive, detect = node_of(tree, "counter-1/navigate"), node_of(tree, "counter-1/detect")
     told = io.StringIO()
     with live_view(Console(file=told, width=200)) as view:
         for now_s, changes in (
@@ -113,7 +123,7 @@ def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compile
             (4.0, {detect: NodeState(Status.FAILURE, Cause.PRECONDITION, "saw none")}),
             (4.1, {detect: NodeState(Status.FAILURE, Cause.PRECONDITION, "saw none")}),
         ):
-            view.tick(Progress(now_s, 20, 0, {"Alice": {**idle, **changes}}, {"Alice": tree}))
+            show(view, now_s, changes)
     first, second = told.getvalue().splitlines()
     assert re.match(r"✓ +2.5 s  go to the counter: there$", first)
     assert re.match(r"✗ +0.4 s  detect \(coke, beer; counter\): PRECONDITION: saw none$", second)
@@ -126,31 +136,25 @@ def test_each_skill_that_ended_is_one_line_with_place_result_and_seconds(compile
         (Status.FAILURE, r"✗ +0.0 s  detect \(coke, beer; counter\): POSTCONDITION: no coke seen$"),
     ],
 )
-def test_a_look_that_found_nothing_has_no_cross_while_the_search_goes_on(compiled, make, search, line):
-    tree = compiled(*make.FETCH)
-    detect = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/detect"))
+def test_a_look_that_found_nothing_has_no_cross_while_the_search_goes_on(tree, show, search, line):
+    detect = node_of(tree, "counter-1/detect")
     look = detect.removesuffix("/detect")
     find = next(node.path_id for node in tree.root.walk() if look in [child.path_id for child in node.children])
-    idle = {path_id: NodeState() for path_id in tree.path_ids}
     told = io.StringIO()
     with live_view(Console(file=told, width=200)) as view:
         for state in (NodeState(Status.RUNNING), NodeState(Status.FAILURE, Cause.POSTCONDITION, "no coke seen")):
-            states = {**idle, look: NodeState(Status.FAILURE), find: NodeState(search), detect: state}
-            view.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
+            show(view, 1.0, {look: NodeState(Status.FAILURE), find: NodeState(search), detect: state})
     assert re.match(line, told.getvalue().strip())
 
 
-def test_speech_is_printed_behind_the_skills_that_ended_before_it(compiled, make):
-    tree = compiled(*make.FETCH)
-    drive = next(node.path_id for node in tree.root.walk() if node.path_id.endswith("counter-1/navigate"))
-    idle = {path_id: NodeState() for path_id in tree.path_ids}
+def test_speech_is_printed_behind_the_skills_that_ended_before_it(tree, show):
+    drive = node_of(tree, "counter-1/navigate")
     told = io.StringIO()
     console = Console(file=told, width=200)
     with live_view(console) as view:
-        speech = SpeechOutput(console, Heard(), quiet=False)
+        speech = SpeechOutput(console, a_voice(), quiet=False)
         speech.message("speech", {"robot": "Alice", "text": "hello", "t": 1.0})
         for visitor in (view, speech):
-            states = {**idle, drive: NodeState(Status.SUCCESS, message="there")}
-            visitor.tick(Progress(1.0, 20, 0, {"Alice": states}, {"Alice": tree}))
+            show(visitor, 1.0, {drive: NodeState(Status.SUCCESS, message="there")})
     first, second = told.getvalue().splitlines()
     assert (first.endswith("there"), second) == (True, "Alice: hello")

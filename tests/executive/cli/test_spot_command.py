@@ -15,11 +15,10 @@ from importlib import util
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
 from executive.cli import spot_command
-from executive.cli.entry import app
 from executive.record.history import read_events
+from tests.executive.cli.calls import done, errand, refusal
 
 PROGRAM = """
 import os, sys, time
@@ -50,21 +49,13 @@ sys.exit(7)
 def test_without_the_sdk_the_extra_is_named(monkeypatch, tmp_path):
     found = util.find_spec
     monkeypatch.setattr(spot_command, "find_spec", lambda name: None if name == "bosdyn" else found(name))
-    result = CliRunner().invoke(app, ["serve"])
-    assert result.exit_code == 2
-    assert "pip install 'spot-errand[spot]'" in result.output
-
-
-def test_a_program_that_is_not_there_is_named(tmp_path):
-    result = CliRunner().invoke(app, ["sdk", str(tmp_path / "none.py"), "127.0.0.1"])
-    assert result.exit_code == 2
-    assert "none.py: there is no such program" in result.output
+    assert "pip install 'spot-errand[spot]'" in refusal("serve")
 
 
 def test_a_map_that_cannot_be_written_is_one_error(tmp_path):
     pytest.importorskip("bosdyn.client", reason="not installed: pip install 'spot-errand[spot]'")
     (tmp_path / "file").write_text("")
-    result = CliRunner().invoke(app, ["serve", "--graph", str(tmp_path / "file")])
+    result = errand("serve", "--graph", str(tmp_path / "file"))
     assert result.exit_code == 2
     assert "file: cannot write it" in result.output.replace("\n", " ") and "--graph" in result.output
 
@@ -76,14 +67,14 @@ def test_a_program_walks_the_robot_and_its_exit_code_is_kept(tmp_path, capfd, pa
     (tmp_path / "beside.py").write_text("GOAL_M = 0.2\n")
     program = tmp_path / "walk.py"
     program.write_text(PROGRAM)
-    result = CliRunner().invoke(app, ["sdk", "--seed", "2", "--pace", pace, str(program), "127.0.0.1"])
+    result = errand("sdk", "--seed", "2", "--pace", pace, str(program), "127.0.0.1")
     said = capfd.readouterr().out
     assert (result.exit_code, "walked 0.2 640" in said) == (7, True), said + result.output
 
 
 def test_nothing_but_the_server_loads_the_sdk():
     before = {name for name in sys.modules if name.startswith("bosdyn")}
-    CliRunner().invoke(app, ["sdk", "--help"])
+    errand("sdk", "--help")
     assert {name for name in sys.modules if name.startswith("bosdyn")} == before
 
 
@@ -109,25 +100,22 @@ def served(request, tmp_path, monkeypatch):
 
 def test_a_wrong_password_is_one_line(served, monkeypatch):
     monkeypatch.setenv("BOSDYN_CLIENT_PASSWORD", "guessed-password")
-    result = CliRunner().invoke(app, served)
+    result = errand(*served)
     assert (result.exit_code, "refuses user 'user' with this password" in result.output) == (2, True), result.output
     assert "guessed-password" not in result.output
 
 
 @pytest.mark.parametrize("option", [["--take"], ["--estop", "own"]])
 def test_an_option_that_replaces_another_holder_needs_a_yes(served, option):
-    result = CliRunner().invoke(app, [*served, *option])
-    assert (result.exit_code, f"{' '.join(option)} needs a yes" in result.output) == (2, True), result.output
+    assert f"{' '.join(option)} needs a yes" in refusal(*served, *option)
 
 
 def test_a_padding_that_is_no_number_is_refused(served):
-    result = CliRunner().invoke(app, [*served, "--padding", "nan"])
-    assert (result.exit_code, "--padding" in result.output) == (2, True), result.output
+    assert "--padding" in refusal(*served, "--padding", "nan")
 
 
 def test_the_password_stands_in_no_file_and_no_output(served, tmp_path):
-    result = CliRunner().invoke(app, [*served, "--power-on", "--padding", "0.1"])
-    assert result.exit_code == 0, result.output
+    result = done(*served, "--power-on", "--padding", "0.1")
     assert SECRET not in result.output
     files = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert {"log.mcap", "report.html", "missions.db"} <= {path.name for path in files}
@@ -137,8 +125,7 @@ def test_the_password_stands_in_no_file_and_no_output(served, tmp_path):
 
 def test_a_password_that_is_missing_is_named_where_nobody_can_type_it(served, monkeypatch):
     monkeypatch.delenv("BOSDYN_CLIENT_PASSWORD")
-    result = CliRunner().invoke(app, served)
-    assert (result.exit_code, "set BOSDYN_CLIENT_PASSWORD" in result.output) == (2, True), result.output
+    assert "set BOSDYN_CLIENT_PASSWORD" in refusal(*served)
 
 
 def test_a_pressed_estop_ends_the_run_by_that_cause(request, served, tmp_path):
@@ -152,7 +139,7 @@ def test_a_pressed_estop_ends_the_run_by_that_cause(request, served, tmp_path):
     pressing = threading.Thread(target=press)
     pressing.start()
     mission = ["run", "--say", "go to the kitchen", *served[3:]]
-    result = CliRunner().invoke(app, [*mission, "--power-on", "--json"])
+    result = errand(*mission, "--power-on", "--json")
     pressing.join()
     report = json.loads(result.output.splitlines()[-1])
     assert (report["outcome"], report["message"]) == ("failure", "the E-stop is pressed"), result.output

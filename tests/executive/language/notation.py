@@ -1,30 +1,24 @@
 """Short notation of steps for the tables of sentences."""
 
-from __future__ import annotations
-
 import json
 import re
-from collections.abc import Iterable
 
-from executive.words.condition import AllOf, AnyOf, ButtonPressed, Condition, DoorOpen, Look, Not, ValueIs
+from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Check, Do, Dock, OpenDoor, Speak, Wait
-from executive.words.step import Step
 from executive.words.steps import Ask, Choose, Group, Repeat, Together, Try
 
-__all__ = ["as_noted", "noted"]
 
-
-def noted(steps: Iterable[Step]) -> str:
+def noted(steps):
     """Steps in the notation, with ";" between them."""
     return "; ".join(map(_step, steps))
 
 
-def as_noted(lines: Iterable[str]) -> str:
+def as_noted(lines):
     """Lines of a table in the form of `noted`; "then" may stand between commands."""
     return re.sub(r"\]\s*then Take", "]; Take", "; ".join(lines))
 
 
-def _step(step: Step) -> str:
+def _step(step):
     match step:
         case Do():
             return str(step.command)
@@ -54,7 +48,7 @@ def _step(step: Step) -> str:
     raise AssertionError(f"no sentence becomes {step!r}")
 
 
-def _condition(condition: Condition) -> str:
+def _condition(condition):
     match condition:
         case ValueIs(text=text):
             return f"value {_quoted(text)}"
@@ -73,7 +67,7 @@ def _condition(condition: Condition) -> str:
     raise AssertionError(f"no sentence asks {condition!r}")
 
 
-def _rounds(step: Repeat) -> str:
+def _rounds(step):
     loop = step.loop
     times = "" if loop.times is None else f" {loop.times} times"
     every = "" if loop.every_s is None else f" every {_number(loop.every_s)} s"
@@ -82,7 +76,7 @@ def _rounds(step: Repeat) -> str:
     return f"{times}{every}{while_}{until}"
 
 
-def _awaited(step: Wait) -> str:
+def _awaited(step):
     awaited = step.awaited
     condition = "" if awaited.condition is None else f" for ({_condition(awaited.condition)})"
     seconds = "" if awaited.seconds is None else f" {_number(awaited.seconds)} s"
@@ -90,23 +84,22 @@ def _awaited(step: Wait) -> str:
     return f"{condition}{seconds}{clock}"
 
 
-def _braced(steps: Iterable[Step]) -> str:
+def _braced(steps):
     return f"{{{noted(steps)}}}"
 
 
-def _branch(word: str, steps: tuple[Step, ...]) -> str:
+def _branch(word, steps):
     return f" {word} {_braced(steps)}" if steps else ""
 
 
-def _quoted(text: str) -> str:
+def _quoted(text):
     return json.dumps(text, ensure_ascii=False)
 
 
-def _number(value: float) -> str:
-    short = f"{value:g}"
-    return short if float(short) == value else repr(float(value))
+def _number(value):
+    return short if float(short := f"{value:g}") == value else repr(float(value))
 
 
-def _policy(step: Step) -> str:
+def _policy(step):
     """Reaction to a failed step, where there is one."""
     return "" if step.on_failure is None else f" {step.on_failure.value}"

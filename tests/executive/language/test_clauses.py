@@ -1,6 +1,7 @@
 import pytest
 
 from executive.language.clauses import Cue, cut, trailing_cue
+from tests.tables import table
 
 
 def cues(text):
@@ -22,18 +23,10 @@ def test_one_clause_is_not_split(text):
     assert [one.text for one in cut(text)] == [text]
 
 
-@pytest.mark.parametrize(
-    ("text", "before", "kind", "rest"),
-    [
-        ("bring a beer if there is one", "bring a beer", Cue.IF, "there is one"),
-        ("go to the hall every ten minutes for an hour", "go to the hall", Cue.EVERY, "for an hour"),
-        ("go to the hall three times", "go to the hall", Cue.TIMES, ""),
-        ("look for it until you find it", "look for it", Cue.UNTIL, "you find it"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "trailing_cues"))
 def test_trailing_cue_is_found(text, before, kind, rest):
     found = trailing_cue(text)
-    assert (found.before, found.kind, found.text) == (before, kind, rest)
+    assert (found.before, found.kind.name, found.text) == (before, kind, rest)
 
 
 @pytest.mark.parametrize(

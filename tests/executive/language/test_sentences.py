@@ -61,15 +61,13 @@ def test_all_commands_parse_back():
 @pytest.mark.parametrize(("sentence", "part"), sentences("refused"))
 def test_a_sentence_is_refused_whole_with_the_part_named(parser, sentence, part):
     answer = answer_to(sentence, parser)
-    assert (answer.status, answer.commands) == (Status.REFUSED, ())
-    assert part in answer.reason
+    assert (answer.status, answer.commands) == (Status.REFUSED, ()) and part in answer.reason
 
 
 @pytest.mark.parametrize(("sentence", "word"), sentences("question"))
 def test_incomplete_sentence_makes_a_question(parser, sentence, word):
     answer = answer_to(sentence, parser)
-    assert (answer.status, answer.commands) == (Status.QUESTION, ())
-    assert word in answer.reason
+    assert (answer.status, answer.commands) == (Status.QUESTION, ()) and word in answer.reason
 
 
 def test_there_are_enough_sentences():

@@ -1,3 +1,4 @@
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from hypothesis import strategies as st
 
 from executive.language.understand import Status, understand
 from executive.words.command import parse_command
+from tests.tables import table
 
 HERE = Path(__file__).parent
 FAMILIES = yaml.safe_load((HERE / "sentences.yaml").read_text(encoding="utf-8"))
@@ -14,132 +16,72 @@ UNUSABLE = yaml.safe_load((HERE / "refused.yaml").read_text(encoding="utf-8"))
 UNDERSTOOD = [(text, commands) for family in FAMILIES.values() for text, commands in family.items()]
 
 
+@pytest.fixture
+def understood(parser, knowledge):
+    return partial(understand, parser=parser, knowledge=knowledge, require_wake=False)
+
+
 def texts(answer):
     return [str(command) for command in answer.commands]
 
 
 @pytest.mark.parametrize(("sentence", "commands"), UNDERSTOOD, ids=[text for text, _ in UNDERSTOOD])
-def test_a_sentence_becomes_its_commands(parser, knowledge, sentence, commands):
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert (answer.reason, texts(answer)) == (None, commands)
-    assert answer.status is Status.OK
+def test_a_sentence_becomes_its_commands(understood, sentence, commands):
+    answer = understood(sentence)
+    assert (answer.reason, texts(answer), answer.status) == (None, commands, Status.OK)
 
 
 @pytest.mark.parametrize(("sentence", "commands"), UNDERSTOOD[::6], ids=[text for text, _ in UNDERSTOOD[::6]])
-def test_the_wake_phrase_changes_nothing_but_the_address(parser, knowledge, sentence, commands):
-    answer = understand(f"Hey Alice, {sentence}", parser=parser, knowledge=knowledge, require_wake=True)
-    assert texts(answer) == commands
+def test_the_wake_phrase_changes_nothing_but_the_address(understood, sentence, commands):
+    assert texts(understood(f"Hey Alice, {sentence}", require_wake=True)) == commands
 
 
-@pytest.mark.parametrize(("sentence", "words"), UNUSABLE["refused"].items())
-def test_refusal_names_the_unsupported_words(parser, knowledge, sentence, words):
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert (answer.status, answer.commands) == (Status.REFUSED, ())
-    assert [word for word in words if word not in answer.reason] == []
-    assert "\n" not in answer.reason
+UNCLEAR = [(Status(status), *row) for status, rows in UNUSABLE.items() for row in rows.items()]
 
 
-@pytest.mark.parametrize(("sentence", "words"), UNUSABLE["question"].items())
-def test_missing_destination_makes_a_question(parser, knowledge, sentence, words):
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert (answer.status, answer.commands) == (Status.QUESTION, ())
-    assert [word for word in words if word not in answer.reason] == []
+@pytest.mark.parametrize(("status", "sentence", "words"), UNCLEAR, ids=[text for _, text, _ in UNCLEAR])
+def test_refusal_or_question_names_the_unsupported_words(understood, status, sentence, words):
+    answer = understood(sentence)
+    assert (answer.status, answer.commands) == (status, ())
+    assert [word for word in words if word not in answer.reason] == [] and "\n" not in answer.reason
 
 
-@pytest.mark.parametrize(
-    ("sentence", "unknown", "hint"),
-    [("sing a song", "sing a song", "I can fetch"), ("bring me the wheelbarrow", "wheelbarrow", "more")],
-)
-def test_refusal_names_only_similar_names(parser, knowledge, sentence, unknown, hint):
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert answer.unknown_words == (unknown,)
-    assert hint in answer.reason
+@pytest.mark.parametrize(*table(__file__, "similar"))
+def test_refusal_names_only_similar_names(understood, knowledge, sentence, unknown, hint):
+    answer = understood(sentence)
+    assert (answer.unknown_words, hint in answer.reason) == ((unknown,), True), answer.reason
     assert sum(name in answer.reason for name in (*knowledge.object_names(), *knowledge.place_names())) <= 3
 
 
-def test_verb_stays_as_spoken(parser, knowledge):
-    answer = understand("could you pick the hammer up", parser=parser, knowledge=knowledge, require_wake=False)
-    assert [command.verb for command in answer.commands] == ["pick up"]
+def test_verb_stays_as_spoken(understood):
+    assert [command.verb for command in understood("could you pick the hammer up").commands] == ["pick up"]
 
 
-@pytest.mark.parametrize(
-    ("sentence", "says"),
-    [
-        ("fetch me a drink", 'begin with "Hey Alice"'),
-        ("Hey Bob, fetch me a drink", "said to Bob"),
-        ("Alice fetched me a drink yesterday", 'begin with "Hey Alice"'),
-    ],
-)
-def test_a_sentence_for_nobody_or_another_is_not_taken(parser, knowledge, sentence, says):
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=True)
-    assert (answer.status, answer.commands) == (Status.NOT_ADDRESSED, ())
-    assert says in answer.reason
+@pytest.mark.parametrize(*table(__file__, "not_taken"))
+def test_a_sentence_for_nobody_or_another_is_not_taken(understood, sentence, says):
+    answer = understood(sentence, require_wake=True)
+    assert (answer.status, answer.commands, says in answer.reason) == (Status.NOT_ADDRESSED, (), True), answer.reason
 
 
-def test_a_mission_may_give_the_robot_another_name(parser, knowledge):
-    answer = understand("Hey Spot, come here", parser=parser, knowledge=knowledge, require_wake=True, robot_name="Spot")
-    assert answer.status is Status.OK
+def test_a_mission_may_give_the_robot_another_name(understood):
+    assert understood("Hey Spot, come here", require_wake=True, robot_name="Spot").status is Status.OK
 
 
-OPEN = {
-    "fetch me the teapot from the pantry": [
-        "Take [Nothing] to [pantry] and do [grasp] to [teapot]",
-        "Take [teapot] to [start] and do [Nothing] to [Nothing]",
-    ],
-    "bring three small boxes to Ms Miller in the archive": [
-        "Take [Nothing] to [Nothing] and do [grasp] to [3 small boxes]",
-        "Take [3 small boxes] to [Ms Miller at archive] and do [Nothing] to [Nothing]",
-    ],
-    "put the pot on the stove in the basement": [
-        "Take [Nothing] to [Nothing] and do [grasp] to [pot]",
-        "Take [pot] to [stove in basement] and do [place] to [pot]",
-    ],
-    "bring me the thing under the newspaper from the sofa": [
-        "Take [Nothing] to [sofa] and do [grasp] to [thing under newspaper]",
-        "Take [thing under newspaper] to [start] and do [Nothing] to [Nothing]",
-    ],
-    "give the parcel to the man holding his hand up in the lobby": [
-        "Take [Nothing] to [Nothing] and do [grasp] to [parcel]",
-        "Take [parcel] to [man holding his hand up at lobby] and do [Nothing] to [Nothing]",
-    ],
-    "bring a glass of milk to the garden": [
-        "Take [Nothing] to [Nothing] and do [grasp] to [glass of milk]",
-        "Take [glass of milk] to [garden] and do [Nothing] to [Nothing]",
-    ],
-    "find grandma's glasses": ["Take [Nothing] to [Nothing] and do [find] to [some grandma's glasses]"],
-}
-
-
-@pytest.mark.parametrize(("sentence", "commands"), OPEN.items())
-def test_with_open_vocabulary_names_stay_as_spoken(parser, sentence, commands):
-    answer = understand(sentence, parser=parser, knowledge=None, require_wake=False)
+@pytest.mark.parametrize(*table(__file__, "open_vocabulary"))
+def test_with_open_vocabulary_names_stay_as_spoken(understood, sentence, commands):
+    answer = understood(sentence, knowledge=None)
     assert (answer.reason, texts(answer)) == (None, commands)
 
 
-def test_lines_are_answered_in_order_and_one_by_one(parser):
-    lines = ["go to the attic", "", "what day is it"]
-    answers = [understand(line, parser=parser, knowledge=None, require_wake=False) for line in lines]
+def test_lines_are_answered_in_order_and_one_by_one(understood):
+    answers = [understood(line, knowledge=None) for line in ("go to the attic", "", "what day is it")]
     assert [answer.status.value for answer in answers] == ["ok", "refused", "refused"]
+    nothing = {"item": None, "goal_at": None, "task": None, "object": None, "item_count": 0, "object_count": 0}
     assert answers[0].to_json() == {
         "text": "go to the attic",
         "status": "ok",
-        "reason": None,
-        "unknown_words": [],
-        "question": None,
-        "notes": [],
-        "commands": [
-            {
-                "item": None,
-                "goal": "attic",
-                "goal_at": None,
-                "task": None,
-                "object": None,
-                "item_count": 0,
-                "object_count": 0,
-                "verb": "go",
-            }
-        ],
-        "mission": [],
+        "commands": [nothing | {"goal": "attic", "verb": "go"}],
+        **{"reason": None, "question": None, "unknown_words": [], "notes": [], "mission": []},
     }
 
 
@@ -151,8 +93,7 @@ MANGLED = st.one_of(st.text(max_size=60), st.lists(st.sampled_from(WORDS), max_s
 @given(MANGLED, st.booleans())
 def test_no_sentence_raises_and_every_command_parses_back(parser, knowledge, sentence, is_open):
     answer = understand(sentence, parser=parser, knowledge=None if is_open else knowledge, require_wake=False)
-    assert (answer.status is Status.OK) == bool(answer.commands or answer.steps)
-    assert (answer.status is Status.OK) == (answer.reason is None)
+    assert (answer.status is Status.OK) == bool(answer.commands or answer.steps) == (answer.reason is None)
     for command in answer.commands:
         assert str(parse_command(str(command))) == str(command)
 
@@ -176,6 +117,5 @@ def test_no_understood_sentence_raises_when_it_is_mangled(parser, knowledge, dat
     "sentence",
     ["fetch " * 10_000, "a" * 100_000, "\x00\x07\x1b[31m", "把饮料拿来", "🙂🙂", "[]\"'", "no " * 50, ", " * 5000],
 )
-def test_odd_input_is_refused(parser, knowledge, sentence):
-    answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert answer.status is Status.REFUSED
+def test_odd_input_is_refused(understood, sentence):
+    assert understood(sentence).status is Status.REFUSED

@@ -52,16 +52,26 @@ def compile_file(parser, flat, skills):
 
 
 @pytest.fixture
-def compile_text(compile_file, tmp_path):
-    """Compiles a text as `mission.yaml` in a folder with other files by name."""
+def write(tmp_path):
+    """Writes `mission.yaml`, and other files by name, into a folder; returns the path of the mission."""
 
-    def compile_here(text, **others):
-        for name, other in others.items():
-            (tmp_path / f"{name}.yaml").write_text(other, encoding="utf-8")
-        (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
-        return compile_file(tmp_path / "mission.yaml")
+    def to_files(text, **others):
+        for name, content in {**others, "mission": text}.items():
+            (tmp_path / f"{name}.yaml").write_text(content, encoding="utf-8")
+        return tmp_path / "mission.yaml"
 
-    return compile_here
+    return to_files
+
+
+@pytest.fixture
+def load(write, parser, flat):
+    """Loads the mission of a text."""
+    return lambda text, **others: mission_from_file(write(text, **others), parser=parser, knowledge=flat)
+
+
+@pytest.fixture
+def compile_text(compile_file, write):
+    return lambda text, **others: compile_file(write(text, **others))
 
 
 @pytest.fixture

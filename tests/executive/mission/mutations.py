@@ -60,7 +60,24 @@ def changed(text: str, rng: np.random.Generator, where: Callable[[Path_, Any], b
         return None
     broken = copy.deepcopy(data)
     change(parent(broken, path), path[-1], rng)
-    return yaml.safe_dump(broken, sort_keys=False, allow_unicode=True).encode()
+    return dumped(broken)
+
+
+def dumped(data: Any) -> bytes:
+    return yaml.safe_dump(data, sort_keys=False, allow_unicode=True).encode()
+
+
+def one_of(*values: Any) -> Any:
+    """A change that puts one of some values in."""
+
+    def change(node, key, rng):
+        node[key] = chosen(rng, list(values))
+
+    return change
+
+
+def remove(node, key, rng):
+    node.pop(key)
 
 
 def rename_key(text, rng):
@@ -72,57 +89,40 @@ def rename_key(text, rng):
 
 
 def delete_required(text, rng):
-    return changed(
-        text, rng, lambda p, v: p in (("name",), ("steps",), ("parts",)), lambda node, key, rng: node.pop(key)
-    )
+    return changed(text, rng, lambda p, v: p in (("name",), ("steps",), ("parts",)), remove)
 
 
 def delete_half_of_a_pair(text, rng):
-    return changed(text, rng, lambda p, v: p[-1] in ("do",), lambda node, key, rng: node.pop(key))
+    return changed(text, rng, lambda p, v: p[-1] == "do", remove)
 
 
 def wrong_type(text, rng):
-    wrong = [[1, 2], {"a": 1}, 3.5, True, None, [], float("nan"), "\x00".join("ab")]
+    wrong = [[1, 2], {"a": 1}, 3.5, True, None, []]
 
     def replace(node, key, rng):
-        fits = [w for w in wrong[:6] if type(w) is not type(node[key]) and not (key == "name" and w is None)]
-        node[key] = fits[int(rng.integers(len(fits)))] if key in ("name", "steps", "say", "do") else [[{"a": [1]}]]
+        fits = [w for w in wrong if type(w) is not type(node[key]) and not (key == "name" and w is None)]
+        value = chosen(rng, fits) if key in ("name", "steps", "say", "do") else [[{"a": [1]}]]
+        node[key] = [1] if value is None else value
 
-    return changed(
-        text, rng, lambda p, v: isinstance(p[-1], str) and p[-1] not in FREE and v is not None, _not_none(replace)
-    )
+    def fits(path, value):
+        return isinstance(path[-1], str) and path[-1] not in FREE and value is not None
 
-
-def _not_none(replace):
-    def change(node, key, rng):
-        replace(node, key, rng)
-        if node[key] is None:
-            node[key] = [1]
-
-    return change
+    return changed(text, rng, fits, replace)
 
 
 def wrong_number(text, rng):
-    values = [-1, 0, -0.5, float("inf"), float("nan"), "soon", [60], True]
-
-    def replace(node, key, rng):
-        node[key] = chosen(rng, values)
-
-    return changed(text, rng, lambda p, v: p[-1] in ("timeout", "time", "limit"), replace)
+    values = (-1, 0, -0.5, float("inf"), float("nan"), "soon", [60], True)
+    return changed(text, rng, lambda p, v: p[-1] in ("timeout", "time", "limit"), one_of(*values))
 
 
 def unknown_name(text, rng):
-    def replace(node, key, rng):
-        node[key] = chosen(rng, ["moon base", "kitchn", "unicorn", "..", "a" * 300, "navigat", "flatt", "🙂"])
-
-    return changed(text, rng, lambda p, v: p[-1] in NAMES and isinstance(v, str), replace)
+    names = ("moon base", "kitchn", "unicorn", "..", "a" * 300, "navigat", "flatt", "🙂")
+    return changed(text, rng, lambda p, v: p[-1] in NAMES and isinstance(v, str), one_of(*names))
 
 
 def unknown_sentence(text, rng):
-    def replace(node, key, rng):
-        node[key] = chosen(rng, ["sing me a song", "", "bring", "fetch the unicorn from the kitchen", "x" * 5000, "?!"])
-
-    return changed(text, rng, lambda p, v: p[-1] == "say", replace)
+    sentences = ("sing me a song", "", "bring", "fetch the unicorn from the kitchen", "x" * 5000, "?!")
+    return changed(text, rng, lambda p, v: p[-1] == "say", one_of(*sentences))
 
 
 def unknown_port(text, rng):
@@ -141,10 +141,7 @@ def mistyped_port(text, rng):
 
 
 def unknown_parameter(text, rng):
-    def replace(node, key, rng):
-        node[key] = "the ${nowhere} room"
-
-    return changed(text, rng, lambda p, v: isinstance(v, str), replace)
+    return changed(text, rng, lambda p, v: isinstance(v, str), one_of("the ${nowhere} room"))
 
 
 def steps_of(data):
@@ -156,21 +153,21 @@ def empty_step(text, rng):
     data = yaml.safe_load(text)
     steps = steps_of(data)
     steps.insert(int(rng.integers(len(steps) + 1)), chosen(rng, [{}, None, "go", 3, [], {"with": {}}]))
-    return yaml.safe_dump(data, sort_keys=False).encode()
+    return dumped(data)
 
 
 def uses_itself(text, rng):
     data = yaml.safe_load(text)
     steps_of(data).append({"use": "mission.yaml"})
     data.pop("parameters", None)
-    return yaml.safe_dump(data, sort_keys=False).encode()
+    return dumped(data)
 
 
 def bad_override(text, rng):
     data = yaml.safe_load(text)
     wrong = [{"places": {"kitchen": 3}}, {"thngs": {}}, {"people": {"Robin": {"at": "mars"}}}, {"surfaces": {"x": {}}}]
     data["knowledge"] = chosen(rng, [*wrong, [1], "all"])
-    return yaml.safe_dump(data, sort_keys=False).encode()
+    return dumped(data)
 
 
 def with_a_tab(text, rng):
@@ -183,9 +180,8 @@ def with_a_tab(text, rng):
 def unbalanced(text, rng):
     lines = text.splitlines()
     at = chosen(rng, [n for n, line in enumerate(lines) if ":" in line and not line.startswith("#")])
-    lines[at] = (
-        lines[at].split(":")[0] + ": " + chosen(rng, ["{", "[", '"', "'", "}", "*x", "!!python/object:x y", "@"])
-    )
+    value = chosen(rng, ["{", "[", '"', "'", "}", "*x", "!!python/object:x y", "@"])
+    lines[at] = f"{lines[at].split(':')[0]}: {value}"
     return "\n".join(lines).encode()
 
 
@@ -318,11 +314,7 @@ def some_key(raw, rng):
 
 def some_value(raw, rng):
     """Replaces a value by another one of the file."""
-
-    def change(node, key, rng):
-        node[key] = chosen(rng, list(VALUES))
-
-    return _tree_changed(raw, rng, change)
+    return _tree_changed(raw, rng, one_of(*VALUES))
 
 
 def some_branch(raw, rng):

@@ -1,6 +1,5 @@
 """Broken mission files, made by seeded mutation of good ones: each gives a located message, never a traceback."""
 
-import importlib.util
 import shutil
 import time
 from pathlib import Path
@@ -9,10 +8,7 @@ import pytest
 
 from executive.app.checker import Checker
 from skills.files.errors import InputError
-
-_spec = importlib.util.spec_from_file_location("mission_mutations", Path(__file__).with_name("mutations.py"))
-mutations = importlib.util.module_from_spec(_spec)
-_spec.loader.exec_module(mutations)
+from tests.executive.mission import mutations
 
 COUNT, SEED = 300, 7
 RANDOM = 100

@@ -35,12 +35,8 @@ parts:
 
 
 @pytest.fixture
-def load(tmp_path):
-    def of(text=FILE, **given):
-        (tmp_path / "mission.yaml").write_text(text, encoding="utf-8")
-        return load_mission(tmp_path / "mission.yaml", given)
-
-    return of
+def load(write):
+    return lambda text=FILE, **given: load_mission(write(text), given)
 
 
 @pytest.fixture
@@ -48,9 +44,8 @@ def part(load, parser, flat):
     """Mission of one robot."""
 
     def of(name, text=FILE, **given):
-        return mission_from_file(
-            mission_of_robot(load(text, **given), name.title(), name), parser=parser, knowledge=flat
-        )
+        loaded = mission_of_robot(load(text, **given), name.title(), name)
+        return mission_from_file(loaded, parser=parser, knowledge=flat)
 
     return of
 
@@ -84,35 +79,14 @@ def test_an_error_in_a_part_has_its_own_line(part):
     assert (error.value.line, "'hal'" in str(error.value)) == (18, True)
 
 
-PARTS = "parts: {alice: {steps: [{to: hall}]}}\n"
-# The rest of a file with the name x; the line of the error, and what it says.
-REFUSED = [
-    ("robots: {}\nsteps: [{to: hall}]\n", 2, "robots: should not be empty"),
-    ("robots: {alice: {at: [1, 2, 0]}}\n" + PARTS, 2, "key 'kind' is missing in robots.alice"),
-    ("robots: {alice: {kind: spot, at: [1, 2]}}\n" + PARTS, 2, "robots.alice.at: it should have more parts than 2"),
-    ("robots: {alice: {kind: spot, speed: 1}}\n" + PARTS, 2, "unknown key 'speed'"),
-    ("steps: [{to: hall}]\n" + PARTS, 1, "either 'steps', or 'parts'"),
-    ("parts: {}\n", 2, "parts: should not be empty"),
-    ("parts: {alice: {after: bob}}\n", 2, "key 'steps' is missing in parts.alice"),
-    ("parts:\n  alice:\n    robot: bob\n    steps: [{to: hall}]\n", 4, "unknown key 'robot'"),
-]
-
-
-@pytest.mark.parametrize(("text", "line", "words"), REFUSED)
-def test_errors_in_robots_and_parts_have_their_line(load, text, line, words):
-    with pytest.raises(InputError) as error:
-        load(f"name: x\n{text}")
-    assert (error.value.line, words in str(error.value)) == (line, True), str(error.value)
-
-
-NAMED = [
-    ("alice: spot\n  Alice: fetch", 4, "'alice' and 'Alice' are the same name"),
-    ("alice: spot\n  bob: ftch", 4, "unknown kind of robot 'ftch'; did you mean 'fetch'?"),
-    ("everyone: spot", 3, "means all robots"),
-]
-
-
-@pytest.mark.parametrize(("robots", "line", "words"), NAMED)
+@pytest.mark.parametrize(
+    ("robots", "line", "words"),
+    [
+        ("alice: spot\n  Alice: fetch", 4, "'alice' and 'Alice' are the same name"),
+        ("alice: spot\n  bob: ftch", 4, "unknown kind of robot 'ftch'; did you mean 'fetch'?"),
+        ("everyone: spot", 3, "means all robots"),
+    ],
+)
 def test_robots_that_cannot_be_are_refused_with_their_line(load, robots, line, words):
     loaded = load(f"name: x\nrobots:\n  {robots}\nsteps: [{{to: hall}}]\n")
     with pytest.raises(InputError) as error:

@@ -5,7 +5,6 @@ import json
 import pytest
 from py_trees.common import Status
 
-from executive.record.event_log import EventLog
 from executive.record.history import Event, read_history, timeline
 from executive.tree.node_view import node_view, to_json
 from executive.view.styles import style_of
@@ -14,14 +13,12 @@ from skills.files.errors import InputError
 
 
 @pytest.fixture
-def failed_run(tmp_path, compiled, run_tree, make, script, clock):
+def failed_run(compiled, make, script, log_run):
     """A mission that fails at `approach`: its log, its tree, and its result."""
     script.ends["approach"] = lambda skill: Failed(Cause.TIMEOUT, "no room to stand")
     tree = compiled(*make.FETCH)
-    log = EventLog(tmp_path / "log.mcap", clock)
-    result = run_tree(tree, log=log)
-    log.close()
-    return log.path, tree, result
+    path, result = log_run(tree)
+    return path, tree, result
 
 
 def test_the_last_state_is_that_of_the_run(failed_run):
@@ -57,13 +54,11 @@ def test_transitions_have_the_keys_of_the_contract(failed_run):
 
 
 @pytest.fixture
-def telling_run(tmp_path, compiled, run_tree, make, script, clock):
+def telling_run(compiled, make, script, log_run):
     """The log of a mission whose skills say in each step what they do: "turning", then "going, 2 m to go" and 1 m."""
     script.steps, script.says = 4, lambda name, left: "turning" if left == 3 else f"going, {left} m to go"
-    log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), log=log)
-    log.close()
-    return read_history(log.path)
+    path, _ = log_run(compiled(*make.FETCH))
+    return read_history(path)
 
 
 def test_new_sentences_of_running_skills_are_logged_once(telling_run):
@@ -99,19 +94,15 @@ def test_the_timeline_lists_skills_failures_and_the_outcome(failed_run):
 
 
 @pytest.mark.parametrize(("found", "marks"), [(True, "––✓"), (False, "–––✗")])
-def test_looks_that_another_one_follows_are_expected_to_find_nothing(
-    tmp_path, compiled, run_tree, make, script, clock, found, marks
-):
+def test_looks_that_another_one_follows_are_expected_to_find_nothing(compiled, make, script, found, marks, log_run):
     def detect(skill):
         third = script.begun.count("detect") == 3
         script.seen_on = tuple(surface.name for surface in skill.inputs.surfaces) if found and third else ()
         return make.default_end(script, "detect")(skill)
 
     script.ends["detect"] = detect
-    log = EventLog(tmp_path / "log.mcap", clock)
-    run_tree(compiled(*make.FETCH), log=log)
-    log.close()
-    entries = list(timeline(read_history(log.path).events, leaves_only=True))
+    path, _ = log_run(compiled(*make.FETCH))
+    entries = list(timeline(read_history(path).events, leaves_only=True))
     over = [entry for entry in entries if entry.state and entry.state.status in (Status.SUCCESS, Status.FAILURE)]
     looks = [entry for entry in over if entry.about.endswith("/detect")]
     assert "".join(style_of(entry.state).symbol for entry in looks) == marks
@@ -119,20 +110,16 @@ def test_looks_that_another_one_follows_are_expected_to_find_nothing(
     assert all(entry in looks for entry in over if style_of(entry.state).symbol == "–")
 
 
-def test_a_log_without_a_tree_is_refused(tmp_path, clock):
-    log = EventLog(tmp_path / "log.mcap", clock)
-    log("run", {"world": "flat", "seed": 1})
-    log.close()
-    with pytest.raises(InputError, match="no tree"):
-        read_history(log.path).trees()
+NO_TREE = [
+    ("no tree", "run", {"world": "flat", "seed": 1}),
+    ("broken", "tree", {"robot": "Alice", "root": {"id": "a"}}),
+]
 
 
-def test_a_broken_tree_is_refused(tmp_path, clock):
-    log = EventLog(tmp_path / "log.mcap", clock)
-    log("tree", {"robot": "Alice", "root": {"id": "a"}})
-    log.close()
-    with pytest.raises(InputError, match="broken"):
-        read_history(log.path).trees()
+@pytest.mark.parametrize(("says", "topic", "message"), NO_TREE)
+def test_a_log_without_a_tree_or_with_a_broken_one_is_refused(write_log, says, topic, message):
+    with pytest.raises(InputError, match=says):
+        read_history(write_log((topic, message))).trees()
 
 
 def test_a_log_cut_anywhere_gives_the_tree_as_it_was(failed_run, tmp_path):
@@ -153,9 +140,8 @@ def test_a_log_cut_anywhere_gives_the_tree_as_it_was(failed_run, tmp_path):
 
 def test_the_timeline_lists_speech():
     events = [Event("speech", 2.0, {"t": 2.0, "robot": "Alice", "text": "Hello"})]
-    assert [(entry.t, entry.about, entry.text) for entry in timeline(events)] == [
-        (2.0, "speech", 'Alice says: "Hello"')
-    ]
+    (entry,) = timeline(events)
+    assert (entry.t, entry.about, entry.text) == (2.0, "speech", 'Alice says: "Hello"')
 
 
 def test_the_timeline_lists_speech_behind_the_changes_of_its_tick():

@@ -9,6 +9,7 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.reader import read_ros2_messages
+from pydrake.math import RigidTransform
 
 from executive.record.announce import map_message
 from executive.record.event_log import EventLog
@@ -17,11 +18,17 @@ from executive.record.ros2 import write_bag, write_ros2
 from executive.record.schemas import DERIVED
 from skills.estimate.grid_map import GridMap
 from skills.files.errors import InputError
+from skills.robot import Joints, Scan
 
 
 @pytest.fixture
-def events(tmp_path, compiled, run_tree, make, clock, knowledge):
-    """Events of a mission with a map, a picture and a path."""
+def events(tmp_path, compiled, run_tree, make, clock, knowledge, robot):
+    """Events of a mission with a map, a picture and a path; walls stand 2 m away on all sides but straight behind."""
+    ranges, azimuths = np.full((2, 8), 2.0, np.float32), np.linspace(-np.pi, np.pi, 8, endpoint=False)
+    ranges[:, 0] = np.nan
+    where = RigidTransform([0.1, 0.0, 0.4]), RigidTransform()
+    robot.scan = lambda: Scan(clock.now(), ranges, np.array([-0.3, 0.0]), azimuths, *where)
+    robot.joints = lambda: Joints(clock.now(), {"elbow": 0.5}, {"elbow": 0.1}, {"elbow": 2.0})
     log = EventLog(tmp_path / "log.mcap", clock)
     occupied, unknown = np.zeros((4, 6), bool), np.zeros((4, 6), bool)
     occupied[0, 0] = unknown[3, 5] = True
@@ -69,10 +76,8 @@ def test_transforms_lead_from_the_map_to_the_body_and_the_lidar(events, decoded)
     assert len(moves) == len([event for event in events if event.topic == "pose"])
     assert {(each.header.frame_id, each.child_frame_id) for each in moves} == {("world", "alice/body")}
     last = of_topic(decoded, "/tf_static")[-1].transforms
-    assert [(each.header.frame_id, each.child_frame_id) for each in last] == [
-        ("map", "world"),
-        ("alice/body", "alice/lidar"),
-    ]
+    frames = [(each.header.frame_id, each.child_frame_id) for each in last]
+    assert frames == [("map", "world"), ("alice/body", "alice/lidar")]
     assert last[1].transform.translation.z == pytest.approx(0.4)
 
 
@@ -121,8 +126,7 @@ def test_late_listeners_get_the_map_and_static_transforms(bag):
 
 def test_the_metadata_say_what_the_bag_holds(bag, decoded):
     told = yaml.safe_load((bag / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert told["storage_identifier"] == "mcap"
-    assert told["relative_file_paths"] == ["bag_0.mcap"]
+    assert (told["storage_identifier"], told["relative_file_paths"]) == ("mcap", ["bag_0.mcap"])
     assert told["starting_time"]["nanoseconds_since_epoch"] == decoded[0][2]
     assert told["duration"]["nanoseconds"] == decoded[-1][2] - decoded[0][2]
     counts = [each["message_count"] for each in told["topics_with_message_count"]]
@@ -139,8 +143,7 @@ def test_rosbags_reads_the_folder_as_a_bag(bag, decoded):
             kinds.setdefault(connection.topic, store.deserialize_cdr(data, connection.msgtype))
         map_qos = next(each.ext.offered_qos_profiles for each in reader.connections if each.topic == "/map")
         assert reader.message_count == len(decoded)
-    assert map_qos[0].durability.name == "TRANSIENT_LOCAL"
-    assert kinds["/map"].info.width == 6
+    assert (map_qos[0].durability.name, kinds["/map"].info.width) == ("TRANSIENT_LOCAL", 6)
     assert kinds["/tf"].transforms[0].child_frame_id == "alice/body"
     assert kinds["/alice/scan"].ranges[1] == pytest.approx(2.0)
     assert kinds["/alice/joint_states"].name == ["elbow"]

@@ -15,18 +15,18 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from plant.robots.spot.kind import spot_capabilities
-from skills.api import Cause, ObjectKind, ObjectObservation, Running, Skill, Succeeded
+from skills.api import Cause, Running, Skill, Succeeded
 from skills.robot import ArmTrajectory
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
 from skills.testing.robot import ScriptedRobot
+from tests.executive.conftest import COKE
 from tests.visitors import OnTick
 
 CAPABILITIES = spot_capabilities()
 STILL_S = 0.2
 TICK_S = 0.05
 DRIVES = frozenset({"navigate", "approach", "hand_over"})
-COKE = ObjectObservation(0.0, ObjectKind("coke"), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.0, 0.9, "counter")
 
 
 def moving_skill(skill_name, inputs, outputs_):

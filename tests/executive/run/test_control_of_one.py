@@ -45,15 +45,13 @@ def control():
 @pytest.fixture
 def run_pair(clock, knowledge, registry, make, control):
     def runner(observe=None, *, after=(), time_limit_s=1200.0, step=None):
-        log, robots = [], {name: make.ScriptedRobot(clock, name) for name in ("Alice", "Bob")}
-        missions = {
-            name: Mission(name="go", robot=name, steps=(step or Do.from_command(parse_command(GO)),)) for name in robots
-        }
+        log, robots = [], {name: make.StandingRobot(clock, name) for name in ("Alice", "Bob")}
+        steps = (step or Do.from_command(parse_command(GO)),)
+        missions = {name: Mission(name="go", robot=name, steps=steps) for name in robots}
         trees = {n: compile_mission(m, knowledge=knowledge, registry=registry) for n, m in missions.items()}
+        waits = {"Bob": after}
         entries = [
-            RunEntry(
-                trees[name], robot, make.StillLocaliser(), make.EmptyCostmap(), after=after if name == "Bob" else ()
-            )
+            RunEntry(trees[name], robot, make.StillLocaliser(), make.EmptyCostmap(), after=waits.get(name, ()))
             for name, robot in robots.items()
         ]
         visitors = [OnMessage(lambda topic, message: log.append((topic, message)))]
@@ -90,8 +88,7 @@ def test_a_robot_that_is_paused_stands_and_the_other_is_done_meanwhile(run_pair,
             control.resume(robot="Bob")
 
     pair = run_pair(observe)
-    assert seen[3] == seen[20]
-    assert (seen["modes"]["Bob"], seen["Alice"]) == (Mode.PAUSED, Status.SUCCESS)
+    assert (seen[3], seen["modes"]["Bob"], seen["Alice"]) == (seen[20], Mode.PAUSED, Status.SUCCESS)
     assert pair.outcomes() == {"Alice": Outcome.SUCCESS, "Bob": Outcome.SUCCESS}
     assert pair.said() == ["Bob: let me look", "Bob: the mission goes on"]
 

@@ -1,6 +1,7 @@
 """What a mission found out: every answer in order, and what its claim tells of them."""
 
 import math
+from pathlib import Path
 
 import pytest
 from py_trees.behaviour import Behaviour
@@ -10,6 +11,9 @@ from executive.run.mission_history import Findings, claim, history_keys
 from executive.run.outcome import Finding, Outcome, Said
 from executive.tree.board import Board
 from skills.api import Cause, Failed, Succeeded
+from skills.files.yaml_source import read_yaml
+
+CLAIMS = read_yaml(Path(__file__).with_name("claims.yaml")).data
 
 CHECKS = (
     "Take [Nothing] to [kitchen] and do [find] to [hammer]",
@@ -83,22 +87,7 @@ def test_another_answer_after_a_restart_is_a_finding_of_its_own(clock):
 
 @pytest.mark.parametrize(
     ("message", "sentences", "skipped", "told"),
-    [
-        ("standing at the goal", [], [], "standing at the goal"),
-        ("", ["no: no hammer in the office"], [], "no: no hammer in the office"),
-        (
-            "",
-            ["no: no hammer in the office", "yes: hammer in the workshop"],
-            [],
-            "no hammer in the office; yes: hammer in the workshop",
-        ),
-        ("", ["no: nobody in the hall"] * 3, [], "nobody in the hall (3 times)"),
-        ("", ["no: not sure", "Robin says no: thank you"], [], "not sure; Robin says no: thank you"),
-        ("let go of the coke", ["yes: hammer"], [], "yes: hammer; let go of the coke"),
-        ("", ["yes: hammer"], ["go to the hall (no way)"], "yes: hammer; skipped: go to the hall (no way)"),
-        ("", ["a" * 200, "b" * 90, "c" * 90, "d"], [], f"{'a' * 200}; {'b' * 90}; and 2 more"),
-        ("", ["yes: " + "x" * 500, "b"], [], f"yes: {'x' * 294}…; and 1 more"),
-    ],
+    CLAIMS,
 )
 def test_the_claim_lists_the_answers_briefly(message, sentences, skipped, told):
     assert claim(message, found(*sentences), skipped) == told
@@ -108,10 +97,8 @@ def test_a_mission_that_only_looked_claims_what_it_found(compiled, run_tree, scr
     script.seen_on = ("counter", "bedside table")
     worst = run_tree(compiled(*CHECKS, name="patrol")).worst
     assert worst.message == "yes: a hammer in the kitchen; yes: a drink in the bedroom"
-    assert [(one.answer, one.sentence) for one in worst.findings] == [
-        (True, "yes: a hammer in the kitchen"),
-        (True, "yes: a drink in the bedroom"),
-    ]
+    sentences = ["yes: a hammer in the kitchen", "yes: a drink in the bedroom"]
+    assert [(one.answer, one.sentence) for one in worst.findings] == [(True, each) for each in sentences]
     assert worst.answers == {one.path_id: True for one in worst.findings}
     assert 0.0 < worst.findings[0].t_s < worst.findings[1].t_s
 

@@ -1,25 +1,22 @@
 """Tests of robots without work in a run of several: they clear ways, and are left alone when they do not answer."""
 
-from __future__ import annotations
-
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
 
 import pytest
 
-from executive.run.outcome import Outcome, RunResult
+from executive.run.outcome import Outcome
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.worker import LockStepWorker
 from executive.tree.compiler import CompiledTree
 from executive.tree.node import NodeSpec
-from skills.api import Running, Skill, Step, Succeeded
+from skills.api import Running, Skill, Succeeded
 from skills.faults.faulty_robot import inject_faults, parse_fault
 from skills.navigate.skill import Navigate, NavigateInputs
-from skills.robot import Imu, Pose2D
+from skills.ports import StowInputs
+from skills.robot import Pose2D
 from skills.testing.blocks import Block
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
@@ -32,57 +29,40 @@ VERB_LIMIT_S, LONG_S = 1.0, 60.0
 """On the wall clock: in a fresh clone kernels are compiled while a robot drives, which takes longer than a second."""
 
 
-@dataclass(frozen=True)
-class Nothing:
-    """No inputs."""
-
-
-class Drives(Skill[Nothing]):
+class Drives(Skill):
     """Goes to the end of the lane, as `navigate` does."""
 
-    name: ClassVar[str] = "drives"
-    Inputs: ClassVar[type] = Nothing
-    goal: ClassVar[Pose2D] = Pose2D(3.2, 0.0, 0.0)
+    name, Inputs = "drives", StowInputs
 
-    def begin(self, inputs: Nothing) -> None:
-        """Set off."""
+    def begin(self, inputs):
         self._navigate = Navigate(self.context)
-        self._navigate.begin(NavigateInputs(self.goal))
+        self._navigate.begin(NavigateInputs(Pose2D(3.2, 0.0, 0.0)))
 
-    def step(self) -> Step:
-        """Drive."""
+    def step(self):
         return self._navigate.step()
 
-    def end(self) -> None:
-        """Stand."""
+    def end(self):
         self._navigate.end()
 
 
-class Finishes(Skill[Nothing]):
+class Finishes(Skill):
     """Is done at once."""
 
-    name: ClassVar[str] = "finishes"
-    Inputs: ClassVar[type] = Nothing
+    name, Inputs = "finishes", StowInputs
 
-    def begin(self, inputs: Nothing) -> None:
-        """Nothing."""
+    def begin(self, inputs):
+        self._ticks = 0
 
-    def step(self) -> Step:
-        """Done."""
+    def step(self):
         return Succeeded("done")
 
 
 class AsksTheImu(Finishes):
-    """Uses a verb after the first tick."""
+    """Uses a verb in the third tick."""
 
-    name: ClassVar[str] = "asks_the_imu"
+    name = "asks_the_imu"
 
-    def begin(self, inputs: Nothing) -> None:
-        """Count from the start."""
-        self._ticks = 0
-
-    def step(self) -> Step:
-        """Ask in the third tick."""
+    def step(self):
         self._ticks += 1
         if self._ticks > 2:
             self.context.robot.imu()
@@ -92,13 +72,9 @@ class AsksTheImu(Finishes):
 class Hanging(ScriptedRobot):
     """A robot whose IMU does not answer."""
 
-    def imu(self) -> Imu:
-        """Hangs."""
+    def imu(self):
         time.sleep(1.5 * VERB_LIMIT_S)
         return super().imu()
-
-
-Published = list[tuple[str, Mapping[str, Any]]]
 
 
 @dataclass
@@ -106,31 +82,18 @@ class Lane:
     """Robots in a lane, each with one skill to do."""
 
     clock: VirtualClock
-    published: Published
+    published: list
     verb_limit_s: float = LONG_S
 
-    def entry(
-        self,
-        name: str,
-        skill: type[Skill[Any]],
-        x_m: float,
-        *,
-        after: tuple[str, ...] = (),
-        robot: Callable[..., ScriptedRobot] = ScriptedRobot,
-    ) -> RunEntry:
+    def entry(self, name, skill, x_m, *, after=(), robot=ScriptedRobot):
         """A robot that begins at x_m in the lane's middle."""
         start = Pose2D(x_m, 0.0, 0.0)
         plan = NodeSpec("skill", f"{name.lower()}/test", "test", {"skill": skill, "limit_s": 100.0})
-        return RunEntry(
-            CompiledTree(name, "test", (), plan),
-            robot(self.clock, name=name, start=Start(start)),
-            KnownPlace(start),
-            BlockCostmap(LANE),
-            after=after,
-        )
+        body = robot(self.clock, name=name, start=Start(start))
+        return RunEntry(CompiledTree(name, "test", (), plan), body, KnownPlace(start), BlockCostmap(LANE), after=after)
 
-    def run(self, *entries: RunEntry, spare: Sequence[RunEntry] = ()) -> RunResult:
-        """Run them to their end."""
+    def run(self, *entries, spare=()):
+        """Runs them to their end."""
         return run(
             entries,
             spare=spare,
@@ -142,12 +105,11 @@ class Lane:
 
 
 @pytest.fixture
-def lane() -> Lane:
-    """An empty lane."""
+def lane():
     return Lane(VirtualClock(), [])
 
 
-def test_a_robot_whose_mission_is_over_clears_a_reserved_path(lane: Lane) -> None:
+def test_a_robot_whose_mission_is_over_clears_a_reserved_path(lane):
     """Bob is done at once and stands in the lane; Alice gets to its end, and Bob's lease is given back."""
     alice, bob = lane.entry("Alice", Drives, 0.0), lane.entry("Bob", Finishes, 2.0)
     result = lane.run(alice, bob)
@@ -157,7 +119,7 @@ def test_a_robot_whose_mission_is_over_clears_a_reserved_path(lane: Lane) -> Non
     assert not any(topic == "errors" for topic, _ in lane.published)
 
 
-def test_a_robot_that_waits_for_another_clears_its_path(lane: Lane) -> None:
+def test_a_robot_that_waits_for_another_clears_its_path(lane):
     """Bob begins when Alice is done, and stands where she has to pass until then."""
     bob = lane.entry("Bob", Finishes, 2.0, after=("Alice",))
     result = lane.run(lane.entry("Alice", Drives, 0.0), bob)
@@ -166,7 +128,7 @@ def test_a_robot_that_waits_for_another_clears_its_path(lane: Lane) -> None:
     assert [each.stepped_aside for each in result.robots] == [False, False]
 
 
-def test_a_robot_outside_all_paths_stays_where_it_ended(lane: Lane) -> None:
+def test_a_robot_outside_all_paths_stays_where_it_ended(lane):
     """Bob stands behind Alice."""
     bob = lane.entry("Bob", Finishes, -1.4)
     result = lane.run(lane.entry("Alice", Drives, 0.0), bob)
@@ -174,7 +136,7 @@ def test_a_robot_outside_all_paths_stays_where_it_ended(lane: Lane) -> None:
     assert math.hypot(bob.robot.odometry().pose.x_m, bob.robot.odometry().pose.y_m) < 0.01
 
 
-def test_a_verb_that_hangs_ends_the_mission_of_its_robot_only(lane: Lane) -> None:
+def test_a_verb_that_hangs_ends_the_mission_of_its_robot_only(lane):
     """Bob stands aside and hangs; Alice goes on and arrives."""
     lane.verb_limit_s = VERB_LIMIT_S
     bob = lane.entry("Bob", AsksTheImu, -1.4, robot=Hanging)
@@ -184,7 +146,7 @@ def test_a_verb_that_hangs_ends_the_mission_of_its_robot_only(lane: Lane) -> Non
     assert bob.robot.lease_holder() is None
 
 
-def test_a_robot_without_a_mission_clears_a_reserved_path(lane: Lane) -> None:
+def test_a_robot_without_a_mission_clears_a_reserved_path(lane):
     """Bob has nothing to do in the run, and is not among its results."""
     bob = lane.entry("Bob", Finishes, 2.0)
     result = lane.run(lane.entry("Alice", Drives, 0.0), spare=(bob,))
@@ -192,7 +154,7 @@ def test_a_robot_without_a_mission_clears_a_reserved_path(lane: Lane) -> None:
     assert bob.robot.odometry().pose.x_m + 2.0 > 3.7 and bob.robot.lease_holder() is None
 
 
-def test_a_robot_without_a_mission_that_does_not_answer_is_left_alone(lane: Lane) -> None:
+def test_a_robot_without_a_mission_that_does_not_answer_is_left_alone(lane):
     """Bob is dead from the beginning; Alice arrives."""
     bob = lane.entry("Bob", Finishes, -1.4)
     dead = replace(bob, robot=inject_faults(bob.robot, lane.clock, [parse_fault("robot dies")]))

@@ -3,7 +3,6 @@
 import dataclasses
 import threading
 import time
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +11,7 @@ from mcap.reader import make_reader
 
 from executive.record.event_log import EventLog
 from executive.run.outcome import Outcome
-from executive.run.run_robot import GarbageError, GuardedRobot
+from executive.run.run_robot import GarbageError, GuardedRobot, garbage_check
 from executive.run.runner import run
 from executive.run.visitor import RunEntry, RunSettings
 from executive.run.watchdog import Watchdog
@@ -23,7 +22,8 @@ from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Running, Skill, Succeeded
 from skills.faults.fault_kinds import Effect
 from skills.faults.faulty_robot import Fault, inject_faults
-from skills.robot import ArmTrajectory, DoorHandle
+from skills.ports import StowInputs
+from skills.robot import ArmTrajectory, DoorHandle, Gripper
 from skills.robot_wrapper import VERBS
 from skills.testing.clock import VirtualClock
 from skills.testing.estimators import BlockCostmap, KnownPlace
@@ -48,16 +48,11 @@ def warm():
     robot.image("hand")
 
 
-@dataclass(frozen=True)
-class Nothing:
-    pass
-
-
 class UseAll(Skill):
     """Uses every verb while base, body, arm and gripper move."""
 
     name = "use_all"
-    Inputs: ClassVar[type] = Nothing
+    Inputs: ClassVar[type] = StowInputs
 
     def begin(self, inputs):
         self.ticks, self.commands, self.picture, self.seen = 0, [], None, None
@@ -268,7 +263,4 @@ def test_garbage_is_named(clock):
 
 
 def test_numpy_truth_and_numbers_are_no_garbage():
-    from executive.run.run_robot import garbage_check
-    from skills.robot import Gripper
-
     assert garbage_check("gripper")(Gripper(1.0, np.float64(0.2), np.float32(3.0), np.bool_(True))) is None

@@ -1,7 +1,7 @@
 """Whole missions with the scripted robot: outcomes, cancel at every node, and orderly ends."""
 
-import itertools
 import time
+from pathlib import Path
 
 import pytest
 from py_trees.common import Status
@@ -16,6 +16,8 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, Succeeded
+from skills.files.yaml_source import read_yaml
+from tests.executive.conftest import default_end
 from tests.visitors import OnMessage
 
 
@@ -23,53 +25,61 @@ def transitions(published):
     return [message for topic, message in published if topic == "transitions"]
 
 
-def test_fetch_succeeds_and_the_robot_is_left_in_order(compiled, run_tree, make, robot, script):
-    result = run_tree(compiled(*make.FETCH))
-    assert (result.outcome, result.worst.cause) == (Outcome.SUCCESS, None)
-    assert (robot.driving, robot.holder, robot.holding) == (False, None, True)
-    assert script.begun == ["navigate", "detect", "approach", "grasp", "stow", "navigate", "hand_over"]
-    assert script.ended == script.begun
+GO = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
+RUNS = read_yaml(Path(__file__).with_name("runs.yaml")).data
 
 
-def test_the_first_detection_ends_the_search_and_others_are_tried_before(compiled, run_tree, make, script):
-    script.seen_on = ("shelf",)
-    assert run_tree(compiled(*make.FETCH)).outcome is Outcome.SUCCESS
-    assert script.begun[:6] == ["navigate", "detect"] * 3
+def ends_of(script, name, said):
+    """How a skill ends each time it is used."""
+    left = list(said)
+
+    def end(skill):
+        cause, _, message = (left.pop(0) if len(left) > 1 else left[0]).partition(" ")
+        if cause == "interrupt":
+            raise KeyboardInterrupt
+        return Failed(Cause[cause], message) if cause in Cause.__members__ else default_end(script, name)(skill)
+
+    return end
 
 
-def test_nothing_found_is_a_failure_that_says_where(compiled, run_tree, make, script):
-    script.seen_on = ()
-    worst = run_tree(compiled(*make.FETCH)).worst
-    assert (worst.outcome, worst.cause) == (Outcome.FAILURE, Cause.PRECONDITION)
-    assert worst.message.startswith("found no drink in the kitchen, nor on the bedside table: not seen")
-    assert "approach" not in script.begun
+def act(control, robot, compiled, case, what):
+    """Does at the control, or to the robot's lease, what a case says."""
+    verb, _, more = what.partition(" ")
+    missions = {"preempt": "aside", "replace": "instead", "then": "later"}
+    if verb == "lease":
+        robot.holder = more
+    elif verb in missions:
+        getattr(control, verb)(compiled(case.get("other", GO), name=missions[verb]))
+    else:
+        getattr(control, verb)(*(["enough"] if verb == "cancel" else []))
 
 
-def test_a_slipped_grasp_is_tried_again_after_a_new_look_from_where_it_stands(compiled, run_tree, make, script, robot):
-    ends = iter([Failed(Cause.EXECUTION, "slipped"), Failed(Cause.POSTCONDITION, "nothing held")])
-    script.ends["grasp"] = lambda skill: next(ends, None) or _hold(skill)
-    assert run_tree(compiled(*make.FETCH)).outcome is Outcome.SUCCESS
-    look = ["approach", "grasp", "detect"]
-    assert script.begun[:8] == ["navigate", "detect", *look, *look]
+@pytest.mark.parametrize("case", RUNS, ids=lambda case: case["name"])
+def test_a_run_ends_as_it_should(compiled, run_tree, make, robot, script, published, case):
+    control = Control(pace=None)
+    script.seen_on, script.steps = case.get("seen_on", script.seen_on), case.get("takes", script.steps)
+    script.ends.update({name: ends_of(script, name, said) for name, said in case.get("ends", {}).items()})
+    robot.holding, robot.holder = case.get("holding", False), case.get("lease")
+    if "raising" in case:
+        robot.raising[case["raising"]] = RuntimeError("cable out")
 
+    def observe(progress):
+        if progress.ticks in case.get("at", {}):
+            act(control, robot, compiled, case, case["at"][progress.ticks])
 
-def _hold(skill):
-    skill.context.robot._robot.holding = True
-    return Succeeded("held", {"tried": (*skill.inputs.avoid, 1)})
-
-
-def test_grasping_is_given_up_after_three_attempts(compiled, run_tree, make, script):
-    script.ends["grasp"] = lambda skill: Failed(Cause.EXECUTION, "slipped")
-    worst = run_tree(compiled(*make.FETCH)).worst
-    assert (worst.cause, worst.message) == (Cause.EXECUTION, "slipped (after 3 attempts)")
-    assert script.begun.count("grasp") == 3
-
-
-@pytest.mark.parametrize("cause", [Cause.TIMEOUT, Cause.ERROR])
-def test_timeouts_and_defects_are_not_tried_again(compiled, run_tree, make, script, cause):
-    script.ends["grasp"] = lambda skill: Failed(cause, "no")
-    assert run_tree(compiled(*make.FETCH)).worst.cause is cause
-    assert script.begun.count("grasp") == 1
+    tree = compiled(*case.get("commands", make.FETCH))
+    result = run_tree(tree, observer=observe, control=control, settings=case.get("settings", {}))
+    worst, begun = result.worst, " ".join(script.begun)
+    facts = {"outcome": result.outcome.value, "cause": worst.cause and worst.cause.value, "message": worst.message}
+    facts |= {"ticks": result.ticks, "begun": begun, "answers": [*worst.answers.values()], "held": robot.holding}
+    facts |= {"count": {name: script.begun.count(name) for name in case.get("count", {})}}
+    facts |= {"mission": worst.tree.mission_name, "mode": control.state.mode.value, "reason": control.state.reason}
+    facts |= {"between": {each.tree.mission_name: each.outcome.value for each in worst.preempting}}
+    facts |= {"notes": [f"{note['what']} {note['message']}" for topic, note in published if topic == "control"]}
+    assert facts == facts | {key: value for key, value in case.items() if key in facts}
+    assert result.sim_time_s == pytest.approx(case.get("time_s", result.sim_time_s), abs=0.5)
+    assert (case.get("has", "") in worst.message, begun.startswith(case.get("begins", ""))) == (True, True)
+    assert (robot.driving, robot.holder, script.ended) == (False, case.get("holder"), script.begun)
 
 
 def test_an_object_lost_on_the_way_is_no_success(compiled, run_tree, make, robot, script):
@@ -88,38 +98,6 @@ def test_an_object_lost_on_the_way_is_no_success(compiled, run_tree, make, robot
         "the coke was lost on the way to the start; pick the coke up again: the coke is not found again where it fell: "
         "not seen; there is no surface within 2 m of (0.00, 0.00) m; there is only the floor",
     )
-
-
-def test_carrying_with_an_empty_gripper_is_refused(compiled, run_tree):
-    worst = run_tree(compiled("Take [coke] to [start] and do [Nothing] to [Nothing]")).worst
-    assert worst.cause is Cause.PRECONDITION
-
-
-def test_a_second_surface_is_tried_when_the_first_does_not_work(compiled, run_tree, script, robot):
-    robot.holding = True
-    places = itertools.count()
-    script.ends["place"] = lambda skill: Failed(Cause.PLANNING, "full") if next(places) == 0 else _placed()
-    assert run_tree(compiled("Take [coke] to [kitchen] and do [Nothing] to [Nothing]")).outcome is Outcome.SUCCESS
-    assert script.begun == ["navigate", "place", "navigate", "place"]
-
-
-def _placed():
-    return Succeeded("placed")
-
-
-@pytest.mark.parametrize(("seen_on", "answer"), [(("counter",), True), ((), False)])
-def test_a_status_check_answers(compiled, run_tree, script, seen_on, answer):
-    script.seen_on = seen_on
-    result = run_tree(compiled("Take [Nothing] to [kitchen] and do [find] to [drink]", name="check"))
-    assert result.outcome is Outcome.SUCCESS
-    assert list(result.worst.answers.values()) == [answer]
-
-
-def test_a_status_check_with_a_blocked_path_does_not_say_no(compiled, run_tree, script):
-    script.seen_on = ()
-    script.ends["navigate"] = lambda skill: Failed(Cause.PLANNING, "no way")
-    worst = run_tree(compiled("Take [Nothing] to [kitchen] and do [find] to [drink]")).worst
-    assert (worst.outcome, worst.cause, worst.answers) == (Outcome.FAILURE, Cause.PLANNING, {})
 
 
 LEAVES = [
@@ -144,8 +122,7 @@ def test_cancel_in_every_leaf_stops_the_robot(compiled, run_tree, make, robot, s
     result = run_tree(compiled(*make.FETCH), observer=observe, control=control)
     assert (result.outcome, result.worst.cause, result.worst.message) == (Outcome.CANCELLED, Cause.CANCELLED, "enough")
     assert result.worst.states[path_id].cause is Cause.CANCELLED
-    assert (robot.driving, robot.holder) == (False, None)
-    assert script.ended == script.begun
+    assert (robot.driving, robot.holder, script.ended) == (False, None, script.begun)
 
 
 @pytest.mark.parametrize("tick", range(16))
@@ -155,35 +132,7 @@ def test_cancel_at_every_tick_stops_the_robot(compiled, run_tree, make, robot, s
         compiled(*make.FETCH), observer=lambda p: control.cancel("enough") if p.ticks > tick else None, control=control
     )
     assert result.ticks <= tick + 1
-    assert (robot.driving, robot.holder) == (False, None)
-    assert script.ended == script.begun
-
-
-def test_keyboard_interrupt_in_a_skill_is_cancelled(compiled, run_tree, make, robot, script):
-    def interrupt(skill):
-        raise KeyboardInterrupt
-
-    script.ends["approach"] = interrupt
-    result = run_tree(compiled(*make.FETCH))
-    assert (result.outcome, result.worst.cause) == (Outcome.CANCELLED, Cause.CANCELLED)
     assert (robot.driving, robot.holder, script.ended) == (False, None, script.begun)
-
-
-def test_time_over_is_a_failure_with_timeout(compiled, run_tree, make, script, robot):
-    script.steps = 10_000
-    result = run_tree(compiled(*make.FETCH), settings={"time_limit_s": 1.0})
-    assert (result.outcome, result.worst.cause) == (Outcome.FAILURE, Cause.TIMEOUT)
-    assert result.sim_time_s == pytest.approx(1.0)
-    assert not robot.driving
-
-
-@pytest.mark.parametrize("verb", ["drive", "odometry", "stop"])
-def test_an_exception_in_a_verb_ends_the_run_with_an_error(compiled, run_tree, make, robot, verb):
-    robot.raising[verb] = RuntimeError("cable out")
-    result = run_tree(compiled(*make.FETCH))
-    assert (result.outcome, result.worst.cause) == (Outcome.ERROR, Cause.ERROR)
-    assert "cable out" in result.worst.message
-    assert robot.holder is None
 
 
 def test_a_defect_in_an_estimator_ends_the_run_with_an_error(compiled, make, robot, clock, published):
@@ -200,18 +149,10 @@ def test_a_defect_in_an_estimator_ends_the_run_with_an_error(compiled, make, rob
     assert any(topic == "errors" and "ZeroDivisionError" in m["traceback"] for topic, m in published)
 
 
-def test_a_held_lease_is_a_failed_precondition(compiled, run_tree, make, robot):
-    robot.holder = "tablet"
-    result = run_tree(compiled(*make.FETCH))
-    assert (result.outcome, result.worst.cause) == (Outcome.FAILURE, Cause.PRECONDITION)
-    assert "tablet holds the lease" in result.worst.message
-    assert robot.holder == "tablet"
-
-
 def test_two_runs_of_a_seed_log_the_same(compiled, run_tree, make, robot, clock, published):
     logs = []
     for _ in range(2):
-        clock.time_s, robot.holder, robot.holding = 0.0, None, False
+        clock._now_s, robot.holder, robot.holding = 0.0, None, False
         published.clear()
         run_tree(compiled(*make.FETCH))
         logs.append([(topic, repr(data)) for topic, data in published if topic != "wall"])
@@ -228,28 +169,27 @@ def test_transitions_are_logged_with_cause_and_sentence(compiled, run_tree, make
 
 def test_poses_are_logged_twice_a_second(compiled, run_tree, published, script):
     script.steps = 60
-    run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
+    run_tree(compiled(GO))
     assert sum(topic == "pose" for topic, _ in published) == 7  # 0.05 s to 3.0 s
 
 
 def test_the_quality_of_the_localisation_is_logged(compiled, run_tree, published):
-    run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
+    run_tree(compiled(GO))
     pose = next(message for topic, message in published if topic == "pose")
     state = next(message for topic, message in published if topic == "state")
-    assert len(pose["covariance"]) == 9
-    assert (state["localised"], state["localisation_health"]) == (True, 1.0)
+    assert (len(pose["covariance"]), state["localised"], state["localisation_health"]) == (9, True, 1.0)
 
 
 def test_particles_and_obstacles_are_logged_when_they_change(compiled, run_tree, published, script):
     script.steps = 60
-    run_tree(compiled("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"))
+    run_tree(compiled(GO))
     (known,) = [message for topic, message in published if topic == "navigation"]
     assert known == {"robot": "Alice", "particle_x": [], "particle_y": [], "seen_x": [], "seen_y": []}
 
 
 def test_overruns_are_counted(compiled, run_tree, make, script, published):
     script.steps = 1
-    script.ends["stow"] = lambda skill: (time.sleep(0.02), _placed())[1]
+    script.ends["stow"] = lambda skill: (time.sleep(0.02), Succeeded("placed"))[1]
     result = run_tree(compiled(*make.FETCH), settings={"tick_period_s": 0.01})
     assert result.overruns >= 1
 
@@ -257,13 +197,13 @@ def test_overruns_are_counted(compiled, run_tree, make, script, published):
 @pytest.fixture
 def run_two(make, knowledge, registry, clock, published):
     """Runs a mission to the bedroom by Alice and Bob; `after` says who waits for whom."""
-    steps = (Do.from_command(parse_command("Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]")),)
+    steps = (Do.from_command(parse_command(GO)),)
 
     def run_them(**after):
         entries = [
             RunEntry(
                 compile_mission(Mission(name="go", robot=name, steps=steps), knowledge=knowledge, registry=registry),
-                make.ScriptedRobot(clock, name),
+                make.StandingRobot(clock, name),
                 make.StillLocaliser(),
                 make.EmptyCostmap(),
                 after=after.get(name, ()),

@@ -14,7 +14,9 @@ from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
 
 
-def test_lock_step_result_appears_after_its_latency(clock):
+def test_lock_step_result_appears_after_its_latency_which_is_not_negative(clock):
+    with pytest.raises(ValueError, match="latency"):
+        LockStepWorker(clock).submit(lambda: 1, latency_s=-0.1, name="bad")
     job = LockStepWorker(clock).submit(lambda: 42, latency_s=0.2, name="sum")
     clock.advance(0.15)
     assert not job.done()
@@ -63,8 +65,16 @@ def test_lock_step_reads_sensors_at_once_in_this_thread(worker):
     assert (read_by, done_by is read_by) == (threading.main_thread(), False)
 
 
-def test_an_exception_while_reading_is_raised_by_result(worker):
-    job = worker.sense(lambda: 1 / 0, lambda given: given, latency_s=0.0, name="bad")
+BAD_JOBS = [
+    lambda worker: worker.sense(lambda: 1 / 0, lambda given: given, latency_s=0.0, name="bad"),
+    lambda worker: worker.submit(lambda: 1 / 0, latency_s=0.0, name="bad"),
+]
+
+
+@pytest.mark.parametrize("begin", BAD_JOBS)
+def test_an_exception_of_a_job_or_while_reading_is_raised_by_result(worker, begin):
+    job = begin(worker)
+    assert job.done()
     with pytest.raises(ZeroDivisionError):
         job.result()
 
@@ -100,18 +110,6 @@ def test_a_job_may_ask_for_capabilities_which_never_change(worker):
     assert job.result() == spot_capabilities()
 
 
-def test_an_exception_of_a_job_is_raised_by_result(clock):
-    job = LockStepWorker(clock).submit(lambda: 1 / 0, latency_s=0.0, name="bad")
-    assert job.done()
-    with pytest.raises(ZeroDivisionError):
-        job.result()
-
-
-def test_a_negative_latency_is_refused(clock):
-    with pytest.raises(ValueError, match="latency"):
-        LockStepWorker(clock).submit(lambda: 1, latency_s=-0.1, name="bad")
-
-
 def test_thread_worker_does_not_block_and_raises_later():
     worker, gate = ThreadWorker(), threading.Event()
     slow = worker.submit(lambda: gate.wait(5.0), latency_s=0.0, name="slow")
@@ -143,7 +141,7 @@ def test_garbage_is_never_collected_in_a_job(worker, clock):
     threads = []
     for _ in range(50):
         Cycle(threads)
-    enabled = gc.isenabled()
+    gc.enable()
     job = worker.submit(lambda: (gc.isenabled(), [[] for _ in range(50_000)])[0], latency_s=0.1, name="allocate")
     clock.advance(0.1)
     assert job.result() is False
@@ -151,6 +149,6 @@ def test_garbage_is_never_collected_in_a_job(worker, clock):
     worker.submit(lambda: None, latency_s=0.0, name="after")
     worker.close()
     gc.collect()
-    assert gc.isenabled() is enabled
-    assert len(threads) == 50
-    assert set(threads) == {threading.current_thread().name}
+    assert gc.isenabled()
+    gc.disable()  # as in all tests
+    assert (len(threads), set(threads)) == (50, {threading.current_thread().name})

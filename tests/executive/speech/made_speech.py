@@ -1,51 +1,33 @@
 """Synthetic sound for tests, and a scripted recogniser and detector."""
 
-from __future__ import annotations
-
 import struct
 import wave
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from executive.speech.recogniser import Transcript, Vocabulary
-from executive.speech.sound import RATE_HZ, Samples
-
-__all__ = [
-    "LoudIsSpeech",
-    "ScriptedRecogniser",
-    "ScriptedRecognition",
-    "silence",
-    "speech_like",
-    "tone",
-    "write_raw_wav",
-    "write_wav",
-]
+from executive.speech.recogniser import Transcript
+from executive.speech.sound import RATE_HZ
 
 
 @dataclass(frozen=True)
 class ScriptedRecognition:
     """Recognition with given readings; `likely` has log likelihoods of other texts, `otherwise` that of all else."""
 
-    transcripts: Sequence[Transcript] = ()
-    wider: Sequence[Transcript] = ()
-    likely: Mapping[str, float] = field(default_factory=dict)
+    transcripts: tuple = ()
+    wider: tuple = ()
+    likely: dict = field(default_factory=dict)
     otherwise: float = 0.0
     plain: str = ""
 
-    def more(self) -> Iterator[Sequence[Transcript]]:
-        """Readings of one further search."""
+    def more(self):
         yield self.wider
 
-    def unprompted_text(self) -> str:
+    def unprompted_text(self):
         """Given text, or the first of the readings."""
         return self.plain or next((transcript.text for transcript in self.transcripts), "")
 
-    def likelihoods(self, texts: Sequence[str]) -> list[float]:
-        """Given likelihoods."""
+    def likelihoods(self, texts):
         return [self.likely.get(text, self.otherwise) for text in texts]
 
 
@@ -53,16 +35,16 @@ class ScriptedRecognition:
 class ScriptedRecogniser:
     """Recogniser that returns the given texts in order, and stores the length of each sound (s)."""
 
-    texts: list[str]
-    lengths_s: list[float] = field(default_factory=list)
+    texts: list
+    lengths_s: list = field(default_factory=list)
 
-    def transcribe(self, sound: Samples, vocabulary: Vocabulary) -> ScriptedRecognition:
+    def transcribe(self, sound, vocabulary):
         """Next text; none for an empty one, or when no text is left."""
         self.lengths_s.append(len(sound) / RATE_HZ)
         text = self.texts.pop(0) if self.texts else ""
         return ScriptedRecognition((Transcript(text, -1.0),) if text else ())
 
-    def partial_transcript(self, sound: Samples, vocabulary: Vocabulary) -> str:
+    def partial_transcript(self, sound, vocabulary):
         """First word of the next text."""
         return self.texts[0].split()[0] if self.texts else ""
 
@@ -70,28 +52,27 @@ class ScriptedRecogniser:
 class LoudIsSpeech:
     """Detector that takes loud sound for speech."""
 
-    def probability(self, frame: Samples) -> float:
+    def probability(self, frame):
         """1 above 26 dB below full scale, else 0."""
         return float(np.abs(frame).max() > 0.05)
 
 
-def tone(seconds: float, *, rate_hz: int = RATE_HZ, height: float = 0.5) -> Samples:
+def tone(seconds, *, rate_hz=RATE_HZ, height=0.5):
     """A tone of 440 Hz."""
     times_s = np.arange(round(seconds * rate_hz)) / rate_hz
     return np.asarray(height * np.sin(2 * np.pi * 440.0 * times_s), np.float32)
 
 
-def silence(seconds: float, *, rate_hz: int = RATE_HZ) -> Samples:
-    """Silence."""
+def silence(seconds, *, rate_hz=RATE_HZ):
     return np.zeros(round(seconds * rate_hz), np.float32)
 
 
-def speech_like(*lengths_s: float) -> Samples:
+def speech_like(*lengths_s):
     """Silences and tones of the given lengths (s) in turn, a silence first."""
     return np.concatenate([tone(s) if n % 2 else silence(s) for n, s in enumerate(lengths_s)])
 
 
-def write_wav(file: Path, samples: npt.ArrayLike, *, rate_hz: int = RATE_HZ, channels: int = 1) -> Path:
+def write_wav(file, samples, *, rate_hz=RATE_HZ, channels=1):
     """Writes a wav file with 16 bits a sample and the same sound in each channel."""
     whole = (np.asarray(samples, np.float32) * 32767).astype("<i2")
     with wave.open(str(file), "wb") as writer:
@@ -102,9 +83,7 @@ def write_wav(file: Path, samples: npt.ArrayLike, *, rate_hz: int = RATE_HZ, cha
     return file
 
 
-def write_raw_wav(
-    file: Path, data: bytes, *, tag: int, bits: int, rate_hz: int = RATE_HZ, size: int | None = None, extra: bytes = b""
-) -> Path:
+def write_raw_wav(file, data, *, tag, bits, rate_hz=RATE_HZ, size=None, extra=b""):
     """Writes a wav file of one channel with any samples: their type `tag`, and the `size` in its head."""
     form = struct.pack("<HHIIHH", tag, 1, rate_hz, rate_hz * bits // 8, bits // 8, bits) + extra
     chunks = b"fmt " + struct.pack("<I", len(form)) + form

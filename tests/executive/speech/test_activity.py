@@ -17,20 +17,24 @@ def _utterances(sound, block=1600, rules=RULES, detector=None):
     return [*ended, *endpointer.flush()]
 
 
-def test_silence_holds_no_utterance():
-    assert _utterances(silence(3.0)) == []
+@pytest.mark.parametrize(
+    ("sound", "utterances"),
+    [
+        (silence(3.0), 0),
+        (speech_like(1.0, 0.05, 2.0), 0),
+        (speech_like(0.5, 1.0, 0.5, 1.0, 1.0), 1),
+        (speech_like(0.5, 1.0, 1.2, 1.0, 1.0), 2),
+    ],
+    ids=["silence", "a click", "a short pause", "a long pause"],
+)
+def test_a_long_pause_ends_an_utterance_and_a_click_is_none(sound, utterances):
+    assert len(_utterances(sound)) == utterances
 
 
 def test_an_utterance_has_a_margin_at_both_ends():
     (one,) = _utterances(speech_like(1.0, 2.0, 2.0))
-    assert one.start_s == pytest.approx(0.7, abs=2 * FRAME_S)
-    assert one.end_s == pytest.approx(3.3, abs=2 * FRAME_S)
+    assert (one.start_s, one.end_s) == pytest.approx((0.7, 3.3), abs=2 * FRAME_S)
     assert one.length_s == pytest.approx(2.6, abs=3 * FRAME_S)
-
-
-def test_a_short_pause_stays_inside_and_a_long_one_ends_it():
-    assert len(_utterances(speech_like(0.5, 1.0, 0.5, 1.0, 1.0))) == 1
-    assert len(_utterances(speech_like(0.5, 1.0, 1.2, 1.0, 1.0))) == 2
 
 
 def test_the_size_of_the_blocks_changes_nothing():
@@ -46,14 +50,9 @@ def test_a_pause_that_is_not_the_end_is_cut_down():
     assert one.length_s == pytest.approx(0.3 + 1.0 + 0.6 + 1.0 + 0.3, abs=5 * FRAME_S)
 
 
-def test_a_click_is_no_utterance():
-    assert _utterances(speech_like(1.0, 0.05, 2.0)) == []
-
-
 def test_nobody_speaks_for_longer_than_the_limit_at_once():
     cut = _utterances(speech_like(0.5, 12.0, 1.0))
-    assert len(cut) == 3
-    assert all(one.length_s <= RULES.most_s + FRAME_S for one in cut)
+    assert len(cut) == 3 and all(one.length_s <= RULES.most_s + FRAME_S for one in cut)
 
 
 def test_sound_that_ends_in_the_middle_of_a_word_is_heard_to_its_end():
@@ -63,8 +62,7 @@ def test_sound_that_ends_in_the_middle_of_a_word_is_heard_to_its_end():
 
 def test_partial_text_is_available_before_the_end():
     endpointer = Endpointer(LoudIsSpeech(), RULES)
-    assert list(endpointer.push(speech_like(0.5, 1.0))) == []
-    assert endpointer.speaking
+    assert list(endpointer.push(speech_like(0.5, 1.0))) == [] and endpointer.speaking
     assert len(endpointer.current_sound()) / RATE_HZ == pytest.approx(1.3, abs=3 * FRAME_S)
 
 

@@ -21,19 +21,17 @@ def weights(model_bin):
     return read_model_file(bytearray(model_bin({"a/weight": WEIGHT, "c/weight": CONVOLUTION, "b": WEIGHT[0]})))
 
 
-def test_the_product_is_added_to_its_matrix_only(weights):
-    low_rank = _low_rank(6, 4)
-    Adapter({"a/weight": low_rank}).add_to(weights)
-    wanted = WEIGHT + low_rank.up.astype(float) @ low_rank.down.astype(float)
-    np.testing.assert_allclose(weights["a/weight"], wanted, atol=0.01)
-    np.testing.assert_array_equal(weights["c/weight"], CONVOLUTION)
-
-
-def test_a_convolution_is_a_matrix_of_inputs_times_width(weights):
-    low_rank = _low_rank(5, 6)
-    Adapter({"c/weight": low_rank}).add_to(weights)
-    wanted = CONVOLUTION.reshape(5, 6) + low_rank.up.astype(float) @ low_rank.down.astype(float)
-    np.testing.assert_allclose(weights["c/weight"].reshape(5, 6), wanted, atol=0.01)
+# the changed matrix, its value and shape, and the one that stays
+@pytest.mark.parametrize(
+    ("name", "before", "shape", "other"),
+    [("a/weight", WEIGHT, (6, 4), "c/weight"), ("c/weight", CONVOLUTION, (5, 6), "a/weight")],
+)
+def test_the_product_is_added_to_its_matrix_only_and_a_convolution_is_one(weights, name, before, shape, other):
+    low_rank, unchanged = _low_rank(*shape), weights[other].copy()
+    Adapter({name: low_rank}).add_to(weights)
+    wanted = before.reshape(shape) + low_rank.up.astype(float) @ low_rank.down.astype(float)
+    np.testing.assert_allclose(weights[name].reshape(shape), wanted, atol=0.01)
+    np.testing.assert_array_equal(weights[other], unchanged)
 
 
 def test_it_is_the_same_when_it_is_read_again(tmp_path):
@@ -60,29 +58,21 @@ def test_one_that_does_not_fit_is_refused_and_changes_nothing(weights, name, low
     np.testing.assert_array_equal(weights["c/weight"], CONVOLUTION)
 
 
-def _damaged(content):
-    return {"cut off": content[: len(content) // 2], "empty": b"", "another kind": b"no file of numpy's"}
-
-
-@pytest.mark.parametrize("how", ["cut off", "empty", "another kind"])
-def test_damaged_file_is_refused_with_a_hint(tmp_path, how):
+@pytest.mark.parametrize(
+    ("damage", "base", "message"),
+    [
+        (lambda content: content[: len(content) // 2], BASE, "damaged"),
+        (lambda content: b"", BASE, "damaged"),
+        (lambda content: b"no file of numpy's", BASE, "damaged"),
+        (bytes, "4567", "other weights"),
+    ],
+    ids=["cut off", "empty", "another kind", "of other weights"],
+)
+def test_damaged_file_is_refused_with_a_hint(tmp_path, damage, base, message):
     Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
-    with pytest.raises(InputError, match="damaged") as refused:
-        read_adapter(_damaged((tmp_path / "a.npz").read_bytes())[how], base=BASE)
+    with pytest.raises(InputError, match=message) as refused:
+        read_adapter(damage((tmp_path / "a.npz").read_bytes()), base=base)
     assert "python -m errand_train.speech" in refused.value.hint
-
-
-def test_one_of_other_weights_is_refused(tmp_path):
-    Adapter({"a/weight": _low_rank(6, 4)}).save(tmp_path / "a.npz", base=BASE)
-    with pytest.raises(InputError, match="other weights"):
-        read_adapter((tmp_path / "a.npz").read_bytes(), base="4567")
-
-
-def test_the_packaged_one_belongs_to_the_published_weights():
-    packaged = packaged_adapter(base=BASE_SHA256)
-    assert len(packaged.changes) == 2 + 6 * 4 + 6 * 7
-    assert all(0 not in low_rank.shape for low_rank in packaged.changes.values())
-    assert all(np.isfinite(low_rank.change()).all() for low_rank in packaged.changes.values())
 
 
 def test_missing_adapter_is_refused_with_a_hint(monkeypatch):
@@ -90,6 +80,13 @@ def test_missing_adapter_is_refused_with_a_hint(monkeypatch):
     with pytest.raises(InputError, match="missing") as refused:
         packaged_adapter(base=BASE_SHA256)
     assert "python -m errand_train.speech" in refused.value.hint
+
+
+def test_the_packaged_one_belongs_to_the_published_weights():
+    packaged = packaged_adapter(base=BASE_SHA256)
+    assert len(packaged.changes) == 2 + 6 * 4 + 6 * 7
+    assert all(0 not in low_rank.shape for low_rank in packaged.changes.values())
+    assert all(np.isfinite(low_rank.change()).all() for low_rank in packaged.changes.values())
 
 
 VARIABLES = {
@@ -119,23 +116,18 @@ def test_read_only_weights_are_not_changed(model_bin):
         read_model_file(model_bin(VARIABLES))["encoder/bias"][...] = 7.0
 
 
-#   what is read                                told
-STRANGE = {
-    "nothing": "damaged",
-    "a file cut off": "damaged",
-    "a file of another version": "version 5",
-    "something else": "version",
-}
-
-
-@pytest.mark.parametrize(("what", "told"), STRANGE.items())
-def test_another_file_is_refused(model_bin, what, told):
-    content = {
-        "nothing": b"",
-        "a file cut off": model_bin(VARIABLES)[:90],
-        "a file of another version": model_bin(VARIABLES, version=5),
-        "something else": b"\xff" * 200,
-    }[what]
+# what is made of the file                          what the refusal says
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda model_bin: b"", "damaged"),
+        (lambda model_bin: model_bin(VARIABLES)[:90], "damaged"),
+        (lambda model_bin: model_bin(VARIABLES, version=5), "version 5"),
+        (lambda model_bin: b"\xff" * 200, "version"),
+    ],
+    ids=["nothing", "a file cut off", "a file of another version", "something else"],
+)
+def test_another_file_is_refused(model_bin, change, told):
     with pytest.raises(InputError, match=told) as refused:
-        read_model_file(content)
+        read_model_file(change(model_bin))
     assert "spot-errand[speech]" in refused.value.hint

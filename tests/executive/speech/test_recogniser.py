@@ -7,24 +7,18 @@ from skills.files.errors import InputError
 def test_a_world_gives_all_its_names_and_the_robots_own_last(flat):
     words = vocabulary_of_world(flat, called=True)
     assert {"coke", "cola", "drink", "kitchen counter", "worktop", "lounge", "Robin"} <= set(words.names)
-    assert words.names[-1] == words.robot_name == "Alice"
-    assert len(set(words.names)) == len(words.names)
+    assert words.names[-1] == words.robot_name == "Alice" and len(set(words.names)) == len(words.names)
 
 
 def test_a_robot_that_need_not_be_called_is_no_part_of_the_prompt(flat):
     words = vocabulary_of_world(flat, called=False)
-    assert words.robot_name is None
-    assert "Alice" not in words.prompt
+    assert (words.robot_name, "Alice" in words.prompt) == (None, False)
 
 
-def test_the_prompt_holds_the_names_and_how_one_calls():
-    prompt = Vocabulary(("sofa", "coke"), "Bob").prompt
-    assert prompt.startswith("sofa, coke. Hey Bob, ")
-    assert "Names" not in Vocabulary().prompt
-
-
-def test_prompt_omits_names_within_longer_ones():
+def test_the_prompt_holds_the_names_without_those_within_longer_ones_and_how_one_calls():
+    assert Vocabulary(("sofa", "coke"), "Bob").prompt.startswith("sofa, coke. Hey Bob, ")
     assert Vocabulary(("coke", "can of coke", "desk")).prompt.startswith("can of coke, desk. ")
+    assert "Names" not in Vocabulary().prompt
 
 
 def test_a_file_of_names_has_one_on_each_line(tmp_path):
@@ -36,16 +30,18 @@ def test_a_file_of_names_has_one_on_each_line(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "told"),
-    [(b"\xff\xfe\x00", "UTF-16"), (b"x" * 200, "too long"), (b"\n".join(b"n%d" % n for n in range(6000)), "too many")],
+    [
+        (None, "no such file"),
+        (b"\xff\xfe\x00", "UTF-16"),
+        (b"x" * 200, "too long"),
+        (b"\n".join(b"n%d" % n for n in range(6000)), "too many"),
+    ],
+    ids=["missing", "UTF-16", "long", "many"],
 )
 def test_file_without_names_is_refused(tmp_path, content, told):
     file = tmp_path / "names.txt"
-    file.write_bytes(content)
+    if content is not None:
+        file.write_bytes(content)
     with pytest.raises(InputError, match=told) as refused:
         read_vocabulary(file, None)
     assert refused.value.file == file
-
-
-def test_missing_file_of_names_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such file"):
-        read_vocabulary(tmp_path / "none.txt", None)

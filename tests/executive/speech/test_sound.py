@@ -1,3 +1,4 @@
+import re
 import struct
 
 import numpy as np
@@ -9,18 +10,12 @@ from skills.files.errors import InputError
 
 
 def test_silence_differs_from_a_soft_voice():
-    assert Loudness().with_block(silence(1.0)).silent
-    assert not Loudness().with_block(tone(1.0, height=0.01)).silent
+    assert [Loudness().with_block(each).silent for each in (silence(1.0), tone(1.0, height=0.01))] == [True, False]
 
 
-def test_flat_tops_at_full_scale_are_clipped():
-    loud = np.clip(tone(1.0) * 4, -1.0, 1.0)
-    assert Loudness().with_block(loud).much_clipped
-    assert not Loudness().with_block(tone(1.0, height=0.95)).much_clipped
-
-
-def test_single_samples_at_full_scale_are_not_clipped():
-    peaks = tone(1.0, height=0.5)
+def test_flat_tops_at_full_scale_are_clipped_and_single_samples_are_not():
+    flat, peaks = np.clip(tone(1.0) * 4, -1.0, 1.0), tone(1.0, height=0.5)
+    assert [Loudness().with_block(each).much_clipped for each in (flat, tone(1.0, height=0.95))] == [True, False]
     peaks[::100] = 1.0
     assert Loudness().with_block(peaks).clipped == 0
 
@@ -32,10 +27,9 @@ def test_blocks_add_up():
 
 
 def test_levels_are_in_decibels_below_full_scale():
-    assert level_db(tone(1.0, height=1.0)) == pytest.approx(-3.01, abs=0.01)
-    assert level_db(tone(1.0, height=0.1)) == pytest.approx(-23.01, abs=0.01)
-    assert level_db(silence(1.0)) == -100.0
-    assert level_db(silence(0.0)) == -100.0
+    sounds = tone(1.0, height=1.0), tone(1.0, height=0.1), silence(1.0), silence(0.0)
+    levels_db = [pytest.approx(-3.01, abs=0.01), pytest.approx(-23.01, abs=0.01), -100.0, -100.0]
+    assert list(map(level_db, sounds)) == levels_db
 
 
 PCM, FLOAT, UNKNOWN, EXTENSIBLE = 1, 3, 0x4242, 0xFFFE
@@ -92,59 +86,41 @@ def test_samples_beyond_full_scale_are_cut(tmp_path):
     assert concatenate(read_wav(file)).tolist() == [1.0] * 4
 
 
-def _refusal(file):
+def cut_off(seconds, kept):
+    return lambda file: file.write_bytes(write_wav(file, tone(seconds)).read_bytes()[:kept])
+
+
+def raw(data, **form):
+    return lambda file: write_raw_wav(file, data, **form)
+
+
+TENTHS = struct.pack("<f", 0.1) * RATE_HZ
+NO_NUMBER = r"^the sample at 1\.000 s is no number$"
+
+
+#   what makes the file                                     a part of the refusal
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda file: None, "no such file"),
+        (lambda file: file.mkdir(), "it is a folder"),
+        (lambda file: file.touch(), "empty"),
+        (lambda file: file.write_text("Hey Alice, fetch me a drink"), "no wav file"),
+        (cut_off(1.0, 13), "ends before its"),
+        (cut_off(1.0, 20), "ends before its"),
+        (cut_off(1.0, 30), "ends before its"),
+        (cut_off(1.0, 40), "ends before its"),
+        (cut_off(2.0, 44 + RATE_HZ), r"^it ends after 0\.5 s, and its head says 2\.0 s$"),
+        (lambda file: write_wav(file, []), "no sound"),
+        (raw(b"\0" * 99, tag=UNKNOWN, bits=8), "no wav file"),
+        (raw(b"\0\0", tag=PCM, bits=16, rate_hz=1), "1 samples per second"),
+        (raw(TENTHS + struct.pack("<f", float("nan")), tag=FLOAT, bits=32), NO_NUMBER),
+        (raw(TENTHS + struct.pack("<f", float("inf")), tag=FLOAT, bits=32), NO_NUMBER),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused(tmp_path, make, message):
+    make(file := tmp_path / "a.wav")
     with pytest.raises(InputError) as refused:
         list(read_wav(file))
     assert refused.value.file == file and refused.value.hint
-    return refused.value.message
-
-
-def test_text_is_no_wav_file(tmp_path):
-    file = tmp_path / "a.wav"
-    file.write_text("Hey Alice, fetch me a drink")
-    assert "no wav file" in _refusal(file)
-
-
-def test_empty_wav_file_is_refused(tmp_path):
-    file = tmp_path / "a.wav"
-    file.touch()
-    assert "empty" in _refusal(file)
-
-
-def test_missing_wav_file_is_refused(tmp_path):
-    assert "no such file" in _refusal(tmp_path / "a.wav")
-
-
-def test_folder_is_refused(tmp_path):
-    assert "it is a folder" in _refusal(tmp_path)
-
-
-@pytest.mark.parametrize("kept", [13, 20, 30, 40])
-def test_file_cut_off_in_its_head_is_refused(tmp_path, kept):
-    file = write_wav(tmp_path / "a.wav", tone(1.0))
-    file.write_bytes(file.read_bytes()[:kept])
-    assert "ends before its" in _refusal(file)
-
-
-def test_error_says_how_much_sound_a_cut_off_file_lacks(tmp_path):
-    file = write_wav(tmp_path / "a.wav", tone(2.0))
-    file.write_bytes(file.read_bytes()[: 44 + RATE_HZ])
-    assert _refusal(file) == "it ends after 0.5 s, and its head says 2.0 s"
-
-
-def test_file_without_sound_is_refused(tmp_path):
-    assert "no sound" in _refusal(write_wav(tmp_path / "a.wav", []))
-
-
-def test_samples_of_an_unknown_type_are_refused(tmp_path):
-    assert "no wav file" in _refusal(write_raw_wav(tmp_path / "a.wav", b"\0" * 99, tag=UNKNOWN, bits=8))
-
-
-def test_unusual_sample_rate_is_refused(tmp_path):
-    assert "1 samples per second" in _refusal(write_raw_wav(tmp_path / "a.wav", b"\0\0", tag=PCM, bits=16, rate_hz=1))
-
-
-@pytest.mark.parametrize("bad", [float("nan"), float("inf")])
-def test_error_gives_the_time_of_a_sample_that_is_no_number(tmp_path, bad):
-    data = struct.pack("<f", 0.1) * RATE_HZ + struct.pack("<f", bad)
-    assert _refusal(write_raw_wav(tmp_path / "a.wav", data, tag=FLOAT, bits=32)) == "the sample at 1.000 s is no number"
+    assert re.search(message, refused.value.message)

@@ -16,43 +16,28 @@ def test_a_synthesiser_that_does_not_start_fails_nothing(tmp_path):
     EspeakVoice(str(tmp_path / "missing")).say("All right.")
 
 
-@pytest.fixture
-def talker(tmp_path):
+def espeak(tmp_path, script):
+    """Finder of a synthesiser that is a shell script."""
     program = tmp_path / "espeak-ng"
-    program.write_text(f'#!/bin/sh\nprintf "%s\\n" "$@" >> {tmp_path}/said\n')
+    program.write_text(f"#!/bin/sh\n{script} >> {tmp_path}/said\n")
     program.chmod(0o755)
-    return installed_voice(which=lambda name: str(program))
+    return lambda name: str(program)
 
 
-def _said(tmp_path, voice):
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [("All right.", "All right."), ("--version", "--version"), ("x" * 1000, "x" * 300)],
+    ids=["short", "like an option", "long"],
+)
+def test_the_answer_is_said_and_a_long_one_is_cut(tmp_path, answer, said):
+    voice = installed_voice(which=espeak(tmp_path, r'printf "%s\n" "$@"'))
+    voice.say(answer)
     voice.wait()
-    return (tmp_path / "said").read_text().splitlines()
+    assert (tmp_path / "said").read_text().splitlines() == ["--", said]
 
 
-def test_the_answer_is_said(talker, tmp_path):
-    talker.say("All right.")
-    assert _said(tmp_path, talker) == ["--", "All right."]
-
-
-def test_an_answer_that_looks_like_an_option_is_said_too(talker, tmp_path):
-    talker.say("--version")
-    assert _said(tmp_path, talker) == ["--", "--version"]
-
-
-def test_a_long_answer_is_cut(talker, tmp_path):
-    talker.say("x" * 1000)
-    assert len(_said(tmp_path, talker)[1]) == 300
-
-
-@pytest.fixture
-def slow_talker(tmp_path):
-    program = tmp_path / "espeak-ng"
-    program.write_text(f'#!/bin/sh\nsleep 0.1\nprintf "%s\\n" "$2" >> {tmp_path}/said\n')
-    program.chmod(0o755)
-    return queued_voice(which=lambda name: str(program))
-
-
-def test_a_queued_voice_says_all_in_order_and_never_waits(slow_talker, tmp_path):
+def test_a_queued_voice_says_all_in_order_and_never_waits(tmp_path):
+    slow_talker = queued_voice(which=espeak(tmp_path, r'sleep 0.1; printf "%s\n" "$2"'))
     begun_s = time.perf_counter()
     for text in ("one", "two", "three"):
         slow_talker.say(text)

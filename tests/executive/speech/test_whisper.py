@@ -14,6 +14,7 @@ from executive.speech.recogniser import vocabulary_of_world
 from executive.speech.sound import concatenate, read_wav
 from executive.speech.whisper import load_whisper
 from skills.files.errors import InputError
+from tests.tables import table
 
 pytest.importorskip("faster_whisper")
 
@@ -37,23 +38,10 @@ def listener(whisper, flat, parser):
     return Listener(whisper, load_detector, reader, spoken_phrases(words))
 
 
-@pytest.mark.parametrize(
-    ("said", "commands"),
-    [
-        ("Hey Alice, go to the kitchen.", ["Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"]),
-        (
-            "Hey Alice, bring the hammer from the workbench to Robin.",
-            [
-                "Take [Nothing] to [workbench] and do [grasp] to [hammer]",
-                "Take [hammer] to [Robin] and do [Nothing] to [Nothing]",
-            ],
-        ),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "spoken"))
 def test_a_spoken_request_becomes_commands(listener, say, said, commands):
     heard = listener.hear_file(say(said))
-    assert heard.addressed
-    assert list(map(str, heard.commands)) == commands
+    assert (heard.addressed, list(map(str, heard.commands))) == (True, commands)
 
 
 def test_speech_to_nobody_is_ignored(listener, say):
@@ -68,9 +56,8 @@ def test_the_same_sound_gives_the_same_readings(whisper, say, flat):
 
 
 def test_the_words_that_were_said_are_likelier_than_others(whisper, say, flat):
-    recognition = whisper.transcribe(
-        concatenate(read_wav(say("Find the wrench."))), vocabulary_of_world(flat, called=False)
-    )
+    sound = concatenate(read_wav(say("Find the wrench.")))
+    recognition = whisper.transcribe(sound, vocabulary_of_world(flat, called=False))
     right, wrong = recognition.likelihoods(["Find the wrench.", "Take the beer."])
     assert right > wrong + 5.0
 

@@ -3,6 +3,7 @@
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -50,20 +51,22 @@ def test_a_simulated_world_is_stored_before_the_changes_of_a_tick_and_not_for_a_
         assert (kept, store.has_steps(mission)) == ([False], True)
 
 
-@pytest.mark.parametrize("start", [None, "unknown", Pose2D(1.25, -3.0, 0.1)])
-def test_a_mission_keeps_where_it_starts(path, start):
-    request = replace(REQUEST, start=start)
+EVENTS = {"people": {"Robin": {"start": 3.0}}, "doors": ({"name": "door", "closes": 4.0},), "moves": ()}
+BOB = RobotConfig("Bob", "fetch", Pose2D(1.0, 2.5, -0.25), "kitchen", Path("/stacks/own.yaml"))
+KEPT = [
+    {"robots": (BOB, RobotConfig("Alice", "spot"))},
+    {"scenario": Scenario(("arm refuses at 3 s",), **EVENTS)},
+    {"start": None},
+    {"start": "unknown"},
+    {"start": Pose2D(1.25, -3.0, 0.1)},
+]
+
+
+@pytest.mark.parametrize("facts", KEPT)
+def test_a_mission_keeps_its_start_its_robots_and_its_faults_and_events(path, facts):
+    request = replace(REQUEST, **facts)
     with MissionStore(path) as store:
         store.add(request, queued=True)
-    with MissionStore(path, create=False) as store:
-        assert store.missions()[0].request == request
-
-
-def test_a_mission_stores_its_faults_and_events(path):
-    events = {"people": {"Robin": {"start": 3.0}}, "doors": ({"name": "door", "closes": 4.0},), "moves": ()}
-    request = replace(REQUEST, scenario=Scenario(("arm refuses at 3 s",), **events))
-    with MissionStore(path) as store:
-        store.add(request, queued=False)
     with MissionStore(path, create=False) as store:
         assert store.missions()[0].request == request
 
@@ -148,16 +151,43 @@ def test_removing_a_mission_forgets_its_steps(path):
         assert store._connection.execute("SELECT count(*) FROM step").fetchone() == (0,)
 
 
-def test_a_missing_store_is_refused(path):
-    with pytest.raises(InputError, match="there is no store; run or queue a mission first"):
-        MissionStore(path, create=False)
+def other_program(path):
+    with closing(sqlite3.connect(path)) as other, other:
+        other.execute("CREATE TABLE recipes (name)")
 
 
-def test_a_damaged_store_is_refused(path):
+def older_version(path):
+    MissionStore(path).close()
+    with closing(sqlite3.connect(path)) as other, other:
+        other.execute(f"PRAGMA user_version = {STORE_FILE.version - 1}")
+
+
+def cut_off(path):
+    with MissionStore(path) as store:
+        for _ in range(200):
+            store.add(REQUEST, queued=True)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2] + b"\0" * 100)
+
+
+OLDER = f"version {STORE_FILE.version - 1}, and this errand reads {STORE_FILE.version}; finish its missions"
+# What lies in place of the store, whether one is made where none is, and what the refusal says.
+UNUSABLE = [
+    (lambda path: None, False, "there is no store; run or queue a mission first"),
+    (lambda path: path.mkdir(), True, "cannot use the store"),
+    (lambda path: path.write_bytes(b"no database at all" * 100), True, r"the store is damaged .* move it away"),
+    (cut_off, False, "damaged"),
+    (older_version, True, OLDER),
+    (other_program, True, "no store; name another file"),
+]
+
+
+@pytest.mark.parametrize(("put", "create", "says"), UNUSABLE)
+def test_a_store_that_cannot_be_used_is_refused(path, put, create, says):
     path.parent.mkdir()
-    path.write_bytes(b"no database at all" * 100)
-    with pytest.raises(InputError, match=r"the store is damaged .* move it away"):
-        MissionStore(path)
+    put(path)
+    with pytest.raises(InputError, match=says), MissionStore(path, create=create) as store:
+        store.missions()
 
 
 def test_an_empty_store_is_damaged(path):
@@ -186,48 +216,6 @@ def test_a_full_disk_names_how_to_continue(path):
         assert store.mission(number).state is MissionState.QUEUED
 
 
-def test_a_store_cut_off_in_the_middle_is_refused(path):
-    with MissionStore(path) as store:
-        for _ in range(200):
-            store.add(REQUEST, queued=True)
-    content = path.read_bytes()
-    path.write_bytes(content[: len(content) // 2] + b"\0" * 100)
-    with pytest.raises(InputError, match="damaged"), MissionStore(path, create=False) as store:
-        store.missions()
-
-
-def test_another_programs_database_is_refused(path):
-    path.parent.mkdir()
-    with sqlite3.connect(path) as other:
-        other.execute("CREATE TABLE recipes (name)")
-    other.close()
-    with pytest.raises(InputError, match="no store; name another file"):
-        MissionStore(path)
-
-
-def test_a_store_of_an_older_version_is_refused_with_what_to_do(path):
-    MissionStore(path).close()
-    with sqlite3.connect(path) as other:
-        other.execute(f"PRAGMA user_version = {STORE_FILE.version - 1}")
-    other.close()
-    with pytest.raises(
-        InputError,
-        match=f"version {STORE_FILE.version - 1}, and this errand reads {STORE_FILE.version}; finish its missions",
-    ):
-        MissionStore(path)
-
-
-def test_a_mission_keeps_its_robots(path):
-    robots = (
-        RobotConfig("Bob", "fetch", Pose2D(1.0, 2.5, -0.25), "kitchen", Path("/stacks/own.yaml")),
-        RobotConfig("Alice", "spot"),
-    )
-    with MissionStore(path) as store:
-        store.add(replace(REQUEST, robots=robots), queued=True)
-    with MissionStore(path, create=False) as store:
-        assert store.missions()[0].request.robots == robots
-
-
 def test_each_of_several_robots_has_its_own_steps_values_and_pose(path):
     with MissionStore(path) as store:
         mission = store.add(replace(REQUEST, robot="Alice"), queued=False).id
@@ -251,14 +239,8 @@ def test_the_lowest_charge_of_a_mission_is_kept_over_a_restart_and_the_last(path
         for tick, charge in enumerate((0.8, None, 0.3, 0.6)):
             journal.note(note(*([changed(f"a/{tick}", Status.SUCCESS)] if tick != 2 else []), charge=charge))
         store.journal(mission).note(note(changed("b", Status.SUCCESS), charge=0.9))
-        assert [tuple(row) for row in store.rows("SELECT lowest_charge, last_charge, ended FROM mission")] == [
-            (0.3, 0.9, None)
-        ]
-
-
-def test_a_folder_in_place_of_the_store_is_refused(tmp_path):
-    with pytest.raises(InputError, match="cannot use the store"):
-        MissionStore(tmp_path)
+        (row,) = store.rows("SELECT lowest_charge, last_charge, ended FROM mission")
+        assert tuple(row) == (0.3, 0.9, None)
 
 
 def test_a_value_that_cannot_be_read_names_the_fix(path):

@@ -182,19 +182,42 @@ def begins(leaf):
     return lambda change: change.path_id.endswith(f"/{leaf}") and change.after.status is Status.RUNNING
 
 
+@pytest.fixture
+def moved_once(live, store, robot, world):
+    """Kills a mission that moves so many objects in any tick, or every second one: each object is moved once."""
+
+    def kill(texts, objects, *, lag=0, every=1, in_the_way=(), says="", **options):
+        world.in_the_way = in_the_way
+        result, ticks, _ = live(texts, **options)
+        assert (result.outcome, world.grasps, world.places) == (Outcome.SUCCESS, objects, objects)
+        for moment in range(1 + lag, ticks, every):
+            store.remove(store.missions()[0].id)
+            robot.holding, world.grasps, world.places, world.in_the_way = False, 0, 0, in_the_way
+            assert live(texts, kill_after=moment, lag=lag, **options)[0] is None
+            result, _, recollection = live(texts, **options)
+            told = (moment, result.worst.message, recollection.log, world.work)
+            assert (result.outcome, result.worst.message.startswith(says)) == (Outcome.SUCCESS, True), told
+            assert (world.grasps, world.places, robot.holding) == (objects, objects, False), told
+
+    return kill
+
+
+@pytest.fixture
+def resumed(live):
+    """A mission that is killed and resumed to its success: its result, and the recollection."""
+
+    def run_twice(texts, **kill):
+        assert live(texts, **kill)[0] is None
+        result, _, recollection = live(texts)
+        assert result.outcome is Outcome.SUCCESS
+        return result, recollection
+
+    return run_twice
+
+
 @pytest.mark.parametrize("lag", [0, 1, 3])
-def test_a_kill_in_any_tick_repeats_nothing(tmp_path, live, store, robot, world, lag):
-    result, ticks, _ = live(TIDY)
-    assert result.outcome is Outcome.SUCCESS
-    assert (world.grasps, world.places) == (1, 1)
-    for moment in range(1 + lag, ticks):
-        store.remove(store.missions()[0].id)
-        robot.holding, world.grasps, world.places = False, 0, 0
-        assert live(TIDY, kill_after=moment, lag=lag)[0] is None
-        result, _, recollection = live(TIDY)
-        told = (moment, result.worst.message, recollection.log, world.work)
-        assert result.outcome is Outcome.SUCCESS, told
-        assert (world.grasps, world.places, robot.holding) == (1, 1, False), told
+def test_a_kill_in_any_tick_repeats_nothing(moved_once, lag):
+    moved_once(TIDY, 1, lag=lag)
 
 
 def test_kills_one_after_another_lead_to_the_end_all_the_same(live, script, world):
@@ -207,7 +230,7 @@ def test_kills_one_after_another_lead_to_the_end_all_the_same(live, script, worl
 
 
 @pytest.mark.parametrize("lag", [0, 3])
-def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, script, make, lag):
+def test_a_kill_in_any_round_moves_each_object_once(moved_once, world, script, make, lag):
     def look(skill):
         if world.places == 2:
             return Failed(Cause.POSTCONDITION, "nothing is left")
@@ -215,16 +238,7 @@ def test_a_kill_in_any_round_moves_each_object_once(live, store, robot, world, s
         return Succeeded("seen", {"observation": seen, "observations": (seen,)})
 
     script.ends["detect"] = look
-    result, ticks, _ = live(CLEAR)
-    for moment in range(1 + lag, ticks, 2):
-        store.remove(store.missions()[0].id)
-        robot.holding, world.grasps, world.places = False, 0, 0
-        assert live(CLEAR, kill_after=moment, lag=lag)[0] is None
-        result, _, recollection = live(CLEAR)
-        told = (moment, result.worst.message, recollection.log, world.work)
-        assert result.outcome is Outcome.SUCCESS, told
-        assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
-        assert result.worst.message.startswith("moved two cokes"), told
+    moved_once(CLEAR, 2, lag=lag, every=2, says="moved two cokes")
 
 
 def test_after_a_kill_in_any_tick_each_person_has_been_greeted(live, store, script, make):
@@ -253,46 +267,29 @@ def test_after_a_kill_in_any_tick_each_person_has_been_greeted(live, store, scri
         assert 2 <= greeted + script.begun.count("speak") <= 3, told
 
 
-def test_a_kill_while_something_is_moved_aside_moves_it_once(live, store, robot, world, script, make):
+def test_a_kill_while_something_is_moved_aside_moves_it_once(moved_once, script, make):
     script.ends["approach"] = lambda skill: Succeeded("near", {"observation": skill.inputs.observation})
-    cube, allowed = dataclasses.replace(make.COKE, kind=ObjectKind("cube")), Policy(move_aside=1)
-    world.in_the_way = (cube,)
-    result, ticks, _ = live(TIDY, policy=allowed)
-    assert (result.outcome, world.grasps, world.places) == (Outcome.SUCCESS, 2, 2)
-    for moment in range(1, ticks, 2):
-        store.remove(store.missions()[0].id)
-        robot.holding, world.grasps, world.places, world.in_the_way = False, 0, 0, (cube,)
-        assert live(TIDY, kill_after=moment, policy=allowed)[0] is None
-        result, _, recollection = live(TIDY, policy=allowed)
-        told = (moment, result.worst.message, recollection.log, world.work)
-        assert result.outcome is Outcome.SUCCESS, told
-        assert (world.grasps, world.places, robot.holding) == (2, 2, False), told
+    cube = dataclasses.replace(make.COKE, kind=ObjectKind("cube"))
+    moved_once(TIDY, 2, every=2, in_the_way=(cube,), policy=Policy(move_aside=1))
 
 
-def test_finished_steps_are_reported_and_not_repeated(live, script, world):
-    live(TIDY, kill_after=12)
-    result, _, recollection = live(TIDY)
-    assert result.outcome is Outcome.SUCCESS
+def test_finished_steps_are_reported_and_not_repeated(resumed, script):
+    _, recollection = resumed(TIDY, kill_after=12)
     assert "detect" not in script.begun
     told = "\n".join(recollection.log)
     assert "find/counter-1/detect: success before the restart: seen" in told
     assert "goes on here" in told
 
 
-def test_a_look_that_found_nothing_anywhere_is_not_repeated(live, script):
+def test_a_look_that_found_nothing_anywhere_is_not_repeated(resumed):
     """Nothing was ever written to the port of its detections: that is no reason to look again."""
-    assert live(FETCH_AND_ASK, kill_after=12)[0] is None
-    script.begun.clear()
-    result, _, recollection = live(FETCH_AND_ASK)
-    assert result.outcome is Outcome.SUCCESS
+    _, recollection = resumed(FETCH_AND_ASK, kill_after=12)
     looks = [told for told in recollection.log if "1-bedroom/search" in told and "/detect: " in told]
     assert [look.partition(": ")[2] for look in looks] == ["failure before the restart: not seen"]
 
 
-def test_answers_and_the_start_pose_outlive_the_process(live, script):
-    assert live(FETCH_AND_ASK, kill_after=12)[0] is None
-    result, _, _ = live(FETCH_AND_ASK)
-    assert result.outcome is Outcome.SUCCESS
+def test_answers_and_the_start_pose_outlive_the_process(resumed):
+    result, _ = resumed(FETCH_AND_ASK, kill_after=12)
     assert list(result.worst.answers.values()) == [False]
     (found,) = result.worst.findings
     assert (found.answer, found.t_s < 2.0) == (False, True)
@@ -310,11 +307,9 @@ def test_an_object_lost_over_the_restart_is_grasped_again(live, robot, world):
     assert any(told.endswith("/grasp: does it again, since the gripper is empty") for told in recollection.log)
 
 
-def test_a_failed_look_before_the_kill_is_not_looked_again(live, script):
+def test_a_failed_look_before_the_kill_is_not_looked_again(resumed, script):
     script.seen_on = ("shelf",)
-    live(TIDY, kill_after=11)
-    result, _, _ = live(TIDY)
-    assert result.outcome is Outcome.SUCCESS
+    resumed(TIDY, kill_after=11)
     assert script.begun.count("detect") <= 1
 
 

@@ -1,10 +1,12 @@
 """Blocks of which a mission is broken off in any tick and taken up by another process: they go on where they were."""
 
-import dataclasses
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
+import yaml
 
+from executive.mission.load import load_mission
 from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.outcome import Outcome
@@ -14,14 +16,11 @@ from executive.run.worker import LockStepWorker
 from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
-from executive.words.command import parse_command
-from executive.words.condition import Look, Not, ValueIs
-from executive.words.leaf_steps import Awaited, CallSkill, Check, Set, Wait
-from executive.words.mission import Mission
-from executive.words.policy import OnFailure, Policy
-from executive.words.steps import Ask, Choose, Group, Loop, Repeat, Together, Try, While
 from skills.api import Cause, Failed, Running, Skill, Succeeded
+from skills.files.yaml_source import read_yaml
+from skills.ports import StowInputs
 
+BLOCKS = read_yaml(Path(__file__).with_name("blocks.yaml")).data
 REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")
 
 
@@ -29,11 +28,6 @@ class KilledError(BaseException):
     """The process is gone."""
 
     stops_run = True
-
-
-@dataclasses.dataclass(frozen=True)
-class Nothing:
-    pass
 
 
 @pytest.fixture
@@ -49,7 +43,7 @@ def works(done):
     def work(skill_name, fails=False):
         class Work(Skill):
             name = skill_name
-            Inputs = Nothing
+            Inputs = StowInputs
             changes_world = True
             checkpoint: ClassVar[dict] = {}
 
@@ -73,99 +67,6 @@ def works(done):
     return {**{name: work(name) for name in "abcd"}, "fails": work("fails", fails=True)}
 
 
-def block(made, policy=None):
-    return made.with_policy(policy)
-
-
-def do(*names):
-    return tuple(CallSkill(skill=name) for name in names)
-
-
-def put(text):
-    return block(Set(set={"n": text}))
-
-
-def value(text):
-    return ValueIs(text=text)
-
-
-WAIT = block(Wait(awaited=Awaited(seconds=0.2)))
-BEER = Look.from_command(parse_command("Take [Nothing] to [shelf] and do [find] to [beer]"))
-RETRIES = Policy(retries=1)
-
-# Each construct, and what is done in all, whenever the process is killed.
-BLOCKS = {
-    "if": (
-        (
-            put("1"),
-            block(Choose(condition=value("n > 0"), then=(*do("a"), put("0"), *do("b")), otherwise=do("c"))),
-            *do("d"),
-        ),
-        "abd",
-    ),
-    "else": ((block(Choose(condition=value("n > 0"), then=do("a"), otherwise=do("b", "c"))), *do("d")), "bcd"),
-    "repeat": ((block(Repeat(loop=Loop(times=3), steps=do("a", "b"))), *do("d")), "abababd"),
-    "until": ((block(Repeat(loop=Loop(until=value("n >= 3")), steps=(*do("a"), put("n + 1")))), *do("d")), "aaad"),
-    "while": ((block(Repeat(loop=Loop(while_=value("n < 3")), steps=(put("n + 1"), *do("a")))), *do("d")), "aaad"),
-    "every": ((block(Repeat(loop=Loop(times=3, every_s=0.5), steps=do("a"))), *do("d")), "aaad"),
-    "repeat in repeat": (
-        (
-            block(Repeat(loop=Loop(times=2), steps=(block(Repeat(loop=Loop(times=2), steps=do("a"))), *do("b")))),
-            *do("d"),
-        ),
-        "aabaabd",
-    ),
-    "if in repeat": (
-        (
-            block(
-                Repeat(
-                    loop=Loop(times=3),
-                    steps=(put("n + 1"), block(Choose(condition=value("n == 2"), then=do("a"), otherwise=do("b")))),
-                )
-            ),
-            *do("d"),
-        ),
-        "babd",
-    ),
-    "try": ((block(Try(steps=do("a"), otherwise=do("b"))), *do("d")), "ad"),
-    "try else": ((block(Try(steps=do("a", "fails"), otherwise=do("b", "c"))), *do("d")), "abcd"),
-    "together": ((block(Together(steps=(*do("a"), WAIT))), *do("d")), "ad"),
-    "group": ((block(Group(steps=do("a", "b"))), *do("d")), "abd"),
-    "always": ((block(Group(steps=do("a"), always=do("b", "c"))), *do("d")), "abcd"),
-    "always after a failure": (
-        (block(Try(steps=(block(Group(steps=do("a", "fails"), always=do("b"))),), otherwise=do("c"))), *do("d")),
-        "abcd",
-    ),
-    "always in always": (
-        (block(Group(steps=(block(Group(steps=do("a"), always=do("b"))),), always=do("c"))), *do("d")),
-        "abcd",
-    ),
-    "while it holds": ((block(Group(steps=do("a", "b"), while_=While(holds=value("battery > 0.1")))), *do("d")), "abd"),
-    "set": (
-        (put("n + 1"), *do("a"), put("n + 1"), block(Choose(condition=value("n == 2"), then=do("b"))), *do("d")),
-        "abd",
-    ),
-    "check": (
-        (
-            block(Check(condition=value("n == 0"), gives={"answer": "so"})),
-            *do("a"),
-            put("5"),
-            block(Choose(condition=value("so"), then=do("b"))),
-            *do("d"),
-        ),
-        "abd",
-    ),
-    "wait": ((*do("a"), WAIT, *do("d")), "ad"),
-    "ask": (
-        (block(Ask(ask="q?", choices={"x": do("a"), "y": do("b", "c")}, limit_s=0.2, default="y")), *do("d")),
-        "bcd",
-    ),
-    "until it is seen": ((block(Repeat(loop=Loop(until=BEER), steps=do("a"))), *do("d")), "aad"),
-    "while it is not seen": ((block(Repeat(loop=Loop(while_=Not(part=BEER)), steps=do("a"))), *do("d")), "aad"),
-    "skipped": ((block(Group(steps=do("a", "fails", "b")), policy=Policy(on_failure=OnFailure.SKIP)), *do("d")), "ad"),
-}
-
-
 @pytest.fixture
 def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done):
     """One life of the executive: to its end, or until it is killed after some tick.
@@ -182,7 +83,8 @@ def live(tmp_path, clock, robot, make, works, registry, knowledge, script, done)
     skills = {**registry, **works}
 
     def one_life(steps, number, kill_after=None):
-        mission = Mission(name="m", robot="Alice", steps=steps, variables={"n": 0, "so": False})
+        facts = {"name": "m", "robot": "Alice", "steps": steps, "variables": {"n": 0, "so": False}}
+        mission = load_mission("blocks.yaml", text=yaml.safe_dump(facts, sort_keys=False))
         tree = compile_mission(mission, knowledge=knowledge, registry=skills)
         with MissionStore(tmp_path / f"{number}.sqlite") as store:
             missions = store.missions()
@@ -226,7 +128,7 @@ class Killing(RunVisitor):
 
 @pytest.mark.parametrize("name", BLOCKS)
 def test_a_kill_in_any_tick_neither_repeats_nor_leaves_out_anything(live, done, name):
-    steps, expected = BLOCKS[name]
+    steps, expected = BLOCKS[name]["steps"], BLOCKS[name]["done"]
     whole = live(steps, "whole")
     assert (whole.outcome, "".join(done)) == (Outcome.SUCCESS, expected)
     wrong = []
@@ -241,7 +143,7 @@ def test_a_kill_in_any_tick_neither_repeats_nor_leaves_out_anything(live, done, 
 
 @pytest.mark.parametrize("name", ["if", "until", "while", "repeat in repeat", "try else", "always after a failure"])
 def test_one_kill_after_the_other_leads_to_the_end_all_the_same(live, done, name):
-    steps, expected = BLOCKS[name]
+    steps, expected = BLOCKS[name]["steps"], BLOCKS[name]["done"]
     lives = 1
     while live(steps, "store", kill_after=7) is None and lives < 50:
         lives += 1
@@ -249,7 +151,7 @@ def test_one_kill_after_the_other_leads_to_the_end_all_the_same(live, done, name
 
 
 def test_after_a_kill_in_any_tick_each_look_is_one_finding(live, done):
-    steps, _ = BLOCKS["while it is not seen"]
+    steps = BLOCKS["while it is not seen"]["steps"]
     whole, wrong = live(steps, "whole"), []
     for tick in range(1, whole.ticks):
         done.clear()
@@ -261,7 +163,7 @@ def test_after_a_kill_in_any_tick_each_look_is_one_finding(live, done):
 
 
 def test_after_a_kill_in_any_tick_a_check_of_several_objects_is_one_finding(live, done):
-    steps = (block(Check(condition=value("n == 0"))), *do("a"))
+    steps = [{"check": "n == 0"}, {"skill": "a"}]
     whole = live(steps, "whole")
     counts = {}
     for tick in range(1, whole.ticks):

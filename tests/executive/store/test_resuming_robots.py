@@ -48,7 +48,7 @@ def world():
 
 @pytest.fixture
 def robots(clock, make):
-    return {robot.name: make.ScriptedRobot(clock, robot.name) for robot in ROBOTS}
+    return {robot.name: make.StandingRobot(clock, robot.name) for robot in ROBOTS}
 
 
 @pytest.fixture

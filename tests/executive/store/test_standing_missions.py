@@ -1,7 +1,9 @@
 """Standing missions: what fires, what is missed, and that nothing is lost or comes twice."""
 
 import sqlite3
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +14,7 @@ from executive.store.missions import MissionState, MissionStore
 from executive.store.standing_missions import MOST_WAITING, StandingMissions, TooManyError
 from executive.store.triggers import Missed, trigger_of
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 
 REQUEST = Request("go to the kitchen", seed=3, name="go kitchen", world_name="flat", robot="Alice", commands=("Take",))
 START = datetime(2026, 11, 24, 8, 0, tzinfo=UTC)  # a Tuesday
@@ -28,6 +31,10 @@ class Clock:
 
     def pass_by(self, **time):
         self.now += timedelta(**time)
+
+    def moment(self, minutes):
+        """Now, or so many minutes after the start."""
+        return self.now if minutes == "now" else START + timedelta(minutes=minutes)
 
 
 @pytest.fixture
@@ -61,9 +68,7 @@ def fire(standing):
     """What fires in a server that serves, and waits, since some moments; at all times where none is given."""
 
     def fired(waiting_since=START, serving_since=START):
-        return [
-            each.why for each in standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)
-        ]  # fmt: skip
+        return [each.why for each in standing.fire_due(waiting_since=waiting_since, serving_since=serving_since)]
 
     return fired
 
@@ -77,6 +82,24 @@ def end_mission(store, *charges):
         journal.note(TickNote(None, 1.0, (), {}, None, {}, charge))
     journal.note(TickNote(None, 2.0, (), {"alice/x": len(charges)}, None, {}))
     store.finish(number, MissionState.SUCCESS, "done")
+
+
+TIMELINES = read_yaml(Path(__file__).with_name("standing.yaml")).data
+
+
+@pytest.mark.parametrize("timeline", TIMELINES, ids=lambda timeline: timeline["name"])
+def test_a_standing_mission_fires_when_it_is_due(clock, fire, standing, store, timeline):
+    for step in timeline["steps"]:
+        if "add" in step:
+            request = replace(REQUEST, robot=step.get("robot", REQUEST.robot))
+            standing.add(request, trigger_of(str(step["add"])), Missed(step.get("missed", "skip")))
+        clock.pass_by(**step.get("pass", {}))
+        if "ends" in step:
+            end_mission(store, *step["ends"])
+        if "fires" in step:
+            assert fire(clock.moment(step.get("waiting", 0)), clock.moment(step.get("serving", 0))) == step["fires"]
+        if "next" in step:
+            assert standing.due_next() == (step["next"] and datetime.fromisoformat(step["next"]))
 
 
 def test_a_standing_mission_is_kept_and_never_run_itself(add, path, store):
@@ -96,73 +119,10 @@ def test_a_trigger_queues_a_copy_that_names_its_standing_mission(add, clock, sta
     assert store.missions(MissionState.QUEUED) == (fired,)
 
 
-def test_an_occurrence_fires_once(add, clock, fire):
-    add("every weekday 09:00")
-    assert fire() == []
-    clock.pass_by(hours=1)
-    assert len(fire()) == 1
-    clock.pass_by(seconds=1)
-    assert fire() == []
-    clock.pass_by(days=1, seconds=-1)
-    assert len(fire()) == 1
-
-
-@pytest.mark.parametrize(("missed", "count"), [(Missed.SKIP, 0), (Missed.ONCE, 1)])
-def test_missed_occurrences_are_skipped_or_made_up_for_once(add, clock, fire, missed, count):
-    add("every 10m", missed)
-    clock.pass_by(minutes=31)
-    assert fire(waiting_since=clock.now) == ["every 10m, due 2026-11-24 08:30, missed"] * count
-    assert fire(waiting_since=clock.now) == []
-    clock.pass_by(minutes=9)
-    assert fire(waiting_since=START + timedelta(minutes=31)) == ["every 10m, due 2026-11-24 08:40"]
-
-
-def test_an_occurrence_noticed_late_is_missed(add, clock, fire):
-    """The machine has slept, or its clock was set forward."""
-    add("every day 09:00"), add("every day 09:01", Missed.ONCE)
-    clock.pass_by(hours=3)
-    assert fire() == ["every day 09:01, due 2026-11-24 09:01, missed"]
-
-
-def test_a_clock_that_is_set_back_a_little_has_nothing_fire_twice(add, clock, fire):
-    add("every day 09:00")
-    clock.pass_by(hours=1, seconds=1)
-    assert len(fire()) == 1
-    clock.pass_by(seconds=-5)
-    assert fire() == []
-    clock.pass_by(seconds=10)
-    assert fire() == []
-
-
-def test_a_clock_that_is_set_back_far_does_not_silence_a_mission(add, clock, fire):
-    clock.pass_by(days=1000)
-    add("every day 09:00")
-    clock.pass_by(days=-1000)
-    assert fire() == []
-    clock.pass_by(hours=1)
-    assert len(fire()) == 1
-
-
-def test_a_single_time_fires_once_and_is_over(add, clock, fire, standing):
-    add("2026-11-25 09:00")
-    assert standing.due_next() == datetime(2026, 11, 25, 9, tzinfo=UTC)
-    clock.pass_by(days=1, hours=1)
-    assert len(fire()) == 1
-    assert (fire(), standing.due_next()) == ([], None)
-
-
 def test_a_single_time_that_has_passed_is_refused(add, store):
     with pytest.raises(InputError, match="2026-11-24 07:59 has passed; give a time to come"):
         add("2026-11-24 07:59")
     assert store.missions() == ()
-
-
-def test_the_next_occurrence_is_the_earliest_of_all(add, standing):
-    assert standing.due_next() is None
-    add("call x"), add("battery full")
-    assert standing.due_next() is None
-    add("every day 09:00"), add("every 15m"), add("every 4h")
-    assert standing.due_next() == START + timedelta(minutes=15)
 
 
 def test_an_occurrence_and_its_mission_are_written_together(add, clock, fire, monkeypatch, standing, store):
@@ -176,8 +136,7 @@ def test_an_occurrence_and_its_mission_are_written_together(add, clock, fire, mo
     with monkeypatch.context() as patch, pytest.raises(InputError, match="killed in between"):
         patch.setattr(standing_module, "_queue", broken)
         fire()
-    assert (standing.missions(), store.missions(MissionState.QUEUED)) == (before, ())
-    assert len(fire()) == 1
+    assert (standing.missions(), store.missions(MissionState.QUEUED), len(fire())) == (before, (), 1)
 
 
 def test_a_process_that_ends_between_firing_and_running_loses_nothing(add, clock, fire, path):
@@ -216,57 +175,3 @@ def test_copies_that_wait_do_not_pile_up_without_end(add, standing, store):
         standing.fire([(added, REQUEST)], "")
     store.finish(2, MissionState.SUCCESS, "done")
     assert len(standing.fire([(added, REQUEST)], "")) == 1
-
-
-@pytest.mark.parametrize(
-    ("charges", "fires"),
-    [
-        ((0.2, 0.6, 0.96), True),
-        ((0.96, 0.2, 0.96), True),
-        ((1.0, 0.97), False),
-        ((0.2, 0.94), False),
-        ((0.2, 0.97, 0.9), False),
-        ((0.951, 0.945, 0.951), False),
-        ((), False),
-    ],
-)
-def test_a_battery_becomes_full_when_a_mission_ends_with_a_charge_that_was_lower_before(
-    add, clock, fire, store, charges, fires
-):
-    add("battery full")
-    clock.pass_by(minutes=1)
-    end_mission(store, *charges)
-    assert fire() == ["battery full"] * fires
-    clock.pass_by(minutes=1)
-    end_mission(store, 1.0, 0.99)
-    assert fire() == []
-
-
-def test_a_battery_trigger_uses_its_own_level(add, clock, fire, store):
-    add("battery 50%")
-    clock.pass_by(minutes=1)
-    end_mission(store, 0.48, 0.5)
-    assert fire() == ["battery 50%"]
-
-
-def test_a_battery_that_was_full_before_is_no_occurrence(add, clock, fire, store):
-    end_mission(store, 0.2, 0.97)
-    clock.pass_by(minutes=1)
-    add("battery full", Missed.ONCE)
-    assert fire() == []
-
-
-@pytest.mark.parametrize("missed", list(Missed))
-def test_a_battery_that_became_full_while_nothing_served_is_missed(add, clock, fire, store, missed):
-    add("battery full", missed)
-    clock.pass_by(minutes=1)
-    end_mission(store, 0.2, 0.97)
-    clock.pass_by(minutes=1)
-    assert fire(serving_since=clock.now) == ["battery full, missed"] * (missed is Missed.ONCE)
-
-
-def test_the_battery_of_another_robot_does_not_matter(clock, fire, standing, store):
-    standing.add(Request(**{**vars(REQUEST), "robot": "Bob"}), trigger_of("battery full"))
-    clock.pass_by(minutes=1)
-    end_mission(store, 0.2, 0.97)
-    assert fire() == []

@@ -6,6 +6,7 @@ import pytest
 
 from executive.store.trigger_source import refuse_missing_source, trigger_source
 from skills.files.errors import InputError
+from tests.executive.distribution import write_distribution
 
 MODULE = """
 class Source:
@@ -23,11 +24,8 @@ def broken(): raise OSError("no broker")
 def installed(tmp_path, monkeypatch):
     """A distribution that registers trigger sources."""
     (tmp_path / "bells.py").write_text(MODULE)
-    info = tmp_path / "bells-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Name: bells\nVersion: 1.0\n")
     lines = ("bell = bells:Source", "half = bells:Half", "broken = bells:broken", "gone = bells:Gone")
-    (info / "entry_points.txt").write_text("\n".join(("[errand.triggers]", *lines, "")))
+    write_distribution(tmp_path, "bells", "errand.triggers", *lines)
     monkeypatch.syspath_prepend(str(tmp_path))
     yield
     sys.modules.pop("bells", None)
@@ -64,9 +62,6 @@ def test_a_source_that_cannot_be_used_says_why(installed, kind, words):
 
 
 def test_two_sources_of_one_kind_are_refused(installed, tmp_path):
-    info = tmp_path / "more-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Name: more\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[errand.triggers]\nbell = more:Source\n")
+    write_distribution(tmp_path, "more", "errand.triggers", "bell = more:Source")
     with pytest.raises(InputError, match="bells:Source and more:Source both are trigger source 'bell'"):
         refuse_missing_source("bell")

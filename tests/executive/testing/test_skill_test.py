@@ -1,7 +1,9 @@
 """Files of skill tests: what is refused, with line and hint, and how a trial is judged."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
 
@@ -97,27 +100,13 @@ def test_the_report_lists_faults_and_messages(written):
     assert "0.05 s  waiting" in report
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "message"),
-    [
-        ("skill: wait", "skill: weight", 1, "there is no skill 'weight'"),
-        ("skill: wait", "skil: wait", 1, "unknown key 'skil'"),
-        ("with: {seconds: 1}", "with: {secs: 1}", 2, "there is no input port 'secs'"),
-        ("with: {seconds: 1}", "with: {seconds: long}", 2, "'long' does not fit; give a number"),
-        ("with: {seconds: 5}", "with: {seconds: [5]}", 7, "does not fit; give a number"),
-        ("with: {seconds: 5}", "with: {seconds: 5, where: {x_m: 1}}", 7, "where: 'y' is missing"),
-        ("with: {seconds: 1}", "with: {}", 4, "input port 'seconds' has no value; give it a number"),
-        ("odometry jumps 0.5 m at 1 s", "odometry jumps at 1 s", 8, "there is no fault"),
-        ("cause: EXECUTION", "cause: BAD_LUCK", 9, "cause"),
-        ("message: moved", "message: '('", 9, "is no regular expression"),
-        ("outcome: success,", "outcome: success, cause: TIMEOUT,", 5, "a success has no cause"),
-        ("name: pushed", "name: it waits", 1, "two tests are named 'it waits'"),
-    ],
-)
-def test_a_wrong_file_is_refused_with_its_line(written, old, new, line, message):
-    assert old in GOOD
-    path = written(GOOD.replace(old, new))
-    with pytest.raises(InputError) as refused:
+REFUSED = read_yaml(Path(__file__).with_name("refused_tests.yaml")).data
+
+
+@pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])
+def test_a_wrong_file_is_refused_with_its_line(written, case):
+    assert case["old"] in GOOD
+    path = written(GOOD.replace(case["old"], case["new"]))
+    with pytest.raises(InputError, match=re.escape(case["message"])) as refused:
         load_skill_tests(path, SKILLS)
-    assert (refused.value.file, refused.value.line) == (path, line)
-    assert message in str(refused.value)
+    assert (refused.value.file, refused.value.line) == (path, case["line"])

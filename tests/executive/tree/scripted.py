@@ -1,30 +1,34 @@
-"""Leaves that do what a script says, and count what is done to them."""
+"""Leaves and conditions that do what a script says, and note what is done to them."""
 
 from py_trees.behaviour import Behaviour
-from py_trees.behaviours import StatusQueue
 from py_trees.common import Status
 
-from executive.tree.behaviour import Explained
+from executive.tree.behaviour import Explained, suspend
 from skills.api import Cause
 
 R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
+CAUSES = {
+    "B": Cause.PRECONDITION, "C": Cause.CANCELLED, "E": Cause.ERROR, "F": Cause.EXECUTION, "O": Cause.POSTCONDITION,
+    "P": Cause.PLANNING, "T": Cause.TIMEOUT,
+}  # fmt: skip
 
 
 class Leaf(Explained, Behaviour):
     """Goes through `script` ("RRS": running twice, then success), the last letter again and again.
 
-    S: success, F: failure with EXECUTION, E: with ERROR, C: with CANCELLED. With `restarts` each start begins it
-    from its beginning, else it goes on. `log` gets "+name" when it begins and "-name" when it is stopped while running.
+    S: success; the letters of CAUSES: a failure. With `restarts` each start begins it from its beginning, else it goes
+    on. `log` gets "+name" when it begins, "~name" when it is suspended, and "-name" when it is stopped while running.
     """
 
     def __init__(self, script, name="leaf", log=None, restarts=False, put=None):
         super().__init__(name)
         self.path_id, self.cause, self.message = f"alice/{name}", None, ""
         self.script, self.log, self.restarts, self.put = script, [] if log is None else log, restarts, put
-        self.place = self.ticks = self.suspended = 0
+        self.place = self.ticks = self.begun = 0
 
     def initialise(self):
         self.clear_explanation()
+        self.begun += 1
         self.log.append(f"+{self.name}")
         self.place = 0 if self.restarts else self.place
 
@@ -33,7 +37,7 @@ class Leaf(Explained, Behaviour):
         self.place += 1
         self.ticks += 1
         self.message = f"{self.name} {letter}"
-        self.cause = {"F": Cause.EXECUTION, "E": Cause.ERROR, "C": Cause.CANCELLED}.get(letter)
+        self.cause = CAUSES.get(letter)
         if letter not in "RS":
             return F
         if letter == "S" and self.put is not None:
@@ -41,28 +45,30 @@ class Leaf(Explained, Behaviour):
         return R if letter == "R" else S
 
     def suspend(self):
-        self.suspended += 1
+        self.log.append(f"~{self.name}")
 
     def terminate(self, new_status):
         if new_status == N and self.status == R:
             self.log.append(f"-{self.name}")
 
 
-class Queue(Explained, StatusQueue):
-    """Goes through `statuses`, then succeeds; says why it fails, and counts how often it is stopped."""
+class Switch:
+    """A condition whose verdict is set by hand; counts how often it begins."""
 
-    def __init__(self, *statuses: Status, name: str = "action", cause: Cause = Cause.EXECUTION) -> None:
-        super().__init__(name=name, queue=list(statuses), eventually=S)
-        self.path_id, self.fails_with, self.stopped = f"a/{name}", cause, 0
-        self.clear_explanation()
+    def __init__(self):
+        self.verdict, self.begun = None, 0
 
-    def update(self) -> Status:
-        status = super().update()
-        self.cause, self.message = (self.fails_with, "slipped") if status == F else (None, "goes on")
-        return status
+    def for_run(self, context):
+        return self
 
-    def terminate(self, new_status: Status) -> None:
-        self.stopped += new_status == N and self.status == R
+    def begin(self, context):
+        self.begun += 1
+
+    def note_call(self):
+        pass
+
+    def check(self, context):
+        return self.verdict
 
 
 def tick(root, times=1, clock=None, dt_s=1.0):
@@ -76,6 +82,34 @@ def tick(root, times=1, clock=None, dt_s=1.0):
     return found
 
 
-def letters(root, times):
-    """The root's status after each tick, by its first letter."""
-    return "".join(status.value[0] for status in tick(root, times))
+def play(root, expected, clock=None):
+    """Ticks the root for each letter of `expected`, suspends it at "|" and stops it at "I"; its status after each.
+
+    The clock, if one is given, advances by a second after each.
+    """
+    found = ""
+    for letter in expected:
+        if letter == "|":
+            suspend(root)
+        elif letter == "I":
+            root.stop(N)
+        else:
+            root.tick_once()
+        found += "|" if letter == "|" else root.status.value[0]
+        if clock is not None:
+            clock.advance(1.0)
+    return found
+
+
+def table(root, ticks):
+    """First letters of the statuses of the root and its children after each tick."""
+    rows = []
+    for _ in range(ticks):
+        root.tick_once()
+        rows.append("".join(node.status.value[0] for node in (root, *root.children)))
+    return rows
+
+
+def told(published, topic="transitions"):
+    """Messages of one topic."""
+    return [message["message"] for each, message in published if each == topic]

@@ -10,6 +10,7 @@ from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.policies import Retry, Timeout
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Failed, Running, Skill, Succeeded
+from tests.executive.tree.scripted import play
 
 
 @pytest.fixture
@@ -43,96 +44,78 @@ def test_the_sequence_keeps_its_place_and_the_running_skill_begins_again(leaf_of
     log = []
     first, second = leaf_of("a", [Succeeded("")], log), leaf_of("b", [Running(""), Succeeded("")], log)
     root = MemorySequence(path_id="alice/all", name="all", children=[first, second])
-    root.tick_once()
-    suspend(root)
-    suspend(root)
+    assert play(root, "R||") == "R||"
     assert (root.status, second.status, second.suspended) == (Status.RUNNING, Status.RUNNING, True)
     assert log == ["a begin", "a step", "a end", "b begin", "b step", "b end"]
     log.clear()
-    root.tick_once()
+    assert play(root, "R") == "R"
     assert (log, second.suspended) == (["b begin", "b step"], False)
-    root.tick_once()
-    assert root.status == Status.SUCCESS
+    assert play(root, "S") == "S"
 
 
 def test_a_retry_keeps_its_attempt(leaf_of):
-    log = []
-    child = leaf_of("a", [Running(""), Failed(Cause.EXECUTION, "no")], log)
+    child = leaf_of("a", [Running(""), Failed(Cause.EXECUTION, "no")], [])
     root = Retry(path_id="alice/r", name="r", child=child, attempts=2, causes=frozenset({Cause.EXECUTION}))
-    for _ in range(3):
+    assert (play(root, "RRR|"), root.attempt) == ("RRR|", 2)
+    assert (play(root, "RF"), root.attempt) == ("RF", 2)
+
+
+@pytest.fixture
+def limited(leaf_of, clock):
+    """A skill under a time limit of 3 s, suspended after 2 s for a long time."""
+
+    def begun(*steps, **hooks):
+        leaf = leaf_of("a", steps, [], **hooks)
+        root = Timeout(path_id="alice/t", name="t", child=leaf, limit_s=3.0, clock=clock)
         root.tick_once()
-    suspend(root)
-    assert (root.attempt, root.status) == (2, Status.RUNNING)
-    root.tick_once()
-    root.tick_once()
-    assert (root.status, root.attempt) == (Status.FAILURE, 2)
+        clock.advance(2.0)
+        suspend(root)
+        clock.advance(1000.0)
+        return root
+
+    return begun
 
 
-def test_time_does_not_count_for_leaf_and_timeout(leaf_of, clock):
-    leaf = leaf_of("a", [Running(""), Running(""), Succeeded("")], [], resume=lambda self, inputs: None)
-    root = Timeout(path_id="alice/t", name="t", child=leaf, limit_s=3.0, clock=clock)
-    root.tick_once()
-    clock.advance(2.0)
-    suspend(root)
-    clock.advance(1000.0)
-    root.tick_once()
-    assert root.status == Status.RUNNING
+def test_time_does_not_count_for_leaf_and_timeout(limited, clock):
+    root = limited(Running(""), Running(""), Succeeded(""), resume=lambda self, inputs: None)
+    assert play(root, "R") == "R"
     clock.advance(0.9)
-    root.tick_once()
-    assert root.status == Status.SUCCESS
+    assert play(root, "S") == "S"
 
 
-def test_time_before_and_after_adds_up(leaf_of, clock):
-    leaf = leaf_of("a", [Running("")] * 9, [])
-    root = Timeout(path_id="alice/t", name="t", child=leaf, limit_s=3.0, clock=clock)
-    root.tick_once()
-    clock.advance(2.0)
-    suspend(root)
-    clock.advance(50.0)
-    root.tick_once()
+def test_time_before_and_after_adds_up(limited, clock):
+    root = limited(*[Running("")] * 9)
+    assert play(root, "R") == "R"
     clock.advance(1.1)
-    root.tick_once()
-    assert (root.status, root.cause) == (Status.FAILURE, Cause.TIMEOUT)
+    assert (play(root, "F"), root.cause) == ("F", Cause.TIMEOUT)
 
 
 def test_a_skill_may_go_on_where_it_was(leaf_of):
     log = []
     hooks = {"suspend": lambda self: log.append("rest"), "resume": lambda self, inputs: log.append(f"on {inputs}")}
-    leaf = leaf_of("a", [Running(""), Succeeded("")], log, **hooks)
-    leaf.tick_once()
-    suspend(leaf)
-    leaf.tick_once()
+    assert play(leaf_of("a", [Running(""), Succeeded("")], log, **hooks), "R|S") == "R|S"
     assert log == ["a begin", "a step", "rest", "on {}", "a step", "a end"]
 
 
-def test_a_defect_in_a_hook_is_a_failure_with_error(leaf_of):
-    def broken(self, *_):
-        raise ZeroDivisionError("hook")
-
-    for hook in ("suspend", "resume"):
-        leaf = leaf_of("a", [Running(""), Succeeded("")], [], **{hook: broken})
-        leaf.tick_once()
-        suspend(leaf)
-        assert leaf.status == Status.RUNNING
-        leaf.tick_once()
-        assert (leaf.status, leaf.cause) == (Status.FAILURE, Cause.ERROR)
-        assert "ZeroDivisionError" in leaf.message
+@pytest.mark.parametrize("hook", ["suspend", "resume"])
+def test_a_defect_in_a_hook_is_a_failure_with_error(leaf_of, hook):
+    leaf = leaf_of("a", [Running(""), Succeeded("")], [], **{hook: lambda self, *_: 1 / 0})
+    assert (play(leaf, "R|"), leaf.status) == ("R|", Status.RUNNING)
+    assert (play(leaf, "F"), leaf.cause) == ("F", Cause.ERROR)
+    assert "ZeroDivisionError" in leaf.message
 
 
 def test_a_suspended_leaf_that_is_stopped_ends_its_skill(leaf_of):
     log = []
     leaf = leaf_of("a", [Running("")], log, suspend=lambda self: None)
-    leaf.tick_once()
-    suspend(leaf)
-    leaf.stop(Status.INVALID)
+    assert play(leaf, "R|I") == "R|I"
     assert (log[-1], leaf.active, leaf.cause) == ("a end", False, Cause.CANCELLED)
 
 
 def test_idle_nodes_are_left_alone(leaf_of):
     log = []
     leaf = leaf_of("a", [Succeeded("done")], log)
-    leaf.tick_once()
-    suspend(leaf)
+    assert play(leaf, "S|") == "S|"
     assert (leaf.status, leaf.suspended, log) == (Status.SUCCESS, False, ["a begin", "a step", "a end"])
 
 

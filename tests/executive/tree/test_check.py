@@ -29,8 +29,10 @@ START = Pose2D(0.0, 0.0, 0.0)
 MASSES = {"coke": 0.35, "beer": 0.55, "hammer": 0.5}
 ABLE = Abilities(MASSES, 5.0, frozenset(MASSES), frozenset({"red"}))
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [{}]"
+TAKE_COKE, BRING = GET.format("coke"), "Take [{}] to [{}] and do [Nothing] to [Nothing]"
 GO = "Take [Nothing] to [{}] and do [Nothing] to [Nothing]"
-FIND = "Take [Nothing] to [kitchen] and do [find] to [coke]"
+FIND = "Take [Nothing] to [kitchen] and do [find] to [{}]"
+BODY = Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)])
 ONLY_COKE = {"classes": frozenset({"coke"})}
 
 
@@ -50,9 +52,9 @@ class StraightRoutes:
 
 @pytest.fixture
 def check(knowledge, registry, tmp_path):
-    """Check commands given as texts, or skill calls, each on a line of its own."""
+    """Checks commands given as texts, or skill calls, each on a line of its own."""
 
-    def check_it(*steps, routes=None, abilities=ABLE):
+    def check_it(*steps, routes=None, **abilities):
         made = []
         for line, one in enumerate(steps, start=1):
             place = Place(YamlSource(tmp_path / "m.yaml", None, {}, first_line=line), ())
@@ -64,7 +66,7 @@ def check(knowledge, registry, tmp_path):
             tree,
             knowledge=knowledge,
             start=START,
-            abilities=abilities,
+            abilities=replace(ABLE, **abilities),
             planner=routes or StraightRoutes(),
             estimates=load_estimates(),
         )
@@ -78,15 +80,12 @@ def errors_in(checked):
 
 def test_steps_together_take_as_long_as_those_that_must_be_done(check):
     drive, wait = Do.from_command(parse_command(GO.format("kitchen"))), Wait(awaited=Awaited(seconds=300.0))
-    alone, either, both = (check(one).estimate for one in (drive, *(_together(drive, wait, n) for n in (1, 2))))
+    together = [Together(steps=(drive, wait), done_when=needed) for needed in (1, 2)]
+    alone, either, both = (check(one).estimate for one in (drive, *together))
     assert alone.duration_s < 60
     assert either.duration_s == pytest.approx(alone.duration_s)
     assert (either.most_s, either.reasons) == (300.0, ("until the first of 2 steps is done",))
     assert (both.duration_s, both.distance_m) == (300.0, pytest.approx(alone.distance_m))
-
-
-def _together(first, second, needed):
-    return Together(steps=(first, second), done_when=needed)
 
 
 def test_a_good_mission_has_no_errors_and_an_estimate(check, make):
@@ -103,16 +102,14 @@ def test_a_step_that_empties_the_battery_is_warned_of_with_its_line(check, regis
     one_way = check(there, routes=far).estimate.charge
     assert 0.25 < one_way < 0.5
     trips = [there, back] * 2
-    tired, rested = (
-        check(*trips, routes=far),
-        check(*trips[:2], CallSkill(skill="charge", values={"level": 0.8}), *trips[2:], routes=far),
-    )
+    rest = CallSkill(skill="charge", values={"level": 0.8})
+    tired, rested = (check(*steps, routes=far) for steps in (trips, [*trips[:2], rest, *trips[2:]]))
     assert [warning.line for warning in tired.warnings] == [1 + int(1.0 / one_way)]
     assert (tired.errors, rested.warnings) == ((), ())
 
 
 def test_time_and_charge_follow_from_the_route(check):
-    near = check("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]").estimate
+    near = check(GO.format("kitchen")).estimate
     drive, use = load_estimates().drive, load_estimates().battery
     assert near.distance_m == 4.0
     assert near.duration_s == pytest.approx(drive.overhead_s + 4.0 * drive.per_metre_s)
@@ -121,10 +118,7 @@ def test_time_and_charge_follow_from_the_route(check):
 
 def test_each_route_begins_where_the_last_one_ended(check):
     routes = StraightRoutes()
-    check(
-        *(f"Take [Nothing] to [{room}] and do [Nothing] to [Nothing]" for room in ("kitchen", "bedroom", "start")),
-        routes=routes,
-    )
+    check(*map(GO.format, ("kitchen", "bedroom", "start")), routes=routes)
     assert [(round(a.x_m), round(b.x_m)) for a, b in routes.asked] == [(0, 4), (4, -4), (-4, 0)]
 
 
@@ -136,15 +130,13 @@ def test_a_place_out_of_reach_is_refused_at_its_line(check):
 
 
 def test_a_search_goes_on_when_one_surface_is_out_of_reach(check):
-    checked = check(GET.format("coke"), routes=StraightRoutes(far_m=4.6))
-    assert checked.errors == ()
+    assert check(TAKE_COKE, routes=StraightRoutes(far_m=4.6)).errors == ()
 
 
 def test_a_count_goes_to_all_surfaces_that_can_be_reached(check):
-    asked = "Take [Nothing] to [kitchen] and do [find] to [{}coke]"
     near, every = StraightRoutes(far_m=4.6), StraightRoutes()
-    assert check(asked.format("some "), routes=near).errors == ()
-    assert check(asked.format("some "), routes=every).errors == check(asked.format(""), routes=StraightRoutes()).errors
+    assert check(FIND.format("some coke"), routes=near).errors == ()
+    assert check(FIND.format("some coke"), routes=every).errors == check(FIND.format("coke")).errors
     assert len(every.asked) == 3
 
 
@@ -152,32 +144,6 @@ def test_a_raw_pose_out_of_reach_is_refused(check):
     call = CallSkill(skill="navigate", values={"x": 50.0, "y": 0.0})
     ((line, message),) = errors_in(check(call, routes=StraightRoutes(far_m=9.0)))
     assert (line, "50.00" in message) == (1, True)
-
-
-@pytest.mark.parametrize(
-    ("text", "abilities", "says"),
-    [
-        (GET.format("hammer"), {"masses_kg": {"coke": 0.3}}, "no 'hammer' that could"),
-        (GET.format("hammer"), {"lift_kg": 0.4}, "'hammer' is too heavy: 0.5 kg"),
-        (GET.format("drink"), ONLY_COKE, "what beer looks like"),
-        ("Take [Nothing] to [kitchen] and do [find] to [drink]", ONLY_COKE, "what beer looks like"),
-        (GET.format("blue coke"), {}, "what blue looks like"),
-    ],
-)
-def test_an_object_that_cannot_be_recognised_or_lifted_is_refused(check, text, abilities, says):
-    ((line, message),) = errors_in(check(text, abilities=replace(ABLE, **abilities)))
-    assert (line, says in message) == (1, True), message
-
-
-@pytest.mark.parametrize(
-    ("text", "abilities"),
-    [
-        (GET.format("drink"), {"lift_kg": 0.4}),
-        ("Take [Nothing] to [kitchen] and do [find] to [hammer]", {"masses_kg": {}}),
-    ],
-)
-def test_one_light_enough_will_do_and_a_look_needs_no_lifting(check, text, abilities):
-    assert check(text, abilities=replace(ABLE, **abilities)).errors == ()
 
 
 @pytest.fixture
@@ -188,9 +154,7 @@ def walled():
 
 
 def test_routes_are_planned_on_the_map_for_the_whole_body(walled):
-    routes = PlannedRoutes(
-        walled, Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)]), LatticePlanner()
-    )
+    routes = PlannedRoutes(walled, BODY, LatticePlanner())
     here = Pose2D(-1.0, -1.0, 0.0)
     assert routes.route(here, Pose2D(-1.0, 1.0, 0.0)).length_m == pytest.approx(2.0, abs=0.3)
     for _ in range(2):
@@ -200,7 +164,6 @@ def test_routes_are_planned_on_the_map_for_the_whole_body(walled):
         routes.route(here, Pose2D(-1.9, 1.0, 0.0))
 
 
-BODY = Footprint.rectangle([(-0.3, -0.2), (0.3, -0.2), (0.3, 0.2), (-0.3, 0.2)])
 SOUTH, NORTH = Pose2D(-1.0, -1.2, 1.57), Pose2D(-1.0, 1.2, 1.57)
 STRIP = ((-2.0, -0.3), (0.05, -0.3), (0.05, 0.3), (-2.0, 0.3))
 
@@ -256,22 +219,23 @@ def test_a_speed_limit_of_a_group_counts_in_the_time_of_its_steps(check):
     assert limited.duration_s - free.duration_s == pytest.approx(slower_s)
 
 
-BRING = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
 DROPPED = CallSkill(skill="place", values={"surface": "counter"})
+
+PUT_COKE, GIVE_COKE = BRING.format("coke", "counter"), BRING.format("coke", "Sam")
 
 # steps -> lines of the errors
 IN_GRIPPER = [
-    ((GET.format("coke"), BRING.format("coke", "counter")), []),
-    ((GET.format("coke"), GET.format("coke"), BRING.format("coke", "counter")), []),
-    ((GET.format("coke"), GET.format("beer")), [2]),
-    ((BRING.format("coke", "counter"),), [1]),
-    ((GET.format("coke"), BRING.format("beer", "counter")), [2]),
-    ((GET.format("coke"), BRING.format("coke", "counter"), BRING.format("coke", "shelf")), [3]),
-    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("beer")), []),
-    ((GET.format("coke"), BRING.format("coke", "Sam"), GET.format("coke")), []),
-    ((GET.format("coke"), BRING.format("coke", "Sam"), BRING.format("coke", "counter")), [3]),
+    ((TAKE_COKE, PUT_COKE), []),
+    ((TAKE_COKE, TAKE_COKE, PUT_COKE), []),
+    ((TAKE_COKE, GET.format("beer")), [2]),
+    ((PUT_COKE,), [1]),
+    ((TAKE_COKE, BRING.format("beer", "counter")), [2]),
+    ((TAKE_COKE, PUT_COKE, BRING.format("coke", "shelf")), [3]),
+    ((TAKE_COKE, GIVE_COKE, GET.format("beer")), []),
+    ((TAKE_COKE, GIVE_COKE, TAKE_COKE), []),
+    ((TAKE_COKE, GIVE_COKE, PUT_COKE), [3]),
     ((DROPPED,), [1]),
-    ((GET.format("coke"), DROPPED, GET.format("beer")), []),
+    ((TAKE_COKE, DROPPED, GET.format("beer")), []),
 ]
 
 
@@ -280,82 +244,69 @@ def test_the_held_object_is_followed_step_by_step(check, steps, lines):
     assert [line for line, _ in errors_in(check(*steps))] == lines
 
 
-PUT = "Take [{}] to [{}] and do [Nothing] to [Nothing]"
+DRIVE = CallSkill(skill="navigate", values={"x": 3.0, "y": 0.0})
+FROM_SHELF = "Take [Nothing] to [shelf] and do [grasp] to [coke]"
+TO_SHELF, TO_ROBIN, TO_START, TO_BEDROOM = (BRING.format("coke", to) for to in ("shelf", "Robin", "start", "bedroom"))
+NARROW = {"widths_m": {"coke": 0.05, "beer": 0.1}, "opens_m": 0.09}
+NO_ROBIN = "Robin is not in this world, or takes nothing"
+NO_HANDS, HIGH = "this kind of robot has no gripper", "the shelf is 1 m high, and the arm reaches"
 
 
-# what is done at the shelf, which is 1 m high; heights that the arm reaches -> what speaks against it
+# steps, abilities; line, message and hint of the error
 @pytest.mark.parametrize(
-    ("commands", "reaches_m", "why"),
+    ("steps", "abilities", "line", "message", "hint"),
     [
-        ((GET.format("coke"), PUT.format("coke", "shelf")), (0.0, 0.6), "up to 0.60 m"),
-        ((GET.format("coke"), PUT.format("coke", "shelf")), (1.1, 1.6), "down to 1.10 m"),
-        (("Take [Nothing] to [shelf] and do [grasp] to [coke]",), (0.0, 0.6), "up to 0.60 m"),
-        ((GET.format("coke"), PUT.format("coke", "shelf")), (0.0, 1.6), None),
-        ((GO.format("shelf"),), (0.0, 0.6), None),
+        ((GET.format("hammer"),), {"masses_kg": {"coke": 0.3}}, 1, "there is no 'hammer' that could be picked up", ""),
+        ((GET.format("hammer"),), {"lift_kg": 0.4}, 1, "'hammer' is too heavy: 0.5 kg, and the arm lifts 0.4 kg", ""),
+        ((GET.format("drink"),), ONLY_COKE, 1, "the robot does not know what beer looks like", ""),
+        ((FIND.format("drink"),), ONLY_COKE, 1, "the robot does not know what beer looks like", ""),
+        ((GET.format("blue coke"),), {}, 1, "the robot does not know what blue looks like", ""),
+        ((GET.format("beer"),), NARROW, 1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m", ""),
+        ((TAKE_COKE, TO_SHELF), {"reaches_m": (0.0, 0.6)}, 2, f"{HIGH} up to 0.60 m", ""),
+        ((TAKE_COKE, TO_SHELF), {"reaches_m": (1.1, 1.6)}, 2, f"{HIGH} down to 1.10 m", ""),
+        ((FROM_SHELF,), {"reaches_m": (0.0, 0.6)}, 1, f"{HIGH} up to 0.60 m", ""),
+        ((TAKE_COKE, TO_START), {"takers": set()}, 2, "nobody is in this world who could take the coke", "surface"),
+        ((TAKE_COKE, TO_ROBIN), {"takers": {"Anna"}}, 2, f"{NO_ROBIN}, so nobody takes the coke", "name Anna"),
+        ((GO.format("kitchen"), TAKE_COKE), {"gripper": False}, 2, f"{NO_HANDS} to take the coke with", ""),
+        ((DRIVE, DROPPED), {"gripper": False}, 2, f"{NO_HANDS}, which place needs", ""),
     ],
 )
-def test_a_surface_that_is_too_high_or_too_low_for_the_arm_is_refused(check, commands, reaches_m, why):
-    messages = [message for _, message in errors_in(check(*commands, abilities=replace(ABLE, reaches_m=reaches_m)))]
-    wanted = [] if why is None else [f"the shelf is 1 m high, and the arm reaches {why}"]
-    assert messages == wanted
+def test_a_step_that_the_robot_or_the_world_does_not_allow_is_refused(check, steps, abilities, line, message, hint):
+    checked = check(*steps, **abilities)
+    assert errors_in(checked) == [(line, message)]
+    assert hint in checked.errors[0].hint
 
 
-def test_an_object_wider_than_the_gripper_is_refused_unless_another_fits(check):
-    narrow = replace(ABLE, widths_m={"coke": 0.05, "beer": 0.10}, opens_m=0.09)
-    (beer_error,) = errors_in(check(GET.format("beer"), abilities=narrow))
-    assert beer_error == (1, "'beer' is too wide: 0.1 m, and the gripper takes 0.09 m")
-    assert errors_in(check(GET.format("drink"), abilities=narrow)) == []
-
-
-HAND_OVER = "Take [coke] to [start] and do [Nothing] to [Nothing]"
-TO_ROBIN = "Take [coke] to [Robin] and do [Nothing] to [Nothing]"
-PUT_DOWN = "Take [coke] to [bedroom] and do [Nothing] to [Nothing]"
-
-
-def test_a_hand_over_in_a_world_without_people_is_refused_with_its_line(check):
-    nobody = replace(ABLE, takers=frozenset())
-    checked = check(GET.format("coke"), HAND_OVER, abilities=nobody)
-    assert errors_in(checked) == [(2, "nobody is in this world who could take the coke")]
-    assert "surface" in checked.errors[0].hint
-    assert errors_in(check(GET.format("coke"), PUT_DOWN, abilities=nobody)) == []
-
-
-def test_a_person_who_is_not_in_the_world_is_refused_with_those_who_are(check):
-    (error,) = check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Anna"}))).errors
-    assert error.message.startswith("Robin is not in this world, or takes nothing")
-    assert "name Anna" in error.hint
-    assert errors_in(check(GET.format("coke"), TO_ROBIN, abilities=replace(ABLE, takers=frozenset({"Robin"})))) == []
-
-
-def test_a_robot_without_a_gripper_is_refused_for_each_step_that_needs_one(check):
-    checked = check(GO.format("kitchen"), GET.format("coke"), abilities=replace(ABLE, gripper=False))
-    assert errors_in(checked) == [(2, "this kind of robot has no gripper to take the coke with")]
-
-
-def test_a_skill_that_needs_a_gripper_is_refused_for_a_robot_without_one(check):
-    drive = CallSkill(skill="navigate", values={"x": 3.0, "y": 0.0})
-    found = errors_in(check(drive, DROPPED, abilities=replace(ABLE, gripper=False)))
-    assert found == [(2, "this kind of robot has no gripper, which place needs")]
+@pytest.mark.parametrize(
+    ("steps", "abilities"),
+    [
+        ((GET.format("drink"),), {"lift_kg": 0.4}),  # one that is light enough will do
+        ((GET.format("drink"),), NARROW),
+        ((FIND.format("hammer"),), {"masses_kg": {}}),
+        ((GO.format("shelf"),), {"reaches_m": (0.0, 0.6)}),
+        ((TAKE_COKE, TO_SHELF), {"reaches_m": (0.0, 1.6)}),
+        ((TAKE_COKE, TO_BEDROOM), {"takers": set()}),
+        ((TAKE_COKE, TO_ROBIN), {"takers": {"Robin"}}),
+    ],
+)
+def test_a_step_that_needs_no_more_than_there_is_is_taken(check, steps, abilities):
+    assert errors_in(check(*steps, **abilities)) == []
 
 
 def test_a_surface_that_is_full_by_what_surely_lies_there_is_warned_of(check, knowledge):
     (name,) = knowledge.surfaces_in("bedroom")
     sizes = {"widths_m": {"coke": 0.066}, "apart_m": 0.1}
-    full, half = (replace(ABLE, taken_m2={name: taken}, **sizes) for taken in (99.0, 0.01))
-    checked = check(GET.format("coke"), PUT_DOWN, abilities=full)
-    assert [(one.line, one.message) for one in checked.warnings] == [
-        (2, "the bedroom is probably full before the coke is put there")
-    ]
-    assert checked.errors == ()
-    assert check(GET.format("coke"), PUT_DOWN, abilities=half).warnings == ()
+    full, half = (check(TAKE_COKE, TO_BEDROOM, taken_m2={name: taken}, **sizes) for taken in (99.0, 0.01))
+    warnings = [(one.line, one.message) for one in full.warnings]
+    assert warnings == [(2, "the bedroom is probably full before the coke is put there")]
+    assert (full.errors, half.warnings) == ((), ())
 
 
 def test_rounds_until_something_holds_are_a_range_up_to_the_most_of_them(check):
-    go, look = Do.from_command(parse_command(GO.format("kitchen"))), Look.from_command(parse_command(FIND))
-    once = check(Repeat(loop=Loop(times=1), steps=(go,))).estimate
-    some = check(Repeat(loop=Loop(times=3, until=look), steps=(go,))).estimate
-    endless = check(Repeat(loop=Loop(until=look), steps=(go,))).estimate
-    fixed = check(Repeat(loop=Loop(times=3), steps=(go,))).estimate
+    go = Do.from_command(parse_command(GO.format("kitchen")))
+    look = Look.from_command(parse_command(FIND.format("coke")))
+    loops = Loop(times=1), Loop(times=3), Loop(times=3, until=look), Loop(until=look)
+    once, fixed, some, endless = (check(Repeat(loop=loop, steps=(go,))).estimate for loop in loops)
     assert once.spare_s == fixed.spare_s == 0.0
     assert some.reasons == ("1 to 3 rounds",)
     assert some.duration_s < some.most_s < math.inf

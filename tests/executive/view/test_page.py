@@ -1,12 +1,10 @@
 """The page in a real browser: states, controls, keyboard, replay, and that changes are seen."""
 
-from __future__ import annotations
-
 import http.server
 import re
 import threading
 import time
-from pathlib import Path
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
@@ -40,6 +38,7 @@ from skills.robot import Pose2D
 LIMIT_MS = 300
 
 playwright_api = pytest.importorskip("playwright.sync_api", reason="not installed: pip install playwright")
+expect = playwright_api.expect
 pytestmark = pytest.mark.browser
 
 
@@ -55,67 +54,131 @@ def page(browser):
     assert defects == []
 
 
-def _is_elsewhere(url: str) -> bool:
+def _is_elsewhere(url):
     return not url.startswith(("http://127.0.0.1:", "ws://127.0.0.1:", "data:", "blob:", "file:", "about:"))
 
 
 @pytest.fixture
-def control() -> Control:
+def control():
     return Control(attended=True)
 
 
 @pytest.fixture
-def live(compiled, make, control):
-    """A served page of a mission that the test plays: the feed, the tree, and the page's address."""
-    tree, feed = compiled(*make.FETCH), Feed()
-    control.begin({"Alice": tree})
-    watch = ControlWatch(control, feed)
-    feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
-    with PageServer(PageContent(feed, control_actions(control))) as server:
-        yield feed, tree, server.url
-    control.end()
-    watch.close()
+def tree(compiled, make):
+    return compiled(*make.FETCH)
 
 
 @pytest.fixture
-def log_path(tmp_path, compiled, run_tree, make, script, clock, knowledge) -> Path:
-    """The log of a mission that failed, with a map and a picture."""
+def feed(tree):
+    """A feed that has Alice's tree."""
+    made = Feed()
+    made("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
+    return made
+
+
+@pytest.fixture
+def serve(page, feed):
+    """Opens the page of a feed, with actions."""
+    with ExitStack() as stack:
+
+        def opened(actions, feed=feed):
+            server = stack.enter_context(PageServer(PageContent(feed, actions)))
+            page.goto(server.url)
+            return server
+
+        yield opened
+
+
+@pytest.fixture
+def controlled(control, feed):
+    """Begins a mission of trees under the control, which the page watches; gives the control's actions."""
+    with ExitStack() as stack:
+
+        def begun(trees, feed=feed):
+            control.begin(trees)
+            stack.callback(ControlWatch(control, feed).close)
+            return control_actions(control)
+
+        yield begun
+        control.end()
+
+
+@pytest.fixture
+def live(serve, controlled, tree):
+    """An open page of a mission that the test plays."""
+    return serve(controlled({"Alice": tree}))
+
+
+@pytest.fixture
+def events(tmp_path, tree, run_tree, script, clock, knowledge):
+    """Events in the log of a mission that failed, with a map and a picture."""
     script.ends["grasp"] = lambda skill: Failed(Cause.EXECUTION, "it slipped </script><b>bold</b>")
     log = EventLog(tmp_path / "log.mcap", clock)
     log("map", map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
     log("run", {"world": "test", "seed": 3, "commands": [], "versions": {}})
     seen = {"class_name": "coke", "score": 0.9, "box": [10, 20, 60, 90]}
     log("detections", {"image": np.full((120, 160, 3), 90, np.uint8), "source": "hand", "detections": [seen]})
-    run_tree(compiled(*make.FETCH), log=log)
+    run_tree(tree, log=log)
     log.close()
-    return log.path
+    return read_history(log.path).events
 
 
-def leaf_ids(tree) -> list[str]:
+@pytest.fixture
+def replay(page, events):
+    """Opens the served page of the log."""
+    with ExitStack() as stack:
+
+        def opened(**more):
+            server = stack.enter_context(PageServer(PageContent(feed_of(events), **more)))
+            page.goto(server.url)
+            return server
+
+        yield opened
+
+
+@pytest.fixture
+def replay_file(page, events, tmp_path):
+    """Opens the page of the log as one file."""
+
+    def opened(*recording):
+        (tmp_path / "replay.html").write_text(log_page(events, *recording), encoding="utf-8")
+        page.goto((tmp_path / "replay.html").as_uri())
+
+    return opened
+
+
+def leaf_ids(tree):
     return [node.path_id for node in tree.root.walk() if not node.children]
 
 
-def change(feed: Feed, node: str, to: str, t: float, message: str = "", cause: str | None = None) -> None:
+def change(feed, node, to, t, message="", cause=None):
     feed("transitions", t, {"t": t, "robot": "Alice", "node": node, "to": to, "cause": cause, "message": message})
+
+
+def end(feed, t, outcome, cause=None, message="done", robot="Alice"):
+    feed("outcome", t, {"robot": robot, "outcome": outcome, "cause": cause, "message": message})
+
+
+def say(page, text):
+    page.fill("#sentence", text)
+    page.press("#sentence", "Enter")
 
 
 def row(page, node: str):
     return page.locator(f'li[data-id="{node}"] > .row')
 
 
-def test_changes_of_nodes_are_seen_although_the_run_is_busy(page, live, benchmark, request):
+def test_changes_of_nodes_are_seen_although_the_run_is_busy(page, live, benchmark, request, feed, tree):
     """From the tee of the log to painted pixels, while another thread computes as a run does.
 
     How long that takes counts among the benchmarks only: every change within 0.3 s.
     """
-    feed, tree, url = live
     nodes = leaf_ids(tree)
-    page.goto(url)
     row(page, nodes[0]).wait_for(state="attached")
     page.wait_for_timeout(1000)
     done = threading.Event()
 
-    def work() -> None:
+    def work():
         """Ticks: what changes is told, the page gets a moment, then 50 ms of pure Python."""
         for number in range(60):
             change(
@@ -138,10 +201,8 @@ def test_changes_of_nodes_are_seen_although_the_run_is_busy(page, live, benchmar
     assert not request.config.getoption("--benchmark-only") or max(delays_ms) < LIMIT_MS, delays_ms
 
 
-def test_a_change_is_really_drawn(page, live):
-    feed, tree, url = live
+def test_a_change_is_really_drawn(page, live, feed, tree):
     node = leaf_ids(tree)[0]
-    page.goto(url)
     page.select_option("#nodes", "all")
     row(page, node).wait_for()
     before = row(page, node).screenshot()
@@ -152,179 +213,141 @@ def test_a_change_is_really_drawn(page, live):
     assert row(page, node).screenshot() != before
 
 
-def test_states_causes_and_sentences_stand_on_the_nodes(page, live):
-    feed, tree, url = live
+def test_states_causes_and_sentences_stand_on_the_nodes(page, live, feed, tree):
     first, second = leaf_ids(tree)[:2]
-    page.goto(url)
     change(feed, first, "SUCCESS", 1.0, "stands at the start")
     change(feed, second, "FAILURE", 2.0, "no way <b>there</b>", "PLANNING")
-    playwright_api.expect(row(page, second)).to_contain_text("PLANNING: no way <b>there</b>")
+    expect(row(page, second)).to_contain_text("PLANNING: no way <b>there</b>")
     assert row(page, second).locator(".symbol").inner_text() == "✗"
     assert row(page, first).locator(".symbol").inner_text() == "✓"
     assert "failure, PLANNING" in (page.locator(f'li[data-id="{second}"]').get_attribute("aria-label") or "")
 
 
 @pytest.mark.parametrize(("search", "symbol"), [("RUNNING", "–"), ("FAILURE", "✗")])
-def test_a_look_that_found_nothing_has_a_dash_while_the_search_goes_on(page, live, search, symbol):
-    feed, tree, url = live
+def test_a_look_that_found_nothing_has_a_dash_while_the_search_goes_on(page, live, search, symbol, feed, tree):
     find = next(node for node in tree.root.walk() if node.kind == "selector" and node.name.startswith("find the"))
     look = next(node for node in find.children if node.kind == "sequence")
     leaf = look.children[-1].path_id
-    page.goto(url)
     page.select_option("#nodes", "all")
     change(feed, find.path_id, search, 1.0)
     for node in (look.path_id, leaf):
         change(feed, node, "FAILURE", 1.0, "no coke seen", "POSTCONDITION")
-    playwright_api.expect(row(page, leaf)).to_contain_text("no coke seen")
-    playwright_api.expect(row(page, leaf).locator(".symbol")).to_have_text(symbol)
+    expect(row(page, leaf)).to_contain_text("no coke seen")
+    expect(row(page, leaf).locator(".symbol")).to_have_text(symbol)
 
 
-def test_the_message_of_a_running_node_is_on_the_node_and_in_the_events(page, live):
-    feed, tree, url = live
+def test_the_message_of_a_running_node_is_on_the_node_and_in_the_events(page, live, feed, tree):
     node = leaf_ids(tree)[0]
-    page.goto(url)
     change(feed, node, "RUNNING", 1.0)
     feed("activity", 2.0, {"t": 2.0, "robot": "Alice", "node": node, "message": "stopping at the goal"})
-    playwright_api.expect(row(page, node)).to_contain_text("stopping at the goal")
-    playwright_api.expect(page.locator("#events li").last).to_contain_text("stopping at the goal")
+    expect(row(page, node)).to_contain_text("stopping at the goal")
+    expect(page.locator("#events li").last).to_contain_text("stopping at the goal")
     change(feed, node, "SUCCESS", 3.0, message="there")
     page.evaluate("t => window.errand.page.timeline.go(t)", 1.5)
-    playwright_api.expect(row(page, node)).not_to_contain_text("stopping at the goal")
+    expect(row(page, node)).not_to_contain_text("stopping at the goal")
 
 
 def test_buttons_and_keys_reach_the_control(page, live, control):
-    _, _, url = live
-    page.goto(url)
     page.locator("#pause").wait_for()
     page.keyboard.press("p")
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("paused")
+    expect(page.locator("#mode-text")).to_have_text("paused")
     assert control.state.mode is Mode.PAUSED
     page.click("#pause")
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("running")
+    expect(page.locator("#mode-text")).to_have_text("running")
     page.keyboard.press("x")
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("stop button")
+    expect(page.locator("#mode-text")).to_have_text("stop button")
     assert control.state.mode is Mode.STOPPED
     page.click("#stop")
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("running")
+    expect(page.locator("#mode-text")).to_have_text("running")
     page.click("#cancel")
     page.wait_for_function("() => document.getElementById('announced').textContent === 'cancelling'")
     assert control.poll().cancel == "cancelled from the page"
 
 
-def test_keys_are_letters_while_a_sentence_is_typed(page, compiled, make):
+def test_keys_are_letters_while_a_sentence_is_typed(page, serve):
     said, control = [], Control()
-    feed = Feed()
-    feed("tree", 0.0, {"robot": "Alice", "root": node_view(compiled(*make.FETCH).root).structure()})
-    actions = {**control_actions(control), "say": lambda values: said.append(values["text"]) or "first: it"}
-    with PageServer(PageContent(feed, actions)) as server:
-        page.goto(server.url)
-        page.locator("#sentence").click()
-        page.keyboard.type("pick cups, scan x")
-        page.keyboard.press("Enter")
-        playwright_api.expect(page.locator("#said")).to_have_text("first: it")
+    serve({**control_actions(control), "say": lambda values: said.append(values["text"]) or "first: it"})
+    page.locator("#sentence").click()
+    page.keyboard.type("pick cups, scan x")
+    page.keyboard.press("Enter")
+    expect(page.locator("#said")).to_have_text("first: it")
     assert said == ["pick cups, scan x"]
     assert control.state.mode is Mode.READY
 
 
-def test_remarks_in_the_sentence_box_are_answered_and_act_at_once(page, compiled, make, control, knowledge):
+def test_remarks_in_the_sentence_box_are_answered_and_act_at_once(page, serve, controlled, tree, control, knowledge):
     def nothing_else(*_):
         raise AssertionError("a remark is no request")
 
-    tree, feed = compiled(*make.FETCH), Feed()
-    control.begin({"Alice": tree})
-    watch = ControlWatch(control, feed)
+    actions = controlled({"Alice": tree})
     talk = Conversation(Speech(knowledge, "Alice", nothing_else, nothing_else), control)
     robots = {"Alice": RobotStatus(Pose2D(5.0, -0.9, 0.0), holding=False)}
     talk.tick(Progress(1.0, 20, 0, {"Alice": {}}, {"Alice": tree}, robots))
-    feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
-    said = {"say": lambda values: talk.hear(values["text"]).text}
-    with PageServer(PageContent(feed, {**control_actions(control), **said})) as server:
-        page.goto(server.url)
-        for text, answer, mode in (
-            ("where are you", "I am in the kitchen, next to the counter", "running"),
-            ("wait", "I wait; say 'go on' when I may go on", "paused"),
-            ("go on", "I go on", "running"),
-        ):
-            page.fill("#sentence", text)
-            page.press("#sentence", "Enter")
-            playwright_api.expect(page.locator("#said")).to_have_text(answer)
-            playwright_api.expect(page.locator("#mode-text")).to_have_text(mode)
-    watch.close()
+    serve({**actions, "say": lambda values: talk.hear(values["text"]).text})
+    for text, answer, mode in (
+        ("where are you", "I am in the kitchen, next to the counter", "running"),
+        ("wait", "I wait; say 'go on' when I may go on", "paused"),
+        ("go on", "I go on", "running"),
+    ):
+        say(page, text)
+        expect(page.locator("#said")).to_have_text(answer)
+        expect(page.locator("#mode-text")).to_have_text(mode)
 
 
-def test_a_refusal_is_shown(page, compiled, make):
-    def refuse(values: object) -> str:
+def test_a_refusal_is_shown(page, serve):
+    def refuse(values):
         raise RefusedError("I know no place 'moon'")
 
-    feed = Feed()
-    feed("tree", 0.0, {"robot": "Alice", "root": node_view(compiled(*make.FETCH).root).structure()})
-    with PageServer(PageContent(feed, {"say": refuse})) as server:
-        page.goto(server.url)
-        page.fill("#sentence", "go to the moon")
-        page.press("#sentence", "Enter")
-        playwright_api.expect(page.locator("#said")).to_have_text("I know no place 'moon'")
-        assert page.input_value("#sentence") == "go to the moon"
+    serve({"say": refuse})
+    say(page, "go to the moon")
+    expect(page.locator("#said")).to_have_text("I know no place 'moon'")
+    assert page.input_value("#sentence") == "go to the moon"
 
 
 def test_a_question_is_asked_and_answered(page, live, control, clock):
-    _, _, url = live
-    page.goto(url)
     page.locator("#pause").wait_for()
     asked = control.ask(Question("q1", "Is the door open?", options=("yes", "no"), default="no", limit_s=60.0), clock)
     page.get_by_role("button", name="yes").click()
-    playwright_api.expect(page.locator(".question")).to_have_count(0)
+    expect(page.locator(".question")).to_have_count(0)
     assert (asked.done(), asked.result()) == (True, "yes")
 
 
 @pytest.fixture
-def talking(compiled, make, control, knowledge):
-    """A page on which "the can" makes a question; the page's address and all that was said."""
-    tree, feed, heard = compiled(*make.FETCH), Feed(), []
+def heard(serve, controlled, tree, feed, control, knowledge):
+    """All that was said on an open page on which "the can" makes a question."""
+    said = []
     question = ClarifyingQuestion("Which can: coke or beer?", Slot.THING, ("coke", "beer"), "coke", "can")
 
     def understand(text, _):
-        heard.append(text)
+        said.append(text)
         if "can" in text:
             return Understanding(text, Status.QUESTION, reason=question.text, question=question)
         return Understanding(text, Status.OK, tree.commands)
 
-    control.begin({"Alice": tree})
-    watch = ControlWatch(control, feed)
+    actions = controlled({"Alice": tree})
     talk = Conversation(Speech(knowledge, "Alice", understand, lambda *_: tree), control)
     talk.listen(lambda waiting: feed.tell("asked", asked_json(waiting)))
-    feed("tree", 0.0, {"robot": "Alice", "root": node_view(tree.root).structure()})
-    actions = {**control_actions(control), "say": lambda values: talk.hear(values["text"]).text}
-    with PageServer(PageContent(feed, actions)) as server:
-        yield server.url, heard
-    control.end()
-    watch.close()
+    serve({**actions, "say": lambda values: talk.hear(values["text"]).text})
+    return said
 
 
-def test_a_question_of_the_robot_is_answered_by_buttons(page, talking):
-    url, heard = talking
-    page.goto(url)
-    page.fill("#sentence", "bring me the can")
-    page.press("#sentence", "Enter")
-    playwright_api.expect(page.locator(".question p")).to_have_text("Which can: coke or beer?")
-    playwright_api.expect(page.locator(".question button")).to_have_text(["coke", "beer", "never mind"])
+def test_a_question_of_the_robot_is_answered_by_buttons(page, heard):
+    say(page, "bring me the can")
+    expect(page.locator(".question p")).to_have_text("Which can: coke or beer?")
+    expect(page.locator(".question button")).to_have_text(["coke", "beer", "never mind"])
     page.get_by_role("button", name="beer").click()
-    playwright_api.expect(page.locator(".question")).to_have_count(0)
+    expect(page.locator(".question")).to_have_count(0)
     assert "bring me the beer" in heard
 
 
-def test_a_question_of_the_robot_can_be_dropped(page, talking):
-    url, _ = talking
-    page.goto(url)
-    page.fill("#sentence", "bring me the can")
-    page.press("#sentence", "Enter")
+def test_a_question_of_the_robot_can_be_dropped(page, heard):
+    say(page, "bring me the can")
     page.get_by_role("button", name="never mind").click()
-    playwright_api.expect(page.locator(".question")).to_have_count(0)
-    playwright_api.expect(page.locator("#said")).to_have_text("all right, never mind")
+    expect(page.locator(".question")).to_have_count(0)
+    expect(page.locator("#said")).to_have_text("all right, never mind")
 
 
 def test_the_tree_is_walked_with_the_keyboard(page, live, control):
-    _, _, url = live
-    page.goto(url)
     page.locator("li").first.wait_for()
     page.locator("#follow").uncheck()
     page.select_option("#nodes", "all")
@@ -345,66 +368,59 @@ def test_the_tree_is_walked_with_the_keyboard(page, live, control):
     assert control.state.breakpoints == {second}
 
 
-def test_the_page_goes_on_as_a_replay_when_the_run_has_ended(page, live, control):
-    feed, tree, url = live
+def test_the_page_goes_on_as_a_replay_when_the_run_has_ended(page, live, control, feed, tree):
     node = leaf_ids(tree)[0]
-    page.goto(url)
     change(feed, node, "RUNNING", 1.0)
     change(feed, node, "SUCCESS", 5.0)
-    feed("outcome", 6.0, {"robot": "Alice", "outcome": "success", "cause": None, "message": "done"})
+    end(feed, 6.0, "success")
     control.end()
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("success")
+    expect(page.locator("#mode-text")).to_have_text("success")
     assert page.locator("#pause").is_disabled()
     page.evaluate("t => window.errand.page.timeline.go(t)", 3.0)
-    playwright_api.expect(row(page, node)).to_have_attribute("data-look", "running")
+    expect(row(page, node)).to_have_attribute("data-look", "running")
     page.evaluate("t => window.errand.page.timeline.go(t)", 0.5)
-    playwright_api.expect(row(page, node)).to_have_attribute("data-look", "idle")
+    expect(row(page, node)).to_have_attribute("data-look", "idle")
     page.locator("#live").click()
-    playwright_api.expect(row(page, node)).to_have_attribute("data-look", "success")
+    expect(row(page, node)).to_have_attribute("data-look", "success")
 
 
-def test_a_log_is_served_with_map_picture_and_events(page, log_path):
-    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
-        page.goto(server.url)
-        playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
-        assert page.locator("#controls").is_hidden()
-        playwright_api.expect(page.locator("#camera rect")).to_have_count(2)
-        playwright_api.expect(page.locator("#camera svg")).to_have_attribute("aria-label", re.compile("coke"))
-        playwright_api.expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("Alice at x"))
-        assert page.locator("#events li").count() > 5
-        page.locator("#events button", has_text="it slipped").first.click()
-        assert float(page.locator("#slider").input_value()) > 0
+def test_a_log_is_served_with_map_picture_and_events(page, replay):
+    replay()
+    expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
+    assert page.locator("#controls").is_hidden()
+    expect(page.locator("#camera rect")).to_have_count(2)
+    expect(page.locator("#camera svg")).to_have_attribute("aria-label", re.compile("coke"))
+    expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("Alice at x"))
+    assert page.locator("#events li").count() > 5
+    page.locator("#events button", has_text="it slipped").first.click()
+    assert float(page.locator("#slider").input_value()) > 0
 
 
-def state(holding: bool = False, charge: float = 0.9, localised: bool = True) -> dict[str, object]:
+def state(holding=False, charge=0.9, localised=True):
     return {
         "robot": "Alice", "holding": holding, "charge": charge,
         "localised": localised, "position_sigma_m": 0.02, "speed_m_s": 0.42,
     }  # fmt: skip
 
 
-def test_the_state_of_the_robot_stands_above_all(page, live):
+def test_the_state_of_the_robot_stands_above_all(page, live, feed):
     # nothing known yet -> no strip; a coke was found and is held -> its name; 1 sigma of 2 cm -> known within 4 cm
-    feed, _, url = live
-    page.goto(url)
     strip = page.locator("#state")
-    playwright_api.expect(strip).to_be_hidden()
+    expect(strip).to_be_hidden()
     feed("object_destination", 0.5, {"class_name": "coke", "goal_x": 1.0, "goal_y": 1.0})
     feed("state", 1.0, state(holding=True))
-    playwright_api.expect(strip).to_have_text("robotAliceholdscokebattery90 %placeknown within 4 cmspeed0.4 m/s")
+    expect(strip).to_have_text("robotAliceholdscokebattery90 %placeknown within 4 cmspeed0.4 m/s")
     feed("state", 1.5, state(charge=0.1, localised=False))
-    playwright_api.expect(strip.locator(".bad")).to_have_text(["battery10 %", "placelost"])
-    playwright_api.expect(strip).to_contain_text("holdsnothing")
+    expect(strip.locator(".bad")).to_have_text(["battery10 %", "placelost"])
+    expect(strip).to_contain_text("holdsnothing")
 
 
-def test_a_held_object_is_drawn_with_the_robot_on_the_map(page, live):
-    feed, _, url = live
-    page.goto(url)
+def test_a_held_object_is_drawn_with_the_robot_on_the_map(page, live, feed):
     pose = {"position": {"x": 1.0, "y": 2.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
     feed("pose", 0.5, {"robot": "Alice", "pose": pose})
     feed("object_destination", 0.5, {"class_name": "coke", "goal_x": 1.0, "goal_y": 1.0})
     feed("state", 1.0, state(holding=True))
-    playwright_api.expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("Alice at .*holding coke"))
+    expect(page.locator("#map")).to_have_attribute("aria-label", re.compile("Alice at .*holding coke"))
     assert page.evaluate("window.errand.page.store.now.destinations.length") == 0
 
 
@@ -412,107 +428,92 @@ def step_rows(page):
     return page.locator("#tree ul ul > li:not([hidden])")
 
 
-def test_the_tree_shows_the_steps_as_the_author_wrote_them_with_their_times(page, live):
+def test_the_tree_shows_the_steps_as_the_author_wrote_them_with_their_times(page, live, feed, tree):
     # nothing of the machinery while nothing runs; the first step done after 2 s
-    feed, tree, url = live
     first, second = [step.path_id for step in tree.mission.children if step.step]
-    page.goto(url)
-    playwright_api.expect(step_rows(page)).to_have_count(2)
+    expect(step_rows(page)).to_have_count(2)
     change(feed, first, "RUNNING", 1.0)
     change(feed, first, "SUCCESS", 3.0, "done")
-    playwright_api.expect(step_rows(page).nth(0).locator("> .row")).to_have_attribute("data-look", "success")
-    playwright_api.expect(step_rows(page).nth(0).locator("> .row .t")).to_have_text("2 s")
+    expect(step_rows(page).nth(0).locator("> .row")).to_have_attribute("data-look", "success")
+    expect(step_rows(page).nth(0).locator("> .row .t")).to_have_text("2 s")
     step_rows(page).nth(1).locator("> .row").click()
     assert page.evaluate("document.activeElement.dataset.id").startswith(second)
     assert step_rows(page).count() > 2
 
 
-def test_the_machinery_of_a_step_is_shown_where_it_runs(page, live):
-    feed, tree, url = live
+def test_the_machinery_of_a_step_is_shown_where_it_runs(page, live, feed, tree):
     leaf = next(node for node in leaf_ids(tree) if node.endswith("grasp"))
-    page.goto(url)
-    playwright_api.expect(row(page, leaf)).to_be_hidden()
+    expect(row(page, leaf)).to_be_hidden()
     for node in tree.root.walk():
         if any(below.path_id == leaf for below in node.walk()):
             change(feed, node.path_id, "RUNNING", 1.0)
-    playwright_api.expect(row(page, leaf)).to_be_visible()
+    expect(row(page, leaf)).to_be_visible()
 
 
-def test_the_leaf_that_decided_a_failure_is_in_view_and_its_sentence_stands_on_top(page, log_path):
-    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
-        page.goto(server.url)
-        playwright_api.expect(page.locator("#why")).to_contain_text("it slipped")
-        leaf = page.locator(".row.decisive")
-        playwright_api.expect(leaf).to_contain_text("it slipped")
-        playwright_api.expect(leaf).to_be_in_viewport()
+def test_the_leaf_that_decided_a_failure_is_in_view_and_its_sentence_stands_on_top(page, replay):
+    replay()
+    expect(page.locator("#why")).to_contain_text("it slipped")
+    leaf = page.locator(".row.decisive")
+    expect(leaf).to_contain_text("it slipped")
+    expect(leaf).to_be_in_viewport()
 
 
-def test_the_first_cause_told_decides_although_a_retry_has_reset_its_leaf(page, live):
-    feed, tree, url = live
+def test_the_first_cause_told_decides_although_a_retry_has_reset_its_leaf(page, live, feed, tree):
     detect, grasp = (
         next(id for id in leaf_ids(tree) if id.rsplit("/", 1)[-1].startswith(n)) for n in ("detect", "grasp")
     )
-    page.goto(url)
     change(feed, grasp, "FAILURE", 1.0, "the gripper closed on nothing", "POSTCONDITION")
     change(feed, grasp, "INVALID", 1.5)
     change(feed, detect, "FAILURE", 2.0, "no coke seen", "POSTCONDITION")
     message = "the gripper closed on nothing, then: no coke seen (after 2 attempts)"
-    feed("outcome", 2.5, {"robot": "Alice", "outcome": "failure", "cause": "POSTCONDITION", "message": message})
-    playwright_api.expect(page.locator(".row.decisive")).to_have_count(1)
+    end(feed, 2.5, "failure", "POSTCONDITION", message)
+    expect(page.locator(".row.decisive")).to_have_count(1)
     leaf = page.locator(f'li[data-id="{grasp}"] > .row.decisive')
-    playwright_api.expect(leaf).to_contain_text("the gripper closed on nothing")
-    playwright_api.expect(leaf).to_be_in_viewport()
+    expect(leaf).to_contain_text("the gripper closed on nothing")
+    expect(leaf).to_be_in_viewport()
 
 
 @pytest.mark.nightly
-def test_a_leaf_that_succeeded_in_the_end_decides_no_failure(page, live):
-    feed, tree, url = live
+def test_a_leaf_that_succeeded_in_the_end_decides_no_failure(page, live, feed, tree):
     one, other = leaf_ids(tree)[:2]
-    page.goto(url)
     change(feed, one, "FAILURE", 1.0, "it slipped", "EXECUTION")
     change(feed, one, "SUCCESS", 2.0, "done")
     change(feed, other, "FAILURE", 3.0, "it fell", "EXECUTION")
     told = "it slipped; it fell"
-    feed("outcome", 3.5, {"robot": "Alice", "outcome": "failure", "cause": "EXECUTION", "message": told})
-    playwright_api.expect(page.locator(".row.decisive")).to_contain_text("it fell")
+    end(feed, 3.5, "failure", "EXECUTION", told)
+    expect(page.locator(".row.decisive")).to_contain_text("it fell")
 
 
 @pytest.mark.nightly
-def test_a_run_that_goes_well_has_no_failure_on_top(page, live):
-    feed, _, url = live
-    page.goto(url)
-    feed("outcome", 2.0, {"robot": "Alice", "outcome": "success", "cause": None, "message": "done"})
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("success")
+def test_a_run_that_goes_well_has_no_failure_on_top(page, live, feed):
+    end(feed, 2.0, "success")
+    expect(page.locator("#mode-text")).to_have_text("success")
     assert page.locator("#why").is_hidden()
 
 
-def test_events_name_what_was_done_and_not_path_ids(page, log_path):
-    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
-        page.goto(server.url)
-        playwright_api.expect(page.locator("#events")).to_contain_text("go to the")
-        assert "/" not in "".join(page.locator("#events .what").all_inner_texts()).replace("</", "")
+def test_events_name_what_was_done_and_not_path_ids(page, replay):
+    replay()
+    expect(page.locator("#events")).to_contain_text("go to the")
+    assert "/" not in "".join(page.locator("#events .what").all_inner_texts()).replace("</", "")
 
 
-def test_the_scene_says_that_it_loads_until_it_is_there(page, log_path, recording):
-    with PageServer(PageContent(feed_of(read_history(log_path).events), recording=recording)) as server:
-        page.goto(server.url)
-        playwright_api.expect(page.locator("#scene .loading")).to_be_visible()
-        playwright_api.expect(page.locator("#scene .loading")).to_have_count(0)
+def test_the_scene_says_that_it_loads_until_it_is_there(page, replay, recording):
+    replay(recording=recording)
+    expect(page.locator("#scene .loading")).to_be_visible()
+    expect(page.locator("#scene .loading")).to_have_count(0)
 
 
-def test_a_replay_of_one_file_works_without_a_server(page, log_path, tmp_path):
-    html = tmp_path / "replay.html"
-    html.write_text(log_page(read_history(log_path).events), encoding="utf-8")
-    page.goto(html.as_uri())
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
-    playwright_api.expect(page.locator("#tree")).to_contain_text("it slipped </script><b>bold</b>")
+def test_a_replay_of_one_file_works_without_a_server(page, replay_file):
+    replay_file()
+    expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
+    expect(page.locator("#tree")).to_contain_text("it slipped </script><b>bold</b>")
     page.locator("#slider").focus()
     page.keyboard.press("Home")
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("running")
+    expect(page.locator("#mode-text")).to_have_text("running")
 
 
 @pytest.fixture
-def recording(tmp_path) -> Path:
+def recording(tmp_path):
     """What stands for a 3D recording of half a second: it loads late, plays by itself and can be held and sought."""
     animator = "{duration: 0.5, playing: true, pause() { this.playing = false; }, seek(t) { this.t = t; }}"
     path = tmp_path / "recording.html"
@@ -520,7 +521,7 @@ def recording(tmp_path) -> Path:
     return path
 
 
-def expect_scene_follows_slider(page) -> None:
+def expect_scene_follows_slider(page):
     # slider at the end, past the recording's 0.5 s -> held at 0.5; at the beginning -> held at 0
     viewer = "document.querySelector('#scene iframe')?.contentWindow.viewer"
     shows = f"t => {{ const v = {viewer}; return Boolean(v) && !v.animator.playing && v.animator.t === t; }}"
@@ -530,32 +531,26 @@ def expect_scene_follows_slider(page) -> None:
     page.wait_for_function(shows, arg=0)
 
 
-def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, log_path, recording, tmp_path):
-    html = tmp_path / "replay.html"
-    html.write_text(log_page(read_history(log_path).events, recording), encoding="utf-8")
-    page.goto(html.as_uri())
+def test_the_recording_in_a_replay_of_one_file_follows_the_slider(page, replay_file, recording):
+    replay_file(recording)
     expect_scene_follows_slider(page)
 
 
 @pytest.mark.nightly
-def test_the_recording_in_a_served_replay_follows_the_slider(page, log_path, recording):
-    with PageServer(PageContent(feed_of(read_history(log_path).events), recording=recording)) as server:
-        page.goto(server.url)
-        expect_scene_follows_slider(page)
+def test_the_recording_in_a_served_replay_follows_the_slider(page, replay, recording):
+    replay(recording=recording)
+    expect_scene_follows_slider(page)
 
 
 @pytest.mark.nightly
-def test_the_recording_that_is_there_when_a_run_has_ended_follows_the_slider(page, log_path, recording):
-    with PageServer(PageContent(feed_of(read_history(log_path).events))) as server:
-        page.goto(server.url)
-        playwright_api.expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
-        server.offer_recording(recording)
-        expect_scene_follows_slider(page)
+def test_the_recording_that_is_there_when_a_run_has_ended_follows_the_slider(page, replay, recording):
+    server = replay()
+    expect(page.locator("#mode-text")).to_have_text("failure (EXECUTION)")
+    server.offer_recording(recording)
+    expect_scene_follows_slider(page)
 
 
 def test_everything_that_acts_has_a_name_and_the_page_fits(page, live):
-    _, _, url = live
-    page.goto(url)
     page.locator("#pause").wait_for()
     unnamed = page.evaluate(
         """() => [...document.querySelectorAll('button, input, select, canvas, iframe')].filter((each) =>
@@ -574,13 +569,13 @@ def elsewhere():
     """The address of an empty page of another origin, which forbids itself nothing."""
 
     class Empty(http.server.BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
+        def do_GET(self):
             self.send_response(200)
             self.send_header("Content-Type", "text/html")
             self.end_headers()
             self.wfile.write(b"<title>elsewhere</title>")
 
-        def log_message(self, format: str, *args: object) -> None:
+        def log_message(self, format, *args):
             """Say nothing."""
 
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Empty) as server:
@@ -591,8 +586,7 @@ def elsewhere():
 
 def test_a_page_elsewhere_reaches_nothing(browser, live, control, elsewhere):
     """A page of another origin that knows the port, and even the token, can neither act nor listen."""
-    _, _, url = live
-    address, token = url.split("/?token=")
+    address, token = live.url.split("/?token=")
     context = browser.new_context()
     page = context.new_page()
     page.goto(elsewhere)
@@ -618,23 +612,20 @@ def test_a_page_elsewhere_reaches_nothing(browser, live, control, elsewhere):
     assert control.state.mode is Mode.RUNNING
 
 
-def test_a_browser_that_draws_on_the_processor_asks_for_fewer_pictures_of_the_scene(page):
+def test_a_browser_that_draws_on_the_processor_asks_for_fewer_pictures_of_the_scene(page, serve):
     eased = threading.Event()
-    with PageServer(PageContent(Feed(), {"ease": lambda values: str(eased.set())})) as server:
-        page.goto(server.url)
-        page.wait_for_timeout(500)
-        assert eased.wait(5)
+    serve({"ease": lambda values: str(eased.set())}, Feed())
+    page.wait_for_timeout(500)
+    assert eased.wait(5)
 
 
-def test_speech_is_announced_and_in_the_list(page, live):
-    feed, tree, url = live
-    page.goto(url)
+def test_speech_is_announced_and_in_the_list(page, live, feed, tree):
     row(page, leaf_ids(tree)[0]).wait_for(state="attached")
     feed("activity", 0.5, {"t": 0.5, "robot": "Alice", "node": leaf_ids(tree)[0], "message": "at it"})
-    playwright_api.expect(row(page, leaf_ids(tree)[0])).to_be_attached()
+    expect(row(page, leaf_ids(tree)[0])).to_be_attached()
     page.wait_for_timeout(300)
     feed("speech", 1.0, {"t": 1.0, "robot": "Alice", "text": "Dinner <b>is</b> ready"})
-    playwright_api.expect(page.locator("#events")).to_contain_text("Alice says “Dinner <b>is</b> ready”")
+    expect(page.locator("#events")).to_contain_text("Alice says “Dinner <b>is</b> ready”")
     assert page.locator("#said").text_content() == "Alice: Dinner <b>is</b> ready"
     assert page.locator("#announced").text_content() == "Alice says: Dinner <b>is</b> ready"
 
@@ -655,18 +646,20 @@ def test_the_report_is_drawn_without_scripts_in_the_width_of_a_telephone(browser
 
 
 @pytest.fixture
-def two(knowledge, registry, control):
-    """A served page of Alice and Bob, each on the way to the kitchen: the feed, their trees and the page's address."""
+def trees(knowledge, registry):
+    """The trees of Alice and Bob, each on the way to the kitchen."""
     step = Do.from_command(parse_command("Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"))
     missions = {name: Mission(name="go", robot=name, steps=(step,)) for name in ("Alice", "Bob")}
-    trees = {name: compile_mission(m, knowledge=knowledge, registry=registry) for name, m in missions.items()}
-    feed = Feed()
-    control.begin(trees)
-    watch = ControlWatch(control, feed)
+    return {name: compile_mission(m, knowledge=knowledge, registry=registry) for name, m in missions.items()}
+
+
+@pytest.fixture
+def two(serve, controlled, trees, knowledge):
+    """The feed of an open page of Alice and Bob."""
+    feed, robots = Feed(), dict.fromkeys(trees, "spot")
+    actions = controlled(trees, feed)
     feed("map", 0.0, map_message(GridMap(np.eye(40, dtype=bool), 0.25, (-5.0, -5.0)), knowledge, world="test"))
-    feed(
-        "run", 0.0, {"world": "test", "seed": 3, "commands": [], "versions": {}, "robots": dict.fromkeys(trees, "spot")}
-    )
+    feed("run", 0.0, {"world": "test", "seed": 3, "commands": [], "versions": {}, "robots": robots})
     for number, (name, tree) in enumerate(trees.items()):
         feed("tree", 0.0, {"robot": name, "root": node_view(tree.root).structure()})
         turn = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
@@ -674,30 +667,24 @@ def two(knowledge, registry, control):
         feed("pose", 0.5, {"robot": name, "pose": {"position": position, "orientation": turn}})
         feed("state", 0.5, {**state(), "robot": name, "charge": 0.9 - 0.5 * number})
     feed("reserved_path", 0.5, {"robot": "Bob", "turn": 1, "x": [1.0, 3.0], "y": [-0.5, -0.5]})
-    with PageServer(PageContent(feed, {**control_actions(control), "say": lambda values: str(dict(values))})) as server:
-        yield feed, trees, server.url
-    control.end()
-    watch.close()
+    serve({**actions, "say": lambda values: str(dict(values))}, feed)
+    return feed
 
 
 def panel(page, name: str):
     return page.locator(f'.robot[data-robot="{name}"]')
 
 
-def test_each_of_several_robots_has_a_panel_of_its_own_and_all_stand_on_one_map(page, two):
-    feed, trees, url = two
-    page.goto(url)
-    playwright_api.expect(page.locator(".robot")).to_have_count(2)
+def test_each_of_several_robots_has_a_panel_of_its_own_and_all_stand_on_one_map(page, two, trees):
+    expect(page.locator(".robot")).to_have_count(2)
     node = leaf_ids(trees["Bob"])[-1]
-    feed("transitions", 1.0, {"t": 1.0, "robot": "Bob", "node": node, "to": "RUNNING", "cause": None, "message": ""})
-    playwright_api.expect(panel(page, "Bob").locator(f'li[data-id="{node}"] > .row')).to_have_attribute(
-        "data-look", "running"
-    )
+    two("transitions", 1.0, {"t": 1.0, "robot": "Bob", "node": node, "to": "RUNNING", "cause": None, "message": ""})
+    expect(panel(page, "Bob").locator(f'li[data-id="{node}"] > .row')).to_have_attribute("data-look", "running")
     assert panel(page, "Alice").locator(f'li[data-id="{node}"]').count() == 0
-    playwright_api.expect(panel(page, "Alice").locator(".state")).to_contain_text("battery90 %")
-    playwright_api.expect(panel(page, "Bob").locator(".state")).to_contain_text("battery40 %")
+    expect(panel(page, "Alice").locator(".state")).to_contain_text("battery90 %")
+    expect(panel(page, "Bob").locator(".state")).to_contain_text("battery40 %")
     where = re.compile(r"Alice at x -2\.00 m.*; Bob at x 1\.00 m.*its way to x 3\.00 m, y -0\.50 m reserved")
-    playwright_api.expect(page.locator("#map")).to_have_attribute("aria-label", where)
+    expect(page.locator("#map")).to_have_attribute("aria-label", where)
     assert (page.locator("#tree-panel").is_hidden(), page.locator("#camera-panel").is_hidden()) == (True, True)
     colours = page.evaluate(
         "() => [...document.querySelectorAll('.robot .swatch')].map((each) => getComputedStyle(each).backgroundColor)"
@@ -707,66 +694,55 @@ def test_each_of_several_robots_has_a_panel_of_its_own_and_all_stand_on_one_map(
 
 @pytest.mark.nightly
 def test_the_buttons_of_a_panel_are_for_its_robot_and_those_above_for_all(page, two, control):
-    _, _, url = two
-    page.goto(url)
     panel(page, "Bob").locator(".pause").click()
-    playwright_api.expect(panel(page, "Bob").locator(".mode")).to_contain_text("paused")
-    playwright_api.expect(panel(page, "Alice").locator(".mode")).to_contain_text("running")
+    expect(panel(page, "Bob").locator(".mode")).to_contain_text("paused")
+    expect(panel(page, "Alice").locator(".mode")).to_contain_text("running")
     assert {name: each.mode for name, each in control.state.robots.items()} == {
         "Alice": Mode.RUNNING,
         "Bob": Mode.PAUSED,
     }
     panel(page, "Bob").locator(".pause").click()
-    playwright_api.expect(panel(page, "Bob").locator(".mode")).to_contain_text("running")
+    expect(panel(page, "Bob").locator(".mode")).to_contain_text("running")
     page.click("#stop")
     for name in ("Alice", "Bob"):
-        playwright_api.expect(panel(page, name).locator(".mode")).to_contain_text("stop button")
+        expect(panel(page, name).locator(".mode")).to_contain_text("stop button")
         assert panel(page, name).locator(".stop").is_disabled()
 
 
 @pytest.mark.nightly
 def test_a_question_stands_on_the_panel_of_the_robot_that_asks(page, two, control, clock):
-    _, _, url = two
-    page.goto(url)
     asked = control.ask(Question("q1", "Is it open?", options=("yes", "no"), default="no", limit_s=60.0), clock, "Bob")
-    playwright_api.expect(panel(page, "Bob").locator(".question")).to_have_count(1)
+    expect(panel(page, "Bob").locator(".question")).to_have_count(1)
     assert panel(page, "Alice").locator(".question").count() == 0
     panel(page, "Bob").get_by_role("button", name="yes").click()
-    playwright_api.expect(page.locator(".question")).to_have_count(0)
+    expect(page.locator(".question")).to_have_count(0)
     assert (asked.done(), asked.result()) == (True, "yes")
 
 
 @pytest.mark.nightly
 def test_a_sentence_is_said_to_the_robot_that_is_chosen(page, two):
-    _, _, url = two
-    page.goto(url)
     page.locator("#whom").select_option("Bob")
-    page.fill("#sentence", "wait")
-    page.press("#sentence", "Enter")
-    playwright_api.expect(page.locator("#said")).to_have_text("{'text': 'wait', 'robot': 'Bob'}")
+    say(page, "wait")
+    expect(page.locator("#said")).to_have_text("{'text': 'wait', 'robot': 'Bob'}")
 
 
 def test_the_missions_of_a_fleet_are_listed_with_the_robot_and_what_came_of_them(page, two):
-    feed, _, url = two
-    page.goto(url)
-    playwright_api.expect(page.locator(".robot")).to_have_count(2)
+    expect(page.locator(".robot")).to_have_count(2)
     assert page.locator("#missions-panel").is_hidden()
     rows = [
         {"id": 1, "sentence": "Go <b>there", "robot": "Bob", "outcome": "success", "reassigned": 1, "message": "done"},
         {"id": 2, "sentence": "Wait", "robot": None, "outcome": "queued", "reassigned": 0, "message": ""},
     ]
-    feed("missions", 2.0, {"missions": rows})
+    two("missions", 2.0, {"missions": rows})
     lines = page.locator("#missions tr")
-    playwright_api.expect(lines).to_have_text(["1Go <b>there Bob✓ successreassigned 1 x", "2Wait○ queued"])
+    expect(lines).to_have_text(["1Go <b>there Bob✓ successreassigned 1 x", "2Wait○ queued"])
 
 
 @pytest.mark.nightly
 def test_verdicts_are_shown_for_each_robot_and_for_all(page, two, control):
-    feed, _, url = two
-    page.goto(url)
-    feed("outcome", 3.0, {"robot": "Alice", "outcome": "failure", "cause": "PLANNING", "message": "no way"})
-    feed("outcome", 3.0, {"robot": "Bob", "outcome": "success", "cause": None, "message": "there"})
+    end(two, 3.0, "failure", "PLANNING", "no way", "Alice")
+    end(two, 3.0, "success", None, "there", "Bob")
     control.end()
-    playwright_api.expect(page.locator("#mode-text")).to_have_text("1 of 2 did it")
-    playwright_api.expect(panel(page, "Alice").locator(".why")).to_have_text("no way")
-    playwright_api.expect(panel(page, "Bob").locator(".mode")).to_contain_text("success")
+    expect(page.locator("#mode-text")).to_have_text("1 of 2 did it")
+    expect(panel(page, "Alice").locator(".why")).to_have_text("no way")
+    expect(panel(page, "Bob").locator(".mode")).to_contain_text("success")

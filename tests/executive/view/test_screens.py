@@ -1,9 +1,5 @@
 """Sizes and overflow of the page and the report in a browser, on a desk and on a telephone, light and dark."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -29,11 +25,10 @@ from skills.estimate.grid_map import GridMap
 from skills.navigate.zones import Zone, ZoneKind, zone_messages
 
 SIZES = [(1400, 900), (390, 844)]
-LONG = (
-    "waits until sixty seconds are over, as the mission says, and then goes on with the rest of the round " + "x" * 60
-)
+LONG = f"waits until sixty seconds are over, as the mission says, and goes on with the rest of the round {'x' * 60}"
 
 playwright_api = pytest.importorskip("playwright.sync_api", reason="not installed: pip install playwright")
+expect = playwright_api.expect
 pytestmark = pytest.mark.browser
 
 OVERFLOWING = """() => [...document.querySelectorAll('body *')].filter((each) => {
@@ -83,12 +78,16 @@ def running(nested):
         yield server.url
 
 
+def expect_fit(page):
+    assert page.evaluate(OVERFLOWING) == []
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+
+
 def test_the_page_of_a_nested_mission_is_readable(page, running):
     page.goto(running)
     note = page.locator(".row.leaf[data-look=running] .note")
-    playwright_api.expect(note).to_contain_text(LONG)
-    assert page.evaluate(OVERFLOWING) == []
-    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    expect(note).to_contain_text(LONG)
+    expect_fit(page)
     widths = page.locator(".tree li:not([hidden]) > .row .name").evaluate_all("rows => rows.map((r) => r.clientWidth)")
     assert min(width for width in widths if width) > 150
     assert page.locator(".tree").evaluate("tree => tree.scrollHeight") < 900
@@ -117,10 +116,9 @@ def several(nested, knowledge):
 
 def test_the_page_of_several_robots_fits_and_no_name_on_the_map_covers_another(page, several):
     page.goto(several)
-    playwright_api.expect(page.locator("#legend li")).to_have_text(["object found", "dock", "keep out of: den"])
-    playwright_api.expect(page.locator("#where")).to_contain_text("Alice at x 0.40 m, y 0.40 m, 0°, keep out of: den")
-    assert page.evaluate(OVERFLOWING) == []
-    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    expect(page.locator("#legend li")).to_have_text(["object found", "dock", "keep out of: den"])
+    expect(page.locator("#where")).to_contain_text("Alice at x 0.40 m, y 0.40 m, 0°, keep out of: den")
+    expect_fit(page)
     uncovered = """() => {
       const { taken, later } = window.errand.page.map.names, names = taken.slice(-later.length);
       const side = (a, b, k) => Math.max(0, Math.min(a[k + 2], b[k + 2]) - Math.max(a[k], b[k]));
@@ -158,9 +156,8 @@ def report_page(tmp_path, nested):
     why = f"The coke stands on the counter. Robin has no coke. {whole}"
     referee = RefereeReport(False, why, 1, 2, events=("1.0 s: it fell",))
     done = Styles.SUCCESS.value
-    steps = tuple(
-        StepRow(f"go to the hall {whole if n == 2 else ''}", done, "success", n, (0.0, 9.0), why) for n in range(4)
-    )
+    names = ("go to the hall", "go to the hall", f"go to the hall {whole}", "go to the hall")
+    steps = tuple(StepRow(name, done, "success", n, (0.0, 9.0), why) for n, name in enumerate(names))
     report = RobotReport("failure", "EXECUTION", why, referee, (), "spot")
     svg = to_svg(readable(node_view(nested.root), 40))
     page = ReportPage(
@@ -177,12 +174,11 @@ def report_page(tmp_path, nested):
     return path
 
 
-def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, report_page: Path):
+def test_the_report_fits_its_page_and_wide_parts_scroll_inside_themselves(page, report_page):
     page.goto(report_page.as_uri())
     assert page.locator(".verdict li").count() == 6
     page.locator("details.tree summary").click()
-    assert page.evaluate(OVERFLOWING) == []
-    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    expect_fit(page)
     assert min(page.locator("td.why").evaluate_all("cells => cells.map((cell) => cell.clientWidth)")) > 200
 
 
@@ -199,5 +195,4 @@ def test_the_report_of_an_evaluation_fits_its_page(page, tmp_path):
     (tmp_path / "results.html").write_text(html, encoding="utf-8")
     page.goto((tmp_path / "results.html").as_uri())
     page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
-    assert page.evaluate(OVERFLOWING) == []
-    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+    expect_fit(page)

@@ -111,7 +111,7 @@ def test_a_title_says_where_and_with_what(compiled, make):
     tree = compiled(*make.FETCH)
     ran = executed_tree(node_view(tree.root, dict.fromkeys(tree.path_ids, DONE)))
     titles = {each.name for _, each in ran.walk()}
-    assert {"go to the counter", "hand over (Robin)"} <= titles, titles
+    assert {"go to the counter", "hand over (Robin; drink)"} <= titles, titles
 
 
 def test_the_legend_fits_beside_a_single_node():

@@ -27,6 +27,5 @@ def test_the_side_along_which_a_line_lies_is_found_in_a_corner_too():
 
 def test_outline_fits_within_a_polygon_beside_taken_ones():
     body = ((0.5, 0.5), (1.0, 0.5), (1.0, 1.0), (0.5, 1.0))
-    assert fits(body, SQUARE, [])
-    assert not fits(SQUARE, body, [])
+    assert fits(body, SQUARE, []) and not fits(SQUARE, body, [])
     assert not fits(body, SQUARE, [((0.9, 0.9), (1.5, 0.9), (1.5, 1.5))])

@@ -4,23 +4,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from executive.words import steps as blocks
 from executive.words.command import Command, Task
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, DoorOpen, Look, Not, ValueIs
 from executive.words.leaf_steps import Awaited, Charging, Check, Do, Dock, Set, Speak, Wait, steps_of_commands
-from executive.words.steps import (
-    Ask,
-    Choose,
-    Group,
-    Handler,
-    Loop,
-    Repeat,
-    Together,
-    Try,
-    While,
-    steps_from_yaml,
-    steps_to_data,
-    steps_to_yaml,
-)
 from skills.api import ObjectKind
 
 texts = st.text(st.characters(exclude_characters="{}", exclude_categories=["C", "Z"]), min_size=1, max_size=12)
@@ -58,9 +45,9 @@ awaited = st.one_of(
     built(Awaited, until_clock=st.sampled_from(["00:00", "09:05", "14:30"])),
 )
 loops = st.one_of(
-    built(Loop, times=st.integers(1, 99), every_s=st.none() | seconds),
-    built(Loop, until=conditions, times=st.none() | st.integers(1, 99)),
-    built(Loop, while_=conditions),
+    built(blocks.Loop, times=st.integers(1, 99), every_s=st.none() | seconds),
+    built(blocks.Loop, until=conditions, times=st.none() | st.integers(1, 99)),
+    built(blocks.Loop, while_=conditions),
 )
 small = st.one_of(
     st.builds(Do.from_command, commands),
@@ -75,22 +62,22 @@ small = st.one_of(
 def holding(steps):
     some = row(steps)
     branch = st.just(()) | some
-    handler = built(Handler, condition=conditions, steps=some, times=st.integers(1, 9))
+    handler = built(blocks.Handler, condition=conditions, steps=some, times=st.integers(1, 9))
     return st.one_of(
-        built(Choose, condition=conditions, then=some, otherwise=branch),
-        built(Repeat, loop=loops, steps=some),
-        built(Try, steps=some, otherwise=some),
-        built(Together, steps=st.tuples(steps, steps), done_when=st.just("any")),
+        built(blocks.Choose, condition=conditions, then=some, otherwise=branch),
+        built(blocks.Repeat, loop=loops, steps=some),
+        built(blocks.Try, steps=some, otherwise=some),
+        built(blocks.Together, steps=st.tuples(steps, steps), done_when=st.just("any")),
         built(
-            Group,
+            blocks.Group,
             steps=some,
             name=st.none() | names,
             always=branch,
-            while_=st.none() | built(While, holds=conditions),
+            while_=st.none() | built(blocks.While, holds=conditions),
             when=st.none() | row(handler),
         ),
-        built(Ask, ask=texts, choices=st.dictionaries(words, branch, min_size=1, max_size=2), limit_s=seconds),
-        built(Ask, ask=texts, match=st.just("place"), default=st.none() | words),
+        built(blocks.Ask, ask=texts, choices=st.dictionaries(words, branch, min_size=1, max_size=2), limit_s=seconds),
+        built(blocks.Ask, ask=texts, match=st.just("place"), default=st.none() | words),
     )
 
 
@@ -100,45 +87,47 @@ missions = row(st.recursive(small, holding, max_leaves=6))
 @settings(max_examples=120, deadline=None)
 @given(missions)
 def test_yaml_reads_back_to_the_same_steps(steps):
-    assert steps_from_yaml(steps_to_yaml(steps)) == steps
+    assert blocks.steps_from_yaml(blocks.steps_to_yaml(steps)) == steps
+
+
+WRITTEN = """\
+- if: {object: beer, at: kitchen}
+  then:
+  - {to: kitchen, do: grasp, object: beer}
+  - {take: beer, to: start}
+  else:
+  - {speak: there is none}
+- wait: {for: battery > 0.5}
+- repeat: {times: 2, every: 600}
+  steps:
+  - ask: Tea?
+    choices:
+      'yes':
+      - dock: {}
+      'no': null"""
 
 
 def test_it_is_what_a_person_would_write():
-    look = Look.from_command(Command(goal="kitchen", task=Task.FIND, object=ObjectKind("beer")))
-    fetch = steps_of_commands(
-        [
-            Command(goal="kitchen", task=Task.GRASP, object=ObjectKind("beer"), verb="fetch"),
-            Command(item=ObjectKind("beer"), goal="start"),
-        ]
-    )
+    beer = ObjectKind("beer")
+    look = Look.from_command(Command(goal="kitchen", task=Task.FIND, object=beer))
+    grasp = Command(goal="kitchen", task=Task.GRASP, object=beer, verb="fetch")
+    fetch = steps_of_commands([grasp, Command(item=beer, goal="start")])
     steps = (
-        Choose(condition=look, then=fetch, otherwise=(Speak(speak="there is none"),)),
+        blocks.Choose(condition=look, then=fetch, otherwise=(Speak(speak="there is none"),)),
         Wait(awaited=Awaited(condition=ValueIs(text="battery > 0.5"))),
-        Repeat(loop=Loop(times=2, every_s=600.0), steps=(Ask(ask="Tea?", choices={"yes": (Dock(),), "no": ()}),)),
+        blocks.Repeat(
+            loop=blocks.Loop(times=2, every_s=600.0),
+            steps=(blocks.Ask(ask="Tea?", choices={"yes": (Dock(),), "no": ()}),),
+        ),
     )
-    assert list(steps_to_yaml(steps)) == [
-        "- if: {object: beer, at: kitchen}",
-        "  then:",
-        "  - {to: kitchen, do: grasp, object: beer}",
-        "  - {take: beer, to: start}",
-        "  else:",
-        "  - {speak: there is none}",
-        "- wait: {for: battery > 0.5}",
-        "- repeat: {times: 2, every: 600}",
-        "  steps:",
-        "  - ask: Tea?",
-        "    choices:",
-        "      'yes':",
-        "      - dock: {}",
-        "      'no': null",
-    ]
+    assert list(blocks.steps_to_yaml(steps)) == WRITTEN.splitlines()
 
 
 def test_data_are_plain():
-    assert steps_to_data([Dock(), Set(set={"n": 1})]) == [{"dock": {}}, {"set": {"n": 1}}]
+    assert blocks.steps_to_data([Dock(), Set(set={"n": 1})]) == [{"dock": {}}, {"set": {"n": 1}}]
 
 
 @pytest.mark.parametrize("lines", [["- {to: hall"], ["- 3"], ["to: hall"], ["- {if: holding}"], ["- {to_: hall}"]])
 def test_document_without_steps_is_refused(lines):
     with pytest.raises(ValueError, match=r".+"):
-        steps_from_yaml(lines)
+        blocks.steps_from_yaml(lines)

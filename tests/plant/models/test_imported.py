@@ -6,6 +6,7 @@ import pytest
 
 from plant.models.catalogue import ImportedObject, read_imported, write_imported
 from skills.files.errors import InputError
+from tests.tables import table
 
 DRILL = ImportedObject(
     name="drill",
@@ -33,17 +34,7 @@ def test_a_written_object_is_read_back_and_its_form_rests_at_half_its_height(fol
     assert (form.half_extents_m, form.rest_height_m, form.round) == ((0.1, 0.03), 0.02, False)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ("mass_kg: 1.2", "mass_kg: -1", "mass_kg: "),
-        ("mass_kg: 1.2", "mass_kg: .nan", "mass_kg: "),
-        ("name: drill", "name: ../drill", "name: "),
-        ("round:", "rnd:", "unknown key 'rnd'"),
-        ("name: drill", "name: [", "broken YAML"),
-        ("name: drill", "name: other", "other.sdf is missing"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "damaged"))
 def test_a_damaged_folder_is_refused_with_its_place(folder, old, new, why):
     facts = folder / "object.yaml"
     facts.write_text(facts.read_text().replace(old, new, 1))

@@ -22,9 +22,7 @@ def test_a_rectangle_larger_than_its_texture_is_cut_into_tiles():
     mesh = Mesh(MATERIALS)
     mesh.add_rectangle("tiles", (0, 0, 0), (1.2, 0, 0), (0, 0.5, 0))
     points, normals, uvs = groups(mesh)["tiles"]
-    assert len(points) == 3 * 6
-    assert uvs.min() >= 0.0
-    assert uvs.max() <= 1.0 + 1e-9
+    assert len(points) == 3 * 6 and uvs.min() >= 0.0 and uvs.max() <= 1.0 + 1e-9
     np.testing.assert_allclose(normals, np.tile([0.0, 0.0, 1.0], (18, 1)))
     assert area(points) == pytest.approx(0.6)
 
@@ -45,15 +43,13 @@ def add_ball(mesh):
 
 @pytest.mark.parametrize("add", [add_box, add_ball])
 def test_closed_shapes_look_outward(add):
-    mesh = Mesh(MATERIALS)
-    assert callable(add)
-    add(mesh)
+    add(mesh := Mesh(MATERIALS))
     points, normals, _ = groups(mesh)["red"]
     a, b, c = points[0::3], points[1::3], points[2::3]
     faces = np.cross(b - a, c - a)
     solid = np.linalg.norm(faces, axis=1) > 1e-9
-    assert np.all(np.sum(faces * (a + b + c), axis=1)[solid] > 0)
-    assert np.all(np.sum(faces * normals[0::3], axis=1)[solid] > 0)
+    for outward in (a + b + c, normals[0::3]):
+        assert np.all(np.sum(faces * outward, axis=1)[solid] > 0)
 
 
 def test_a_turned_mesh_keeps_unit_normals_that_stay_square_to_it():
@@ -90,13 +86,10 @@ def test_faces_point_at_lines_that_exist():
     text = obj_text(mesh, "m.mtl")
     counts = [len(re.findall(rf"^{key} ", text, re.MULTILINE)) for key in ("v", "vt", "vn")]
     corners = np.array([[int(k) for k in c.split("/")] for c in re.findall(r"\d+/\d+/\d+", text)])
-    assert corners.min() == 1
-    assert tuple(corners.max(axis=0)) == tuple(counts)
+    assert (corners.min(), tuple(corners.max(axis=0))) == (1, tuple(counts))
 
 
 def test_the_material_file_has_only_used_materials():
-    mesh = Mesh(MATERIALS)
-    add_box(mesh)
+    add_box(mesh := Mesh(MATERIALS))
     text = mtl_text(mesh, "palette.png")
-    assert "palette.png" in text
-    assert "tiles.png" not in text
+    assert [name in text for name in ("palette.png", "tiles.png")] == [True, False]

@@ -19,7 +19,6 @@ from plant.models.catalogue import MODELS_FOLDER, load_catalogue
 
 LOOSE = [(name, form) for name, entry in load_catalogue().items() if name != "person" for form in entry.forms]
 MASSES_KG = {("coke", "can"): 0.35, ("beer", "brown_bottle"): 0.55, ("hammer", "claw"): 0.55, ("cube", "blue"): 0.12}
-Poses = dict[tuple[str, str], list[RigidTransform]]
 
 
 def of(loose):
@@ -32,22 +31,19 @@ def poses():
     builder = DiagramBuilder()
     config = MultibodyPlantConfig(time_step=0.0125, discrete_contact_approximation="sap")
     plant, _ = AddMultibodyPlant(config, builder)
-    friction = CoulombFriction(0.8, 0.8)
-    plant.RegisterCollisionGeometry(
-        plant.world_body(), RigidTransform([0.0, 0.0, 0.70]), Box(40, 4, 0.1), "table", friction
-    )
+    X_WT, friction = RigidTransform([0.0, 0.0, 0.70]), CoulombFriction(0.8, 0.8)
+    plant.RegisterCollisionGeometry(plant.world_body(), X_WT, Box(40, 4, 0.1), "table", friction)
     parser, bodies = Parser(plant), {}
     parser.SetAutoRenaming(True)
     for index, loose in enumerate(LOOSE):
-        model = add_model(parser, of(loose).path())
-        bodies[loose] = plant.GetBodyByName(loose[0], model)
+        bodies[loose] = plant.GetBodyByName(loose[0], add_model(parser, of(loose).path()))
         z = 0.75 + of(loose).rest_height_m + 0.001
         X_WO = RigidTransform(RollPitchYaw(0.0, 0.0, 0.4 + index), np.array([0.5 * index, 0.3, z]))
         plant.SetDefaultFloatingBaseBodyPose(bodies[loose], X_WO)
     plant.Finalize()
     simulator = Simulator(builder.Build())
     context = plant.GetMyContextFromRoot(simulator.get_context())
-    seen: Poses = {loose: [] for loose in LOOSE}
+    seen = {loose: [] for loose in LOOSE}
     for time_s in (0.5, 3.5):
         simulator.AdvanceTo(time_s)
         for loose, body in bodies.items():
@@ -85,36 +81,27 @@ def test_has_its_mass_and_friction(loose):
     assert inspector.NumGeometriesWithRole(Role.kPerception) == 1
 
 
-def test_every_class_that_is_handled_has_several_forms():
-    assert {name: len(entry.forms) for name, entry in load_catalogue().items() if name != "person"} == dict.fromkeys(
-        ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube"), 3
-    )
+def test_every_class_that_is_handled_has_several_forms_and_an_id_of_its_own():
+    handled = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
+    catalogue = load_catalogue()
+    forms = {name: len(entry.forms) for name, entry in catalogue.items() if name != "person"}
+    assert forms == dict.fromkeys(handled, 3)
+    ids = [entry.id for entry in catalogue.values()]
+    assert len(set(ids)) == len(ids) and min(ids) > 0
 
 
 def test_the_hammer_is_heavy_at_its_head():
-    hammer = objects.hammer()
-    assert hammer.mass is not None
-    assert hammer.mass.com[0] > 0.05
+    assert objects.hammer().mass.com[0] > 0.05
 
 
-def test_mass_properties_follow_the_parallel_axis_theorem():
-    rod = Cylinder(radius=0.01, length=0.2, p=(0, 0, 0.1))
-    other = Cylinder(radius=0.01, length=0.2, p=(0, 0, -0.1))
+def test_mass_properties_follow_the_parallel_axis_theorem_and_need_a_mass():
+    halves = [Cylinder(radius=0.01, length=0.2, p=(0, 0, z)) for z in (0.1, -0.1)]
     both = shape_mass(Cylinder(radius=0.01, length=0.4), 2.0)
-    whole = join_masses([shape_mass(rod, 1.0), shape_mass(other, 1.0)])
+    whole = join_masses([shape_mass(half, 1.0) for half in halves])
     np.testing.assert_allclose(whole.com, 0.0, atol=1e-12)
     np.testing.assert_allclose(whole.inertia, both.inertia, rtol=1e-9, atol=1e-15)
-
-
-def test_mass_properties_without_mass_are_refused():
     with pytest.raises(ValueError, match="no mass"):
-        join_masses([shape_mass(Cylinder(radius=0.01, length=0.2), 0.0)])
-
-
-def test_class_ids_are_distinct_and_leave_zero_to_nothing():
-    ids = [entry.id for entry in load_catalogue().values()]
-    assert len(set(ids)) == len(ids)
-    assert min(ids) > 0
+        join_masses([shape_mass(halves[0], 0.0)])
 
 
 @pytest.mark.parametrize(("write", "files"), [(build, 18), (write_forms, 3 * len(FORMS))])

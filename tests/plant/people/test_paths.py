@@ -25,10 +25,8 @@ def test_a_free_path_is_straight():
 
 def test_a_path_leads_around_a_wall_with_clearance_for_the_shoulders():
     path = Ground(WALL, (A, B)).plan_path(A, B, who="Kim")
-    assert path[0] == A and path[-1] == B
-    assert clearance_m(path, WALL) > SHOULDERS_M - 0.06
-    assert sum(map(math.dist, path, path[1:])) < 5.2
-    assert len(path) < 9
+    assert path[0] == A and path[-1] == B and clearance_m(path, WALL) > SHOULDERS_M - 0.06
+    assert sum(map(math.dist, path, path[1:])) < 5.2 and len(path) < 9
 
 
 def test_a_path_leads_through_a_door_of_75_centimetres():
@@ -57,13 +55,10 @@ def test_a_person_close_to_a_wall_steps_away_first():
     with pytest.raises(WorldError, match="Kim cannot stand"):
         ground.plan_path(close, A, who="Kim")
     path = ground.plan_on(close, A, who="Kim")
-    assert path[0] == close and path[-1] == A
-    assert clearance_m(path[1:], WALL) > SHOULDERS_M - 0.06
+    assert path[0] == close and path[-1] == A and clearance_m(path[1:], WALL) > SHOULDERS_M - 0.06
 
 
 def test_free_points_are_drawn_for_a_person_who_is_hemmed_in():
-    ground = Ground(WALL, (A, B))
-    points = list(ground.free_points((1.67, 0.0), 1.0, 0.5, np.random.default_rng(3), 20))
-    assert len(points) > 10
-    assert all(math.dist(point, (1.67, 0.0)) >= 1.0 for point in points)
+    points = list(Ground(WALL, (A, B)).free_points((1.67, 0.0), 1.0, 0.5, np.random.default_rng(3), 20))
+    assert len(points) > 10 and all(math.dist(point, (1.67, 0.0)) >= 1.0 for point in points)
     assert all(shapely.Point(point).distance(shapely.Polygon(WALL[0])) > 0.4 for point in points)

@@ -18,14 +18,8 @@ from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Placement, PointRoute, PointStop, Receiving
 from skills.files.json_values import pack, unpack
 from skills.robot import ArmTrajectory, Pose2D
+from tests.plant.boxes import box_world
 
-FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">
-<collision name="top"><pose>0 0 -0.5 0 0 0</pose><geometry><box><size>20 20 1</size></box></geometry></collision>
-</link></model></sdf>"""
-WORLD = """directives:
-- add_model: {name: floor, file: "%s"}
-- add_weld: {parent: world, child: "floor::floor"}
-"""
 CATALOGUE = load_catalogue()
 PERSON, CAN = CATALOGUE["person"].forms["standing"], CATALOGUE["coke"].forms["can"]
 OUT_RAD = np.array([0.0, -1.45, 1.85, 0.0, -0.4, 1.57])
@@ -38,21 +32,14 @@ class Hall:
     """Alice offers a can to Kim, who stands in front of her or walks past."""
 
     def __init__(self, folder, receiving=TAKES, *, route=None):
-        (folder / "floor.sdf").write_text(FLOOR)
-        (folder / "world.dmd.yaml").write_text(WORLD % (folder / "floor.sdf").as_uri())
+        directives = box_world(folder, floor=("20 20 1", "0 0 -0.5"))
         models = [
             LooseModel("Kim", PERSON.path(), X_WP, fixed=route is None, route=route, receiving=receiving),
             LooseModel("coke", CAN.path(), RigidTransform([-2.0, 0.0, CAN.rest_height_m])),
         ]
-        self.world = build_diagram(
-            DiagramConfig(
-                directives=folder / "world.dmd.yaml",
-                models=models,
-                robots=[PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))],
-                visuals=False,
-                render=False,
-            )
-        )
+        robots = [PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))]
+        config = DiagramConfig(directives=directives, models=models, robots=robots, visuals=False, render=False)
+        self.world = build_diagram(config)
         self.engine = Engine(self.world)
         placed = Placement("coke", "coke", CAN, RigidTransform())
         self.referee = Referee(
@@ -118,6 +105,12 @@ class Hall:
         self.robot.set_gripper(1.2, 20.0, until_s=self.engine.now() + 3.0, lease=self.lease)
 
 
+def slide(hall, along_m):
+    """Puts the state as if the object had moved in the hand."""
+    state = hall.kim.state()
+    hall.kim.restore({**state, "p_HO": pack(unpack(state["p_HO"]) + [along_m, 0.0, 0.0])})
+
+
 @pytest.fixture(scope="module")
 def stage(tmp_path_factory):
     """One hall with its states: when Alice holds the can out, and when each phase of the receiving begins."""
@@ -155,8 +148,7 @@ def test_the_lowest_point_of_a_gripper_is_found_from_a_few_of_its_balls(at, monk
         lowest_m(plant.EvalBodyPoseInWorld(hall.engine.context, body), receivers.shape_row(inspector, each))
         for body, each in shapes
     ]
-    assert found_m == min(lows_m)
-    assert len(computed) < len(shapes) // 3
+    assert found_m == min(lows_m) and len(computed) < len(shapes) // 3
 
 
 def test_the_tray_moves_below_an_offered_object_without_contact(at):
@@ -170,8 +162,7 @@ def test_the_tray_moves_below_an_offered_object_without_contact(at):
         speeds.append(np.linalg.norm(hall.place_W(tray) - last_W) / 0.05)
         assert len(speeds) < 160
     under_m = hall.place_W(hall.can)[2] - CAN.rest_height_m - hall.place_W(tray)[2]
-    assert 0.005 < under_m < 0.08
-    assert max(speeds) < 0.31
+    assert 0.005 < under_m < 0.08 and max(speeds) < 0.31
     assert hall.place_W(hall.can) == pytest.approx(before_W, abs=0.005)
 
 
@@ -181,22 +172,16 @@ def test_an_object_released_under_the_pull_rests_on_the_tray(at):
     hall.let_go()
     hall.until(Phase.RECEIVING).engine.advance(2.0)
     history = hall.referee.objects["coke"]
-    assert history.on_tray_of == "Kim"
-    assert history.drops == 0
-    assert hall.referee.collisions == ()
+    assert (history.on_tray_of, history.drops, hall.referee.collisions) == ("Kim", 0, ())
 
 
 def test_a_gripper_that_holds_on_is_pulled_at_again_after_a_pause(at):
-    hall = at(Phase.PULLING).until(Phase.PAUSING).until(Phase.PULLING)
-    assert hall.robot.gripper().holding
+    assert at(Phase.PULLING).until(Phase.PAUSING).until(Phase.PULLING).robot.gripper().holding
 
 
 def test_the_person_pulls_again_when_the_object_only_slides_in_the_gripper(at):
     hall = at(Phase.PULLING)
-    state = hall.kim.state()
-    hall.kim.restore(
-        {**state, "p_HO": pack(unpack(state["p_HO"]) + [0.011, 0.0, 0.0])}
-    )  # as if it had moved 11 mm in the hand
+    slide(hall, 0.011)
     hall.until(Phase.RECEIVING).until(Phase.PULLING)
     assert hall.robot.gripper().holding
 
@@ -232,8 +217,7 @@ def test_the_tray_goes_home_when_the_object_is_drawn_in(at):
 def test_a_person_who_does_not_receive_has_no_tray(tmp_path):
     hall = Hall(tmp_path, None)
     hall.engine.advance(4.0)
-    assert not hall.world.trays
-    assert hall.robot.gripper().holding
+    assert not hall.world.trays and hall.robot.gripper().holding
 
 
 def test_a_walking_person_stops_to_take_an_object(tmp_path):
@@ -242,8 +226,7 @@ def test_a_walking_person_stops_to_take_an_object(tmp_path):
     person = hall.world.plant.GetBodyByName("person")
     stopped_W = hall.place_W(person)
     hall.engine.advance(2.5)
-    assert hall.place_W(person) == pytest.approx(stopped_W, abs=1e-6)
-    assert stopped_W[1] < 2.0
+    assert hall.place_W(person) == pytest.approx(stopped_W, abs=1e-6) and stopped_W[1] < 2.0
 
 
 def test_a_state_taken_up_again_goes_on_as_before(at, stage):
@@ -263,7 +246,6 @@ def test_a_state_taken_up_again_goes_on_as_before(at, stage):
 @pytest.mark.parametrize(("moved_m", "let_go"), [(0.013, False), (0.02, True)])
 def test_a_small_creep_before_the_pull_does_not_count_as_released(at, moved_m, let_go):
     hall = at(Phase.BRINGING)
-    state = hall.kim.state()
-    hall.kim.restore({**state, "p_HO": pack(unpack(state["p_HO"]) + [moved_m, 0.0, 0.0])})
+    slide(hall, moved_m)
     hall.engine.advance(0.3)
     assert (hall.kim.phase is Phase.RECEIVING) is let_go

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -19,6 +20,7 @@ from plant.robots.spot.kind import SPOT
 from plant.worlds.seeding import Lapse, PointRoute, PointStop, place_people
 from plant.worlds.world import DoorRule, WorldError, load_world
 from skills.robot import Pose2D
+from tests.plant.boxes import box_world
 
 STEP_S = 0.0125
 
@@ -56,8 +58,7 @@ def test_a_person_ends_the_pause_on_request():
 
 def test_a_person_turns_to_the_path_at_a_limited_rate():
     walk = walk_of(Leg(((0.0, 0.0), (0.0, 3.0)), 0.0))
-    assert after(walk, 0.1).yaw_rad == pytest.approx(0.4, abs=0.06)
-    assert walk.heading_rad == pytest.approx(math.pi / 2)
+    assert (after(walk, 0.1).yaw_rad, walk.heading_rad) == (pytest.approx(0.4, abs=0.06), pytest.approx(math.pi / 2))
     assert after(walk, 1.0).yaw_rad == pytest.approx(math.pi / 2)
 
 
@@ -70,25 +71,6 @@ def test_a_person_without_a_path_stands():
     assert after(walk_of(), 1.0).place_W == (0.0, 0.0)
 
 
-def test_goes_on_from_a_state():
-    leg = Leg(((0.0, 0.0), (1.0, 0.0), (1.0, 3.0)), 0.5)
-    walk, other = after(walk_of(leg), 1.7), walk_of(leg)
-    other.restore(walk.state())
-    assert after(other, 0.5).state() == after(walk, 0.5).state()
-
-
-FLOOR = """<sdf version="1.9"><model name="floor"><link name="floor">
-<collision name="top"><pose>0 0 -0.5 0 0 0</pose><geometry><box><size>20 20 1</size></box></geometry></collision>
-</link></model></sdf>"""
-WALL = """<sdf version="1.9"><model name="wall"><link name="wall">
-<collision name="wall"><pose>2 -2 1 0 0 0</pose><geometry><box><size>0.2 6 2</size></box></geometry></collision>
-</link></model></sdf>"""
-WORLD = """directives:
-- add_model: {name: floor, file: "%s"}
-- add_weld: {parent: world, child: "floor::floor"}
-- add_model: {name: wall, file: "%s"}
-- add_weld: {parent: world, child: "wall::wall"}
-"""
 START = Pose2D(-3.0, 0.0, 0.0)
 PERSON = load_catalogue()["person"].forms["standing"].path()
 
@@ -97,28 +79,17 @@ class Hall:
     """A floor with a wall, a robot and a person, and the referee."""
 
     def __init__(self, folder, route, robot=START, doors=(), **others):
-        for name, text in (("floor", FLOOR), ("wall", WALL)):
-            (folder / f"{name}.sdf").write_text(text)
-        (folder / "world.dmd.yaml").write_text(
-            WORLD % tuple((folder / f"{name}.sdf").as_uri() for name in ("floor", "wall"))
-        )
+        directives = box_world(folder, floor=("20 20 1", "0 0 -0.5"), wall=("0.2 6 2", "2 -2 1"))
         models = [
             LooseModel(name, PERSON, RigidTransform([*each.stops[0].at_W, 0.0]), route=each)
             for name, each in {"Kim": route, **others}.items()
         ]
-        self.world = build_diagram(
-            DiagramConfig(
-                directives=folder / "world.dmd.yaml",
-                models=models,
-                robots=[PlacedRobot("Alice", "spot", robot)],
-                doors=doors,
-                visuals=False,
-                render=False,
-            )
-        )
-        self.engine = Engine(self.world)
+        placed = [PlacedRobot("Alice", "spot", robot)]
+        config = DiagramConfig(directives=directives, models=models, robots=placed, visuals=False, render=False)
+        self.world = build_diagram(replace(config, doors=doors))
+        self.engine, persons = Engine(self.world), ["Kim", *others]
         self.referee = Referee(
-            self.world.plant, [], robots={"Alice": SPOT}, persons=["Kim", *others], scenery=self.world.scenery
+            self.world.plant, [], robots={"Alice": SPOT}, persons=persons, scenery=self.world.scenery
         )
         self.engine.observe(lambda now_s: self.referee.observe(self.engine.context, now_s), every=4)
 
@@ -128,10 +99,22 @@ class Hall:
         return Pose2D.from_transform(self.world.plant.EvalBodyPoseInWorld(self.engine.context, body))
 
     @property
+    def person_xy(self):
+        return self.person_W.x_m, self.person_W.y_m
+
+    @property
     def gap_m(self):
         """Distance between the robot's body and Kim."""
-        x, y, _ = self.referee.path("Alice")[-1]
-        return math.dist((x, y), (self.person_W.x_m, self.person_W.y_m))
+        return math.dist(self.referee.path("Alice")[-1][:2], self.person_xy)
+
+    @property
+    def blame(self):
+        """Collisions, people whom the robot hit, and people who walked into it."""
+        verdict = self.referee.judge([])
+        return verdict.collisions, verdict.people_hit, verdict.hit_by_people
+
+    def saved(self):
+        return self.engine.state(), {name: each.copy() for name, each in self.engine.world_state().items()}
 
     def drive(self, vx, seconds):
         robot = self.engine.robots["Alice"]
@@ -150,7 +133,7 @@ def hall(tmp_path):
 def test_the_body_in_the_plant_follows_the_route(hall):
     stage = hall((0.0, 2.0), (0.0, -2.0), speed_m_s=1.0)
     stage.engine.advance(2.0)
-    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert stage.person_xy == pytest.approx((0.0, 0.0), abs=1e-6)
     assert stage.person_W.yaw_rad == pytest.approx(-math.pi / 2, abs=0.01)
 
 
@@ -159,7 +142,7 @@ def test_a_person_walks_around_a_wall_without_contact(hall):
     places = []
     for _ in range(60):
         stage.engine.advance(0.05)
-        places.append((stage.person_W.x_m, stage.person_W.y_m))
+        places.append(stage.person_xy)
     assert places[-1] == pytest.approx((3.0, 0.0), abs=1e-6)
     aside = [math.hypot(max(abs(x - 2.0) - 0.1, 0.0), max(y - 1.0, 0.0)) for x, y in places]
     assert min(aside) > 0.22
@@ -186,8 +169,7 @@ def test_the_lidar_sees_a_walking_person(hall):
 def test_a_yielding_person_waits_for_a_robot_ahead_and_walks_on_later(hall):
     stage = hall((-1.0, -2.0), (-1.0, 3.0), robot=Pose2D(-1.0, 0.5, 0.0))
     stage.engine.advance(4.0)
-    held = stage.person_W.y_m
-    assert -0.6 < held < -0.4 and not stage.referee.collisions
+    assert -0.6 < stage.person_W.y_m < -0.4 and not stage.referee.collisions
     stage.drive(-0.8, 4.0)
     assert stage.person_W.y_m > 1.0 and not stage.referee.collisions
 
@@ -195,48 +177,39 @@ def test_a_yielding_person_waits_for_a_robot_ahead_and_walks_on_later(hall):
 def test_a_person_who_does_not_yield_walks_into_a_standing_robot(hall):
     stage = hall((-1.0, -2.0), (-1.0, 1.0), robot=Pose2D(-1.0, 0.5, 0.0), yields=False)
     stage.engine.advance(4.0)
-    verdict = stage.referee.judge([])
-    assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (0, 0, 1)
-    assert "Kim walked into Alice's" in stage.referee.events[0]
+    assert stage.blame == (0, 0, 1) and "Kim walked into Alice's" in stage.referee.events[0]
     assert stage.person_W.y_m == pytest.approx(1.0, abs=1e-6)
 
 
 def test_a_robot_that_drives_into_a_person_causes_the_collision(hall):
     stage = hall((-1.0, 0.0), (-1.0, 0.0))
     stage.drive(0.6, 4.0)
-    verdict = stage.referee.judge([])
-    assert (verdict.collisions, verdict.people_hit, verdict.hit_by_people) == (1, 1, 0)
-    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 0.0), abs=0.02)
-
-
-def test_a_restored_walk_continues(hall):
-    stage = hall((0.0, 2.0), (0.0, -2.0), loops=True)
-    stage.engine.advance(1.0)
-    state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
-    stage.engine.advance(1.0)
-    there = stage.person_W
-    stage.engine.resume(state, world)
-    stage.engine.advance(1.0)
-    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
+    assert (stage.blame, stage.person_xy) == ((1, 1, 0), pytest.approx((-1.0, 0.0), abs=0.02))
 
 
 def test_a_person_who_has_yielded_for_long_walks_around_the_robot(hall):
     stage = hall((-1.0, -1.0), (-1.0, 2.2), robot=Pose2D(-1.0, 0.5, 0.0))
     stage.engine.advance(9.0)
-    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((-1.0, 2.2), abs=1e-6)
-    assert not stage.referee.collisions
+    assert stage.person_xy == pytest.approx((-1.0, 2.2), abs=1e-6) and not stage.referee.collisions
 
 
-def test_a_detour_continues_after_a_restart(hall):
-    stage = hall((-1.0, -1.0), (-1.0, 3.5), robot=Pose2D(-1.0, 0.5, 0.0))
-    stage.engine.advance(4.5)
-    state, world = stage.engine.state(), {k: v.copy() for k, v in stage.engine.world_state().items()}
+# a loop without a robot in the way, and a detour around one
+@pytest.mark.parametrize(
+    ("points", "options", "before_s", "detour"),
+    [
+        (((0.0, 2.0), (0.0, -2.0)), {"loops": True}, 1.0, False),
+        (((-1.0, -1.0), (-1.0, 3.5)), {"robot": Pose2D(-1.0, 0.5, 0.0)}, 4.5, True),
+    ],
+)
+def test_a_restored_walk_continues(hall, points, options, before_s, detour):
+    stage = hall(*points, **options)
+    stage.engine.advance(before_s)
+    saved = stage.saved()
     stage.engine.advance(1.0)
-    there = stage.person_W
-    stage.engine.resume(state, world)
+    there = stage.person_xy
+    stage.engine.resume(*saved)
     stage.engine.advance(1.0)
-    assert stage.engine.walkers["Kim"].on_detour
-    assert (stage.person_W.x_m, stage.person_W.y_m) == pytest.approx((there.x_m, there.y_m), abs=1e-6)
+    assert (stage.engine.walkers["Kim"].on_detour, stage.person_xy) == (detour, pytest.approx(there, abs=1e-6))
 
 
 LINE = ((0.0, 0.0), (9.0, 0.0))
@@ -250,10 +223,8 @@ def test_a_distracted_person_stops_and_walks_on():
 
 def test_a_distracted_person_walks_back_first():
     walk = after(walk_of(Leg(LINE, 0.0), lapses=(Lapse(4.0, 2.0, 1.5),)), 6.0)
-    assert walk.place_W == pytest.approx((2.5, 0.0), abs=0.05)
-    assert abs(walk.heading_rad) == pytest.approx(math.pi)
-    assert after(walk, 3.0).place_W == pytest.approx((4.0, 0.0), abs=0.05)
-    assert after(walk, 9.0).place_W == (9.0, 0.0)
+    assert (walk.place_W, abs(walk.heading_rad)) == (pytest.approx((2.5, 0.0), abs=0.05), pytest.approx(math.pi))
+    assert (after(walk, 3.0).place_W, after(walk, 9.0).place_W) == (pytest.approx((4.0, 0.0), abs=0.05), (9.0, 0.0))
 
 
 def test_something_behind_ends_the_walk_back():
@@ -267,11 +238,19 @@ def test_the_pace_changes_on_the_path():
     assert after(walk, 5.0).place_W == pytest.approx((4.0, 0.0), abs=0.05)
 
 
-def test_a_walk_back_continues_from_a_state():
-    leg, lapses = Leg(LINE, 0.0), (Lapse(2.0, 1.0, 1.5),)
-    walk, other = after(walk_of(leg, lapses=lapses), 2.5), walk_of(leg, lapses=lapses)
+# a walk, which goes back after a lapse, or not -> it continues from its state
+@pytest.mark.parametrize(
+    ("leg", "lapses", "before_s", "after_s"),
+    [
+        (Leg(((0.0, 0.0), (1.0, 0.0), (1.0, 3.0)), 0.5), (), 1.7, 0.5),
+        (Leg(LINE, 0.0), (Lapse(2.0, 1.0, 1.5),), 2.5, 4.0),
+    ],
+)
+def test_a_walk_continues_from_a_state(leg, lapses, before_s, after_s):
+    walk, other = after(walk_of(leg, lapses=lapses), before_s), walk_of(leg, lapses=lapses)
     other.restore(walk.state())
-    assert walk.goes_back and after(other, 4.0).state() == after(walk, 4.0).state()
+    assert walk.goes_back is bool(lapses)
+    assert after(other, after_s).state() == after(walk, after_s).state()
 
 
 def test_a_person_follows_the_robot_that_has_spoken_near_them(hall):

@@ -10,8 +10,7 @@ def test_of_many_commands_the_last_are_known_and_the_old_ones_are_over():
     table = CommandTable()
     arm = table.begin(Part.ARM, None, 0.0, 1e9)
     ids = [table.begin(Part.VELOCITY, None, 0.05 * n, 0.05 * n + 0.5) for n in range(10 * MOST_STATUSES)]
-    assert len(table._statuses) <= MOST_STATUSES + 2
-    assert len(set(ids)) == len(ids)
+    assert len(table._statuses) <= MOST_STATUSES + 2 and len(set(ids)) == len(ids)
     assert table.status(arm).state is CommandState.RUNNING
     assert [table.status(each).state for each in ids[-2:]] == [CommandState.STOPPED, CommandState.RUNNING]
     assert table.status(ids[0]).reason == "it was over long ago"

@@ -41,17 +41,14 @@ def test_drift_over_ten_metres_is_about_a_percent_and_three_degrees():
     ends = [drive(OdometryModel(np.random.default_rng(seed)), straight(10.0)).pose for seed in range(40)]
     along = np.array([np.hypot(end.x_m, end.y_m) - 10.0 for end in ends])
     turned = np.degrees([end.yaw_rad for end in ends])
-    assert 0.04 < np.std(along) < 0.16
-    assert 1.5 < np.std(turned) < 4.5
-    assert np.max(np.abs(along)) < 0.4
+    assert 0.04 < np.std(along) < 0.16 and 1.5 < np.std(turned) < 4.5 and np.max(np.abs(along)) < 0.4
 
 
 def test_standing_and_swaying_adds_no_drift():
     rng = np.random.default_rng(3)
     poses = [(1.0 + 0.0005 * rng.standard_normal(), 2.0, 0.0005 * rng.standard_normal()) for _ in range(4000)]
     pose = drive(OdometryModel(np.random.default_rng(0)), poses).pose
-    assert np.hypot(pose.x_m, pose.y_m) < 0.01
-    assert abs(pose.yaw_rad) < 0.01
+    assert np.hypot(pose.x_m, pose.y_m) < 0.01 and abs(pose.yaw_rad) < 0.01
 
 
 def test_height_roll_and_pitch_are_true_within_small_noise():
@@ -59,8 +56,7 @@ def test_height_roll_and_pitch_are_true_within_small_noise():
     X_WB = RigidTransform(RollPitchYaw(0.05, -0.2, 1.0), [1, 2, 0.46])
     read = [model.update(i * 0.1, X_WB, ZERO, ZERO).X_OB for i in range(200)]
     rpy = np.array([RollPitchYaw(X.rotation()).vector() for X in read])
-    assert np.mean(rpy[:, 0]) == pytest.approx(0.05, abs=1e-3)
-    assert np.mean(rpy[:, 1]) == pytest.approx(-0.2, abs=1e-3)
+    assert (np.mean(rpy[:, 0]), np.mean(rpy[:, 1])) == (pytest.approx(0.05, abs=1e-3), pytest.approx(-0.2, abs=1e-3))
     assert 0.0005 < np.std([X.translation()[2] for X in read]) < 0.005
 
 

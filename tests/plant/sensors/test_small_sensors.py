@@ -4,18 +4,11 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from plant.sensors.proprioception import (
-    BatteryModel,
-    BatterySpec,
-    GripperModel,
-    ImuModel,
-    ImuNoise,
-    JointModel,
-    charge_after,
-)
+from plant.sensors import proprioception
+from plant.sensors.proprioception import BatteryModel, BatterySpec, GripperModel, ImuModel, JointModel, charge_after
 
 ZERO = np.zeros(3)
-QUIET_IMU = ImuNoise(0.0, 0.0, 0.0, 0.0)
+QUIET_IMU = proprioception.ImuNoise(0.0, 0.0, 0.0, 0.0)
 
 
 def rng():
@@ -46,9 +39,8 @@ def test_imu_has_bias_and_noise():
 
 def test_battery_lasts_its_runtime_at_load_and_longer_at_rest():
     spec = BatterySpec()
-    assert charge_after(1.0, 5400.0, 1.0, spec) == pytest.approx(0.0)
-    assert charge_after(1.0, 5400.0, 0.0, spec) == pytest.approx(0.6)
-    assert charge_after(0.1, 1e6, 1.0, spec) == 0.0
+    left = [charge_after(*each, spec) for each in ((1.0, 5400.0, 1.0), (1.0, 5400.0, 0.0), (0.1, 1e6, 1.0))]
+    assert left == [pytest.approx(0.0), pytest.approx(0.6), 0.0]
 
 
 def test_battery_reading_falls_with_time_and_an_impossible_charge_is_refused():
@@ -67,31 +59,27 @@ def feel(gripper, opening_rad, force_n, start_s, duration_s=1.0):
 
 def test_gripper_believes_it_holds_after_pressing_on_something_wide():
     readings = feel(GripperModel(rng()), 0.6, 30.0, 0.0)
-    assert not readings[0].holding
-    assert readings[-1].holding
+    assert not readings[0].holding and readings[-1].holding
     assert np.mean([r.force_n for r in readings]) == pytest.approx(30.0, rel=0.1)
     assert np.std([r.opening for r in readings]) == pytest.approx(0.003, rel=0.4)
 
 
 def test_gripper_notices_a_lost_object_and_holds_nothing_on_itself():
     gripper = GripperModel(rng())
-    assert feel(gripper, 0.6, 30.0, 0.0)[-1].holding
-    assert not feel(gripper, 0.0, 30.0, 1.0)[-1].holding
-    assert not feel(GripperModel(rng()), 0.0, 40.0, 0.0)[-1].holding
+    held = [feel(gripper, opening_rad, 30.0, start_s)[-1].holding for opening_rad, start_s in ((0.6, 0.0), (0.0, 1.0))]
+    assert [*held, feel(GripperModel(rng()), 0.0, 40.0, 0.0)[-1].holding] == [True, False, False]
 
 
 def test_gripper_moving_freely_holds_nothing_and_reads_no_negative_force():
     readings = feel(GripperModel(rng()), 1.0, 0.0, 0.0)
-    assert not any(r.holding for r in readings)
-    assert min(r.force_n for r in readings) >= 0.0
+    assert not any(r.holding for r in readings) and min(r.force_n for r in readings) >= 0.0
 
 
 def test_joint_readings_are_close_and_named_and_wrong_lengths_refused():
     joints = JointModel(rng(), ["a", "b"]).update(0.3, np.array([0.1, 0.2]), np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     assert joints.position_rad["b"] == pytest.approx(0.2, abs=0.01)
     assert joints.velocity_rad_s["a"] == pytest.approx(1.0, abs=0.1)
-    assert joints.effort_nm["b"] == pytest.approx(4.0, abs=2.0)
-    assert joints.position_rad["a"] != 0.1
+    assert joints.effort_nm["b"] == pytest.approx(4.0, abs=2.0) and joints.position_rad["a"] != 0.1
     with pytest.raises(ValueError):
         JointModel(rng(), ["a", "b"]).update(0.0, np.zeros(3), np.zeros(3), np.zeros(3))
 

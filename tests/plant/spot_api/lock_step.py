@@ -6,6 +6,8 @@ import time
 from contextlib import contextmanager
 from types import ModuleType
 
+import grpc
+
 from plant.robots.spot.kind import spot_capabilities
 from plant.spot_api.adapter.connection import Address, Connection
 from plant.spot_api.adapter.robot import ApiRobot
@@ -60,6 +62,19 @@ def robot_time(computer):
     for name in ("time", "monotonic", "perf_counter"):
         vars(made).update({name: computer.now_s, f"{name}_ns": lambda: round(computer.now_s() * 1e9)})
     return made
+
+
+class FailedCall(grpc.RpcError):
+    """Call that fails with a code."""
+
+    def __init__(self, code, details="cut"):
+        self._code, self._details = code, details
+
+    def code(self):
+        return self._code
+
+    def details(self):
+        return self._details
 
 
 class LockStep:
@@ -125,6 +140,23 @@ class LockStep:
     def done(self, command):
         """Advances until a command has ended."""
         return self.until(lambda: self.robot.command_status(command).state.value != "running", every_s=0.1)
+
+    def ends(self, command):
+        """Advances until a command has ended; returns its status."""
+        assert self.until(lambda: self.robot.command_status(command).state.value != "running", 40.0)
+        return self.robot.command_status(command)
+
+    def until_in(self, seconds):
+        """The end, in some seconds, of a command, and the test's lease."""
+        return {"until_s": self.now() + seconds, "lease": self.lease}
+
+    def drive(self, vx, seconds=0.2, *, vy=0.0, wz=0.0):
+        """Commands a drive; returns its number."""
+        return self.robot.drive(vx, vy, wz, **self.until_in(seconds))
+
+    def status(self, command):
+        """The status of a command."""
+        return self.robot.command_status(command)
 
     def stand_up(self):
         """Switches the motors on and stands up."""

@@ -43,8 +43,7 @@ def known_poses(world):
 def test_walls_are_where_they_are(world, band):
     made, true = grids(world, band)
     walls = made.centres(np.argwhere(made.occupied))
-    assert len(walls) > 5000
-    assert np.mean(true.distance_m(walls) <= FLOORS_M[world.name]) > 0.97
+    assert len(walls) > 5000 and np.mean(true.distance_m(walls) <= FLOORS_M[world.name]) > 0.97
 
 
 def test_the_map_shows_all_that_the_body_could_touch(world):

@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -31,36 +32,37 @@ def outline(placement):
     return outline_W(placement.form, (pose.x_m, pose.y_m), pose.yaw_rad)
 
 
+@pytest.fixture
+def things(placed):
+    return [*itertools.chain(*placed.values())]
+
+
 def test_each_thing_lies_in_its_room(world, placed):
-    for things in placed.values():
-        assert {t.name: world.surface_places[t.surface or ""] for t in things} == HOME
+    rooms = [{each.name: world.surface_places[each.surface or ""] for each in seeded} for seeded in placed.values()]
+    assert rooms == [HOME] * len(SEEDS)
 
 
-def test_each_thing_starts_a_millimetre_above_its_surface(world, placed):
-    for thing in itertools.chain(*placed.values()):
-        top = world.surfaces[thing.surface or ""].height_m
-        rest = thing.form.rest_height_m
-        assert thing.X_WO.translation()[2] - rest - top == pytest.approx(0.001)
+def test_each_thing_starts_a_millimetre_above_its_surface(world, things):
+    for thing in things:
+        rests_m = world.surfaces[thing.surface or ""].height_m + thing.form.rest_height_m
+        assert thing.X_WO.translation()[2] - rests_m == pytest.approx(0.001)
         assert thing.X_WO.rotation().matrix()[2, 2] == pytest.approx(1.0)
 
 
-def test_each_thing_lies_within_reach_of_a_front_edge(world, placed):
-    for thing in itertools.chain(*placed.values()):
-        centre = thing.X_WO.translation()[:2]
-        depths = []
+def test_each_thing_lies_within_reach_of_a_front_edge(world, things):
+    for thing in things:
+        depths, centre = [], thing.X_WO.translation()[:2]
         for a, b in np.array(world.seed_rules.fronts[thing.surface or ""]):
             along = (b - a) / np.linalg.norm(b - a)
             if 0 <= (centre - a) @ along <= np.linalg.norm(b - a):
                 depths.append(abs(along[0] * (centre - a)[1] - along[1] * (centre - a)[0]))
-        assert min(depths) >= 0.08 - 1e-9
-        assert min(depths) <= 0.25 + 1e-9
+        assert 0.08 - 1e-9 <= min(depths) <= 0.25 + 1e-9
 
 
-def test_outlines_stay_on_the_surface(world, placed):
-    for thing in itertools.chain(*placed.values()):
+def test_outlines_stay_on_the_surface(world, things):
+    for thing in things:
         corners = np.array(world.surfaces[thing.surface or ""].polygon_W)
-        assert np.all(outline(thing) >= corners.min(axis=0))
-        assert np.all(outline(thing) <= corners.max(axis=0))
+        assert np.all((corners.min(axis=0) <= outline(thing)) & (outline(thing) <= corners.max(axis=0)))
 
 
 def test_things_keep_clear_of_each_other_and_of_fixtures(world, placed):
@@ -71,13 +73,13 @@ def test_things_keep_clear_of_each_other_and_of_fixtures(world, placed):
         assert min(polygon_distance(a, b) for a, b in pairs) >= 0.12 - 1e-9
 
 
-def test_every_allowed_surface_is_used(world, placed):
-    used = {(thing.name, thing.surface) for thing in itertools.chain(*placed.values())}
+def test_every_allowed_surface_is_used(world, things):
+    used = {(thing.name, thing.surface) for thing in things}
     assert used == {(rule.name, surface) for rule in world.seed_rules.objects for surface in rule.surfaces}
 
 
-def test_every_form_of_a_class_is_used(placed):
-    used = {(thing.class_name, thing.form.file) for thing in itertools.chain(*placed.values())}
+def test_every_form_of_a_class_is_used(things):
+    used = {(thing.class_name, thing.form.file) for thing in things}
     forms = {(name, form.file) for name, entry in load_catalogue().items() for form in entry.forms.values()}
     assert used == {pair for pair in forms if pair[0] != "person"}
 
@@ -89,31 +91,25 @@ def test_poses_differ_between_seeds_and_not_within_one(world, placed):
 
 
 def test_the_person_stands_before_the_robot_and_looks_at_it(world):
-    start = np.array([world.start.x_m, world.start.y_m])
     for seed in SEEDS:
         (robin,) = place_people(world, seed)
-        offset = robin.X_WO.translation()[:2] - start
-        assert 0.9 <= np.linalg.norm(offset) <= 1.3
-        assert robin.X_WO.rotation().matrix()[:2, 0] @ offset / np.linalg.norm(offset) < -0.9
-        assert robin.X_WO.translation()[2] == 0.0
+        x, y, z = robin.X_WO.translation() - [world.start.x_m, world.start.y_m, 0.0]
+        assert (0.9 <= math.hypot(x, y) <= 1.3, z) == (True, 0.0)
+        assert robin.X_WO.rotation().matrix()[:2, 0] @ [x, y] / math.hypot(x, y) < -0.9
 
 
-def test_things_that_do_not_fit_are_refused(world):
-    crowded = world.seed_rules.model_copy(update={"objects": world.seed_rules.objects[:1] * 60})
-    with pytest.raises(WorldError, match="coke finds no free spot on kitchen"):
-        place_objects(dataclasses.replace(world, seed_rules=crowded), 1)
-
-
-def test_a_model_that_does_not_exist_is_refused(world):
-    rule = world.seed_rules.objects[0].model_copy(update={"model": "sofa"})
-    wrong = world.seed_rules.model_copy(update={"objects": (rule,)})
-    with pytest.raises(WorldError, match="no model 'sofa'; there are beer, coke"):
+@pytest.mark.parametrize(
+    ("count", "change", "message"),
+    [(60, {}, "coke finds no free spot on kitchen"), (1, {"model": "sofa"}, "no model 'sofa'; there are beer, coke")],
+)
+def test_things_that_do_not_fit_or_have_no_model_are_refused(world, count, change, message):
+    rule = world.seed_rules.objects[0].model_copy(update=change)
+    wrong = world.seed_rules.model_copy(update={"objects": (rule,) * count})
+    with pytest.raises(WorldError, match=message):
         place_objects(dataclasses.replace(world, seed_rules=wrong), 1)
 
 
 def test_polygon_distance_is_zero_for_overlap_and_the_gap_otherwise():
     square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
-    assert polygon_distance(square, square + [0.5, 0.5]) == 0.0
-    assert polygon_distance(square, square * 0.2 + 0.4) == 0.0
-    assert polygon_distance(square, square + [1.3, 0.2]) == pytest.approx(0.3)
-    assert polygon_distance(square, square + [1.3, 1.4]) == pytest.approx(0.5)
+    others = [square + [0.5, 0.5], square * 0.2 + 0.4, square + [1.3, 0.2], square + [1.3, 1.4]]
+    assert [polygon_distance(square, other) for other in others] == [0.0, 0.0, pytest.approx(0.3), pytest.approx(0.5)]

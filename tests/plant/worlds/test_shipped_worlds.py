@@ -106,34 +106,23 @@ def test_from_before_every_door_it_is_seen_from_a_free_pose(world, keepout):
         views = [view for room in door.between if (view := view_of(knowledge, door, room)) is not None]
         poses = [{"x": view.x_m, "y": view.y_m, "yaw": view.yaw_rad} for view in views]
         lines = [np.linspace([view.x_m, view.y_m], door.at, 100) for view in views]
-        free = [
-            np.all(keepout.at(np.vstack([footprint(pose), line])) == FREE)
-            for pose, line in zip(poses, lines, strict=True)
-        ]
-        assert any(free), door
+        seen = [np.vstack([footprint(pose), line]) for pose, line in zip(poses, lines, strict=True)]
+        assert any(np.all(keepout.at(points) == FREE) for points in seen), door
 
 
-@pytest.mark.parametrize(
-    ("name", "door"),
-    [
-        pytest.param(name, door, id=f"{name}-{door.name}")
-        for name in PLANS
-        for door in load_plan(name).doors
-        if not door.open
-    ],
-)
+CLOSED = [(name, door) for name in PLANS for door in load_plan(name).doors if not door.open]
+
+
+@pytest.mark.parametrize(("name", "door"), CLOSED, ids=[f"{name}-{door.name}" for name, door in CLOSED])
 def test_every_door_is_as_wide_as_planned_and_free_on_both_sides(name, door):
     keepout, width = Map(load_world(name).surveyed.keepout_map_path), load_plan(name).width_m(door)
     across = np.array([0.0, 1.0]) if door.along_x else np.array([1.0, 0.0])
-    along = across[::-1]
-    middle = np.array([door.x, door.y])
+    along, middle = across[::-1], np.array([door.x, door.y])
     line = middle + np.arange(-width / 2 - 0.1, width / 2 + 0.1, 0.005)[:, None] * along
     assert np.sum(keepout.at(line) == FREE) * 0.005 == pytest.approx(width, abs=0.03)
-    reach, half = (0.65, width / 2 - 0.02) if name == "lab" else (1.05, width / 2 - 0.02)  # its corridors are narrow
-    way = (
-        middle + np.arange(-reach, reach, 0.01)[:, None, None] * across + np.arange(-half, half, 0.01)[:, None] * along
-    )
-    assert np.all(keepout.at(way) == FREE)
+    reach, half = 0.65 if name == "lab" else 1.05, width / 2 - 0.02  # the lab's corridors are narrow
+    lines = middle + np.arange(-half, half, 0.01)[:, None] * along
+    assert np.all(keepout.at(lines + np.arange(-reach, reach, 0.01)[:, None, None] * across) == FREE)
 
 
 def test_rooms_hang_together(knowledge, keepout):
@@ -142,9 +131,8 @@ def test_rooms_hang_together(knowledge, keepout):
     _, parts = cv2.connectedComponents(passable)
     centres = np.array([(p["pose"]["x"], p["pose"]["y"]) for p in knowledge["places"].values()])
     index = np.floor((centres - keepout.header["origin"][:2]) / resolution).astype(int)
-    labels = set(parts[index[:, 1], index[:, 0]])
-    assert len(labels) == 1
-    assert 0 not in labels
+    (label,) = set(parts[index[:, 1], index[:, 0]])
+    assert label != 0
 
 
 def test_known_places_hold_their_poses_and_surfaces(knowledge):
@@ -163,11 +151,8 @@ def test_viewpoints_face_their_surface_from_the_right_distance(knowledge):
         for view in surface["viewpoints"]:
             distance = -cv2.pointPolygonTest(polygon, (view["x"], view["y"]), True)
             assert 0.85 <= distance <= 1.0, name
-            ahead = (
-                view["x"] + (distance + 0.1) * np.cos(view["yaw"]),
-                view["y"] + (distance + 0.1) * np.sin(view["yaw"]),
-            )
-            assert cv2.pointPolygonTest(polygon, ahead, False) > 0, name
+            ahead = (distance + 0.1) * np.array([np.cos(view["yaw"]), np.sin(view["yaw"])])
+            assert cv2.pointPolygonTest(polygon, tuple(ahead + [view["x"], view["y"]]), False) > 0, name
 
 
 def test_surfaces_are_solid_and_flat_at_their_heights(world, knowledge, furnished):
@@ -179,10 +164,9 @@ def test_surfaces_are_solid_and_flat_at_their_heights(world, knowledge, furnishe
             for y in np.linspace(low[1] + 0.03, high[1] - 0.03, 4):
                 if any(np.hypot(x - t[0], y - t[1]) < 0.25 for t in things):
                     continue
-                below = query_object.ComputeSignedDistanceToPoint(np.array([x, y, surface["height"] - 0.01]), 0.0)
-                assert below, (name, x, y)
-                above = query_object.ComputeSignedDistanceToPoint(np.array([x, y, surface["height"] + 0.01]), 0.005)
-                assert not above, (name, x, y)
+                near = query_object.ComputeSignedDistanceToPoint
+                assert near(np.array([x, y, surface["height"] - 0.01]), 0.0), (name, x, y)
+                assert not near(np.array([x, y, surface["height"] + 0.01]), 0.005), (name, x, y)
 
 
 @pytest.mark.parametrize("name", ["scan", "keepout"])
@@ -216,8 +200,7 @@ def test_outside_of_the_walls_is_unknown(world, keepout):
 
 def test_the_coffee_table_is_for_the_body_and_not_for_the_lidar(world, keepout):
     middle = np.mean(world.surfaces["coffee table"].polygon_W, axis=0)
-    assert keepout.at(middle) == OCCUPIED
-    assert Map(world.surveyed.scan_map_path).at(middle) == FREE
+    assert (keepout.at(middle), Map(world.surveyed.scan_map_path).at(middle)) == (OCCUPIED, FREE)
 
 
 def test_people_and_things_are_not_surveyed(world, keepout):
@@ -242,8 +225,7 @@ def test_things_stay_where_the_seed_put_them(world, furnished):
     for thing in place_objects(world, 1):
         X_WO = plant.EvalBodyPoseInWorld(now, plant.GetBodyByName(thing.class_name))
         moved = X_WO.translation() - thing.X_WO.translation()
-        assert np.linalg.norm(moved[:2]) < 1e-3
-        assert moved[2] == pytest.approx(-0.001, abs=5e-4)
+        assert np.linalg.norm(moved[:2]) < 1e-3 and moved[2] == pytest.approx(-0.001, abs=5e-4)
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.nightly] * (name != "flat")) for name in PLANS])
@@ -258,13 +240,11 @@ def test_committed_world_is_what_the_builder_writes(name, tmp_path, monkeypatch)
 
 
 def test_a_way_of_more_than_a_hundred_metres_leads_around_the_rooms_of_the_lab():
-    corridors = {
-        room.name: room.inside for room in load_plan("lab").rooms if room.name.endswith(("corridor", "passage"))
-    }
-    widths = {name: min(x1 - x0, y1 - y0) for name, (x0, y0, x1, y1) in corridors.items()}
-    assert all(0.8 <= width <= 1.2 + 1e-9 for width in widths.values())
+    plan = load_plan("lab")
+    corridors = {room.name: room.inside for room in plan.rooms if room.name.endswith(("corridor", "passage"))}
+    assert all(0.8 <= min(x1 - x0, y1 - y0) <= 1.2 + 1e-9 for x0, y0, x1, y1 in corridors.values())
     middles = {name: ((x0 + x1) / 2, (y0 + y1) / 2) for name, (x0, y0, x1, y1) in corridors.items()}
     along_x = middles["east corridor"][0] - middles["west corridor"][0]
     along_y = middles["north corridor"][1] - middles["south corridor"][1]
     assert 2 * (along_x + along_y) > 100
-    assert all(0.75 <= load_plan("lab").width_m(door) <= 0.9 for door in load_plan("lab").doors if not door.open)
+    assert all(0.75 <= plan.width_m(door) <= 0.9 for door in plan.doors if not door.open)

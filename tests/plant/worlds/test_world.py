@@ -6,10 +6,11 @@ import shutil
 import pytest
 
 from executive.words.mission import Route
-from plant.worlds.seeding import place_objects, place_people
+from plant.worlds.seeding import PointStop, place_objects, place_people
 from plant.worlds.world import WORLDS_FOLDER, known_worlds, load_world
 from skills.files.errors import InputError
 from skills.robot import Pose2D
+from tests.tables import table
 
 
 @pytest.fixture
@@ -39,30 +40,25 @@ def test_an_unknown_world_is_told_the_near_one():
         load_world("flatt")
 
 
-@pytest.mark.parametrize(
-    ("file", "old", "new", "says"),
-    [
-        ("objects", "clear_m: 0.12", "cleer_m: 0.12", "LINE: unknown key 'cleer_m'; did you mean 'clear_m'"),
-        ("knowledge", "height: 0.75", "height: high", r"LINE: surfaces\.kitchen table\.height"),
-        ("knowledge", "[counter, worktop]\n", "[counter, worktop\n", r"\d+: broken YAML"),
-        ("objects", "[kitchen counter", "[kitchen countr", ".*no surface 'kitchen countr'.*mean 'kitchen counter'"),
-        ("objects", "[kitchen counter, kitchen table]", "[desk]", ".*'desk' may carry .* no entry under `fronts`"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(*table(__file__, "wrong_lines"))
 def test_a_wrong_line_is_named(copy, file, old, new, says):
     path = copy / f"{file}.yaml"
-    text = path.read_text(encoding="utf-8")
-    assert old in text
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    line = text[: text.index(old)].count("\n") + 1
+    before, found, after = path.read_text(encoding="utf-8").partition(old)
+    assert found
+    path.write_text(before + new + after, encoding="utf-8")
+    line = before.count("\n") + 1
     with pytest.raises(InputError, match=rf"{file}\.yaml:{says}".replace("LINE", str(line))):
         load_world(copy)
 
 
-def test_a_pipe_is_refused_at_once(copy):
-    (copy / "objects.yaml").unlink()
-    os.mkfifo(copy / "objects.yaml")
-    with pytest.raises(InputError, match=r"objects\.yaml:1: it is a pipe"):
+@pytest.mark.parametrize(
+    ("file", "make", "says"),
+    [("objects", os.mkfifo, ":1: it is a pipe"), ("knowledge", lambda path: None, ": there is no such file")],
+)
+def test_a_missing_file_is_named_and_a_pipe_refused_at_once(copy, file, make, says):
+    (copy / f"{file}.yaml").unlink()
+    make(copy / f"{file}.yaml")
+    with pytest.raises(InputError, match=rf"{file}\.yaml{says}"):
         load_world(copy)
 
 
@@ -74,12 +70,6 @@ def test_an_invalid_yaml_file_is_named(copy, text):
     with pytest.raises(InputError, match=r"objects\.yaml:[12]: ") as error:
         load_world(copy)
     assert len(str(error.value)) < 500
-
-
-def test_a_missing_file_is_named(copy):
-    (copy / "knowledge.yaml").unlink()
-    with pytest.raises(InputError, match=r"knowledge\.yaml: there is no such file"):
-        load_world(copy)
 
 
 def test_geometry_and_a_start_are_enough(copy):
@@ -107,26 +97,13 @@ def with_people(copy, people):
 
 def test_a_person_walks_on_a_route_of_places_and_points(copy):
     (kim,) = place_people(load_world(with_people(copy, WALKER)), seed=1)
-    assert kim.route is not None
-    assert [(stop.at_W, stop.pause_s) for stop in kim.route.stops] == [
-        ((8.4, 6.9), 0.0), ((8.0, 4.0), 2.0), ((5.75, 1.75), 0.0)
-    ]  # fmt: skip
-    assert (kim.route.speed_m_s, kim.route.loops, kim.route.start_s, kim.route.yields) == (0.9, True, 5.0, False)
+    stops = (PointStop((8.4, 6.9), 0.0), PointStop((8.0, 4.0), 2.0), PointStop((5.75, 1.75), 0.0))
+    facts = {"stops": stops, "speed_m_s": 0.9, "loops": True, "start_s": 5.0, "yields": False}
+    assert {name: getattr(kim.route, name) for name in facts} == facts
     assert tuple(kim.X_WO.translation()[:2]) == (8.4, 6.9)
 
 
-@pytest.mark.parametrize(
-    ("people", "says"),
-    [
-        ("people: [{name: Kim}]", "give 'route', or 'distance_m', 'bearing_rad' and 'turned_rad'"),
-        ("people: [{name: Kim, route: {waypoints: []}}]", "a route needs 'waypoints'"),
-        ("people: [{name: Kim, route: {wanders: true}}]", "Kim stands nowhere at first"),
-        ("people: [{name: Kim, route: {waypoints: [kitchen], follows: robot, loop: true}}]", "nor walks a loop"),
-        ("people: [{name: Kim, route: {waypoints: [kitchn]}}]", "Kim cannot walk to 'kitchn'.*did you mean 'kitchen'"),
-        ("people: [{name: Kim, route: {waypoints: [kitchen], speed: 9}}]", "route.speed"),
-        ("people: [{name: coke, route: {waypoints: [kitchen]}}]", "'coke' names two objects or people"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "wrong_people"))
 def test_a_wrong_person_is_refused(copy, people, says):
     with pytest.raises(InputError, match=says):
         load_world(with_people(copy, people))
@@ -134,13 +111,9 @@ def test_a_wrong_person_is_refused(copy, people, says):
 
 def test_routes_are_added_and_take_the_place_of_who_stands():
     world = load_world("flat")
-    walking = world.with_routes(
-        {"Robin": Route(waypoints=("kitchen", "office")), "Kim": Route(waypoints=((4.0, 4.5),))}
-    )
-    assert [(each.name, each.route is not None) for each in place_people(walking, 1)] == [
-        ("Robin", True), ("Kim", True)
-    ]  # fmt: skip
-    assert [each.name for each in place_people(world, 1)] == ["Robin"]
+    routes = {"Robin": Route(waypoints=("kitchen", "office")), "Kim": Route(waypoints=((4.0, 4.5),))}
+    walking = [(each.name, each.route is not None) for each in place_people(world.with_routes(routes), 1)]
+    assert (walking, [each.name for each in place_people(world, 1)]) == ([("Robin", True), ("Kim", True)], ["Robin"])
     with pytest.raises(InputError, match="'hammer' names two"):
         world.with_routes({"hammer": Route(waypoints=("kitchen",))})
 

@@ -5,24 +5,17 @@ import math
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, Succeeded
 from skills.back_off.skill import BackOff, BackOffInputs
 from skills.robot import BaseKind, Pose2D
 
 IN_THE_OPEN = Pose2D(3.0, 5.5, 0.0)
 
 
-def outcome(bench, inputs=None, limit_s=15.0):
-    """Run the skill to its end; the last step."""
-    skill = BackOff(bench.context())
-    for _ in range(4):
-        bench.tick()
-    skill.begin(inputs or BackOffInputs())
-    while isinstance(step := skill.step(), Running):
-        bench.tick()
-        assert bench.clock.now() < limit_s
-    skill.end()
-    return step
+def outcome(bench):
+    """Runs the skill to its end; the last step."""
+    bench.tick(4)
+    return bench.run(BackOff(bench.context()), BackOffInputs(), limit_s=15.0)
 
 
 def gone(bench, start):
@@ -45,19 +38,18 @@ def test_with_a_wall_behind_it_goes_in_another_direction():
     assert bench.robot.least_clearance_m > 0.02
 
 
+def test_an_obstacle_seen_behind_counts_too():
+    bench = Bench(IN_THE_OPEN, unmapped=[Box(1.9, 5.2, 2.3, 5.8, 0.0, 1.5)])
+    bench.tick(30)
+    assert isinstance(outcome(bench), Succeeded)
+    assert bench.robot.least_clearance_m > 0.02
+
+
 def test_a_base_that_cannot_go_sideways_goes_ahead_then():
     start = Pose2D(0.75, 5.5, 0.0)
     bench = Bench(start, base_kind=BaseKind.DIFFERENTIAL)
     assert isinstance(outcome(bench), Succeeded)
     assert bench.robot.pose.x_m == pytest.approx(start.x_m + 0.4, abs=0.05)
-
-
-def test_an_obstacle_seen_behind_counts_too():
-    bench = Bench(IN_THE_OPEN, unmapped=[Box(1.9, 5.2, 2.3, 5.8, 0.0, 1.5)])
-    for _ in range(30):
-        bench.tick()
-    assert isinstance(outcome(bench), Succeeded)
-    assert bench.robot.least_clearance_m > 0.02
 
 
 def test_shut_in_it_says_so_and_stays():
@@ -87,8 +79,7 @@ def test_a_robot_that_does_not_move_is_given_up():
 def test_it_stops_when_it_is_ended_while_it_drives():
     bench = Bench(IN_THE_OPEN)
     skill = BackOff(bench.context())
-    for _ in range(4):
-        bench.tick()
+    bench.tick(4)
     skill.begin(BackOffInputs())
     for _ in range(10):
         skill.step()

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from planar_robot import Bench, Box
 
-from skills.api import Cause, Running, Succeeded
+from skills.api import Cause, Succeeded
 from skills.clear_costmap.skill import ClearCostmap, ClearCostmapInputs
 from skills.robot import Pose2D
 
@@ -13,18 +13,12 @@ CRATE = Box(4.4, 5.2, 4.8, 5.8, 0.0, 1.2)
 
 
 def outcome(context, bench):
-    skill = ClearCostmap(context)
-    skill.begin(ClearCostmapInputs())
-    while isinstance(step := skill.step(), Running):
-        bench.tick()
-    skill.end()
-    return step
+    return bench.run(ClearCostmap(context), ClearCostmapInputs())
 
 
 def seen_bench():
     bench = Bench(Pose2D(3.0, 5.5, 0.0), unmapped=[CRATE])
-    for _ in range(40):
-        bench.tick()
+    bench.tick(40)
     assert len(bench.costmap.obstacle_cells()) > 0
     return bench
 
@@ -53,5 +47,4 @@ def test_the_surveyed_grid_stays():
 
 def test_a_costmap_that_cannot_forget_is_a_failed_precondition():
     bench = seen_bench()
-    step = outcome(dataclasses.replace(bench.context(), costmap=object()), bench)
-    assert step.cause is Cause.PRECONDITION
+    assert outcome(dataclasses.replace(bench.context(), costmap=object()), bench).cause is Cause.PRECONDITION

@@ -1,11 +1,7 @@
-"""Descriptions of objects in words."""
-
 import pytest
 
 from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.detect.descriptions import count_sentence, plural, wanted_names
-
-BENCH = Surface("bench", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.8)
 
 
 def seen(name, surface="bench", *attributes):
@@ -23,7 +19,7 @@ def seen(name, surface="bench", *attributes):
     ],
 )
 def test_counts_are_described_in_a_sentence(found, told):
-    assert count_sentence(found, [BENCH]) == told
+    assert count_sentence(found, [Surface("bench", ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), 0.8)]) == told
 
 
 def test_plural_of_class_names():

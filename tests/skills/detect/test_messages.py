@@ -1,11 +1,9 @@
-"""Messages of the detect skill in the log."""
-
 import json
 
 import numpy as np
 from made_detections import detected_3d
 from pydrake.math import RigidTransform
-from scripted_robot import ScriptedRobot, context_of
+from table_robot import TableRobot, context_of
 from table_scene import COKE, TABLE, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate
@@ -20,8 +18,7 @@ PLACE = LocalisationEstimate(0.0, RigidTransform(), np.diag([0.02**2, 0.02**2, 0
 def test_message_has_all_detections_and_their_positions_if_known():
     image = scene([COKE])
     found = (seen_as("coke", image), Detection("beer", 0.6, (1.0, 1.0, 9.0, 9.0)))
-    placed = detections_3d(image, PLACE, found[:1], [TABLE])
-    message = detections_message(image, found, placed)
+    message = detections_message(image, found, detections_3d(image, PLACE, found[:1], [TABLE]))
     coke, beer = message["detections"]
     assert (coke["class_id"], coke["surface"], len(coke["position_W"])) == (2, "table", 3)
     assert coke["sigma_m"][0] > 0.02
@@ -30,9 +27,8 @@ def test_message_has_all_detections_and_their_positions_if_known():
 
 
 def test_messages_are_json_but_for_the_picture():
-    context = context_of(ScriptedRobot())
-    tracker = Tracker(("coke",))
-    tracks = tracks_message(context, tracker.update([detected_3d()], lambda track: True))
+    context = context_of(TableRobot())
+    tracks = tracks_message(context, Tracker(("coke",)).update([detected_3d()], lambda track: True))
     coverage = coverage_message(context, {"table": SurfaceShares(0.5, 0.25)})
     assert json.loads(json.dumps(tracks))["tracks"][0]["class_name"] == "coke"
     assert json.loads(json.dumps(coverage))["surfaces"]["table"] == {"seen": 0.5, "hidden": 0.25, "out_of_view": 0.25}

@@ -1,7 +1,7 @@
 """Search for own objects, which the detector knows by their models."""
 
 from own_models import can_model
-from scripted_robot import Colours, ScriptedRobot, context_of, failed, outcome
+from table_robot import Colours, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, COKE, GREEN, RED, TABLE, Can
 
 from skills.api import Cause, Succeeded
@@ -24,7 +24,7 @@ class Counting(Colours):
 
 def search(things, name, networks=None):
     detector = ModelDetector(networks or Colours({"coke": RED}), MODELS)
-    return Detect(context_of(ScriptedRobot(things=things), detector=detector)), DetectInputs((name,), (TABLE,))
+    return Detect(context_of(TableRobot(things=things), detector=detector)), DetectInputs((name,), (TABLE,))
 
 
 def test_own_object_is_found_by_its_model_from_two_sides():

@@ -15,9 +15,7 @@ BOX = Can(1.1, 0.25, 0.06, 0.10, GREY)
 
 
 def clusters(*things):
-    view = segment_surface(scene(things), RigidTransform(), TABLE)
-    assert view is not None
-    return view.clusters
+    return segment_surface(scene(things), RigidTransform(), TABLE).clusters
 
 
 def track_at(x, y, **seen):
@@ -28,6 +26,10 @@ def track_at(x, y, **seen):
 def test_clusters_with_a_track_are_not_unlabelled():
     left = unlabelled_clusters(clusters(COKE, BOX), track_at(COKE.x, COKE.y), ("coke",))
     assert [round(one.shape.centre[1], 1) for one in left] == [0.2]
+
+
+def test_an_empty_table_has_no_unlabelled_clusters():
+    assert unlabelled_clusters(clusters(), (), ("coke",)) == []
 
 
 def test_cluster_with_a_track_that_may_be_wanted_stays_unlabelled():
@@ -46,7 +48,3 @@ def test_clusters_too_large_or_small_for_the_class_are_ignored():
 
 def test_a_place_that_was_seen_twice_counts_once():
     assert len(unlabelled_clusters([*clusters(COKE), *clusters(COKE)], (), ("coke",))) == 1
-
-
-def test_an_empty_table_has_no_unlabelled_clusters():
-    assert unlabelled_clusters(clusters(), (), ("coke",)) == []

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from scripted_robot import Colours, ScriptedRobot, context_of, failed, outcome
+from table_robot import Colours, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, COKE, GREEN, RED, TABLE, Can
 
 from skills.api import Cause, Succeeded
@@ -15,7 +15,7 @@ ODD = Can(1.1, 0.25, 0.04, 0.09, GREEN)
 
 
 def seen(things, inputs, **options):
-    step = outcome(Detect(context_of(ScriptedRobot(things=things), **options)), inputs)
+    step = outcome(Detect(context_of(TableRobot(things=things), **options)), inputs)
     assert isinstance(step, Succeeded), step
     return step
 
@@ -51,7 +51,7 @@ def test_the_nearest_and_most_free_is_the_first():
 
 
 def test_search_for_anything_on_an_empty_table_fails():
-    failed(Detect(context_of(ScriptedRobot(things=[]))), ANY, Cause.POSTCONDITION, "no thing seen on the table")
+    failed(Detect(context_of(TableRobot(things=[]))), ANY, Cause.POSTCONDITION, "no thing seen on the table")
 
 
 def test_an_object_is_found_again_at_its_expected_position():
@@ -63,5 +63,5 @@ def test_an_object_without_a_class_has_colours_and_no_size_attribute():
     red = replace(ODD, colour=RED)
     unknowing = Colours({"coke": BLUE})
     assert seen([red], replace(ANY, attributes=("red",)), detector=unknowing).outputs["observation"].kind.attributes
-    skill = Detect(context_of(ScriptedRobot(things=[ODD])))
+    skill = Detect(context_of(TableRobot(things=[ODD])))
     failed(skill, replace(ANY, attributes=("big",)), Cause.POSTCONDITION, "no big thing")

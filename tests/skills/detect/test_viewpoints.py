@@ -10,8 +10,7 @@ def filled(width_m, depth_m, x_m=0.0, y_m=0.0, yaw_rad=0.0):
     """Points all over a rectangle with a corner at (x, y), then rotated about the origin."""
     x, y = np.meshgrid(np.arange(0.0, width_m, 0.01), np.arange(0.0, depth_m, 0.01))
     points = np.column_stack([x.ravel() + x_m, y.ravel() + y_m])
-    turn = np.array([[np.cos(yaw_rad), -np.sin(yaw_rad)], [np.sin(yaw_rad), np.cos(yaw_rad)]])
-    return points @ turn.T
+    return points @ np.array([[np.cos(yaw_rad), -np.sin(yaw_rad)], [np.sin(yaw_rad), np.cos(yaw_rad)]]).T
 
 
 def inside_any(parts, point, margin_m=0.01):
@@ -26,8 +25,7 @@ def test_a_filled_rectangle_is_one_part(yaw_rad):
 
 
 def test_two_walls_at_a_corner_leave_the_space_between_them_free():
-    walls = np.concatenate([filled(0.7, 0.03), filled(0.03, 0.45)])
-    parts = standing_parts(walls)
+    parts = standing_parts(np.concatenate([filled(0.7, 0.03), filled(0.03, 0.45)]))
     assert not inside_any(parts, [0.3, 0.2])
     assert inside_any(parts, [0.6, 0.01])
     assert inside_any(parts, [0.01, 0.4])
@@ -39,5 +37,4 @@ def test_all_points_are_kept():
 
 
 def test_a_small_object_is_one_part_even_if_little_of_it_is_seen():
-    corner = np.concatenate([filled(0.1, 0.005), filled(0.005, 0.1)])
-    assert len(standing_parts(corner)) == 1
+    assert len(standing_parts(np.concatenate([filled(0.1, 0.005), filled(0.005, 0.1)]))) == 1

@@ -1,7 +1,5 @@
 """Maps in the forms that map_server, map_saver and slam_toolbox write: one small room, made anew in each form."""
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Callable, Mapping
@@ -16,7 +14,7 @@ FREE, UNKNOWN, OCCUPIED = 254, 205, 0
 SAVED: Final = "origin: [-1, -2, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
 
-def room() -> np.ndarray:
+def room():
     """A room of 10 x 8 cells with walls around, and unknown ground in its first row below the upper wall."""
     grey = np.full((8, 10), FREE, np.uint8)
     grey[[0, -1]], grey[:, [0, -1]], grey[1, 1:-1] = OCCUPIED, OCCUPIED, UNKNOWN
@@ -36,17 +34,17 @@ class MapForm:
     refused: str | None = None
     image: str = "image: {}\n"
 
-    def write(self, folder: Path) -> Path:
+    def write(self, folder):
         """Writes picture and YAML file."""
         path = folder / "m.yaml"
         path.write_text(self.image.format(self.picture(folder)) + self.keys)
         return path
 
 
-def binary_pgm(most: int = 255, *, head: str = "P5\n10 8\n{}\n", tail: bytes = b"") -> Callable[[Path], str]:
+def binary_pgm(most=255, *, head="P5\n10 8\n{}\n", tail=b""):
     """Writer of a P5 picture with a maximum."""
 
-    def write(folder: Path) -> str:
+    def write(folder):
         scaled = np.floor(room() / 255.0 * most)
         content = head.format(most).encode() + scaled.astype("u1" if most < 256 else ">u2").tobytes() + tail
         (folder / "m.pgm").write_bytes(content)
@@ -55,10 +53,10 @@ def binary_pgm(most: int = 255, *, head: str = "P5\n10 8\n{}\n", tail: bytes = b
     return write
 
 
-def text_pgm(most: int = 255, *, end: str = "\n") -> Callable[[Path], str]:
+def text_pgm(most=255, *, end="\n"):
     """Writer of a P2 picture with a maximum."""
 
-    def write(folder: Path) -> str:
+    def write(folder):
         rows = (" ".join(str(int(value / 255 * most)) for value in row) for row in room())
         (folder / "m.pgm").write_text(f"P2\n# CREATOR: GIMP\n10 8\n{most}\n" + "\n".join(rows) + end)
         return "m.pgm"
@@ -66,23 +64,23 @@ def text_pgm(most: int = 255, *, end: str = "\n") -> Callable[[Path], str]:
     return write
 
 
-def picture(name: str, pixels: Callable[[np.ndarray], np.ndarray] = lambda grey: grey) -> Callable[[Path], str]:
+def picture(name, pixels=lambda grey: grey):
     """Writer of a picture in any format of OpenCV."""
 
-    def write(folder: Path) -> str:
+    def write(folder):
         cv2.imwrite(str(folder / name), pixels(room()))
         return name
 
     return write
 
 
-def png(kind: int, depth: int, samples: Callable[[np.ndarray], np.ndarray], **chunks: bytes) -> Callable[[Path], str]:
+def png(kind, depth, samples, **chunks):
     """Writer of a PNG of a colour type and depth that OpenCV does not write."""
 
-    def chunk(name: bytes, data: bytes) -> bytes:
+    def chunk(name, data):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
-    def write(folder: Path) -> str:
+    def write(folder):
         values = samples(room())
         content = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 10, 8, depth, kind, 0, 0, 0))
         content += b"".join(chunk(name.encode(), data) for name, data in chunks.items())
@@ -93,21 +91,21 @@ def png(kind: int, depth: int, samples: Callable[[np.ndarray], np.ndarray], **ch
     return write
 
 
-def _palette(grey: np.ndarray) -> np.ndarray:
+def _palette(grey):
     return np.searchsorted([OCCUPIED, UNKNOWN, FREE], grey).astype(np.uint8)
 
 
-def _two_bits(grey: np.ndarray) -> np.ndarray:
+def _two_bits(grey):
     indices = np.pad(_palette(grey), ((0, 0), (0, 2))).reshape(8, 3, 4)
     return (indices @ np.array([64, 16, 4, 1])).astype(np.uint8)
 
 
-def _alpha(grey: np.ndarray) -> np.ndarray:
+def _alpha(grey):
     hidden = grey == UNKNOWN
     return np.dstack([*[np.where(hidden, 128, grey)] * 3, np.where(hidden, 127, 255)]).astype(np.uint8)
 
 
-def _percent(grey: np.ndarray) -> np.ndarray:
+def _percent(grey):
     return np.select([grey == OCCUPIED, grey == UNKNOWN], [100, 255], 0).astype(np.uint8)
 
 

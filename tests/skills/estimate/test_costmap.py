@@ -9,9 +9,8 @@ PERSON = Box(3.2, 5.2, 3.6, 5.6, 0.0, 1.7)
 AT_PERSON = np.array([[3.2, 5.4]])
 
 
-def ticked(bench: Bench, ticks: int = 10) -> Bench:
-    for _ in range(ticks):
-        bench.tick()
+def ticked(bench, ticks=10):
+    bench.tick(ticks)
     return bench
 
 
@@ -35,8 +34,7 @@ def test_a_person_who_walks_away_is_forgotten_at_once():
 
 
 def test_obstacles_below_the_beams_stay_remembered_and_then_decay():
-    crate = Box(2.6, 5.2, 3.0, 5.6, 0.0, 0.3)
-    bench = ticked(Bench(START, unmapped=[crate], cameras=False))
+    bench = ticked(Bench(START, unmapped=[Box(2.6, 5.2, 3.0, 5.6, 0.0, 0.3)], cameras=False))
     ahead = np.array([[2.7, 5.4]])
     assert bench.costmap.clearance_m(ahead)[0] > 0.5  # the LiDAR passes over it
     points = np.column_stack(
@@ -50,22 +48,14 @@ def test_obstacles_below_the_beams_stay_remembered_and_then_decay():
     assert bench.costmap.clearance_m(ahead)[0] > 0.5
 
 
-def test_single_depth_points_count_as_noise():
+@pytest.mark.parametrize(
+    "points_W",
+    [[[3.0, 5.4, 0.3], [3.5, 5.0, 0.3]], [[1.8, 5.5, 0.4]] * 20, [[5.0, 6.52, 0.4]] * 20],
+    ids=["single", "on the robot", "on surveyed furniture"],
+)
+def test_depth_points_that_are_no_obstacles_are_ignored(points_W):
     bench = ticked(Bench(START))
-    bench.costmap.add_points(np.array([[3.0, 5.4, 0.3], [3.5, 5.0, 0.3]]), bench.clock.now())
-    assert len(bench.costmap.obstacle_cells()) == 0
-
-
-def test_points_on_the_robot_are_ignored():
-    bench = ticked(Bench(START))
-    on_body = np.tile([[1.8, 5.5, 0.4]], (20, 1))
-    bench.costmap.add_points(on_body, bench.clock.now())
-    assert len(bench.costmap.obstacle_cells()) == 0
-
-
-def test_points_on_surveyed_furniture_are_ignored():
-    bench = ticked(Bench(START))
-    bench.costmap.add_points(np.tile([[5.0, 6.52, 0.4]], (20, 1)), bench.clock.now())
+    bench.costmap.add_points(np.array(points_W), bench.clock.now())
     assert len(bench.costmap.obstacle_cells()) == 0
 
 

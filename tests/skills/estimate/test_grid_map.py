@@ -1,11 +1,10 @@
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
 
 from skills.estimate.grid_map import FilterMask, GridMap, load_grid_map
 from skills.files.errors import InputError
+from tests.tables import table
 
 YAML = """image: room.pgm
 resolution: 0.1
@@ -17,7 +16,7 @@ height_band_m: [0.7, 1.3]
 """
 
 
-def write_map(folder: Path, text: str = YAML) -> Path:
+def write_map(folder, text=YAML):
     grey = np.full((20, 30), 254, dtype=np.uint8)
     grey[0, :] = 0  # the picture's top row: the largest y
     grey[5, 7] = 205
@@ -61,36 +60,7 @@ def test_unknown_ground_is_blocked_for_planning(tmp_path):
     assert grid.distance_m(grid.centres(np.array([[14, 7]])))[0] < 0.0
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "line", "key"),
-    [
-        ("resolution: 0.1", "resolution: -1", 2, "resolution"),
-        ("resolution: 0.1", "resolution: fine", 2, "resolution"),
-        ("origin: [-1.0, -2.0, 0.0]", "origin: [1, 2]", 3, "origin"),
-        ("resolution: 0.1", "resolution: 0", 2, "resolution"),
-        ("resolution: 0.1", "resolution: 50", 2, "resolution"),
-        ("negate: 0", "mode: grey", 4, "mode"),
-        ("resolution: 0.1", "resolutoin: 0.1", 2, "unknown key 'resolutoin'; did you mean 'resolution'"),
-        ("negate: 0", "resolution: 1", 4, "key 'resolution' stands twice"),
-        ("negate: 0", "mode: scale\ntrinary: true", 5, "trinary: 'mode' says scale"),
-        ("origin: [-1.0, -2.0, 0.0]", "origin: [448262.5, -2, 0.0]", 3, "origin"),
-        (
-            "origin: [-1.0, -2.0, 0.0]",
-            "origin: [0, 0, 90]",
-            3,
-            "origin.2: should be from -6.283 to 6.283 rad; it reads 90 now; write 1.57",
-        ),
-        ("origin: [-1.0, -2.0, 0.0]", "origin: [0, .nan, 0]", 3, "origin"),
-        ("resolution: 0.1", "resolution: .inf", 2, "resolution"),
-        ("image: room.pgm", "image: http://x/room.pgm", 1, "image"),
-        ("image: room.pgm", "image: ../room.pgm", 1, "image: '../room.pgm' leads out of the folder"),
-        ("image: room.pgm", "image: /etc/passwd", 1, "image"),
-        ("image: room.pgm", "image: .", 1, "image"),
-        ("free_thresh: 0.196", "free_thresh: 0.9", 6, "free_thresh"),
-        ("image: room.pgm", "image: hall.pgm", 1, "image"),
-        ("negate: 0", "negate: [0", 5, "broken YAML"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "errors"))
 def test_errors_name_file_line_and_hint(tmp_path, old, new, line, key):
     path = write_map(tmp_path, YAML.replace(old, new))
     with pytest.raises(InputError) as error:
@@ -105,9 +75,14 @@ def test_missing_key_and_missing_file_are_named(tmp_path):
         load_grid_map(tmp_path / "nowhere.yaml")
 
 
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    (tmp_path / "room.yaml").write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match=r"room\.yaml:2: it is no UTF-8 text"):
+        load_grid_map(tmp_path / "room.yaml")
+
+
 def test_a_turned_map_is_given_with_axes_of_the_world(tmp_path):
-    turned = YAML.replace("0.0]", "1.5707963267948966]")
-    grid = load_grid_map(write_map(tmp_path, turned))
+    grid = load_grid_map(write_map(tmp_path, YAML.replace("0.0]", "1.5707963267948966]")))
     assert grid.resolution_m == pytest.approx(0.05)
     assert grid.origin_m == pytest.approx((-3.0, -2.0))
     assert grid.size_m == pytest.approx((2.0, 3.0))
@@ -118,12 +93,8 @@ def test_a_turned_map_is_given_with_axes_of_the_world(tmp_path):
 
 def test_a_map_turned_by_any_angle_keeps_its_walls_in_place(tmp_path):
     grid = load_grid_map(write_map(tmp_path, YAML.replace("0.0]", "0.6]")))
-    along = np.linspace(0.1, 2.9, 50)
-    wall = (
-        np.array([-1.0, -2.0])
-        + along[:, None] * [np.cos(0.6), np.sin(0.6)]
-        + 1.95 * np.array([-np.sin(0.6), np.cos(0.6)])
-    )
+    c, s = np.cos(0.6), np.sin(0.6)
+    wall = np.array([-1.0, -2.0]) + np.linspace(0.1, 2.9, 50)[:, None] * [c, s] + 1.95 * np.array([-s, c])
     assert np.abs(grid.distance_m(wall)).max() < 0.08
     assert grid.occupied[tuple(grid.cells(wall).T)].all()
 
@@ -140,70 +111,62 @@ def test_negated_maps_are_white_where_occupied(tmp_path):
     assert grid.occupied.sum() == 20 * 30 - 30
 
 
-def _png(folder, picture):
-    cv2.imwrite(str(folder / "other.png"), picture)
-    return "other.png"
-
-
-def _pgm(folder, head, size):
-    (folder / "other.pgm").write_bytes(head + b"\0" * size)
-    return "other.pgm"
-
-
+# Bytes of a picture -> the reason why it is no map
 @pytest.mark.parametrize(
-    ("picture", "why"),
+    ("content", "why"),
     [
-        (lambda folder: _pgm(folder, b"P5\n30 20\n255\n", 599), "30 x 20 pixels, 600 values, and it has 599"),
-        (lambda folder: _pgm(folder, b"P5\n30 20\n65535\n", 600), "it has 300"),
-        (lambda folder: _pgm(folder, b"P2\n3 2\n255\n1 2 3 4 5 x", 0), "it has 5"),
-        (lambda folder: _pgm(folder, b"P2\n3 2\n255\n1 2 3 4 5", 0), "it has 5"),
-        (lambda folder: _pgm(folder, b"P5\n30 20\n0\n", 600), "its greatest value is 0"),
-        (lambda folder: _pgm(folder, b"P5\n20000 20000\n255\n", 9), "20000 x 20000 pixels"),
-        (lambda folder: _pgm(folder, b"P5\n1 600\n255\n", 600), "1 x 600 cells"),
-        (lambda folder: _pgm(folder, b"version https://git-lfs.github.com/spec/v1\n", 0), "pointer of Git LFS"),
-        (lambda folder: _pgm(folder, b"P9", 99), "no picture|damaged"),
+        (b"P5\n30 20\n255\n" + bytes(599), "30 x 20 pixels, 600 values, and it has 599"),
+        (b"P5\n30 20\n65535\n" + bytes(600), "it has 300"),
+        (b"P2\n3 2\n255\n1 2 3 4 5 x", "it has 5"),
+        (b"P2\n3 2\n255\n1 2 3 4 5", "it has 5"),
+        (b"P5\n30 20\n0\n" + bytes(600), "its greatest value is 0"),
+        (b"P5\n20000 20000\n255\n" + bytes(9), "20000 x 20000 pixels"),
+        (b"P5\n1 600\n255\n" + bytes(600), "1 x 600 cells"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "pointer of Git LFS"),
+        (b"P9" + bytes(99), "no picture|damaged"),
     ],
 )
-def test_a_picture_that_is_no_map_is_refused_with_the_reason(tmp_path, picture, why):
+def test_a_picture_that_is_no_map_is_refused_with_the_reason(tmp_path, content, why):
     path = write_map(tmp_path)
-    path.write_text(YAML.replace("room.pgm", picture(tmp_path)))
+    (tmp_path / "room.pgm").write_bytes(content)
     with pytest.raises(InputError, match=rf"room\.yaml:1: image: .*{why}"):
         load_grid_map(path)
-
-
-def test_a_file_that_is_no_text_is_refused(tmp_path):
-    (tmp_path / "room.yaml").write_bytes(bytes(range(256)))
-    with pytest.raises(InputError, match=r"room\.yaml:2: it is no UTF-8 text"):
-        load_grid_map(tmp_path / "room.yaml")
 
 
 GREYS = np.repeat([[0], [205], [254], [128]], 30, axis=1).astype(np.uint8)
 """Occupied, unknown, free and grey, from the top."""
 
 
-def classes(folder: Path, name: str, keys: str = "") -> tuple[list[bool], list[bool]]:
+def classes(folder, content, keys="", name="m.pgm"):
     """Whether each row of a picture is occupied, and unknown, from the top."""
+    if isinstance(content, bytes):
+        (folder / name).write_bytes(content)
+    else:
+        name = "m.png"
+        cv2.imwrite(str(folder / name), content)
     (folder / "room.yaml").write_text(YAML.replace("room.pgm", name).replace("negate: 0\n", "") + keys)
     grid = load_grid_map(folder / "room.yaml")
-    assert grid.unknown is not None
     return grid.occupied[::-1, 3].tolist(), grid.unknown[::-1, 3].tolist()
 
 
 TRINARY = ([True, False, False, False], [False, True, False, True])
 
 
-def pnm(head: bytes, values: np.ndarray, kind: str = "u1") -> bytes:
+def pnm(head, values, kind="u1"):
     return head + values.astype(kind).tobytes()
+
+
+PLAIN = pnm(b"P5\n30 4\n255\n", GREYS)
 
 
 @pytest.mark.parametrize(
     "content",
     [
-        pnm(b"P5\n30 4\n255\n", GREYS),
+        PLAIN,
         pnm(b"P5 30 4 255 ", GREYS),
         pnm(b"P5\n# made by map_saver 0.050 m/pix\n30 4\n#x\n255\n", GREYS),
         pnm(b"P5\r\n30 4\r\n255\r\n", GREYS),
-        pnm(b"P5\n30 4\n255\n", GREYS) + b"\n",
+        PLAIN + b"\n",
         pnm(b"P5\n30 4\n65535\n", GREYS * 257.0, ">u2"),
         pnm(b"P5\n30 4\n200\n", np.rint(GREYS / 255.0 * 200.0 - 0.4)),
         pnm(b"P6\n30 4\n255\n", np.repeat(GREYS[..., None], 3, axis=2)),
@@ -213,57 +176,45 @@ def pnm(head: bytes, values: np.ndarray, kind: str = "u1") -> bytes:
     ids=["p5", "blanks", "comments", "crlf", "trailing", "16bit", "max200", "colour", "p2", "p2max1000"],
 )
 def test_a_pgm_is_read_as_map_server_reads_it(tmp_path, content):
-    (tmp_path / "m.pgm").write_bytes(content)
-    assert classes(tmp_path, "m.pgm") == TRINARY
+    assert classes(tmp_path, content) == TRINARY
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_a_png_is_read_as_map_server_reads_it(tmp_path, channels, kind):
-    pixels = np.repeat(GREYS[..., None], channels, axis=2).astype(kind) * (257 if kind is np.uint16 else 1)
-    cv2.imwrite(str(tmp_path / "m.png"), pixels.squeeze())
-    assert classes(tmp_path, "m.png") == TRINARY
+@pytest.mark.parametrize(("kind", "scale"), [(np.uint8, 1), (np.uint16, 257)])
+def test_a_png_is_read_as_map_server_reads_it(tmp_path, channels, kind, scale):
+    pixels = np.repeat(GREYS[..., None], channels, axis=2).astype(kind) * scale
+    assert classes(tmp_path, pixels.squeeze()) == TRINARY
 
 
-def test_colours_are_averaged(tmp_path):
-    cv2.imwrite(str(tmp_path / "m.png"), np.tile(np.array([255, 255, 0], np.uint8), (4, 30, 1)))
-    assert classes(tmp_path, "m.png") == ([False] * 4, [True] * 4)
+PERCENT = pnm(b"P5\n30 4\n255\n", np.repeat([[100], [255], [0], [60]], 30, axis=1))
+NO_205, NO_0 = (np.dstack([GREYS] * 3 + [np.uint8(255) * (hidden != GREYS)]) for hidden in (205, 0))
+DARK_HALF, SECOND = [True, False, False, True], [False, True, False, False]
 
 
-def test_a_map_with_the_key_trinary_is_read_in_that_mode(tmp_path):
-    (tmp_path / "m.pgm").write_bytes(pnm(b"P5\n30 4\n255\n", GREYS))
-    assert classes(tmp_path, "m.pgm", "trinary: true\n") == TRINARY
-    assert classes(tmp_path, "m.pgm", "trinary: false\n") == ([True, False, False, True], [False] * 4)
+@pytest.mark.parametrize(
+    ("content", "keys", "expected"),
+    [
+        (np.tile(np.array([255, 255, 0], np.uint8), (4, 30, 1)), "", ([False] * 4, [True] * 4)),
+        (PERCENT, "mode: raw\n", (DARK_HALF, SECOND)),
+        (PLAIN, "trinary: true\n", TRINARY),
+        (PLAIN, "mode: trinary\ntrinary: true\n", TRINARY),
+        (PLAIN, "mode: Trinary\n", TRINARY),
+        (PLAIN, "trinary: false\n", (DARK_HALF, [False] * 4)),
+        (PLAIN, "mode: SCALE\n", (DARK_HALF, [False] * 4)),
+        (PERCENT, "mode: Raw\n", (DARK_HALF, SECOND)),
+        (NO_205, "mode: scale\n", (DARK_HALF, SECOND)),
+        (NO_0, "", ([False] * 4, [True, True, False, True])),
+    ],
+    ids=["colours", "raw", "trinary", "both", "Trinary", "no trinary", "SCALE", "Raw", "alpha, scale", "alpha"],
+)
+def test_classes_follow_from_mode_and_transparency(tmp_path, content, keys, expected):
+    assert classes(tmp_path, content, keys) == expected
 
 
-def test_transparent_ground_is_unknown_in_scale_mode(tmp_path):
-    pixels = np.dstack([GREYS, GREYS, GREYS, np.where(GREYS == 205, 0, 255)]).astype(np.uint8)
-    cv2.imwrite(str(tmp_path / "m.png"), pixels)
-    assert classes(tmp_path, "m.png", "mode: scale\n") == ([True, False, False, True], [False, True, False, False])
-
-
-def test_transparent_ground_is_unknown_in_trinary_mode_with_a_note_where_map_server_differs(tmp_path):
-    pixels = np.dstack([GREYS, GREYS, GREYS, np.where(GREYS == 0, 0, 255)]).astype(np.uint8)
-    cv2.imwrite(str(tmp_path / "m.png"), pixels)
-    assert classes(tmp_path, "m.png") == ([False] * 4, [True, True, False, True])
+def test_transparent_ground_is_noted_in_trinary_mode_where_map_server_differs(tmp_path):
+    classes(tmp_path, NO_0)
     (note,) = load_grid_map(tmp_path / "room.yaml").notes
     assert note.startswith("map_server reads 50 % of the picture otherwise")
-
-
-def test_values_are_percentages_in_raw_mode(tmp_path):
-    (tmp_path / "m.pgm").write_bytes(pnm(b"P5\n30 4\n255\n", np.repeat([[100], [255], [0], [60]], 30, axis=1)))
-    assert classes(tmp_path, "m.pgm", "mode: raw\n") == ([True, False, False, True], [False, True, False, False])
-
-
-@pytest.mark.parametrize("mode", ["Trinary", "SCALE", "Raw"])
-def test_the_mode_is_read_in_any_case(tmp_path, mode):
-    (tmp_path / "m.pgm").write_bytes(pnm(b"P5\n30 4\n255\n", GREYS))
-    assert classes(tmp_path, "m.pgm", f"mode: {mode}\n") == classes(tmp_path, "m.pgm", f"mode: {mode.lower()}\n")
-
-
-def test_the_keys_mode_and_trinary_may_agree(tmp_path):
-    (tmp_path / "m.pgm").write_bytes(pnm(b"P5\n30 4\n255\n", GREYS))
-    assert classes(tmp_path, "m.pgm", "mode: trinary\ntrinary: true\n") == TRINARY
 
 
 def test_unknown_keys_are_noted_and_not_read(tmp_path):
@@ -275,41 +226,31 @@ def test_unknown_keys_are_noted_and_not_read(tmp_path):
     )
 
 
-def test_a_map_that_was_moved_reads_the_picture_beside_it(tmp_path):
-    for name in ("/home/ros/maps/room.pgm", "C:\\maps\\room.pgm"):
-        grid = load_grid_map(write_map(tmp_path, YAML.replace("image: room.pgm", f"image: {name}")))
-        assert grid.occupied.sum() == 30
-        assert grid.notes == (f"image: there is no {name}; room.pgm beside the file is read",)
+def test_unknown_ground_that_counts_as_free_is_noted(tmp_path):
+    (note,) = load_grid_map(write_map(tmp_path, YAML.replace("0.196", "0.25"))).notes
+    assert "free_thresh is 0.25" in note
+    assert load_grid_map(write_map(tmp_path)).notes == ()
 
 
-def test_bytes_after_the_last_pixel_are_noted_and_not_read(tmp_path):
-    for content in (pnm(b"P5\n30 4\n255\n", GREYS) + b"\n\0\0tail", b"P2\n30 4\n255\n" + b"0 " * 120 + b"\n9 tail"):
-        (tmp_path / "m.pgm").write_bytes(content)
-        classes(tmp_path, "m.pgm")
-        (note,) = load_grid_map(tmp_path / "room.yaml").notes
-        assert "after the last pixel" in note
+@pytest.mark.parametrize("name", ["/home/ros/maps/room.pgm", "C:\\maps\\room.pgm"])
+def test_a_map_that_was_moved_reads_the_picture_beside_it(tmp_path, name):
+    grid = load_grid_map(write_map(tmp_path, YAML.replace("image: room.pgm", f"image: {name}")))
+    assert grid.occupied.sum() == 30
+    assert grid.notes == (f"image: there is no {name}; room.pgm beside the file is read",)
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("room.pgm", "picture of a map.*give .*room.yaml"),
-        ("other.png", "picture of a map.*'resolution'"),
-        ("room.posegraph", "pose graph of slam_toolbox.*map_saver_cli"),
-        ("room.pbstream", "Cartographer"),
-    ],
-)
+@pytest.mark.parametrize("content", [PLAIN + b"\n\0\0tail", b"P2\n30 4\n255\n" + b"0 " * 120 + b"\n9 tail"])
+def test_bytes_after_the_last_pixel_are_noted_and_not_read(tmp_path, content):
+    classes(tmp_path, content)
+    (note,) = load_grid_map(tmp_path / "room.yaml").notes
+    assert "after the last pixel" in note
+
+
+@pytest.mark.parametrize(*table(__file__, "other_files"))
 def test_other_files_of_a_map_are_named(tmp_path, name, said):
     write_map(tmp_path)
     with pytest.raises(InputError, match=said):
         load_grid_map(tmp_path / name)
-
-
-def test_unknown_ground_that_counts_as_free_is_noted(tmp_path):
-    path = write_map(tmp_path, YAML.replace("0.196", "0.25"))
-    (note,) = load_grid_map(path).notes
-    assert "free_thresh is 0.25" in note
-    assert load_grid_map(write_map(tmp_path)).notes == ()
 
 
 def test_the_outlines_of_a_turned_mask_lie_about_its_cells():

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
-from skills.api import LocalisationEstimate
 from skills.estimate.localiser import DeadReckoning
 from skills.geometry import compose, inverse
 from skills.robot import Pose2D
 
-START = Pose2D(1.5, 2.0, 0.0)
+START, ALONG = Pose2D(1.5, 2.0, 0.0), Pose2D(1.5, 5.4, 0.0)
 
 
-def drive_along_the_corridor(bench: Bench, way_m: float = 9.0) -> list[tuple[float, float]]:
+def drive_along_the_corridor(bench, way_m=9.0):
     """Back and forth at 0.6 m/s with a wiggle; the pose's error at each tick after the first second."""
     errors = []
     while bench.robot.travelled_m < way_m:
@@ -25,22 +24,21 @@ def drive_along_the_corridor(bench: Bench, way_m: float = 9.0) -> list[tuple[flo
     return errors
 
 
-def searched(bench: Bench, radius_m: float | None) -> LocalisationEstimate | None:
+def searched(bench, radius_m):
     scan = bench.robot.scan()
     assert scan is not None
     return bench.localiser.search(scan, bench.localiser.estimate(), radius_m)
 
 
-def odometry_error_m(bench: Bench, start: Pose2D) -> float:
+def odometry_error_m(bench, start):
     off = compose(inverse(bench.robot.pose), compose(start, bench.robot.odometry().pose))
     return math.hypot(off.x_m, off.y_m)
 
 
 def test_error_stays_below_3_cm_and_1_degree_while_odometry_drifts():
-    start = Pose2D(1.5, 5.4, 0.0)
-    bench = Bench(start)
+    bench = Bench(ALONG)
     errors = np.array(drive_along_the_corridor(bench, 4.0))
-    by_odometry_m = odometry_error_m(bench, start)
+    by_odometry_m = odometry_error_m(bench, ALONG)
     errors = np.vstack([errors, drive_along_the_corridor(bench, 10.0)])
     assert errors[:, 0].max() < 0.03
     assert errors[:, 1].max() < math.radians(1.0)
@@ -48,50 +46,43 @@ def test_error_stays_below_3_cm_and_1_degree_while_odometry_drifts():
 
 
 def test_unmapped_objects_near_the_robot_do_not_pull_the_pose():
-    person = Box(2.3, 6.2, 2.7, 6.6, 0.0, 1.7)
-    moved_cupboard = Box(4.5, 4.25, 5.6, 4.6, 0.0, 1.8)
-    bench = Bench(Pose2D(1.5, 5.4, 0.0), unmapped=[person, moved_cupboard])
-    errors = np.array(drive_along_the_corridor(bench))
+    person, moved_cupboard = Box(2.3, 6.2, 2.7, 6.6, 0.0, 1.7), Box(4.5, 4.25, 5.6, 4.6, 0.0, 1.8)
+    errors = np.array(drive_along_the_corridor(Bench(ALONG, unmapped=[person, moved_cupboard])))
     assert errors[:, 0].max() < 0.03
 
 
-def test_a_slightly_wrong_start_is_corrected():
+def test_a_slightly_wrong_start_is_corrected_by_the_first_scans():
     bench = Bench(START, believed_start=Pose2D(1.65, 1.85, 0.1))
-    for _ in range(20):
-        bench.tick()
+    assert not bench.localiser.estimate().localised
+    bench.tick(20)
     distance_m, yaw_rad = bench.pose_error()
     assert distance_m < 0.03 and yaw_rad < math.radians(1.0)
     assert bench.localiser.estimate().localised
 
 
-def test_not_localised_before_the_first_scan():
-    bench = Bench(START)
-    assert not bench.localiser.estimate().localised
+def unchanged(before, after):
+    return np.array_equal(before.X_WO.GetAsMatrix4(), after.X_WO.GetAsMatrix4())
 
 
 def test_a_scan_is_used_once():
     bench = Bench(START)
-    for _ in range(4):
-        bench.tick()
+    bench.tick(4)
     before = bench.localiser.estimate()
     bench.localiser.update(bench.robot)
-    after = bench.localiser.estimate()
-    assert np.array_equal(before.X_WO.GetAsMatrix4(), after.X_WO.GetAsMatrix4())
-    assert np.array_equal(before.covariance, after.covariance)
+    assert unchanged(before, bench.localiser.estimate())
+    assert np.array_equal(before.covariance, bench.localiser.estimate().covariance)
 
 
 def test_covariance_shrinks_and_fits_the_errors():
     bench = Bench(START)
-    for _ in range(20):
-        bench.tick()
+    bench.tick(20)
     sigma = np.sqrt(np.diag(bench.localiser.estimate().covariance))
     assert (sigma[:2] < 0.03).all() and (sigma[:2] > 0.001).all()
 
 
 def test_a_carried_robot_is_lost_and_found_again_nearby():
     bench = Bench(START)
-    for _ in range(10):
-        bench.tick()
+    bench.tick(10)
     bench.robot.carry_off(Pose2D(2.4, 2.7, 0.5))
     said = []
     for _ in range(80):
@@ -135,13 +126,12 @@ def test_equal_seeds_give_equal_estimates():
 def test_pose_is_in_the_world_frame_for_any_odometry():
     bench = Bench(START)
     bench.robot.odometry_pose = Pose2D(5.0, -3.0, 2.0)
-    for _ in range(4):
-        bench.tick()
+    bench.tick(4)
     assert bench.context().pose().x_m == pytest.approx(START.x_m, abs=0.03)
     assert bench.context().pose().yaw_rad == pytest.approx(START.yaw_rad, abs=0.02)
 
 
-def surrounded_bench() -> tuple[Bench, np.ndarray]:
+def surrounded_bench():
     """A robot in a corridor between three others that no map knows, and the discs that cover them."""
     others = [Box(x - 0.3, 5.0, x + 0.3, 6.2, 0.0, 1.1) for x in (3.0, 5.6)] + [Box(3.8, 4.5, 4.8, 4.8, 0.0, 1.1)]
     middles = [(x, y) for x in (3.0, 5.6) for y in (5.3, 5.9)] + [(4.0, 4.65), (4.6, 4.65)]
@@ -149,36 +139,42 @@ def surrounded_bench() -> tuple[Bench, np.ndarray]:
 
 
 @pytest.mark.parametrize("reported", [True, False])
-def test_localisation_holds_among_robots_that_report_their_poses(reported: bool) -> None:
+def test_localisation_holds_among_robots_that_report_their_poses(reported):
     """Most of what it sees are the others: left out, the rest is enough; taken for walls, it is lost."""
     bench, discs_W = surrounded_bench()
     if reported:
         bench.localiser.exclude_robots(discs_W)
-    for _ in range(30):
-        bench.tick()
+    bench.tick(30)
     assert bench.localiser.estimate().localised == reported
 
 
-def test_a_scan_of_other_robots_only_does_not_delocalise() -> None:
+def test_a_scan_of_other_robots_only_does_not_delocalise():
     """Localised first, then all is covered: the belief goes on by odometry."""
     bench = Bench(START)
-    for _ in range(5):
-        bench.tick()
+    bench.tick(5)
     before = bench.localiser.estimate()
     bench.localiser.exclude_robots(np.array([[*START.transform().translation()[:2], 30.0]]))
-    for _ in range(30):
-        bench.tick()
+    bench.tick(30)
     after = bench.localiser.estimate()
     assert before.localised and after.localised
-    assert np.array_equal(before.X_WO.GetAsMatrix4(), after.X_WO.GetAsMatrix4())
+    assert unchanged(before, after)
 
 
 CORRIDOR = Pose2D(1.5, 5.4, 0.3)
 
 
-def test_dead_reckoning_starts_at_the_given_pose_and_follows_odometry():
-    bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False)
+def reckoning_bench(**options):
+    bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False, **options)
     bench.tick()
+    return bench
+
+
+def test_it_is_not_localised_before_it_has_seen_odometry():
+    assert not DeadReckoning().build(Bench(CORRIDOR).costmap.keepout, None, surely=False).estimate().localised
+
+
+def test_dead_reckoning_starts_at_the_given_pose_and_follows_odometry():
+    bench = reckoning_bench()
     assert bench.localiser.estimate().localised
     assert bench.pose_error() == pytest.approx((0.0, 0.0), abs=1e-3)
     bench.robot.push(3.0, 0.5, 0.4)
@@ -187,20 +183,13 @@ def test_dead_reckoning_starts_at_the_given_pose_and_follows_odometry():
 
 
 def test_covariance_grows_with_the_distance():
-    bench = Bench(CORRIDOR, component=DeadReckoning(), cameras=False)
-    bench.tick()
+    bench = reckoning_bench()
     before = bench.localiser.estimate().covariance
-    bench.robot.push(5.0, 0.0, 0.0)
+    bench.robot.push(3.0, 0.5, 0.4)
     bench.tick()
     assert np.all(np.diag(bench.localiser.estimate().covariance) > np.diag(before))
 
 
 def test_an_unknown_start_is_the_origin():
-    bench = Bench(CORRIDOR, component=DeadReckoning(), start_known=False, cameras=False)
-    bench.tick()
-    pose = bench.context().pose()
+    pose = reckoning_bench(start_known=False).context().pose()
     assert (pose.x_m, pose.y_m, pose.yaw_rad) == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
-
-
-def test_it_is_not_localised_before_it_has_seen_odometry():
-    assert not DeadReckoning().build(Bench(CORRIDOR).costmap.keepout, None, surely=False).estimate().localised

@@ -1,7 +1,5 @@
 """Maps of the forms that other programs write are read right, or refused by their reason."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

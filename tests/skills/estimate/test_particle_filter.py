@@ -12,8 +12,7 @@ from skills.robot import Pose2D
 from skills.testing.blocks import Block, block_array, cast_rays, grid_of
 
 WALLS = (Block(0.0, -0.1, 6.0, 0.0), Block(0.0, 4.0, 6.0, 4.1), Block(-0.1, -0.1, 0.0, 4.1), Block(6.0, -0.1, 6.1, 4.1))
-CUPBOARD = Block(0.0, 2.5, 1.0, 4.0)
-ROOM = (*WALLS, CUPBOARD)
+ROOM = (*WALLS, Block(0.0, 2.5, 1.0, 4.0))
 HERE = Pose2D(2.0, 1.5, 0.3)
 TIGHT = np.diag([0.05**2, 0.05**2, 0.03**2])
 
@@ -27,8 +26,12 @@ def beams_at(pose, blocks, count=60):
     return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles)])
 
 
-def filter_on(blocks=ROOM, **options):
-    return ParticleFilter(grid_of(blocks, (0.7, 1.3)), FilterOptions(**options))
+def filter_on(blocks=ROOM, *, placed=True, **options):
+    """Particles around the pose, or not yet placed."""
+    particles = ParticleFilter(grid_of(blocks, (0.7, 1.3)), FilterOptions(**options))
+    if placed:
+        particles.place(HERE, TIGHT)
+    return particles
 
 
 def followed(particles, pose, blocks=ROOM, updates=6):
@@ -42,7 +45,7 @@ def followed(particles, pose, blocks=ROOM, updates=6):
 
 
 def test_scattered_particles_gather_where_the_robot_is_and_become_fewer():
-    particles = filter_on(max_particles=8000)
+    particles = filter_on(placed=False, max_particles=8000)
     particles.scatter()
     assert len(particles.poses) == 8000
     pose = followed(particles, HERE)
@@ -55,7 +58,6 @@ def test_scattered_particles_gather_where_the_robot_is_and_become_fewer():
 
 def test_in_an_empty_room_the_weight_stays_in_both_places_that_look_alike():
     particles, opposite = filter_on(WALLS), Pose2D(6.0 - HERE.x_m, 4.0 - HERE.y_m, HERE.yaw_rad + math.pi)
-    particles.place(HERE, TIGHT)
     particles.resample(particles.sample_around(opposite, TIGHT, 400))
     pose = followed(particles, HERE, WALLS, updates=20)
     opposite = Pose2D(opposite.x_m, opposite.y_m, pose.yaw_rad + math.pi)
@@ -66,7 +68,6 @@ def test_in_an_empty_room_the_weight_stays_in_both_places_that_look_alike():
 
 def test_the_number_follows_the_spread():
     particles = filter_on(max_particles=5000)
-    particles.place(HERE, TIGHT)
     particles.resample()
     few = len(particles.poses)
     particles.place(HERE, np.diag([1.0, 1.0, 1.0]))
@@ -76,31 +77,25 @@ def test_the_number_follows_the_spread():
 
 
 def test_a_beam_that_no_particle_explains_is_skipped():
-    person = Block(2.6, 1.2, 3.0, 1.6)
+    beams = beams_at(HERE, (*ROOM, Block(2.6, 1.2, 3.0, 1.6)))
     off = {}
     for share in (0.0, 0.3):
         particles = filter_on(skip_share=share, skip_m=0.3, random_share=0.001)
-        particles.place(HERE, TIGHT)
-        particles.weigh(beams_at(HERE, (*ROOM, person)))
+        particles.weigh(beams)
         off[share] = particles.weights.max() / particles.weights.min()
     assert off[0.3] != pytest.approx(off[0.0])
-    particles = filter_on(skip_share=0.3, skip_m=0.3)
-    particles.place(HERE, TIGHT)
-    used = particles._explained(beams_at(HERE, (*ROOM, person)))
-    blocked = np.hypot(*(beams_at(HERE, (*ROOM, person)) - beams_at(HERE, ROOM)).T) > 0.6
+    used = filter_on(skip_share=0.3, skip_m=0.3)._explained(beams)
+    blocked = np.hypot(*(beams - beams_at(HERE, ROOM)).T) > 0.6
     assert blocked.any() and not used[blocked].any()
     assert used[~blocked].mean() > 0.8
 
 
 def test_no_beam_is_skipped_where_most_of_them_are_unexplained():
-    particles = filter_on()
-    particles.place(HERE, TIGHT)
-    assert particles._explained(beams_at(HERE, ROOM) * 3.0).all()
+    assert filter_on()._explained(beams_at(HERE, ROOM) * 3.0).all()
 
 
 def test_scans_of_another_place_surprise_and_those_of_this_one_do_not():
     particles = filter_on()
-    particles.place(HERE, TIGHT)
     for _ in range(10):
         particles.weigh(beams_at(HERE, ROOM))
     assert particles.surprise < 0.05
@@ -111,7 +106,6 @@ def test_scans_of_another_place_surprise_and_those_of_this_one_do_not():
 
 def test_injected_particles_take_over_when_they_fit():
     particles, there = filter_on(), Pose2D(4.5, 3.0, 2.0)
-    particles.place(HERE, TIGHT)
     for _ in range(3):
         particles.weigh(beams_at(there, ROOM))
         particles.resample(particles.sample_around(there, TIGHT, 20))
@@ -122,10 +116,8 @@ def test_injected_particles_take_over_when_they_fit():
 def test_the_likeliest_of_random_poses_are_of_different_places():
     poses = filter_on().likeliest_poses(20_000, 5, beams_at(HERE, ROOM))
     assert poses.shape == (5, 3)
-    near = np.hypot(poses[:, 0] - HERE.x_m, poses[:, 1] - HERE.y_m)
-    assert near.min() < 0.3
-    gaps = np.abs(poses[:, None] - poses[None])[np.triu_indices(5, 1)]
-    assert (gaps > 1e-3).any(axis=1).all()
+    assert np.hypot(poses[:, 0] - HERE.x_m, poses[:, 1] - HERE.y_m).min() < 0.3
+    assert (np.abs(poses[:, None] - poses[None])[np.triu_indices(5, 1)] > 1e-3).any(axis=1).all()
 
 
 def test_random_poses_stand_on_free_known_ground():
@@ -133,8 +125,7 @@ def test_random_poses_stand_on_free_known_ground():
     unknown = np.zeros_like(grid.occupied)
     unknown[:, : grid.occupied.shape[1] // 2] = True
     half = GridMap(grid.occupied, grid.resolution_m, grid.origin_m, unknown)
-    poses = ParticleFilter(half, FilterOptions()).sample_anywhere(500)
-    cells = half.cells(poses)
+    cells = half.cells(ParticleFilter(half, FilterOptions()).sample_anywhere(500))
     assert not unknown[cells[:, 0], cells[:, 1]].any()
     assert not grid.occupied[cells[:, 0], cells[:, 1]].any()
 

@@ -10,15 +10,14 @@ START = Pose2D(1.5, 5.4, 0.0)
 PERSON = Box(3.2, 5.2, 3.6, 5.6, 0.0, 1.7)
 
 
-def bench_of(*more: Box, **options) -> Bench:
+def bench_of(*more, **options):
     bench = Bench(START, surveyed=[*TWO_ROOMS, *more], component=DeadReckoning(), cameras=False)
     bench.costmap = RollingCostmap(RollingCostmapOptions(**options))
     return bench
 
 
-def ticked(bench: Bench, ticks: int = 20) -> Bench:
-    for _ in range(ticks):
-        bench.tick()
+def ticked(bench, ticks=20):
+    bench.tick(ticks)
     return bench
 
 
@@ -27,8 +26,7 @@ def test_before_the_first_scan_all_is_free():
 
 
 def test_walls_stand_where_the_beams_end_within_a_cell():
-    bench = ticked(bench_of())
-    off = bench.costmap.clearance_m(np.array([[3.5, 4.6], [3.5, 5.9], [1.5, 4.3]]))
+    off = ticked(bench_of()).costmap.clearance_m(np.array([[3.5, 4.6], [3.5, 5.9], [1.5, 4.3]]))
     assert off == pytest.approx([0.5, 1.0, 0.2], abs=0.05)  # no more than 1 m near the robot
 
 
@@ -39,11 +37,26 @@ def test_a_gap_is_as_wide_as_it_is_in_spite_of_noise():
     assert free.max() - free.min() == pytest.approx(0.9, abs=0.09)
 
 
+def test_obstacles_too_near_for_the_lidar_stay():
+    bench = ticked(bench_of(Box(1.2, 5.75, 1.4, 5.85, 0.0, 1.0)), 1)
+    bench.robot.push(0.0, -0.5, 0.0)
+    ticked(bench)
+    bench.robot.push(0.0, 0.5, 0.0)
+    ticked(bench, 40)
+    assert bench.costmap.clearance_m(np.array([[1.3, 5.78]]))[0] < 0.05
+
+
 def test_obstacles_out_of_sight_are_remembered():
     bench = ticked(bench_of())
     bench.robot.push(7.0, 0.0, 0.0)
     ticked(bench)
     assert bench.costmap.clearance_m(np.array([[0.5, 4.05]]))[0] < 0.05
+
+
+def test_the_costmap_can_be_cleared():
+    bench = ticked(bench_of())
+    assert bench.costmap.clear_obstacles() > 100
+    assert bench.costmap.clearance_m(np.array([[3.5, 4.05]]))[0] > 0.3
 
 
 def test_a_person_who_leaves_is_cleared_and_unseen_ground_is_a_little_free():
@@ -55,16 +68,6 @@ def test_a_person_who_leaves_is_cleared_and_unseen_ground_is_a_little_free():
     ticked(bench, 40)
     assert bench.costmap.clearance_m(np.array([[3.4, 5.4]]))[0] > 0.5
     assert bench.costmap.clearance_m(behind)[0] > RollingCostmapOptions().unknown_clearance_m
-
-
-def test_obstacles_too_near_for_the_lidar_stay():
-    beside = Box(1.2, 5.75, 1.4, 5.85, 0.0, 1.0)
-    bench = ticked(bench_of(beside), 1)
-    bench.robot.push(0.0, -0.5, 0.0)
-    ticked(bench)
-    bench.robot.push(0.0, 0.5, 0.0)
-    ticked(bench, 40)
-    assert bench.costmap.clearance_m(np.array([[1.3, 5.78]]))[0] < 0.05
 
 
 def test_the_window_follows_the_robot_and_keeps_its_cells():
@@ -83,9 +86,3 @@ def test_only_new_obstacles_count_as_unexplained():
     ticked(bench, 2)
     near = bench.costmap.unexplained_returns()[1]
     assert np.count_nonzero(np.hypot(near[:, 0] - 3.3, near[:, 1] - 5.4) < 0.5) > 20
-
-
-def test_the_costmap_can_be_cleared():
-    bench = ticked(bench_of())
-    assert bench.costmap.clear_obstacles() > 100
-    assert bench.costmap.clearance_m(np.array([[3.5, 4.05]]))[0] > 0.3

@@ -15,12 +15,12 @@ HAND = GripperCapabilities("finger", 1.0, 0.1, 50.0, 0.05, 0.1, 0.2, 0.2, 0.0, 0
 OUTLINE = ((0.55, 0.25), (-0.55, 0.25), (-0.55, -0.25), (0.55, -0.25))
 
 
-def capabilities(arm: bool = True) -> Capabilities:
+def capabilities(arm=True):
     limbs = ArmCapabilities(("shoulder", "elbow"), 1.0, (0.0, 0.0), 5.0) if arm else None
     return Capabilities(OUTLINE, 1.6, 2.0, 0.52, (0.4, 0.6), (-0.3, 0.3), limbs, HAND, (), URDF)
 
 
-def joints(shoulder: float, elbow: float) -> Joints:
+def joints(shoulder, elbow):
     return Joints(0.0, {"shoulder": shoulder, "elbow": elbow, "other": 1.0}, {}, {})
 
 
@@ -29,24 +29,17 @@ def test_arm_points_follow_the_joint_angles():
     assert points == pytest.approx(np.array([[0.3, 0.0, 0.2], [0.7, 0.0, 0.2], [0.7, 0.0, 0.55]]), abs=1e-9)
 
 
-def test_a_held_object_is_the_robots_own_and_one_beyond_is_not():
-    own = SelfFilter.of(capabilities())
-    assert own.arm is not None
-    arm = own.arm.points_B(joints(0.0, 0.0))
-    points = np.array([[1.05, 0.1, 0.2], [1.4, 0.0, 0.2], [0.8, 0.5, 0.2]])
-    assert own.foreign(points, arm).tolist() == [False, True, True]
-
-
 def test_body_points_are_filtered_also_without_an_arm():
     own = SelfFilter.of(capabilities(arm=False))
     assert own.arm is None
     assert own.foreign(np.array([[0.0, 0.2, 0.5], [0.0, 0.6, 0.5]]), np.empty((0, 3))).tolist() == [False, True]
 
 
-def test_distance_from_a_segment_ends_at_its_ends():
-    points = np.array([[0.5, 1.0, 0.0], [2.0, 0.0, 0.0], [-3.0, 4.0, 0.0]])
-    ends = np.zeros(3), np.array([1.0, 0.0, 0.0])
-    assert segment_distance(points, *ends) == pytest.approx([1.0, 1.0, 5.0])
+def test_a_held_object_is_the_robots_own_and_one_beyond_is_not():
+    own = SelfFilter.of(capabilities())
+    arm = own.arm.points_B(joints(0.0, 0.0))
+    points = np.array([[1.05, 0.1, 0.2], [1.4, 0.0, 0.2], [0.8, 0.5, 0.2]])
+    assert own.foreign(points, arm).tolist() == [False, True, True]
 
 
 def test_points_about_a_holding_hand_are_the_held_object():
@@ -55,3 +48,9 @@ def test_points_about_a_holding_hand_are_the_held_object():
     beside_the_hand = np.array([[0.95, 0.3, 0.7]])
     assert own.foreign(beside_the_hand, arm).tolist() == [True]
     assert own.foreign(beside_the_hand, arm, holding=True).tolist() == [False]
+
+
+def test_distance_from_a_segment_ends_at_its_ends():
+    points = np.array([[0.5, 1.0, 0.0], [2.0, 0.0, 0.0], [-3.0, 4.0, 0.0]])
+    ends = np.zeros(3), np.array([1.0, 0.0, 0.0])
+    assert segment_distance(points, *ends) == pytest.approx([1.0, 1.0, 5.0])

@@ -1,5 +1,3 @@
-"""The error that bad input gives, as a user reads it."""
-
 import pytest
 
 from skills.files.errors import MOST_LETTERS, InputError, definite, known_names, with_article
@@ -16,6 +14,10 @@ def test_a_message_escapes_control_characters():
     assert str(InputError("no 'a\x1b[31m\u202eb\nc\udcff'", hint="x\x07")) == r"no 'a\x1b[31m\u202eb c\udcff'; x\x07"
 
 
+def test_without_a_known_name_none_is_listed():
+    assert known_names("x", []) == "none is known"
+
+
 @pytest.mark.parametrize(
     "phrase", ["a hammer", "an extinguisher", "an orange cube", "a unit", "an hour", "a one-way door"]
 )
@@ -29,7 +31,3 @@ def test_a_noun_gets_the_article_of_its_sound(phrase):
 )
 def test_a_noun_has_one_definite_article_at_most(noun, said):
     assert definite(noun) == said
-
-
-def test_without_a_known_name_none_is_listed():
-    assert known_names("x", []) == "none is known"

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.files.json_values import from_text, to_text
 from skills.robot import CommandState, Pose2D
+from tests.tables import table
 
 SEEN = ObjectObservation(12.5, ObjectKind("coke", ("red",)), (1.0, 2.0, 0.9), (0.06, 0.06, 0.12), 0.3, 0.9, "counter")
 
@@ -58,19 +59,7 @@ def test_values_without_a_stored_form_are_refused():
         to_text((1, lambda: 0))
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "{",
-        "[1]",
-        '{"$kind": "spell"}',
-        '{"a": 1}',
-        '{"$kind": "dataclass", "class": "gone.away:ObjectKind", "fields": {}}',
-        '{"$kind": "dataclass", "class": "skills.api:ObjectKind", "fields": {"colour": "red"}}',
-        '{"$kind": "dataclass", "class": "os:system", "fields": {}}',
-        '{"$kind": "enum", "class": "skills.api:ObjectKind", "name": "A"}',
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "damaged"))
 def test_damaged_text_and_missing_classes_are_refused(text):
     with pytest.raises(ValueError, match=r".+"):
         from_text(text)

@@ -1,7 +1,6 @@
 """The YAML reader is the only one."""
 
 import ast
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
@@ -12,7 +11,7 @@ ELSEWHERE = {
 }
 
 
-def calls(source: str) -> Iterator[str]:
+def calls(source):
     """Reading functions of PyYAML that a source calls."""
     for node in ast.walk(ast.parse(source)):
         called = node.func if isinstance(node, ast.Call) else None

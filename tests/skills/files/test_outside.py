@@ -106,6 +106,10 @@ def test_blanks_around_a_text_are_stripped():
     assert plain_text(" the coke\r\n", what="the answer") == "the coke"
 
 
+def test_an_empty_text_is_an_empty_object():
+    assert json_object(b" ", what="the values", hint="") == {}
+
+
 @pytest.mark.parametrize(
     "content",
     [b"[" * 15_000, b"[]", b"{", b"\xff", b'{"a": ' * 15_000, b'{"a": "\\ud800"}', b'{"a": ' + b"9" * 5000 + b"}"],
@@ -125,7 +129,3 @@ def test_any_json_is_an_object_or_refused(value):
         assert set(json_object(content, what="the values", hint="")) == {"a"}
     except InputError as error:
         assert "no JSON object" in str(error)
-
-
-def test_an_empty_text_is_an_empty_object():
-    assert json_object(b" ", what="the values", hint="") == {}

@@ -53,6 +53,11 @@ def test_ctrl_c_during_an_import_passes_through():
         run_plugin(ENTRY, raising(KeyboardInterrupt()))
 
 
+def test_a_call_that_ends_in_time_does_not_end_the_process_later():
+    assert run_plugin(ENTRY, lambda: 3, limit_s=0.05) == 3
+    time.sleep(0.2)
+
+
 def test_an_import_that_hangs_ends_the_process_with_one_line():
     begun = time.monotonic()
     ended = subprocess.run([sys.executable, "-c", HANGS], capture_output=True, text=True, check=False)
@@ -60,11 +65,6 @@ def test_an_import_that_hangs_ends_the_process_with_one_line():
     what = "errand.skills 'wave' (wavers:Wave) of distribution an unknown distribution is not loaded within 0.2 s"
     assert ended.stderr == f"errand: {what}; repair or uninstall that distribution\n"
     assert time.monotonic() - begun < 40.0
-
-
-def test_a_call_that_ends_in_time_does_not_end_the_process_later():
-    assert run_plugin(ENTRY, lambda: 3, limit_s=0.05) == 3
-    time.sleep(0.2)
 
 
 def test_a_call_in_a_thread_returns_its_result_or_raises_a_defect():

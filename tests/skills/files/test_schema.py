@@ -1,5 +1,3 @@
-"""Errors of a file that does not fit its schema."""
-
 import pytest
 from pydantic import BaseModel, ConfigDict
 

@@ -3,7 +3,6 @@
 import os
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 from pydantic import BaseModel, ConfigDict
@@ -14,35 +13,14 @@ from executive.words.mission import Mission
 from skills.files.errors import InputError
 from skills.files.outside import TEXT_BYTES
 from skills.files.schema import Name, validate
-from skills.files.yaml_source import YamlSource, parse_yaml, read_yaml, scalar_of, yaml_of
+from skills.files.yaml_source import parse_yaml, read_yaml, scalar_of, yaml_of
 from skills.quantities import Count, Share
 from tests.hostile_values import FILES
+from tests.tables import table
 
 
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("010", "010"),
-        ("08", "08"),
-        ("14:30", "14:30"),
-        ("190:20:30.5", "190:20:30.5"),
-        ("2026-12-01", "2026-12-01"),
-        ("2026-12-01 09:00:00", "2026-12-01 09:00:00"),
-        ("1e3", 1000.0),
-        ("-2.5E-1", -0.25),
-        ("=", "="),
-        ("10", 10),
-        ("0", 0),
-        ("0.5", 0.5),
-        ("0x1F", 31),
-        ("yes", True),
-        ("off", False),
-        ('"no"', "no"),
-        ("'010'", "010"),
-        ("", None),
-    ],
-)
-def test_a_scalar_has_the_type_that_people_mean(text: str, value: Any) -> None:
+@pytest.mark.parametrize(*table(__file__, "scalars"))
+def test_a_scalar_has_the_type_that_people_mean(text, value):
     assert scalar_of(text) == value
     assert type(scalar_of(text)) is type(value)
 
@@ -57,57 +35,33 @@ class Thing(BaseModel):
     battery: Share = 1.0
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("name: no", 'name: should be a text; put it in quotes: "no"'),
-        ("name: On", 'put it in quotes: "On"'),
-        ("name: true", "put it in quotes"),
-        ("name: 42", 'put it in quotes: "42"'),
-        ("name: a\ntimes: 010", "times: should be a whole number; write 10, without the zero"),
-        ("name: a\ntimes: 2.0", "times: should be a whole number; write 2"),
-        ("name: a\ntimes: 1:30", "times: should be a whole number; it reads '1:30' now"),
-        ("name: a\nbattery: 0,3", "battery: should be a number; write 0.3, with a point"),
-        ("{name: a, battery: 0,3}", "write 'battery: 0.3', with a point"),
-        ("{name: a, 3: b}", "put the key in quotes"),
-    ],
-)
-def test_values_that_yaml_misreads_are_refused_with_a_correction(tmp_path: Path, text: str, says: str) -> None:
-    file = tmp_path / "thing.yaml"
-    file.write_text(text)
+def source_of(tmp_path, text):
+    (tmp_path / "f.yaml").write_bytes(text if isinstance(text, bytes) else text.encode())
+    return read_yaml(tmp_path / "f.yaml")
+
+
+@pytest.mark.parametrize(*table(__file__, "misread"))
+def test_values_that_yaml_misreads_are_refused_with_a_correction(tmp_path, text, says):
     with pytest.raises(InputError) as error:
-        validate(Thing, read_yaml(file))
+        validate(Thing, source_of(tmp_path, text))
     assert says in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "name"), [("name: 007", "007"), ("name: 14:30", "14:30"), ("name: 2026-12-01", "2026-12-01")]
-)
-def test_octals_times_and_dates_are_texts(tmp_path: Path, text: str, name: str) -> None:
-    file = tmp_path / "thing.yaml"
-    file.write_text(f"name: {name}")
-    assert validate(Thing, read_yaml(file)).name == name
+@pytest.mark.parametrize("name", ["007", "14:30", "2026-12-01"])
+def test_octals_times_and_dates_are_texts(tmp_path, name):
+    assert validate(Thing, source_of(tmp_path, f"name: {name}")).name == name
 
 
-def test_yes_and_no_are_texts_as_keys(tmp_path: Path) -> None:
-    file = tmp_path / "thing.yaml"
-    file.write_text("choices: {yes: 1, no: 2, on: 3}")
-    assert read_yaml(file).data == {"choices": {"yes": 1, "no": 2, "on": 3}}
-
-
-# text    PyYAML alone writes    reads back as
-# 0E0     0E0                    0.0
-# 1e3     1e3                    1000.0
-# 12      '12'                   "12"
+# PyYAML alone writes 0E0 and 1e3 without quotes, which read back as numbers
 @pytest.mark.parametrize("text", ["0E0", "1e3", "-.5e-7", "12", "no", "14:30", "010", "beer", "a: b", "ä"])
-def test_a_text_that_looks_like_a_number_reads_back_as_text(text: str) -> None:
+def test_a_text_that_looks_like_a_number_reads_back_as_text(text):
     assert parse_yaml(yaml_of({"answer": text}), Path("m.yaml")).data == {"answer": text}
 
 
 LOADERS = (load_mission, load_stack, load_knowledge)
 
 
-def refused(load, path) -> InputError:
+def refused(load, path):
     with pytest.raises(InputError) as error:
         load(path)
     assert error.value.file == Path(path)
@@ -116,22 +70,12 @@ def refused(load, path) -> InputError:
 
 
 @pytest.mark.parametrize("load", LOADERS)
-def test_a_pipe_is_refused_at_once(tmp_path, load):
+@pytest.mark.parametrize("name", ["pipe.yaml", "/dev/zero", "/dev/null", "/dev/urandom", "."])
+def test_a_pipe_a_device_and_a_folder_are_refused_at_once(tmp_path, load, name):
     os.mkfifo(tmp_path / "pipe.yaml")
     begun = time.perf_counter()
-    refused(load, tmp_path / "pipe.yaml")
+    refused(load, tmp_path / name)
     assert time.perf_counter() - begun < 1.0
-
-
-@pytest.mark.parametrize("load", LOADERS)
-@pytest.mark.parametrize("device", ["/dev/zero", "/dev/null", "/dev/urandom"])
-def test_a_device_is_refused(load, device):
-    refused(load, device)
-
-
-@pytest.mark.parametrize("load", LOADERS)
-def test_a_folder_is_refused(tmp_path, load):
-    refused(load, tmp_path)
 
 
 def test_no_more_than_the_limit_is_read(tmp_path):
@@ -183,12 +127,7 @@ def test_a_name_in_any_script_is_accepted(tmp_path, name):
     assert isinstance(load_mission(tmp_path / "m.yaml"), Mission)
 
 
-def source_of(tmp_path, text) -> YamlSource:
-    (tmp_path / "f.yaml").write_bytes(text if isinstance(text, bytes) else text.encode())
-    return read_yaml(tmp_path / "f.yaml")
-
-
-def refusal_of(tmp_path, text) -> InputError:
+def refusal_of(tmp_path, text):
     with pytest.raises(InputError) as error:
         source_of(tmp_path, text)
     assert error.value.line is not None
@@ -197,23 +136,38 @@ def refusal_of(tmp_path, text) -> InputError:
 
 @pytest.mark.parametrize("raw", FILES, ids=lambda raw: repr(raw[:20]))
 def test_any_bytes_are_read_or_refused_at_a_line(tmp_path, raw):
-    (tmp_path / "f.yaml").write_bytes(raw)
     try:
-        read_yaml(tmp_path / "f.yaml")
+        source_of(tmp_path, raw)
     except InputError as error:
         assert 1 <= (error.line or 0) <= raw.count(b"\n") + 1
         assert len(str(error)) < 500
 
 
-def test_merge_keys_add_missing_keys(tmp_path):
-    source = source_of(tmp_path, "a: &a {x: 1, y: 2}\nb: &b\n  y: 3\nc:\n  <<: [*a, *b]\n  x: 5\nd: {<<: *b}\n")
-    assert (source.data["c"], source.data["d"]) == ({"x": 5, "y": 2}, {"y": 3})
+MERGED = {"a": {"x": 1, "y": 2}, "b": {"y": 3}, "c": {"x": 5, "y": 2}, "d": {"y": 3}}
+
+
+@pytest.mark.parametrize(
+    ("text", "data"),
+    [
+        ("a: &a {x: 1, y: 2}\nb: &b\n  y: 3\nc:\n  <<: [*a, *b]\n  x: 5\nd: {<<: *b}\n", MERGED),
+        ("choices: {yes: 1, no: 2, on: 3}", {"choices": {"yes": 1, "no": 2, "on": 3}}),
+        (b"\xef\xbb\xbfa: 1\r\nb: 2\r\n", {"a": 1, "b": 2}),
+    ],
+    ids=["merge keys add missing keys", "yes and no are texts as keys", "byte order mark and windows line ends"],
+)
+def test_a_yaml_file_is_read(tmp_path, text, data):
+    assert source_of(tmp_path, text).data == data
 
 
 def test_aliased_values_have_the_line_of_their_anchor(tmp_path):
     source = source_of(tmp_path, "a: &a\n  x: 1\nb:\n  <<: *a\n  z: 1\nc:\n- *a\n")
     lines = [source.line(path) for path in (("b", "x"), ("b", "z"), ("c", 0, "x"))]
     assert lines == [2, 5, 2]
+
+
+def test_allowed_tags_are_read(tmp_path):
+    (tmp_path / "f.yaml").write_text("a: !Rpy {deg: [0, 0, 90]}\n")
+    assert read_yaml(tmp_path / "f.yaml", frozenset({"!Rpy"})).data == {"a": {"deg": [0, 0, 90]}}
 
 
 def test_a_small_file_that_aliases_make_huge_is_refused(tmp_path):
@@ -230,41 +184,14 @@ def test_many_merges_of_a_large_mapping_are_refused(tmp_path):
     assert "repeat more than" in str(refusal_of(tmp_path, large + "b: {<<: [" + ", ".join(["*a"] * 5_000) + "]}\n"))
 
 
-@pytest.mark.parametrize(
-    ("text", "said", "line"),
-    [
-        ("a: 1\nb: 2\na: 3\n", "stands twice (first in line 1)", 3),
-        ("1: a\n0x1: b\n", "stands twice", 2),
-        ("x: {b: 1,\n  b: 2}\n", "stands twice", 2),
-        ("a: &a {x: 1}\nb:\n  <<: *a\n  <<: *a\n", "write one", 4),
-        ("a: 1\nb:\n  <<: [1]\n", "takes a mapping", 3),
-        ("a: 1\n<<: text\n", "takes a mapping", 2),
-        ("a: 1\nb: &b {<<: *b}\n", "inside of what it repeats", 2),
-        ("a: 1\nb: !!python/object/apply:os.system [id]\n", "tag", 2),
-        ("a: 1\nb: !Rpy {deg: [0, 0, 90]}\n", "the tag '!Rpy' cannot be used", 2),
-        ("a: 1\nb: !!binary aGk=\n", "the tag '!!binary' cannot be used", 2),
-        ("a: 1\n? [b, c]\n: 1\n", "a key cannot be a list", 2),
-        ("a: 1\nb: !!int x\n", "put it in quotes", 2),
-        ("a: 1\n---\nb: 2\n", "more than one document", 2),
-        ("a: *b\n", "undefined alias", 1),
-        ('a: 1\nb: "\\ud800"\n', "lone surrogate", 2),
-        ("a: 1\n".encode("utf-16"), "UTF-16", 1),
-        (b"a: 1\nb: caf\xe9\n", "UTF-8", 2),
-    ],
-)
+OTHER_ENCODINGS = [("a: 1\n".encode("utf-16"), "UTF-16", 1), (b"a: 1\nb: caf\xe9\n", "UTF-8", 2)]
+
+
+@pytest.mark.parametrize(*table(__file__, "invalid", *OTHER_ENCODINGS))
 def test_invalid_yaml_is_refused_at_its_line(tmp_path, text, said, line):
     error = refusal_of(tmp_path, text)
     assert said in str(error)
     assert error.line == line
-
-
-def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path):
-    assert source_of(tmp_path, b"\xef\xbb\xbfa: 1\r\nb: 2\r\n").data == {"a": 1, "b": 2}
-
-
-def test_allowed_tags_are_read(tmp_path):
-    (tmp_path / "f.yaml").write_text("a: !Rpy {deg: [0, 0, 90]}\n")
-    assert read_yaml(tmp_path / "f.yaml", frozenset({"!Rpy"})).data == {"a": {"deg": [0, 0, 90]}}
 
 
 @pytest.mark.parametrize("opening", ["[", "{a: ", "- "])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planar_people import PeopleDetector, person_at
+from planar_people import LateAnswer, PeopleDetector, person_at
 from planar_robot import Bench
 
 from skills.api import Cause, Failed, Running, Succeeded, nobody_to_ask
@@ -20,23 +20,6 @@ from skills.robot import Pose2D
 START, LANE_M = Pose2D(1.5, 5.4, 0.0), 5.4
 END = ((5.0, 4.5), (8.0, 4.5), (8.0, 6.5), (5.0, 6.5))
 QUICK = FollowPersonOptions(lost_s=2.0, finding_s=2.0, asking_s=2.0, search_s=4.0)
-
-
-class Remark:
-    """What a person says to the robot at a time."""
-
-    def __init__(self, bench, at_s):
-        self.bench, self.at_s = bench, at_s
-        self.withdrawn = False
-
-    def done(self):
-        return self.bench.clock.now() >= self.at_s
-
-    def result(self):
-        return "thank you"
-
-    def withdraw(self):
-        self.withdrawn = True
 
 
 class Walk:
@@ -62,9 +45,8 @@ class Walk:
         self.bench = Bench(START, unmapped=[person_at(3.2, LANE_M), *others], cameras=cameras)
         self.to_m, self.speed_m_s, self.gone_s, self.back_s, self.x_m = to_m, speed_m_s, gone_s, back_s, 3.2
         self.questions = []
-        for _ in range(10):
-            self.bench.tick()
-        self.remark = Remark(self.bench, told_s)
+        self.bench.tick(10)
+        self.remark = LateAnswer(self.bench.clock, "thank you", told_s)
         self.detector = PeopleDetector(self.bench, [])
         ask = lambda question: self.questions.append(question.text) or nobody_to_ask(replace(question, default=answer))  # noqa: E731
         context = replace(
@@ -101,10 +83,18 @@ class Walk:
         return [message["text"] for topic, message in self.bench.published if topic == "speech"]
 
 
+class Started(Walk):
+    """A walk that has gone on for some seconds."""
+
+    def __init__(self, *args, seconds, **how):
+        super().__init__(*args, **how)
+        while self.bench.clock.now() < seconds:
+            self.tick()
+
+
 def test_robot_keeps_behind_a_person_until_they_stand_in_the_place():
     walk = Walk(until_W=END, until="kitchen")
-    step = walk.run()
-    assert step == Succeeded("followed Robin to the kitchen")
+    assert walk.run() == Succeeded("followed Robin to the kitchen")
     assert 1.2 <= walk.distances_m[-1] <= 2.1
     assert min(walk.distances_m) > 1.1 and max(walk.distances_m) < 2.9
     assert not walk.bench.robot.driving
@@ -123,9 +113,20 @@ def test_without_anybody_ahead_the_skill_fails():
     assert "nobody is seen ahead" in step.message
 
 
+def test_the_time_limit_ends_the_skill():
+    step = Walk(time_limit_s=5.0, until_W=END, until="kitchen").run()
+    assert isinstance(step, Failed) and step.cause is Cause.TIMEOUT
+
+
+def test_a_blind_lidar_ends_the_skill_with_its_sentence():
+    walk = Started(seconds=5.0)
+    walk.bench.robot.scan = lambda: None
+    step = walk.run()
+    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
+
+
 def test_a_person_is_found_at_the_place_where_they_were_seen():
-    other = person_at(3.0, 4.6)
-    walk = Walk(others=[other], place_W=(3.2, LANE_M), until_W=END)
+    walk = Walk(others=[person_at(3.0, 4.6)], place_W=(3.2, LANE_M), until_W=END)
     assert isinstance(walk.run(), Succeeded)
     assert walk.distances_m[-1] < 2.2
 
@@ -145,15 +146,8 @@ def test_a_lost_person_is_searched_and_asked_for_before_the_skill_fails():
     assert any("going to where Robin went" in message for message in walk.messages)
 
 
-def test_the_time_limit_ends_the_skill():
-    step = Walk(time_limit_s=5.0, until_W=END, until="kitchen").run()
-    assert isinstance(step, Failed) and step.cause is Cause.TIMEOUT
-
-
 def test_robot_goes_aside_for_a_person_who_comes_back():
-    walk = Walk(to_m=5.5)
-    while walk.bench.clock.now() < 8.0:
-        walk.tick()
+    walk = Started(to_m=5.5, seconds=8.0)
     walk.to_m, walk.speed_m_s = 0.6, -0.6
     while walk.x_m > 2.0 and walk.bench.clock.now() < 25.0:
         here = walk.bench.robot.pose
@@ -172,15 +166,12 @@ def test_somebody_found_after_a_search_is_followed_only_if_they_are_the_person(a
 
 
 def test_after_drives_that_failed_the_robot_makes_way_for_the_person_next_to_it(monkeypatch):
-    walk = Walk(to_m=5.5)
-    while walk.bench.clock.now() < 6.0:
-        walk.tick()
+    walk = Started(to_m=5.5, seconds=6.0)
     here = walk.bench.robot.pose
     other = SeenPerson((here.x_m + 1.2, here.y_m), np.eye(2), 1.0, 6.0, here, track=9)
     monkeypatch.setattr(walk.skill._company, "others", lambda: (other,))
     walk.skill._tries = 3
-    aside = walk.skill._next_pose(walk.skill._target, 0.0)
-    assert abs(aside.y_m - here.y_m) > 0.5
+    assert abs(walk.skill._next_pose(walk.skill._target, 0.0).y_m - here.y_m) > 0.5
 
 
 def test_the_search_goes_from_room_to_room_through_the_nearest_doors():
@@ -194,36 +185,19 @@ def test_the_search_goes_from_room_to_room_through_the_nearest_doors():
 
 @pytest.mark.parametrize("at_s", [0.6, 4.0, 9.5])
 def test_a_cancel_in_any_phase_stops_the_base_and_the_listening(at_s):
-    walk = Walk(gone_s=6.5)
-    while walk.bench.clock.now() < at_s:
-        walk.tick()
+    walk = Started(gone_s=6.5, seconds=at_s)
     walk.skill.end()
     assert not walk.bench.robot.driving and walk.remark.withdrawn
 
 
 def test_after_a_pause_the_robot_looks_for_the_person_again_and_follows():
-    walk = Walk(until_W=END)
-    while walk.bench.clock.now() < 5.0:
-        walk.tick()
+    walk = Started(until_W=END, seconds=5.0)
     walk.skill.suspend()
     assert not walk.bench.robot.driving
-    for _ in range(20):
-        walk.bench.tick()
+    walk.bench.tick(20)
     walk.skill.resume(walk.inputs)
     assert isinstance(walk.run(), Succeeded)
 
 
-def test_a_blind_lidar_ends_the_skill_with_its_sentence():
-    walk = Walk()
-    while walk.bench.clock.now() < 5.0:
-        walk.tick()
-    walk.bench.robot.scan = lambda: None
-    step = walk.run()
-    assert isinstance(step, Failed) and step.cause is Cause.EXECUTION
-
-
 def test_pictures_are_bounded():
-    walk = Walk(cameras=True)
-    while walk.bench.clock.now() < 6.0:
-        walk.tick()
-    assert 4 <= len(walk.detector.pictures) <= 8
+    assert 4 <= len(Started(cameras=True, seconds=6.0).detector.pictures) <= 8

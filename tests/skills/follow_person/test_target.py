@@ -35,23 +35,28 @@ def test_a_person_who_comes_back_takes_the_loop_off_the_trail():
     assert target.trail[:, 0].max() < 3.3
 
 
-def test_a_new_track_near_the_prediction_is_the_person_again():
+def test_a_person_seen_again_far_from_the_trail_begins_a_new_one():
     target = walked()
-    target.update([track(7, 5.4, 3.4)], (), 3.4)
-    assert (target.seen.track, target.hidden_s(3.4)) == (7, 0.0)
+    target.farthest_m = 20.0
+    target.update([track(7, 9.0, 8.0, y=3.0)], (), 8.0)
+    assert target.trail.tolist() == [[0.0, 0.0], [9.0, 3.0]]
 
 
-def test_nobody_is_taken_for_the_person_who_was_seen_beside_them():
-    other = track(2, 4.5, 2.0, y=0.8)
-    target = walked(others=[other])
-    target.update([track(2, 4.6, 3.4, y=0.2)], (), 3.4)
-    assert target.seen.track == 1 and target.hidden_s(3.4) > 1.0
-
-
-def test_a_track_too_far_away_is_somebody_else():
-    target = walked()
-    target.update([track(7, 9.0, 3.0)], (), 3.0)
-    assert target.seen.track == 1
+# Predicted at x = 5.4 at 3.4 s -> track that is followed, and how long it has been hidden
+@pytest.mark.parametrize(
+    ("seen", "others", "number", "hidden"),
+    [
+        (track(7, 5.4, 3.4), (), 7, False),
+        (track(7, 9.0, 3.0), (), 1, True),
+        (track(2, 4.6, 3.4, y=0.2), [track(2, 4.5, 2.0, y=0.8)], 1, True),
+    ],
+    ids=["near the prediction", "too far away", "seen beside the person before"],
+)
+def test_a_new_track_is_the_person_again_only_near_the_prediction(seen, others, number, hidden):
+    target = walked(others=others)
+    target.update([seen], (), seen.stamp_s)
+    assert (target.seen.track, target.hidden_s(3.4) > 1.0) == (number, hidden)
+    assert hidden or target.hidden_s(3.4) == 0.0
 
 
 def test_on_a_search_somebody_far_away_may_be_the_person():
@@ -70,13 +75,34 @@ def test_a_person_stands_still_after_five_seconds_in_one_place():
         assert target.stands_still(2.0 + 0.1 * n) == (n >= 46)
 
 
-def test_somebody_rejected_is_not_taken_for_the_person_again():
+def test_the_time_that_a_person_has_stood_begins_anew_when_they_are_trusted():
+    target = walked()
+    for n in range(1, 152):
+        target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], (), 2.0 + 0.1 * n)
+    assert target.standing_s(17.1) == pytest.approx(10.6, abs=0.2)
+    target.trust()
+    assert target.standing_s(17.1) == pytest.approx(0.0, abs=0.2)
+
+
+# Tracks at 3.4 s, at 3.5 s after the person of the first was rejected -> who is followed then
+@pytest.mark.parametrize(
+    ("first", "then", "number"),
+    [
+        ([track(7, 5.4, 3.4)], [track(7, 5.5, 3.5)], 0),
+        ([track(7, 5.4, 3.4), track(8, 5.4, 3.4, y=2.0)], [track(7, 5.5, 3.5), track(8, 5.5, 3.5, y=1.5)], 8),
+        ([track(7, 5.4, 3.4)], [track(9, 5.4, 3.5, speed_m_s=0.0)], 0),
+        ([track(7, 5.4, 3.4)], [track(9, 5.4, 3.5, speed_m_s=0.5)], 9),
+    ],
+    ids=["the rejected one", "seen beside", "stands where the rejected one was", "walks there"],
+)
+def test_somebody_rejected_is_not_taken_for_the_person_again(first, then, number):
     target = walked()
     before = target.seen
-    target.update([track(7, 5.4, 3.4)], (), 3.4)
+    target.update(first, (), 3.4)
     target.reject(before)
-    target.update([track(7, 5.5, 3.5)], (), 3.5)
-    assert (target.seen.place_W, target.seen.track) == (before.place_W, 0)
+    target.update(then, (), 3.5)
+    assert target.seen.track == number
+    assert number or target.seen.place_W == before.place_W
 
 
 def test_a_person_is_not_doubted_after_a_short_gap():
@@ -104,24 +130,10 @@ def test_a_track_goes_on_without_doubt_only_where_the_person_was_expected(x, dou
     assert target.seen.stamp_s == 3.4 and (target.doubted is not None) is doubted
 
 
-def test_the_time_that_a_person_has_stood_begins_anew_when_they_are_trusted():
-    target = walked()
-    for n in range(1, 152):
-        target.update([track(1, 4.0, 2.0 + 0.1 * n, speed_m_s=0.0)], (), 2.0 + 0.1 * n)
-    assert target.standing_s(17.1) == pytest.approx(10.6, abs=0.2)
-    target.trust()
-    assert target.standing_s(17.1) == pytest.approx(0.0, abs=0.2)
-
-
 AHEAD, BEHIND, FAR = (3.0, 0.0), (-1.0, 0.0), (5.0, 0.0)
 
 
-# people, the first is asked | stands still, in sight | addressed
-# nearest and ahead          |                        | yes
-# ahead, one ahead nearer    | yes, yes               | no
-# ahead, one behind nearer   | only if both           | yes
-# behind, alone              | only if still          | yes
-# behind, one ahead          | yes, yes               | no
+# Places of people, the first is asked, who stands still or is in sight -> whether that person is addressed
 @pytest.mark.parametrize(
     ("places", "still", "in_sight", "addressed"),
     [
@@ -139,33 +151,6 @@ def test_a_person_is_asked_only_where_nobody_else_answers(places, still, in_sigh
     people = [SeenPerson(place, np.eye(2), 1.0, 0.0, HERE) for place in places]
     near = sorted(people, key=lambda one: math.hypot(*one.place_W))
     assert is_addressed(people[0], near, HERE, still=still, in_sight=in_sight) is addressed
-
-
-def test_a_person_may_be_one_who_was_seen_beside_somebody_rejected():
-    target = walked()
-    before = target.seen
-    target.update([track(7, 5.4, 3.4), track(8, 5.4, 3.4, y=2.0)], (), 3.4)
-    target.reject(before)
-    target.update([track(7, 5.5, 3.5), track(8, 5.5, 3.5, y=1.5)], (), 3.5)
-    assert target.seen.track == 8
-
-
-def test_a_person_is_nobody_who_stands_where_somebody_was_rejected():
-    target = walked()
-    before = target.seen
-    target.update([track(7, 5.4, 3.4)], (), 3.4)
-    target.reject(before)
-    target.update([track(9, 5.4, 3.6, speed_m_s=0.0)], (), 3.6)
-    assert target.seen.track == 0
-    target.update([track(9, 5.4, 3.7, speed_m_s=0.5)], (), 3.7)
-    assert target.seen.track == 9
-
-
-def test_a_person_seen_again_far_from_the_trail_begins_a_new_one():
-    target = walked()
-    target.farthest_m = 20.0
-    target.update([track(7, 9.0, 8.0, y=3.0)], (), 8.0)
-    assert target.trail.tolist() == [[0.0, 0.0], [9.0, 3.0]]
 
 
 def test_the_longest_loss_counts_the_time_with_somebody_rejected():

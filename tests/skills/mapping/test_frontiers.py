@@ -8,7 +8,7 @@ from skills.mapping.frontiers import Ground
 CELL_M = 0.05
 
 
-def ground(width_m: float = 1.0) -> Ground:
+def ground(width_m=1.0):
     """A room of 4 x 4 m, walled, with an opening to the unknown at the right; the robot in its middle."""
     occupied, unknown = np.zeros((100, 140), dtype=np.bool_), np.ones((100, 140), dtype=np.bool_)
     unknown[10:90, 10:90] = False
@@ -17,8 +17,7 @@ def ground(width_m: float = 1.0) -> Ground:
     occupied[50 - half : 50 + half, 90:92] = False
     unknown[50 - half : 50 + half, 88:100] = False
     unknown[occupied] = False
-    grid = GridMap(occupied, CELL_M, (0.0, 0.0), unknown)
-    return Ground(grid, ~unknown, (2.5, 2.5), clear_m=0.3)
+    return Ground(GridMap(occupied, CELL_M, (0.0, 0.0), unknown), ~unknown, (2.5, 2.5), clear_m=0.3)
 
 
 def test_the_opening_is_the_only_frontier():

@@ -12,7 +12,7 @@ AZIMUTHS = np.radians(np.arange(-180.0, 180.0, 1.0))
 HEIGHT_M = 0.9
 
 
-def frame(ranges_m: np.ndarray) -> Keyframe:
+def frame(ranges_m):
     return Keyframe(
         stamp_s=0.0,
         X_OF=Pose2D(0.0, 0.0, 0.0),
@@ -25,20 +25,20 @@ def frame(ranges_m: np.ndarray) -> Keyframe:
     )
 
 
-def round_wall(radius_m: float = 3.0) -> np.ndarray:
+def round_wall(radius_m=3.0):
     """Ranges to an upright wall all around; the floor ends what falls below it."""
     wall = np.full((len(ELEVATIONS), len(AZIMUTHS)), radius_m) / np.cos(ELEVATIONS)[:, None]
     floor = np.where(ELEVATIONS < 0.0, HEIGHT_M / np.maximum(-np.sin(ELEVATIONS), 1e-9), np.inf)
     return np.minimum(wall, floor[:, None])
 
 
-def most(grid: LayeredOccupancy, band: str, x: float, y: float) -> float:
+def most(grid, band, x, y):
     """The highest probability within 10 cm."""
     steps = (-0.1, -0.05, 0.0, 0.05, 0.1)
     return max(at(grid, band, x + dx, y + dy)[0] for dx in steps for dy in steps)
 
 
-def at(grid: LayeredOccupancy, band: str, x: float, y: float) -> tuple[float, bool]:
+def at(grid, band, x, y):
     probability, observed = grid.probability(band)
     column, row = (math.floor((v - o) / grid.resolution_m) for v, o in zip((x, y), grid.origin_m, strict=True))
     return float(probability[row, column]), bool(observed[row, column])
@@ -70,7 +70,7 @@ def test_a_beam_over_a_low_box_leaves_it_occupied():
     assert at(grid, "scan", 2.025, 0.0)[0] < 0.1
 
 
-def under_table(away_m: float, *, top_m: float = 0.85, thick_m: float = 0.03) -> np.ndarray:
+def under_table(away_m, *, top_m=0.85, thick_m=0.03):
     """Ranges past a table 0.8 m deep, so far away all around, to the wall and floor behind it; it has no legs."""
     ranges = round_wall(6.0)
     for ring, elevation in enumerate(ELEVATIONS):
@@ -100,7 +100,7 @@ def test_the_noise_of_ranges_does_not_thicken_a_wall():
     assert before_the_wall(grid, grid.probability("keepout")[0] > 0.65) < 0.5 * before_the_wall(grid, raw)
 
 
-def before_the_wall(grid: LayeredOccupancy, cells: np.ndarray) -> int:
+def before_the_wall(grid, cells):
     """Number of cells more than 3 cm before the round wall."""
     rows, columns = np.nonzero(cells)
     away = np.hypot((columns + 0.5) * 0.025 + grid.origin_m[0], (rows + 0.5) * 0.025 + grid.origin_m[1])

@@ -13,13 +13,13 @@ pytest.importorskip("gtsam")
 SURE = np.diag([0.02, 0.02, 0.01]) ** 2
 
 
-def ring(count: int = 40, radius_m: float = 5.0) -> list[Pose2D]:
+def ring(count=40, radius_m=5.0):
     """Poses on a circle, the last beside the first."""
     turns = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)
     return [Pose2D(radius_m * math.cos(t), radius_m * math.sin(t), t + math.pi / 2) for t in turns.tolist()]
 
 
-def drifting(true: list[Pose2D]) -> PoseGraph:
+def drifting(true):
     """A chain whose every step turns by half a degree too much."""
     steps = [relative_pose(a, b) for a, b in pairwise(true)]
     wrong = [Pose2D(step.x_m, step.y_m, step.yaw_rad + math.radians(0.5)) for step in steps]
@@ -29,15 +29,20 @@ def drifting(true: list[Pose2D]) -> PoseGraph:
     return PoseGraph(poses, [Edge(n, n + 1, step, SURE) for n, step in enumerate(wrong)])
 
 
-def worst_m(graph: PoseGraph, true: list[Pose2D]) -> float:
+def worst_m(graph, true):
     return max(math.hypot(a.x_m - b.x_m, a.y_m - b.y_m) for a, b in zip(graph.poses, true, strict=True))
+
+
+def closed(true):
+    """The last edge back to the first pose."""
+    return Edge(0, len(true) - 1, relative_pose(true[0], true[-1]), SURE, closure=True)
 
 
 def test_a_loop_closure_takes_the_drift_out():
     true = ring()
     graph = drifting(true)
     before = worst_m(graph, true)
-    graph.edges.append(Edge(0, len(true) - 1, relative_pose(true[0], true[-1]), SURE, closure=True))
+    graph.edges.append(closed(true))
     graph.optimise()
     assert before > 1.0 and worst_m(graph, true) < 0.4
 
@@ -45,7 +50,7 @@ def test_a_loop_closure_takes_the_drift_out():
 def test_the_first_pose_stays():
     true = ring()
     graph = drifting(true)
-    graph.edges.append(Edge(0, len(true) - 1, relative_pose(true[0], true[-1]), SURE, closure=True))
+    graph.edges.append(closed(true))
     graph.optimise()
     off = relative_pose(true[0], graph.poses[0])
     assert math.hypot(off.x_m, off.y_m) < 1e-3 and abs(off.yaw_rad) < 1e-3

@@ -1,5 +1,6 @@
 """The meet_person skill: where it stands, people who walk on, and people who are gone."""
 
+import itertools
 import math
 
 import pytest
@@ -14,18 +15,15 @@ from skills.robot import Pose2D
 START = Pose2D(1.2, 5.4, 0.0)
 
 
+def bench_with(*people, start=START, surveyed=TWO_ROOMS):
+    return Bench(start, unmapped=people, surveyed=surveyed, cameras=False)
+
+
 def met(bench, inputs, at_tick=()):
     """Runs the skill; `at_tick` maps ticks to changes of the bench."""
-    for _ in range(10):
-        bench.tick()
-    skill, changes, ticks = MeetPerson(bench.context()), dict(at_tick), 0
-    skill.begin(inputs)
-    while isinstance(step := skill.step(), Running) and ticks < 2000:
-        changes.pop(ticks, lambda: None)()
-        bench.tick()
-        ticks += 1
-    skill.end()
-    return step
+    bench.tick(10)
+    changes, ticks = dict(at_tick), itertools.count(1)
+    return bench.run(MeetPerson(bench.context()), inputs, each=lambda: changes.pop(next(ticks), lambda: None)())
 
 
 def apart_m(bench, x, y):
@@ -42,17 +40,16 @@ def test_robot_goes_beside_a_person_and_faces_them():
 
 
 def test_without_a_place_the_robot_stays_before_the_person_ahead():
-    bench = Bench(START, unmapped=(person_at(2.6, 5.4),), surveyed=TWO_ROOMS, cameras=False)
+    bench = bench_with(person_at(2.6, 5.4))
     assert isinstance(met(bench, MeetPersonInputs("somebody")), Succeeded)
     assert apart_m(bench, START.x_m, START.y_m) < 0.1
 
 
 def test_robot_goes_after_a_person_who_walks_on():
-    first, then = person_at(5.0, 5.4), person_at(5.8, 5.0)
-    bench = Bench(START, unmapped=(first,), surveyed=TWO_ROOMS, cameras=False)
+    bench = bench_with(person_at(5.0, 5.4))
 
     def walk_on():
-        bench.robot.blocks[bench.robot.blocks.index(first)] = then
+        bench.robot.blocks[bench.robot.blocks.index(person_at(5.0, 5.4))] = person_at(5.8, 5.0)
 
     step = met(bench, MeetPersonInputs("Robin", (5.0, 5.4)), {60: walk_on})
     assert isinstance(step, Succeeded), step
@@ -61,16 +58,14 @@ def test_robot_goes_after_a_person_who_walks_on():
 
 def test_robot_does_not_claim_to_have_met_a_person_who_is_gone():
     first = person_at(5.0, 5.4)
-    bench = Bench(START, unmapped=(first,), surveyed=TWO_ROOMS, cameras=False)
+    bench = bench_with(first)
     step = met(bench, MeetPersonInputs("Robin", (5.0, 5.4)), {40: lambda: bench.robot.blocks.remove(first)})
-    assert isinstance(step, Failed)
-    assert (step.cause, step.message) == (Cause.POSTCONDITION, "Robin is not seen at (5.00, 5.40)")
+    assert step == Failed(Cause.POSTCONDITION, "Robin is not seen at (5.00, 5.40)")
 
 
 @pytest.mark.parametrize("people", [(), (person_at(8.0, 5.4),)])
 def test_without_anybody_near_there_is_nobody_to_meet(people):
-    bench = Bench(START, unmapped=people, surveyed=TWO_ROOMS, cameras=False)
-    step = met(bench, MeetPersonInputs("somebody"))
+    step = met(bench_with(*people), MeetPersonInputs("somebody"))
     assert (type(step), step.cause) == (Failed, Cause.POSTCONDITION)
 
 
@@ -86,8 +81,7 @@ def test_robot_stops_further_away_only_where_that_is_near_enough_and_nothing_nea
 
 def test_robot_does_not_stand_on_the_other_side_of_a_wall():
     # a person 0.6 m above the wall between room and corridor; the robot is in the room below
-    person = person_at(5.5, 4.9)
-    bench = Bench(Pose2D(6.0, 2.5, 1.57), unmapped=(person,), surveyed=TWO_ROOMS, cameras=False)
+    bench = Bench(Pose2D(6.0, 2.5, 1.57), unmapped=(person_at(5.5, 4.9),), surveyed=TWO_ROOMS, cameras=False)
     step = met(bench, MeetPersonInputs("Robin", (5.5, 4.9)))
     assert isinstance(step, Succeeded), step
     assert bench.robot.pose.y_m > 4.1
@@ -95,8 +89,7 @@ def test_robot_does_not_stand_on_the_other_side_of_a_wall():
 
 def test_a_cancel_stops_the_robot():
     bench = Bench(START, unmapped=(person_at(6.0, 5.2),), surveyed=TWO_ROOMS, cameras=False)
-    for _ in range(10):
-        bench.tick()
+    bench.tick(10)
     skill = MeetPerson(bench.context())
     skill.begin(MeetPersonInputs("Robin", (6.0, 5.2)))
     while not bench.robot.driving:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box, grid_of
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
-from scripted_robot import CAPABILITIES, GRIPPER, MODEL, ScriptedRobot, context_of
+from table_robot import CAPABILITIES, GRIPPER, MODEL, TableRobot, context_of
 
-from skills.api import Running, Succeeded
+from skills.api import Succeeded
 from skills.estimate.costmap import LayeredCostmap
 from skills.estimate.scan_points import ArmShape, SelfFilter
 from skills.manipulation.arm.collision import ArmScene, box_corners
@@ -20,6 +20,7 @@ from skills.navigate.footprint import Footprint
 from skills.navigate.planner import NoPathError, plan_path
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
+from skills.testing.estimators import BlockCostmap
 
 PLAIN = Footprint.of(CAPABILITIES)
 LEFT_ROOM, RIGHT_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(8.5, 2.0, -1.57)
@@ -34,7 +35,7 @@ CARRYING = carry_configuration(
 
 def outline(q_rad, *, held_m=None, holding=False, costmap=None):
     """The footprint with an arm at joint angles that holds a box about the fingers' middle."""
-    context = context_of(ScriptedRobot(q=np.array(q_rad), holding=holding or held_m is not None), costmap=costmap)
+    context = context_of(TableRobot(np.array(q_rad), holding=holding or held_m is not None), costmap=costmap)
     if held_m is not None:
         context.payload.corners_H = box_corners(HeldBox(RigidTransform([GRIPPER.grip_x_m, 0.0, 0.0]), held_m))
     return ArmFootprint(context)
@@ -49,8 +50,7 @@ def test_the_stowed_arm_leaves_the_footprint_as_it_is():
 
 
 def test_a_can_carried_near_the_body_leaves_it_as_it_is():
-    footprint = outline(CARRYING, held_m=(0.07, 0.07, 0.12)).now()
-    assert np.array_equal(footprint.discs, PLAIN.discs)
+    assert np.array_equal(outline(CARRYING, held_m=(0.07, 0.07, 0.12)).now().discs, PLAIN.discs)
 
 
 def test_the_arm_stretched_out_ahead_extends_the_front_only():
@@ -61,8 +61,7 @@ def test_the_arm_stretched_out_ahead_extends_the_front_only():
 
 
 def test_a_held_object_of_unknown_size_counts_as_the_largest_one():
-    X_BH = MODEL.X_BH(CARRYING)
-    tip_m = (X_BH @ [GRIPPER.grip_x_m, 0.0, 0.0])[0] + GRIPPER.length_m - GRIPPER.grip_x_m
+    tip_m = (MODEL.X_BH(CARRYING) @ [GRIPPER.grip_x_m, 0.0, 0.0])[0] + GRIPPER.length_m - GRIPPER.grip_x_m
     assert front_m(outline(CARRYING, holding=True).now()) == pytest.approx(tip_m)
 
 
@@ -95,29 +94,21 @@ def test_the_path_leads_through_the_wider_door():
     costmap = LayeredCostmap(grid_of([*surveyed, *doors], (0.05, 1.0)))
     start, goal = Pose2D(1.6, 2.0, math.pi / 2), Pose2D(0.8, 5.6, math.pi)
     narrow = plan_path(costmap, PLAIN, start, goal)
-    carrying = outline(CARRYING, held_m=(0.03, 0.72, 0.03)).now()
-    wide = plan_path(costmap, carrying, start, goal)
+    wide = plan_path(costmap, outline(CARRYING, held_m=(0.03, 0.72, 0.03)).now(), start, goal)
     through = [float(path.poses[np.argmin(np.abs(path.poses[:, 1] - 4.05)), 0]) for path in (narrow, wide)]
     assert through[0] < 1.05 and 2.0 < through[1] < 2.9
 
 
-class Table:
-    """A table from x = 0.7 on, seen from the origin."""
-
-    def clearance_m(self, points_W):
-        return 0.7 - np.asarray(points_W)[:, 0]
-
-    def update(self, robot, localisation):
-        pass
+TABLE = BlockCostmap([Box(0.7, -9.0, 20.0, 9.0)])
+"""A table from x = 0.7 on, seen from the origin."""
 
 
 def test_obstacles_under_the_arm_do_not_block_the_pose_where_the_robot_stands():
-    footprint = outline(AHEAD, costmap=Table()).now()
-    assert front_m(footprint) < 0.7
+    assert front_m(outline(AHEAD, costmap=TABLE).now()) < 0.7
 
 
 def test_away_from_the_table_the_arm_outgrows_the_planned_footprint():
-    at_table, away = outline(AHEAD, costmap=Table()), outline(AHEAD)
+    at_table, away = outline(AHEAD, costmap=TABLE), outline(AHEAD)
     assert not at_table.outgrows(at_table.now())
     assert away.outgrows(at_table.now())
     assert not away.outgrows(away.now())
@@ -127,10 +118,15 @@ def test_away_from_the_table_the_arm_outgrows_the_planned_footprint():
 def test_the_robots_arm_and_load_are_no_obstacles():
     own, held_m = SelfFilter.of(CAPABILITIES), (0.03, 0.6, 0.03)
     corners_H = box_corners(HeldBox(RigidTransform([GRIPPER.grip_x_m, 0.0, 0.0]), held_m))
-    joints = ScriptedRobot(q=CARRYING).joints()
-    arm_B = ArmShape(CAPABILITIES).points_B(joints)
+    arm_B = ArmShape(CAPABILITIES).points_B(TableRobot(CARRYING).joints())
     seen_B = np.vstack([arm_B, (MODEL.X_BH(CARRYING) @ corners_H.T).T])
     assert not own.foreign(seen_B, arm_B, holding=True).any()
+
+
+def test_an_arm_without_a_gripper_widens_the_footprint_too():
+    bare = replace(CAPABILITIES, gripper=None)
+    ahead, stowed = (ArmFootprint(context_of(TableRobot(q, capabilities=bare))).now() for q in (AHEAD, None))
+    assert len(ahead.discs) > len(stowed.discs)
 
 
 def drive_along_the_corridor(raised_from_x_m):
@@ -138,32 +134,13 @@ def drive_along_the_corridor(raised_from_x_m):
     bench = Bench(Pose2D(1.2, 5.4, 0.0), cameras=False)
     robot, capabilities = bench.robot, replace(CAPABILITIES, cameras=())
     robot.capabilities = lambda: capabilities
-    robot.joints = lambda: ScriptedRobot(q=AHEAD if robot.pose.x_m > raised_from_x_m else MODEL.stowed_rad).joints()
-    skill = Navigate(bench.context())
-    skill.begin(NavigateInputs(Pose2D(8.2, 5.4, 0.0)))
-    while isinstance(step := skill.step(), Running) and bench.clock.now() < 60.0:
-        bench.tick()
-    skill.end()
+    robot.joints = lambda: TableRobot(AHEAD if robot.pose.x_m > raised_from_x_m else MODEL.stowed_rad).joints()
+    step = bench.run(Navigate(bench.context()), NavigateInputs(Pose2D(8.2, 5.4, 0.0)), limit_s=60.0)
     return step, bench.worker.names.count("plan a path")
 
 
-def test_raising_the_arm_while_driving_causes_one_new_plan():
-    step, plans = drive_along_the_corridor(raised_from_x_m=3.0)
+@pytest.mark.parametrize(("raised_from_x_m", "plans"), [(3.0, 2), (math.inf, 1)], ids=["raised", "stowed"])
+def test_raising_the_arm_while_driving_causes_one_new_plan(raised_from_x_m, plans):
+    step, made = drive_along_the_corridor(raised_from_x_m)
     assert isinstance(step, Succeeded), step.message
-    assert plans == 2
-
-
-def test_a_stowed_arm_causes_no_new_plan():
-    step, plans = drive_along_the_corridor(raised_from_x_m=math.inf)
-    assert isinstance(step, Succeeded), step.message
-    assert plans == 1
-
-
-def test_an_arm_without_a_gripper_widens_the_footprint_too():
-    class WithoutGripper(ScriptedRobot):
-        def capabilities(self):
-            return replace(super().capabilities(), gripper=None)
-
-    ahead = ArmFootprint(context_of(WithoutGripper(q=np.array(AHEAD)))).now()
-    stowed = ArmFootprint(context_of(WithoutGripper())).now()
-    assert len(ahead.discs) > len(stowed.discs)
+    assert made == plans

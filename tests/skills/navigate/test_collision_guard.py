@@ -74,33 +74,29 @@ def test_robot_waits_while_a_person_crosses(from_x):
     assert isinstance(drive.step, Succeeded)
 
 
-def test_guard_brakes_harder_for_a_person_who_appears_just_ahead():
+def test_guard_brakes_harder_for_a_person_who_appears_just_ahead(monkeypatch):
     def just_ahead(now_s, x):
         return (4.6, 5.6) if x > 3.58 else None
 
-    def off(*_):
-        return None
-
     drive = Drive(just_ahead, most_s=9.0)
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(CollisionGuard, "danger", off)
-        without = Drive(just_ahead, most_s=9.0)
+    monkeypatch.setattr(CollisionGuard, "danger", lambda *_: None)
+    without = Drive(just_ahead, most_s=9.0)
     assert drive.stood() and not without.stood()
     assert drive.nearest_while_moving_m() > max(0.2, without.nearest_while_moving_m() + 0.03)
 
 
-def test_a_person_who_walks_beside_the_path_does_not_stop_the_robot():
-    drive = Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5))
-    assert not drive.stood() and isinstance(drive.step, Succeeded)
-
-
-def test_a_person_who_stands_beside_the_path_does_not_stop_the_robot():
-    drive = Drive(lambda now_s, x: (4.6, 4.6))
-    assert not drive.stood() and isinstance(drive.step, Succeeded)
-
-
-def test_a_person_who_walks_away_ahead_does_not_stop_the_robot():
-    drive = Drive(lambda now_s, x: (3.2 + 0.9 * now_s, 5.6) if now_s < 5.5 else None)
+@pytest.mark.parametrize(
+    "place",
+    [
+        lambda now_s, x: (1.5 + 0.6 * now_s, 4.5),
+        lambda now_s, x: (4.6, 4.6),
+        lambda now_s, x: (3.2 + 0.9 * now_s, 5.6) if now_s < 5.5 else None,
+        lambda now_s, x: (max(0.3, x - 1.2), 5.6),
+    ],
+    ids=["walks beside the path", "stands beside the path", "walks away ahead", "follows"],
+)
+def test_a_person_does_not_stop_the_robot(place):
+    drive = Drive(place)
     assert not drive.stood() and isinstance(drive.step, Succeeded)
 
 
@@ -108,8 +104,3 @@ def test_the_margin_is_an_option():
     options = NavigateOptions()
     wide = replace(options, guard=replace(options.guard, margin_m=1.0))
     assert Drive(lambda now_s, x: (1.5 + 0.6 * now_s, 4.5), options=wide, most_s=15.0).stood()
-
-
-def test_a_person_who_follows_does_not_stop_the_robot():
-    drive = Drive(lambda now_s, x: (max(0.3, x - 1.2), 5.6))
-    assert not drive.stood() and isinstance(drive.step, Succeeded)

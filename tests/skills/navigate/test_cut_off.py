@@ -1,7 +1,5 @@
 """Closed doors are detected, named and end a drive; a person in a doorway is no closed door."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 from planar_robot import Bench, Box
 
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, Succeeded
 from skills.navigate.cut_off import DoorOptions, DoorWatch, closed_doors_sentence
 from skills.navigate.footprint import Footprint
 from skills.navigate.skill import Navigate, NavigateInputs
@@ -27,22 +25,15 @@ def context_of(bench, doors=(LEFT, RIGHT)):
     return dataclasses.replace(bench.context(), doors=doors)
 
 
-def go(bench, goal, *, limit_s=40.0, nearby_m=(), each=lambda: None, context=None):
+def go(bench, goal, *, nearby_m=(), context=None, **how):
     """Runs the skill; returns the last step."""
-    skill = Navigate(context or context_of(bench))
-    skill.begin(NavigateInputs(goal, nearby_m=nearby_m))
-    begun_s = bench.clock.now()
-    while isinstance(step := skill.step(), Running) and bench.clock.now() < begun_s + limit_s:
-        bench.tick()
-        each()
-    skill.end()
-    return step
+    inputs = NavigateInputs(goal, nearby_m=nearby_m)
+    return bench.run(Navigate(context or context_of(bench)), inputs, **{"limit_s": 40.0, **how})
 
 
 def watch(*unmapped, start=BEFORE_RIGHT):
     bench = Bench(start, unmapped=unmapped, azimuths=900)
-    for _ in range(10):
-        bench.tick()
+    bench.tick(10)
     doors = DoorWatch(context_of(bench))
     doors.look()
     return bench, doors
@@ -53,19 +44,18 @@ def test_a_door_is_closed_when_its_panel_is_seen_over_its_whole_width():
     assert watch()[1].closed == ()
 
 
+def test_a_door_that_opens_is_no_longer_closed():
+    bench, doors = watch(RIGHT_PANEL)
+    bench.robot.blocks.remove(RIGHT_PANEL)
+    bench.tick(10)
+    doors.look()
+    assert doors.closed == ()
+
+
 @pytest.mark.parametrize("aside_m", [-0.25, 0.0, 0.25])
 def test_a_person_in_a_doorway_is_no_closed_door(aside_m):
     x = 7.45 + aside_m
     assert watch(Box(x - 0.22, 3.85, x + 0.22, 4.25, 0.0, 1.7))[1].closed == ()
-
-
-def test_a_door_that_opens_is_no_longer_closed():
-    bench, doors = watch(RIGHT_PANEL)
-    bench.robot.blocks.remove(RIGHT_PANEL)
-    for _ in range(10):
-        bench.tick()
-    doors.look()
-    assert doors.closed == ()
 
 
 def test_the_memory_of_doors_outlasts_the_trip():
@@ -104,22 +94,6 @@ def test_robot_goes_and_looks_at_the_only_door_though_it_remembers_it_closed():
     assert context.door_memory.last_seen(RIGHT).state is DoorState.OPEN
 
 
-def test_only_doors_that_block_every_path_are_reported():
-    bench, doors = watch(LEFT_PANEL, RIGHT_PANEL, start=Pose2D(5.0, 5.7, 0.0))
-    assert set(doors.closed) == {LEFT, RIGHT}
-    footprint = Footprint.of(bench.robot.capabilities())
-    assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
-    assert doors.blocking_doors(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
-    assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN, Pose2D(9.0, 5.5, 0.0))) == ()
-
-
-def test_closed_doors_on_a_path_count_though_others_may_lead_there():
-    bench, doors = watch(RIGHT_PANEL)
-    footprint = Footprint.of(bench.robot.capabilities())
-    assert doors.doors_on_path(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
-    assert doors.doors_on_path(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
-
-
 def test_behind_a_closed_door_the_failure_is_final_and_names_the_door():
     bench = Bench(BEFORE_RIGHT, unmapped=[RIGHT_PANEL])
     step = go(bench, KITCHEN)
@@ -140,8 +114,7 @@ def test_robot_drives_through_a_door_that_opens_while_it_waits():
 
 
 def test_failure_is_final_when_goal_and_nearby_poses_are_enclosed():
-    fence = [Box(8.0, 4.1, 8.1, 7.0, 0.0, 1.7)]
-    bench = Bench(Pose2D(5.5, 5.4, 0.0), unmapped=fence)
+    bench = Bench(Pose2D(5.5, 5.4, 0.0), unmapped=[Box(8.0, 4.1, 8.1, 7.0, 0.0, 1.7)])
     step = go(bench, Pose2D(9.2, 5.5, 0.0), nearby_m=((-0.5, 0.0),))
     assert isinstance(step, Failed)
     assert (step.cause, step.final) == (Cause.PLANNING, True)
@@ -160,6 +133,22 @@ def test_one_sentence_names_all_closed_doors():
         "The doors between the study and the corridor, and between the corridor and the kitchen, are closed, "
         "so no path leads to (8.50, 2.00)."
     )
+
+
+def test_only_doors_that_block_every_path_are_reported():
+    bench, doors = watch(LEFT_PANEL, RIGHT_PANEL, start=Pose2D(5.0, 5.7, 0.0))
+    assert set(doors.closed) == {LEFT, RIGHT}
+    footprint = Footprint.of(bench.robot.capabilities())
+    assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
+    assert doors.blocking_doors(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
+    assert doors.blocking_doors(footprint, bench.robot.pose, (KITCHEN, Pose2D(9.0, 5.5, 0.0))) == ()
+
+
+def test_closed_doors_on_a_path_count_though_others_may_lead_there():
+    bench, doors = watch(RIGHT_PANEL)
+    footprint = Footprint.of(bench.robot.capabilities())
+    assert doors.doors_on_path(footprint, bench.robot.pose, (KITCHEN,)) == (RIGHT,)
+    assert doors.doors_on_path(footprint, bench.robot.pose, (Pose2D(9.0, 5.5, 0.0),)) == ()
 
 
 def test_clearing_within_discs_leaves_other_obstacles():

@@ -91,8 +91,7 @@ def test_paths_are_about_as_short_as_those_of_an_omnidirectional_base():
 
 
 def test_corners_are_rounded_where_there_is_clearance():
-    path = plan_path(costmap_of(*TWO_ROOMS), BASE, LEFT_ROOM, RIGHT_ROOM)
-    ahead, _, turns = motion(path)
+    ahead, _, turns = motion(plan_path(costmap_of(*TWO_ROOMS), BASE, LEFT_ROOM, RIGHT_ROOM))
     assert np.count_nonzero((np.abs(turns) > 0.02) & (np.abs(ahead) > 0.01)) > 20
 
 
@@ -143,10 +142,9 @@ def test_corners_are_where_turning_begins_and_ends_and_where_the_direction_chang
 
 
 def test_a_turn_on_the_spot_shorter_than_a_step_is_still_made():
-    """A path of 0.04 rad on the spot, less than 2 cm long: the base turns to its end."""
+    # A path of 0.04 rad on the spot, less than 2 cm long: the base turns to its end.
     turn_rad = 0.04
     path = Path(np.array([[0.0, 0.0, 0.0], [0.0, 0.0, turn_rad]]), np.full(2, 3.0))
     follower = FollowerOptions().build(path, BASE, max_speed_m_s=0.8)
-    costmap = costmap_of(*OPEN)
-    command = follower.command(Pose2D(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros(3), costmap)
+    command = follower.command(Pose2D(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros(3), costmap_of(*OPEN))
     assert command.velocity[2] > 0.01

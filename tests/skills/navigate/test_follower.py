@@ -13,7 +13,7 @@ from skills.robot import Pose2D
 FOOTPRINT = Footprint.rectangle(OUTLINE)
 
 
-def straight(length_m: float = 4.0, yaw_rad: float = 0.0, clearance_m: float = 1.0) -> Path:
+def straight(length_m=4.0, yaw_rad=0.0, clearance_m=1.0):
     x = np.arange(2.0, 2.0 + length_m, 0.05)
     return Path(np.column_stack([x, np.full_like(x, 5.5), np.full_like(x, yaw_rad)]), np.full_like(x, clearance_m))
 
@@ -52,8 +52,7 @@ def test_velocity_changes_no_faster_than_the_accelerations():
 
 
 def test_robot_brakes_for_an_obstacle_ahead_and_reports_its_position():
-    pillar = Box(3.6, 5.4, 3.8, 5.6)
-    costmap = LayeredCostmap(grid_of([*TWO_ROOMS, pillar], (0.05, 1.0)))
+    costmap = LayeredCostmap(grid_of([*TWO_ROOMS, Box(3.6, 5.4, 3.8, 5.6)], (0.05, 1.0)))
     last = np.array([0.8, 0.0, 0.0])
     far = PathFollower(straight(), FOOTPRINT).command(Pose2D(2.2, 5.5, 0.0), (0.8, 0.0, 0.0), last, costmap)
     assert far.blocked_at is not None and far.blocked_at[0] == pytest.approx(3.6, abs=0.3)

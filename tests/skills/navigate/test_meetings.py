@@ -1,7 +1,5 @@
 """Robots that meet where only one fits: one makes way, and both arrive."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -9,7 +7,6 @@ from planar_robot import TWO_ROOMS
 from traffic_floor import Floor
 
 from skills.api import Failed
-from skills.estimate.grid_map import GridMap
 from skills.robot import BaseKind, Pose2D
 from skills.testing.blocks import Block, grid_of
 
@@ -27,15 +24,13 @@ DEAD_END = (
 
 
 @pytest.fixture(scope="module")
-def rooms() -> GridMap:
+def rooms():
     """Two rooms under a corridor, joined by doors of 0.9 m."""
     return grid_of(TWO_ROOMS, (0.05, 1.0))
 
 
 @pytest.mark.parametrize("kinds", [(OBLONG, OBLONG), (ROUND, OBLONG)])
-def test_two_robots_that_swap_places_through_a_door_both_arrive(
-    rooms: GridMap, kinds: tuple[BaseKind, BaseKind]
-) -> None:
+def test_two_robots_that_swap_places_through_a_door_both_arrive(rooms, kinds):
     """One robot backs out, the other passes, then the first follows; they never touch."""
     floor = Floor(rooms)
     floor.send("alice", Pose2D(2.4, 5.0, DOWN), Pose2D(2.5, 2.6, DOWN), base_kind=kinds[0])
@@ -44,7 +39,7 @@ def test_two_robots_that_swap_places_through_a_door_both_arrive(
     assert floor.apart_m > 0.05
 
 
-def test_robots_swap_priority_when_one_is_stuck_in_a_dead_end(rooms: GridMap) -> None:
+def test_robots_swap_priority_when_one_is_stuck_in_a_dead_end(rooms):
     """Alice claims first and wants in; Bob has no waiting place behind him, so the two swap priorities."""
     floor = Floor(grid_of(DEAD_END, (0.05, 1.0)))
     floor.send("alice", Pose2D(6.2, 0.45, math.pi), Pose2D(1.0, 0.45, math.pi))
@@ -53,7 +48,7 @@ def test_robots_swap_priority_when_one_is_stuck_in_a_dead_end(rooms: GridMap) ->
     assert floor.apart_m > 0.05
 
 
-def test_an_idle_robot_clears_a_reserved_path_and_stays_aside(rooms: GridMap) -> None:
+def test_an_idle_robot_clears_a_reserved_path_and_stays_aside(rooms):
     """Bob arrives in a door first; Alice, who comes later, gets through it."""
     floor = Floor(rooms)
     floor.send("bob", Pose2D(7.4, 3.0, UP), Pose2D(7.45, 4.05, UP))
@@ -64,7 +59,7 @@ def test_an_idle_robot_clears_a_reserved_path_and_stays_aside(rooms: GridMap) ->
     assert floor.apart_m > 0.05
 
 
-def test_an_idle_robot_off_all_paths_stays(rooms: GridMap) -> None:
+def test_an_idle_robot_off_all_paths_stays(rooms):
     """Bob stands in the room; Alice passes above it."""
     floor = Floor(rooms)
     floor.send("bob", Pose2D(7.4, 1.5, UP), Pose2D(7.4, 1.5, UP))
@@ -73,7 +68,7 @@ def test_an_idle_robot_off_all_paths_stays(rooms: GridMap) -> None:
     assert floor.robots["bob"].pose.y_m == pytest.approx(1.5, abs=0.1)
 
 
-def test_robot_without_any_path_on_the_map_does_not_wait_for_others() -> None:
+def test_robot_without_any_path_on_the_map_does_not_wait_for_others():
     """Bob blocks nobody; no path exists for Alice on the map, and three attempts are over soon."""
     floor = Floor(grid_of((*DEAD_END, Block(5.0, 0.0, 5.1, 0.9)), (0.05, 1.0)))
     floor.send("alice", Pose2D(1.0, 0.45, 0.0), Pose2D(6.5, 3.2, 0.0))

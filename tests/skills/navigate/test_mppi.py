@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from planar_robot import OUTLINE, TWO_ROOMS, Bench, Box, grid_of
 
-from skills.api import Running, Succeeded
+from skills.api import Succeeded
 from skills.estimate.costmap import LayeredCostmap
 from skills.navigate.footprint import Footprint
 from skills.navigate.mppi import MppiController, MppiOptions
@@ -20,12 +20,12 @@ LEFT_ROOM, RIGHT_ROOM = Pose2D(1.5, 2.0, 0.0), Pose2D(8.5, 2.0, -1.57)
 OPEN = LayeredCostmap(grid_of([Box(-9.0, -9.0, 9.0, -8.9), Box(-9.0, 8.9, 9.0, 9.0)], (0.05, 1.0)))
 
 
-def straight(length_m: float) -> Path:
+def straight(length_m):
     x = np.arange(0.0, length_m, 0.05)
     return Path(np.column_stack([x, np.zeros_like(x), np.zeros_like(x)]), np.full(len(x), 5.0))
 
 
-def driven(controller: MppiController, start: Pose2D, ticks: int) -> tuple[np.ndarray, np.ndarray]:
+def driven(controller, start, ticks):
     """Velocities and poses of an ideal base that obeys."""
     pose, last, velocities, poses = np.array([start.x_m, start.y_m, start.yaw_rad]), np.zeros(3), [], []
     for _ in range(ticks):
@@ -72,12 +72,7 @@ def test_robot_stands_at_speed_zero():
 def test_robot_passes_two_doors_and_a_new_obstacle_without_contact(appears):
     bench = Bench(LEFT_ROOM, unmapped=appears, cameras=False)
     context = replace(bench.context(), stack=replace(default_stack(), controller=MppiOptions()))
-    skill = Navigate(context)
-    skill.begin(NavigateInputs(RIGHT_ROOM))
-    step = skill.step()
-    while isinstance(step, Running) and bench.clock.now() < 90.0:
-        bench.tick()
-        step = skill.step()
+    step = bench.run(Navigate(context), NavigateInputs(RIGHT_ROOM))
     assert isinstance(step, Succeeded), step.message
     assert bench.robot.least_clearance_m > 0.03
 
@@ -94,5 +89,4 @@ def test_driven_distance_is_hardly_longer_than_the_path():
         bench.clock.advance(0.05)
         if answer.remaining_m < 0.05:
             break
-    steps = np.diff(path.poses[:, :2], axis=0)
-    assert bench.robot.travelled_m < 1.05 * float(np.hypot(*steps.T).sum())
+    assert bench.robot.travelled_m < 1.05 * float(np.hypot(*np.diff(path.poses[:, :2], axis=0).T).sum())

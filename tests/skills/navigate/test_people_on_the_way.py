@@ -149,8 +149,7 @@ def test_robot_approaches_a_person_who_is_the_goal():
 
 def test_robot_passes_a_person_slowly_in_a_narrow_passage():
     """In a corridor of 1.1 m beside the person a disc of full size would block the path."""
-    shelf = replace(TWO_ROOMS[-1], x0=4.0, x1=6.0, y0=6.05, y1=7.0)
-    drive = Drive([person_at(5.0, 4.4)], surveyed=[shelf])
+    drive = Drive([person_at(5.0, 4.4)], surveyed=[replace(TWO_ROOMS[-1], x0=4.0, x1=6.0, y0=6.05, y1=7.0)])
     assert isinstance(drive.step, Succeeded), drive.step.message
     assert drive.bench.robot.least_clearance_m > 0.03
     assert drive.fastest(4.3, 5.2) < 0.35

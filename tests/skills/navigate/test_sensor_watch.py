@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from planar_robot import TWO_ROOMS, Bench, Box
 
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, Succeeded
 from skills.back_off.skill import BackOff, BackOffInputs
 from skills.faults.faulty_robot import inject_faults
 from skills.navigate.sensor_watch import LowObstacleWatch, ScanHealth, WatchOptions, low_points
@@ -33,22 +33,24 @@ def test_points_lie_on_the_object_in_the_odom_frame():
     assert np.abs(points[:, 1]).max() < 0.25
 
 
-def test_cameras_take_pictures_in_turn_within_their_period():
+def watched_bench(ticks):
+    """A bench before a shoe box, after some ticks of the watch."""
     bench = Bench(START, unmapped=[SHOE_BOX])
     watch = LowObstacleWatch(bench.context())
-    for _ in range(40):
+    for _ in range(ticks):
         bench.tick()
         watch.step()
+    return bench
+
+
+def test_cameras_take_pictures_in_turn_within_their_period():
+    bench = watched_bench(40)
     assert set(bench.worker.names) == {"look for low obstacles by frontleft", "look for low obstacles by frontright"}
     assert 4 <= bench.robot.images_taken <= 2.0 / WatchOptions().period_s + 1
 
 
 def test_the_costmap_shows_the_object():
-    bench = Bench(START, unmapped=[SHOE_BOX])
-    watch = LowObstacleWatch(bench.context())
-    for _ in range(20):
-        bench.tick()
-        watch.step()
+    bench = watched_bench(20)
     assert bench.costmap.clearance_m(np.array([[2.85, 5.4]]))[0] < 0.06
 
 
@@ -71,20 +73,13 @@ class Repeating(RobotWrapper):
 
 
 def drive(*faults, wrap=None, seconds=20.0):
-    """How a drive ends, where the robot stood when the LiDAR failed for half a second, and where at the end."""
+    """How a drive ends, and the times and places of the robot on the way."""
     bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
-    base = bench.robot
+    base, places = bench.robot, []
     bench.robot = wrap(bench) if wrap else inject_faults(base, bench.clock, faults)
     bench.tick()
-    skill = Navigate(bench.context())
-    skill.begin(NavigateInputs(GOAL))
-    step, places = skill.step(), []
-    while isinstance(step, Running) and bench.clock.now() < seconds:
-        bench.tick()
-        places.append((bench.clock.now(), base.pose.x_m))
-        step = skill.step()
-    skill.end()
-    return step, places
+    note = lambda: places.append((bench.clock.now(), base.pose.x_m))  # noqa: E731
+    return bench.run(Navigate(bench.context()), NavigateInputs(GOAL), limit_s=seconds, each=note), places
 
 
 def driven_after(places, time_s):
@@ -113,27 +108,15 @@ def test_a_scan_repeated_with_new_stamps_is_reported():
     assert driven_after(places, 2.4) < 0.02
 
 
-def test_a_robot_without_scans_does_not_start():
-    step, places = drive("scan is missing")
-    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION and "gives no scans" in step.message
-    assert driven_after(places, 0.0) == pytest.approx(0.0)
-
-
 def test_robot_waits_through_a_short_gap_of_scans():
     step, _ = drive("scan is missing from 1.5 s to 3 s")
     assert isinstance(step, Succeeded)
 
 
-def test_some_lost_returns_are_no_trouble():
-    bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
-    for _ in range(4):
-        bench.tick()
-    context = bench.context()
-    assert ScanHealth(context).trouble() is None
-    scan = context.robot.scan()
-    holes = np.where(np.arange(scan.ranges_m.size).reshape(scan.ranges_m.shape) % 10, np.nan, scan.ranges_m)
-    bench.robot.scan = lambda: replace(scan, ranges_m=holes.astype(np.float32))
-    assert ScanHealth(bench.context()).trouble() is None
+def test_a_robot_without_scans_does_not_start():
+    step, places = drive("scan is missing")
+    assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION and "gives no scans" in step.message
+    assert driven_after(places, 0.0) == pytest.approx(0.0)
 
 
 def test_robot_does_not_back_off_without_scans():
@@ -143,3 +126,14 @@ def test_robot_does_not_back_off_without_scans():
     skill.begin(BackOffInputs())
     step = skill.step()
     assert isinstance(step, Failed) and step.cause is Cause.PRECONDITION and "gives no scans" in step.message
+
+
+def test_some_lost_returns_are_no_trouble():
+    bench = Bench(DRIVE_START, surveyed=TWO_ROOMS)
+    bench.tick(4)
+    context = bench.context()
+    assert ScanHealth(context).trouble() is None
+    scan = context.robot.scan()
+    holes = np.where(np.arange(scan.ranges_m.size).reshape(scan.ranges_m.shape) % 10, np.nan, scan.ranges_m)
+    bench.robot.scan = lambda: replace(scan, ranges_m=holes.astype(np.float32))
+    assert ScanHealth(bench.context()).trouble() is None

@@ -1,7 +1,5 @@
 """Zones: keep-out ground is an obstacle that may be left, limits slow the robot down, costs lead the planner."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
@@ -10,7 +8,7 @@ import numpy as np
 import pytest
 from planar_robot import OUTLINE, TWO_ROOMS, Bench, grid_of
 
-from skills.api import Cause, Failed, NoWorkCounter, Running, Succeeded
+from skills.api import Cause, Failed, NoWorkCounter, Succeeded
 from skills.estimate.costmap import LayeredCostmap
 from skills.navigate.footprint import Footprint, disc_centres, footprint_clearance_m, pose_array
 from skills.navigate.planner import LatticePlanner, NoPathError
@@ -54,14 +52,14 @@ def plan(*zones, start=START, goal=OTHER_END):
 def go(start, goal, *zones, limit_s=60.0):
     """Runs the skill; returns its last step, and the true poses and speeds of all ticks."""
     bench = Bench(start)
-    skill = Navigate(dataclasses.replace(bench.context(), zones=zones))
-    skill.begin(NavigateInputs(goal))
     poses, speeds = [bench.robot.pose], [0.0]
-    while isinstance(step := skill.step(), Running) and len(poses) < limit_s / 0.05:
-        bench.tick()
+
+    def note():
         poses.append(bench.robot.pose)
         speeds.append(float(np.hypot(*bench.robot.velocity[:2])))
-    skill.end()
+
+    skill = Navigate(dataclasses.replace(bench.context(), zones=zones))
+    step = bench.run(skill, NavigateInputs(goal), limit_s=limit_s, each=note)
     return step, pose_array(poses), np.array(speeds)
 
 
@@ -81,16 +79,15 @@ def test_robot_goes_round_a_keep_out_zone():
 
 def test_a_goal_in_a_keep_out_zone_is_refused_with_its_name():
     step, poses, _ = go(START, OTHER_END, keep_out("lab", 8.0, 4.1, 10.0, 7.0))
-    assert isinstance(step, Failed) and (step.cause, step.final) == (Cause.PLANNING, True)
-    assert step.message == "The lab is a keep-out zone. The robot does not stand at (8.80, 5.50)."
+    why = "The lab is a keep-out zone. The robot does not stand at (8.80, 5.50)."
+    assert step == Failed(Cause.PLANNING, why, final=True)
     assert len(poses) < 10
 
 
 def test_zones_that_leave_no_path_are_named():
-    stairs = keep_out("stairs", 4.0, 4.1, 6.0, 7.0)
-    step, _, _ = go(START, OTHER_END, keep_out("rug", 0.0, 0.0, 1.0, 0.4), stairs, limit_s=20.0)
-    assert isinstance(step, Failed) and (step.cause, step.final) == (Cause.PLANNING, True)
-    assert step.message == "The stairs is a keep-out zone. No path leads to (8.80, 5.50)."
+    zones = keep_out("rug", 0.0, 0.0, 1.0, 0.4), keep_out("stairs", 4.0, 4.1, 6.0, 7.0)
+    step, _, _ = go(START, OTHER_END, *zones, limit_s=20.0)
+    assert step == Failed(Cause.PLANNING, "The stairs is a keep-out zone. No path leads to (8.80, 5.50).", final=True)
 
 
 def test_a_start_in_a_keep_out_zone_leaves_it_by_the_door_and_does_not_come_back():
@@ -103,8 +100,7 @@ def test_a_start_in_a_keep_out_zone_leaves_it_by_the_door_and_does_not_come_back
 
 
 def test_a_start_in_a_keep_out_zone_does_not_cross_it():
-    hall = keep_out("hall", 2.0, 4.1, 8.0, 7.0)
-    step, poses, _ = go(Pose2D(2.2, 5.5, 0.0), OTHER_END, hall, limit_s=30.0)
+    step, poses, _ = go(Pose2D(2.2, 5.5, 0.0), OTHER_END, keep_out("hall", 2.0, 4.1, 8.0, 7.0), limit_s=30.0)
     assert isinstance(step, Failed) and "The hall is a keep-out zone." in step.message
     assert poses[:, 0].max() < 2.6
 
@@ -134,8 +130,7 @@ def test_a_share_is_one_of_the_speed_at_which_the_robot_drives():
 
 
 def test_a_path_prefers_a_lane():
-    lane = Zone("lane", ZoneKind.PREFERRED, box(2.5, 4.4, 7.5, 5.1))
-    poses, _ = plan(lane)
+    poses, _ = plan(Zone("lane", ZoneKind.PREFERRED, box(2.5, 4.4, 7.5, 5.1)))
     between = poses[(poses[:, 0] > 3.2) & (poses[:, 0] < 6.8)]
     assert ((between[:, 1] > 4.4) & (between[:, 1] < 5.1)).all()
     assert (plan()[0][:, 1] > 5.1).all()
@@ -156,14 +151,12 @@ def test_a_one_way_zone_that_leaves_no_path_is_named():
 
 
 def test_a_start_in_a_one_way_zone_may_leave_it_against_the_direction():
-    zone = Zone("hall", ZoneKind.ONE_WAY, box(0.0, 4.1, 4.0, 7.0), direction_rad=math.pi)
-    poses, _ = plan(zone)
+    poses, _ = plan(Zone("hall", ZoneKind.ONE_WAY, box(0.0, 4.1, 4.0, 7.0), direction_rad=math.pi))
     assert poses[-1, 0] == OTHER_END.x_m
 
 
 def test_zones_without_costs_change_no_plan_and_expand_as_many_states():
-    far = Zone("far", ZoneKind.ONE_WAY, box(0.2, 0.2, 0.5, 0.3))
-    bare, among = plan(), plan(far)
+    bare, among = plan(), plan(Zone("far", ZoneKind.ONE_WAY, box(0.2, 0.2, 0.5, 0.3)))
     assert np.array_equal(bare[0], among[0]) and bare[1] == among[1]
     assert not zone_map((Zone("hush", ZoneKind.SILENT, CORRIDOR),), FULL_M_S).has_costs(START)
 
@@ -195,25 +188,20 @@ def test_a_keep_out_mask_blocks_full_cells_and_makes_others_dearer(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("info", "value", "limit_m_s"),
+    ("info", "value", "mode", "limit_m_s"),
     [
-        ((FilterType.SPEED_SHARE, 100.0, -1.0), 75, 0.2),
-        ((FilterType.SPEED_SHARE, 100.0, -1.0), 0, 0.8),
-        ((FilterType.SPEED_SHARE, 100.0, -1.0), 100, math.inf),
-        ((FilterType.SPEED_SHARE, 100.0, -1.0), 255, math.inf),
-        ((FilterType.SPEED, 0.1, 0.01), 20, 0.3),
+        ((FilterType.SPEED_SHARE, 100.0, -1.0), 75, "raw", 0.2),
+        ((FilterType.SPEED_SHARE, 100.0, -1.0), 0, "raw", 0.8),
+        ((FilterType.SPEED_SHARE, 100.0, -1.0), 100, "raw", math.inf),
+        ((FilterType.SPEED_SHARE, 100.0, -1.0), 255, "raw", math.inf),
+        ((FilterType.SPEED_SHARE, 100.0, -1.0), 127, "scale", 0.4),  # a share of darkness
+        ((FilterType.SPEED, 0.1, 0.01), 20, "raw", 0.3),
     ],
 )
-def test_a_speed_mask_limits_by_share_or_by_speed(tmp_path, info, value, limit_m_s):
-    zones = mask_zone(tmp_path, np.full((8, 8), value), ZoneKind.SPEED_LIMIT, info)
+def test_a_speed_mask_limits_by_share_or_by_speed(tmp_path, info, value, mode, limit_m_s):
+    zones = mask_zone(tmp_path, np.full((8, 8), value), ZoneKind.SPEED_LIMIT, info, mode)
     found = zones.speed_m_s(FOOTPRINT, pose_array([Pose2D(3.0, 4.0, 0.0)]), np.zeros(1))
     assert found == pytest.approx(limit_m_s)
-
-
-def test_a_grey_mask_in_scale_mode_has_shares_of_darkness(tmp_path):
-    info = (FilterType.SPEED_SHARE, 100.0, -1.0)
-    zones = mask_zone(tmp_path, np.full((8, 8), 127), ZoneKind.SPEED_LIMIT, info, mode="scale")
-    assert zones.speed_m_s(FOOTPRINT, pose_array([Pose2D(3.0, 4.0, 0.0)]), np.zeros(1)) == pytest.approx(0.4)
 
 
 def test_the_robot_knows_the_silent_zone_in_which_it_stands():

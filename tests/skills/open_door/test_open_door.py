@@ -1,7 +1,5 @@
 """Doors that a plug-in opens: the call, the wait for the door, and failures by name."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import socket
@@ -12,7 +10,7 @@ from http.server import BaseHTTPRequestHandler, HTTPServer
 import pytest
 from planar_robot import Bench, Box
 
-from skills.api import Cause, Failed, Running, Succeeded
+from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
 from skills.navigate.skill import Navigate, NavigateInputs
 from skills.open_door.arm_door import ArmDoor
@@ -21,6 +19,7 @@ from skills.open_door.skill import OpenDoor
 from skills.perception.doorway import Doorway
 from skills.robot import CommandCause, CommandId, CommandState, CommandStatus, Pose2D
 from skills.stack import StackError, door_opener
+from tests.tables import table
 
 PANEL = Box(7.0, 4.03, 7.9, 4.07, 0.0, 2.0)
 INPUTS = CheckDoorInputs((7.45, 4.05), 0.9, math.pi / 2, "door between corridor and kitchen")
@@ -66,13 +65,8 @@ def run(skill_class, inputs, opener, bench=None):
     bench = bench or Bench(BEFORE, unmapped=[PANEL])
     door = Doorway(INPUTS.middle_W, INPUTS.width_m, INPUTS.through_rad, ("corridor", "kitchen"), opener)
     skill = skill_class(dataclasses.replace(bench.context(), doors=(door,)))
-    for _ in range(10):
-        bench.tick()
-    skill.begin(inputs)
-    while isinstance(step := skill.step(), Running) and bench.clock.now() < 60.0:
-        bench.tick()
-    skill.end()
-    return bench, step
+    bench.tick(10)
+    return bench, bench.run(skill, inputs, limit_s=60.0)
 
 
 @pytest.mark.parametrize(("skill", "inputs"), [(OpenDoor, INPUTS), (Navigate, NavigateInputs(KITCHEN))])
@@ -121,23 +115,23 @@ def test_a_door_without_plug_in_is_not_called():
     )
 
 
+def test_a_robot_that_opens_no_doors_says_so():
+    _, step = run(OpenDoor, INPUTS, ArmDoor((7.8, 4.05, 1.0), 0.0))
+    assert (step.cause, step.message) == (
+        Cause.PRECONDITION,
+        "this robot cannot open the door between corridor and kitchen with an arm",
+    )
+
+
 def test_the_plug_in_is_made_of_its_options():
     assert door_opener({"plugin": "http", "url": "http://door/open"}) == HttpDoor("http://door/open")
 
 
-@pytest.mark.parametrize(
-    ("given", "path", "message"),
-    [
-        ({"plugin": "htp", "url": "http://door"}, ("plugin",), "no plug-in 'htp' opens doors"),
-        ({"plugin": "http"}, ("url",), "missing"),
-        ({"plugin": "http", "url": "file:///etc/passwd"}, ("url",), "should"),
-        ({"plugin": "http", "url": "http://door", "methd": "PUT"}, ("methd",), "unknown key 'methd'"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "wrong_options"))
 def test_wrong_options_are_refused_at_their_place(given, path, message):
     with pytest.raises(StackError) as refused:
         door_opener(given)
-    assert refused.value.path == path
+    assert refused.value.path == tuple(path)
     assert message in refused.value.message
 
 
@@ -150,18 +144,9 @@ def test_wrong_options_are_refused_at_their_place(given, path, message):
     ],
 )
 def test_the_handle_is_seen_from_the_side_of_the_robot(here, p_BH, hinge_left, pull):
-    door = ArmDoor((7.8, 4.05, 1.0), -math.pi / 2)
-    handle = door.handle_from(here, 0.52, (7.45, 4.05))
+    handle = ArmDoor((7.8, 4.05, 1.0), -math.pi / 2).handle_from(here, 0.52, (7.45, 4.05))
     assert handle.p_BH == pytest.approx(p_BH)
     assert (handle.hinge_left, handle.pull) == (hinge_left, pull)
-
-
-def test_a_robot_that_opens_no_doors_says_so():
-    _, step = run(OpenDoor, INPUTS, ArmDoor((7.8, 4.05, 1.0), 0.0))
-    assert (step.cause, step.message) == (
-        Cause.PRECONDITION,
-        "this robot cannot open the door between corridor and kitchen with an arm",
-    )
 
 
 # How the door command ends -> the skill's last step.

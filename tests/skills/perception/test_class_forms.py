@@ -1,5 +1,3 @@
-"""Knowledge of object classes and attributes."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +7,7 @@ from made_detections import detected_3d
 from plant.models.catalogue import load_catalogue
 from skills.perception.class_forms import class_forms, known_attributes
 from skills.perception.detection_3d import has_attribute
+from tests.tables import table
 
 
 def test_skills_and_models_use_the_same_class_ids():
@@ -31,21 +30,7 @@ def coloured(*colours):
     return replace(detected_3d(), colours=np.array(colours * 20, np.uint8))
 
 
-@pytest.mark.parametrize(
-    ("colour", "word"),
-    [
-        ((190, 20, 25), "red"),
-        ((25, 60, 190), "blue"),
-        ((40, 140, 60), "green"),
-        ((230, 210, 40), "yellow"),
-        ((90, 55, 25), "brown"),
-        ((20, 20, 22), "black"),
-        ((235, 235, 230), "white"),
-        ((235, 130, 20), "orange"),
-        ((110, 40, 150), "purple"),
-        ((130, 130, 132), "grey"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "colours"))
 def test_an_object_has_its_colour_and_not_the_opposite(colour, word):
     assert has_attribute(coloured(colour), word)
     assert not has_attribute(coloured(colour), "green" if word != "green" else "red")
@@ -60,17 +45,6 @@ def test_an_object_in_a_grey_picture_has_no_colour():
     assert not has_attribute(detected_3d(), "red")
 
 
-def test_big_and_small_are_relative_to_the_class():
-    big = replace(detected_3d(name="hammer"), size_m=(0.8, 0.2, 0.06))
-    small = replace(detected_3d(name="hammer"), size_m=(0.25, 0.1, 0.03))
-    assert [
-        has_attribute(big, "big"),
-        has_attribute(big, "small"),
-        has_attribute(small, "large"),
-        has_attribute(small, "small"),
-    ] == [1, 0, 0, 1]
-
-
 def test_an_unknown_word_is_an_error():
     assert "shiny" not in known_attributes()
     with pytest.raises(KeyError):
@@ -81,3 +55,14 @@ def test_known_words_can_all_be_judged():
     assert {"red", "blue", "big", "small"} <= known_attributes()
     for word in known_attributes():
         has_attribute(coloured((190, 20, 25)), word)
+
+
+def test_big_and_small_are_relative_to_the_class():
+    big = replace(detected_3d(name="hammer"), size_m=(0.8, 0.2, 0.06))
+    small = replace(detected_3d(name="hammer"), size_m=(0.25, 0.1, 0.03))
+    assert [
+        has_attribute(big, "big"),
+        has_attribute(big, "small"),
+        has_attribute(small, "large"),
+        has_attribute(small, "small"),
+    ] == [1, 0, 0, 1]

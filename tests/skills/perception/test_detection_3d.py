@@ -1,5 +1,3 @@
-"""Detections in 3D."""
-
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -25,10 +23,22 @@ def test_a_detection_gets_position_size_surface_and_colours():
     assert np.all(np.median(found.colours, axis=0) == RED)
 
 
+def test_a_detection_without_depth_is_left_out():
+    image = scene([COKE])
+    image.depth_m[:] = 0.0
+    assert detections_3d(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
+
+
+def test_an_observation_has_the_data_of_its_detection():
+    seen = observation(only(scene([COKE])), ("red",))
+    assert str(seen.kind) == "red coke"
+    assert seen.position_W == pytest.approx(tuple(COKE_W), abs=0.006)
+    assert (seen.score, seen.surface) == (0.9, "table")
+
+
 def test_the_position_follows_the_localisation():
     turned = RigidTransform(RollPitchYaw(0.0, 0.0, 0.5), [1.0, 2.0, 0.0])
-    place = LocalisationEstimate(0.0, turned, np.zeros((3, 3)), True)
-    found = only(scene([COKE]), place, ())
+    found = only(scene([COKE]), LocalisationEstimate(0.0, turned, np.zeros((3, 3)), True), ())
     assert found.position_W == pytest.approx(turned @ COKE_W, abs=0.006)
     assert found.yaw_rad == pytest.approx(0.5)
 
@@ -45,12 +55,6 @@ def test_an_uncertain_heading_adds_sideways_uncertainty_to_far_points():
     assert np.sqrt(np.diag(added)) == pytest.approx([0.0, 0.02, 0.0])
 
 
-def test_a_detection_without_depth_is_left_out():
-    image = scene([COKE])
-    image.depth_m[:] = 0.0
-    assert detections_3d(image, SURE, [seen_as("coke", image)], [TABLE]) == ()
-
-
 # class -> whether it can span 0.6 m, where the longest are (class_forms.yaml) 0.30, 0.36, 0.60 and 1.00 m long
 @pytest.mark.parametrize(("name", "possible"), [("coke", False), ("beer", False), ("wrench", True), ("hammer", True)])
 def test_a_box_far_too_large_for_its_class_is_left_out(name, possible):
@@ -60,9 +64,6 @@ def test_a_box_far_too_large_for_its_class_is_left_out(name, possible):
     middle = 0.5 * (u0 + u1)
     wide = Detection(name, 0.9, (middle - half_px, v0, middle + half_px, v1))
     assert bool(detections_3d(image, SURE, [wide], [TABLE])) is possible
-
-
-SHELF = Surface("shelf", TABLE.polygon_W, 0.40)
 
 
 @pytest.mark.parametrize(
@@ -77,14 +78,7 @@ SHELF = Surface("shelf", TABLE.polygon_W, 0.40)
     ],
 )
 def test_surface_below_an_object(p_W, base_m, name):
-    assert surface_below(np.array(p_W), base_m, (TABLE, SHELF)) == name
-
-
-def test_an_observation_has_the_data_of_its_detection():
-    seen = observation(only(scene([COKE])), ("red",))
-    assert str(seen.kind) == "red coke"
-    assert seen.position_W == pytest.approx(tuple(COKE_W), abs=0.006)
-    assert (seen.score, seen.surface) == (0.9, "table")
+    assert surface_below(np.array(p_W), base_m, (TABLE, Surface("shelf", TABLE.polygon_W, 0.40))) == name
 
 
 def test_depth_at_points_is_theirs_and_that_of_the_picture():
@@ -97,8 +91,7 @@ def test_depth_at_points_is_theirs_and_that_of_the_picture():
 
 
 def test_an_object_behind_another_is_not_in_plain_view():
-    tall = Can(COKE.x, COKE.y, 0.05, 0.3, BLUE)
-    image = scene([tall])
+    image = scene([Can(COKE.x, COKE.y, 0.05, 0.3, BLUE)])
     assert in_plain_view(image, RigidTransform(), np.array([1.2, 0.3, 0.8]))
     assert not in_plain_view(image, RigidTransform(), np.array([COKE.x + 0.15, COKE.y - 0.02, 0.8]))
     assert not in_plain_view(image, RigidTransform(), np.array([-1.0, 0.0, 0.8]))
@@ -108,8 +101,7 @@ def test_a_long_object_beside_another_does_not_take_its_points():
     disk = Can(1.02, 0.16, 0.06, 0.012, RED)  # as flat as a wrench
     before = Can(0.94, 0.115, 0.03, 0.10, BLUE)
     image = scene([disk, before])
-    found = [seen_as("wrench", image), seen_as("coke", image, BLUE)]
-    wrench, coke = detections_3d(image, SURE, found, [TABLE])
+    wrench, coke = detections_3d(image, SURE, [seen_as("wrench", image), seen_as("coke", image, BLUE)], [TABLE])
     assert wrench.position_W[:2] == pytest.approx([disk.x, disk.y], abs=0.03)
     assert wrench.position_W[2] < TABLE.height_m + 0.02
     assert coke.position_W[:2] == pytest.approx([before.x, before.y], abs=0.01)

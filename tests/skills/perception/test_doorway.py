@@ -24,64 +24,58 @@ def seen(*blocks, at=None, believed=None, door=DOOR, count=5):
     return measure_opening(door, [(scan, X_believed @ scan.X_BL) for scan in scans])
 
 
+HERE, NEAR, SHUT = Pose2D(0.5, 0.0, 0.0), Pose2D(0.45, 0.08, 0.03), Block(1.98, -0.45, 2.02, 0.45)
+LEAF = [Block(2.0 + 0.06 * k, -0.45 + 0.1 * k, 2.06 + 0.06 * k, -0.35 + 0.1 * k) for k in range(8)]
+"""A door that is ajar by 30 degrees."""
+
+
 @pytest.mark.parametrize(
-    "at",
+    ("blocks", "at", "believed", "least_m", "most_m"),
     [
-        Pose2D(0.5, 0.0, 0.0),
-        Pose2D(0.5, 0.0, 1.5),
-        Pose2D(0.8, 1.0, -0.7),
-        Pose2D(3.5, 0.0, math.pi),
-        Pose2D(-0.5, 0, 0),
+        ([], HERE, None, (0.75, 0.9), (0.75, 1.0)),
+        ([], Pose2D(0.5, 0.0, 1.5), None, (0.75, 0.9), (0.75, 1.0)),
+        ([], Pose2D(0.5, 0.0, math.pi), None, (0.75, 0.9), (0.75, 1.0)),
+        ([], Pose2D(0.8, 1.0, -0.7), None, (0.75, 0.9), (0.75, 1.0)),
+        ([], Pose2D(3.5, 0.0, math.pi), None, (0.75, 0.9), (0.75, 1.0)),
+        ([], Pose2D(-0.5, 0.0, 0.0), None, (0.75, 0.9), (0.75, 1.0)),
+        ([], HERE, NEAR, (0.6, 0.9), (0.6, 1.0)),
+        ([SHUT], HERE, None, (0.0, 0.0), (0.0, 0.0)),
+        ([SHUT], HERE, NEAR, (0.0, 0.1), (0.0, 0.1)),
+        ([Block(1.98, -0.45, 2.02, 0.25)], HERE, None, (0.0, 0.26), (0.14, 1.0)),
+        ([Block(1.98, -0.45, 2.02, 0.05)], HERE, None, (0.0, 0.46), (0.34, 1.0)),
+        ([Block(1.98, -0.45, 2.02, -0.25)], HERE, None, (0.0, 0.76), (0.64, 1.0)),
+        ([Block(1.85, -0.2, 2.15, 0.2, 0.0, 1.7)], HERE, None, (0.0, 0.3), (0.8, 1.0)),  # counts as unseen
+        ([SHUT, Block(1.2, -0.25, 1.4, 0.25, 0.0, 1.8)], HERE, None, (0.0, 0.0), (0.5, 1.0)),  # hides a closed door
+        (LEAF, HERE, None, (0.0, 0.6), (0.0, 0.6)),
+    ],
+    ids=[
+        "open, from the middle",
+        "open, to the left of the robot",
+        "open, behind the robot",
+        "open, from aside",
+        "open, from the other side",
+        "open, from farther away",
+        "open, by a pose with a small error",
+        "closed",
+        "closed, by a pose with a small error",
+        "gap of 20 cm",
+        "gap of 40 cm",
+        "gap of 70 cm",
+        "object free in the doorway",
+        "closed door behind an object",
+        "swing door that is ajar",
     ],
 )
-def test_an_open_doorway_is_free_over_nearly_its_width(at):
-    assert 0.75 <= seen(at=at).least_m <= 0.9
-
-
-def test_a_closed_doorway_is_free_nowhere():
-    told = seen(Block(1.98, -0.45, 2.02, 0.45))
-    assert (told.least_m, told.most_m) == (0.0, 0.0)
-
-
-@pytest.mark.parametrize("gap_m", [0.2, 0.4, 0.7])
-def test_a_gap_is_measured(gap_m):
-    told = seen(Block(1.98, -0.45, 2.02, 0.45 - gap_m))
-    assert told.least_m - 0.06 <= gap_m <= told.most_m + 0.06
-
-
-def test_an_object_free_in_the_doorway_counts_as_unseen():
-    told = seen(Block(1.85, -0.2, 2.15, 0.2, 0.0, 1.7))
-    assert told.least_m < 0.3
-    assert told.most_m >= 0.8
-
-
-def test_an_object_before_a_closed_door_hides_it():
-    told = seen(Block(1.98, -0.45, 2.02, 0.45), Block(1.2, -0.25, 1.4, 0.25, 0.0, 1.8))
-    assert told.least_m == 0.0
-    assert told.most_m >= 0.5
-
-
-def test_a_swing_door_that_is_ajar_is_not_open_wide():
-    leaf = [Block(2.0 + 0.06 * k, -0.45 + 0.1 * k, 2.06 + 0.06 * k, -0.35 + 0.1 * k) for k in range(8)]  # 30 degrees
-    assert seen(*leaf).most_m < 0.6
-
-
-def test_an_open_door_is_recognised_despite_a_small_pose_error():
-    assert seen(believed=Pose2D(0.45, 0.08, 0.03)).least_m >= 0.6
-
-
-def test_a_closed_door_is_recognised_despite_a_small_pose_error():
-    assert seen(Block(1.98, -0.45, 2.02, 0.45), believed=Pose2D(0.45, 0.08, 0.03)).most_m <= 0.1
+def test_the_opening_of_a_doorway_is_measured(blocks, at, believed, least_m, most_m):
+    opening = seen(*blocks, at=at, believed=believed)
+    assert least_m[0] <= opening.least_m <= least_m[1]
+    assert most_m[0] <= opening.most_m <= most_m[1]
 
 
 def test_too_few_rays_show_nothing():
-    told = seen(at=Pose2D(-20.0, 0.0, 0.0), count=1)
-    assert (told.least_m, told.rays < 50) == (0.0, True)
-    assert told.most_m == pytest.approx(0.9)
-
-
-def test_doors_behind_the_robot_are_measured():
-    assert seen(at=Pose2D(0.5, 0.0, math.pi)).least_m >= 0.75
+    opening = seen(at=Pose2D(-20.0, 0.0, 0.0), count=1)
+    assert (opening.least_m, opening.rays < 50) == (0.0, True)
+    assert opening.most_m == pytest.approx(0.9)
 
 
 def test_view_angle_of_a_doorway():

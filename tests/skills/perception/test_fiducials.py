@@ -44,6 +44,15 @@ def test_depth_decides_between_the_two_poses_of_a_small_tag():
     assert off(seen, X_CT)[1] < 3.0
 
 
+def test_a_grey_camera_with_fewer_pixels_finds_a_tag_from_nearer():
+    body = replace(HAND, width=320, height=240, fx=165.0, fy=165.0, cx=160.0, cy=120.0)
+    X_CT = facing(0.8, 40.0, 15.0)
+    (seen,) = find_tags(picture_of([(7, 0.1, X_CT)], body), {7: 0.1})
+    off_mm, off_deg = off(seen, X_CT)
+    assert off_mm < 20.0
+    assert off_deg < 3.0
+
+
 def test_tags_that_the_robot_does_not_know_are_ignored():
     both = picture_of([(7, 0.1, facing(1.0, 20.0, 0.0, (-0.2, 0.0))), (8, 0.1, facing(1.0, 20.0, 0.0, (0.2, 0.0)))])
     assert [seen.id for seen in find_tags(both, {8: 0.1})] == [8]
@@ -57,22 +66,6 @@ def test_a_tag_with_a_hidden_corner_is_not_found():
     grey = image.grey.copy()
     grey[v - 8 : v + 8, u - 8 : u + 20] = 150
     assert find_tags(replace(image, grey=grey), {7: 0.1}) == ()
-
-
-def test_a_grey_camera_with_fewer_pixels_finds_a_tag_from_nearer():
-    body = replace(HAND, width=320, height=240, fx=165.0, fy=165.0, cx=160.0, cy=120.0)
-    X_CT = facing(0.8, 40.0, 15.0)
-    (seen,) = find_tags(picture_of([(7, 0.1, X_CT)], body), {7: 0.1})
-    off_mm, off_deg = off(seen, X_CT)
-    assert off_mm < 20.0
-    assert off_deg < 3.0
-
-
-def test_the_pose_of_a_wall_tag_looks_along_its_heading_with_its_top_up():
-    X_WT = Tag(3, 0.15, p_W=(1.0, 2.0, 0.5), yaw_rad=np.pi / 2).X_WT()
-    assert X_WT.translation().tolist() == [1.0, 2.0, 0.5]
-    np.testing.assert_allclose(X_WT.rotation().matrix() @ [0, 0, 1], [0, 1, 0], atol=1e-12)
-    np.testing.assert_allclose(X_WT.rotation().matrix() @ [0, 1, 0], [0, 0, 1], atol=1e-12)
 
 
 MUG = Can(1.0, 0.1, 0.045, 0.12, (200, 200, 190))
@@ -106,6 +99,13 @@ def test_an_object_with_a_tag_is_detected_as_its_class(table):
     assert (found.class_name, found.score) == ("mug", TAG_SCORE)
 
 
+def test_the_pose_of_a_wall_tag_looks_along_its_heading_with_its_top_up():
+    X_WT = Tag(3, 0.15, p_W=(1.0, 2.0, 0.5), yaw_rad=np.pi / 2).X_WT()
+    assert X_WT.translation().tolist() == [1.0, 2.0, 0.5]
+    np.testing.assert_allclose(X_WT.rotation().matrix() @ [0, 0, 1], [0, 1, 0], atol=1e-12)
+    np.testing.assert_allclose(X_WT.rotation().matrix() @ [0, 1, 0], [0, 0, 1], atol=1e-12)
+
+
 def test_its_box_holds_the_object_and_not_the_table(table):
     (found,) = detect_in_image(with_tags(NETWORKS, [Tag(7, 0.06, on="mug")]), table)
     (mug,) = detections_3d(table, HERE, [found], [TABLE])
@@ -133,8 +133,7 @@ def test_a_tag_outvotes_what_its_object_is_taken_for(table):
 
 
 def test_without_tags_on_objects_the_detector_stays_the_same():
-    wall = Tag(3, 0.15, p_W=(1.0, 2.0, 0.5))
-    assert with_tags(NETWORKS, [wall]) is NETWORKS
+    assert with_tags(NETWORKS, [Tag(3, 0.15, p_W=(1.0, 2.0, 0.5))]) is NETWORKS
 
 
 def test_a_tag_without_depth_gives_its_own_box(table):

@@ -13,6 +13,13 @@ from skills.testing.estimators import PlainColours
 MODEL = can_model("tin", 0.04, 0.12, (190, 15, 20))
 
 
+def rewritten(folder, **changes):
+    """Writes the model of a folder again with other arrays; None: without."""
+    with np.load(folder / RECOGNITION_FILE) as data:
+        arrays = {key: changes.get(key, lambda values: values)(data[key]) for key in data}
+    np.savez(folder / RECOGNITION_FILE, **{key: values for key, values in arrays.items() if values is not None})
+
+
 def test_a_model_is_read_as_it_was_written(tmp_path):
     MODEL.write(tmp_path)
     read = read_model(tmp_path)
@@ -29,9 +36,7 @@ def test_views_of_photographs_are_read_as_they_were_written(tmp_path):
 
 def test_a_model_from_before_there_were_views_has_none(tmp_path):
     MODEL.write(tmp_path)
-    with np.load(tmp_path / RECOGNITION_FILE) as data:
-        before = {key: data[key] for key in data if key != "views"}
-    np.savez(tmp_path / RECOGNITION_FILE, **before)
+    rewritten(tmp_path, views=lambda views: None)
     assert len(read_model(tmp_path).views) == 0
 
 
@@ -43,20 +48,12 @@ def test_a_folder_without_a_model_is_refused_in_one_sentence(tmp_path, content):
         read_model(tmp_path)
 
 
-def test_a_model_with_too_few_colours_is_refused(tmp_path):
-    MODEL.write(tmp_path)
-    with np.load(tmp_path / RECOGNITION_FILE) as data:
-        changed = {**data, "colours": data["colours"][:5]}
-    np.savez(tmp_path / RECOGNITION_FILE, **changed)
-    with pytest.raises(InputError, match="damaged"):
-        read_model(tmp_path)
-
-
-def test_a_model_with_views_of_another_size_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    "changes", [{"colours": lambda rows: rows[:5]}, {"views": lambda views: views[:, :12]}], ids=" ".join
+)
+def test_a_model_with_too_few_colours_or_views_of_another_size_is_refused(tmp_path, changes):
     photographed_can("tin", 0.04, 0.12, (190, 15, 20)).write(tmp_path)
-    with np.load(tmp_path / RECOGNITION_FILE) as data:
-        changed = {**data, "views": data["views"][:, :12]}
-    np.savez(tmp_path / RECOGNITION_FILE, **changed)
+    rewritten(tmp_path, **changes)
     with pytest.raises(InputError, match="damaged"):
         read_model(tmp_path)
 

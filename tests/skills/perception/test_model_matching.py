@@ -58,18 +58,18 @@ def test_each_object_gets_the_name_of_its_own_model():
     assert sorted(each.class_name for each in found) == ["pot", ANY_OBJECT, "tin"]
 
 
-@by_mesh_and_by_photographs
-def test_models_that_nothing_tells_apart_are_alternatives_without_a_claim(model):
-    (found,) = seen([TIN], [model, replace(model, name="twin")])
-    assert found.class_name == ANY_OBJECT
-    assert {name for name, _ in found.detection.alternatives} == {"tin", "twin"}
-
-
 def test_an_object_behind_another_is_claimed_only_while_half_of_it_shows():
     behind = Can(1.15, -0.02, 0.04, 0.12, RED)
     wall = Can(1.0, 0.0, 0.045, 0.2, BLUE)
     names = [each.class_name for each in seen([behind, wall], [MODEL])]
     assert "tin" not in names
+
+
+@by_mesh_and_by_photographs
+def test_models_that_nothing_tells_apart_are_alternatives_without_a_claim(model):
+    (found,) = seen([TIN], [model, replace(model, name="twin")])
+    assert found.class_name == ANY_OBJECT
+    assert {name for name, _ in found.detection.alternatives} == {"tin", "twin"}
 
 
 def test_no_model_is_aligned_with_segments_of_another_size(monkeypatch):

@@ -1,5 +1,3 @@
-"""Moving objects and still ones."""
-
 import math
 
 import numpy as np
@@ -13,8 +11,7 @@ SCAN_S = 0.1
 def side_of(x, y, *, seen_from=(0.0, 0.0), radius_m=0.2, noise_m=0.02, rng=None):
     """Returns on the visible side of an upright cylinder."""
     rng = rng or np.random.default_rng(0)
-    towards = math.atan2(seen_from[1] - y, seen_from[0] - x)
-    turn = towards + np.linspace(-1.4, 1.4, 40)
+    turn = math.atan2(seen_from[1] - y, seen_from[0] - x) + np.linspace(-1.4, 1.4, 40)
     points = np.column_stack([x + radius_m * np.cos(turn), y + radius_m * np.sin(turn)])
     return points + rng.normal(scale=noise_m, size=points.shape)
 

@@ -1,5 +1,3 @@
-"""Segmentation of an object in its box."""
-
 from dataclasses import replace
 
 import numpy as np
@@ -24,9 +22,17 @@ def test_table_and_floor_are_planes_about_an_object_at_the_tables_edge():
     assert heights == pytest.approx([0.0, TABLE.height_m], abs=0.01)
 
 
-def test_the_segment_has_only_points_of_the_object():
+def test_the_window_has_only_valid_depth():
     image = scene([COKE])
-    found = segment_object(window_of(image), FORM)
+    image.depth_m[::2] = np.nan
+    image.depth_m[1::4] = 60.0
+    window = window_of(image)
+    assert np.all(np.isfinite(window.p_O))
+    assert 0.15 < window.valid.mean() < 0.35
+
+
+def test_the_segment_has_only_points_of_the_object():
+    found = segment_object(window_of(scene([COKE])), FORM)
     off = np.linalg.norm(found.points_O[:, :2] - [COKE.x, COKE.y], axis=1)
     assert np.percentile(off, 95) < COKE.radius + 0.008
     assert found.plane.height_m == pytest.approx(TABLE.height_m, abs=0.004)
@@ -43,8 +49,7 @@ def test_the_segment_has_most_visible_points_of_the_object():
 
 
 def test_another_object_in_the_box_is_left_out():
-    before = Can(COKE.x - 0.10, COKE.y - 0.05, 0.03, 0.08, BLUE)
-    image = scene([COKE, before])
+    image = scene([COKE, Can(COKE.x - 0.10, COKE.y - 0.05, 0.03, 0.08, BLUE)])
     window = window_of(image)
     blue = np.all(image.colour == BLUE, axis=-1)[np.rint(window.v).astype(int), np.rint(window.u).astype(int)]
     assert np.count_nonzero(segment_object(window, FORM).mask & blue) < 20
@@ -62,22 +67,16 @@ def test_a_wall_behind_two_parts_of_an_object_is_left_out():
 
 def test_large_boxes_are_subsampled():
     image = scene([Can(0.75, 0.0, 0.12, 0.3, COKE.colour)])
-    window = window_of(image)
-    assert max(window.z.shape) <= 150
+    assert max(window_of(image).z.shape) <= 150
 
 
-def test_the_window_has_only_valid_depth():
-    image = scene([COKE])
-    image.depth_m[::2] = np.nan
-    image.depth_m[1::4] = 60.0
-    window = window_of(image)
-    assert np.all(np.isfinite(window.p_O))
-    assert 0.15 < window.valid.mean() < 0.35
+def test_a_grey_picture_is_enough():
+    image = replace(scene([COKE]), colour=None)
+    assert segment_object(window_about(image, seen_as("coke", scene([COKE])).box), FORM).covered > 0.8
 
 
 def test_rays_go_through_the_sides_of_the_box():
-    image = scene([COKE])
-    window = window_of(image)
+    window = window_of(scene([COKE]))
     left, right, top, bottom, middle = window.rays_O()
     assert left @ right > 0.9
     assert top[2] > middle[2] > bottom[2]
@@ -88,9 +87,3 @@ def test_a_point_outside_of_the_picture_is_beyond_its_border():
     assert window.border_px(np.array([COKE.x, COKE.y, 0.8])) > 20.0
     assert window.border_px(np.array([COKE.x, 2.0, 0.8])) < 0.0
     assert window.border_px(np.array([-1.0, 0.0, 0.8])) < 0.0
-
-
-def test_a_grey_picture_is_enough():
-    image = replace(scene([COKE]), colour=None)
-    box = seen_as("coke", scene([COKE])).box
-    assert segment_object(window_about(image, box), FORM).covered > 0.8

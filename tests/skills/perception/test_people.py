@@ -17,45 +17,41 @@ def people_seen(scan, X_WB=None):
     return people_in_scan(scan, X_WB or RigidTransform(), OUTLINE)
 
 
-def test_a_person_is_found_at_their_position():
-    (person,) = people_seen(scan_of([(1.8, 0.4, 0.2)]))
-    assert person.place_W == pytest.approx((1.8, 0.4), abs=0.12)
-
-
 def test_the_nearest_of_two_comes_first():
     people = people_seen(scan_of([(2.6, -1.0, 0.2), (1.6, 0.8, 0.2)]))
     assert [round(person.place_W[1], 1) > 0 for person in people] == [True, False]
 
 
 def test_a_person_in_front_of_a_wall_is_found():
-    people = people_seen(scan_of([(1.6, 0.0, 0.2)], wall_x=2.6))
-    assert len(people) == 1
+    assert len(people_seen(scan_of([(1.6, 0.0, 0.2)], wall_x=2.6))) == 1
 
 
-def test_a_wall_is_no_person():
-    assert people_seen(scan_of(wall_x=2.0)) == []
+@pytest.mark.parametrize(
+    ("discs", "wall_x"),
+    [
+        ([], 2.0),
+        ([(1.5, 0.0, 0.03)], None),
+        ([(2.4, 0.0, 0.2)], 2.5),
+        ([(5.0, 0.0, 0.2)], None),
+        ([(0.55, 0.0, 0.1)], None),
+    ],
+    ids=["a wall", "a thin post", "a person who leans on a wall", "a person far away", "the held object"],
+)
+def test_a_scan_without_people_has_none(discs, wall_x):
+    assert people_seen(scan_of(discs, wall_x=wall_x)) == []
 
 
-def test_a_thin_post_is_no_person():
-    assert people_seen(scan_of([(1.5, 0.0, 0.03)])) == []
-
-
-def test_a_person_who_leans_on_a_wall_is_not_found():
-    assert people_seen(scan_of([(2.4, 0.0, 0.2)], wall_x=2.5)) == []
-
-
-def test_a_person_far_away_does_not_count():
-    assert people_seen(scan_of([(5.0, 0.0, 0.2)])) == []
-
-
-def test_the_held_object_is_no_person():
-    assert people_seen(scan_of([(0.55, 0.0, 0.1)])) == []
-
-
-def test_the_position_is_in_the_world_frame():
-    (person,) = people_seen(scan_of([(1.8, 0.0, 0.2)]), Pose2D(5.0, 2.0, 1.5708).transform())
-    assert person.place_W == pytest.approx((5.0, 3.8), abs=0.12)
-    assert person.distance_m == pytest.approx(1.8, abs=0.12)
+@pytest.mark.parametrize(
+    ("discs", "X_WB", "place_W", "distance_m"),
+    [
+        ([(1.8, 0.4, 0.2)], None, (1.8, 0.4), 1.84),
+        ([(1.8, 0.0, 0.2)], Pose2D(5.0, 2.0, 1.5708).transform(), (5.0, 3.8), 1.8),
+    ],
+)
+def test_a_person_is_found_at_their_position_in_the_world(discs, X_WB, place_W, distance_m):
+    (person,) = people_seen(scan_of(discs), X_WB)
+    assert person.place_W == pytest.approx(place_W, abs=0.12)
+    assert person.distance_m == pytest.approx(distance_m, abs=0.12)
 
 
 class SurveyedWall:
@@ -78,14 +74,6 @@ def test_a_person_close_to_a_surveyed_wall_is_found():
     assert person.place_W == pytest.approx((2.55, 0.0), abs=0.12)
 
 
-def test_a_person_just_before_a_stowed_arm_is_where_they_stand():
-    # the robot ends at x = 0.5; the person's near side is 0.13 m ahead
-    scan = scan_of([(0.83, 0.0, 0.2)], wall_x=3.0)
-    X_WB, survey = RigidTransform([0.0, 0.0, 0.52]), SurveyedWall(3.0)
-    (person,) = people_in_scan(scan, X_WB, OUTLINE, 6.0, survey, ahead_m=STOWED_AHEAD_M)
-    assert person.place_W == pytest.approx((0.83, 0.0), abs=0.12)
-
-
 def test_two_people_side_by_side_are_two_people_where_a_survey_explains_the_walls():
     assert len(people_before_wall([(1.8, 0.35, 0.2), (1.8, -0.35, 0.2)])) == 2
 
@@ -93,6 +81,14 @@ def test_two_people_side_by_side_are_two_people_where_a_survey_explains_the_wall
 def test_a_surveyed_wall_and_an_unmapped_post_are_no_people():
     assert people_before_wall([]) == []
     assert people_before_wall([(1.5, 0.0, 0.04)]) == []
+
+
+def test_a_person_just_before_a_stowed_arm_is_where_they_stand():
+    # the robot ends at x = 0.5; the person's near side is 0.13 m ahead
+    scan = scan_of([(0.83, 0.0, 0.2)], wall_x=3.0)
+    X_WB, survey = RigidTransform([0.0, 0.0, 0.52]), SurveyedWall(3.0)
+    (person,) = people_in_scan(scan, X_WB, OUTLINE, 6.0, survey, ahead_m=STOWED_AHEAD_M)
+    assert person.place_W == pytest.approx((0.83, 0.0), abs=0.12)
 
 
 def test_a_pair_of_legs_is_a_person_for_a_lidar_of_one_ring():

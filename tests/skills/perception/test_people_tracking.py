@@ -13,7 +13,9 @@ from skills.perception.people_tracking import PeopleOptions, PeopleTracker, Peop
 from skills.robot import Pose2D
 
 START = Pose2D(1.5, 5.4, 0.0)
-STILL = np.zeros(3)
+
+
+PERSON = person_at(3.5, 5.5)
 
 
 def watched(*people, detector_changes=None, seconds=2.0, cameras=True):
@@ -25,10 +27,18 @@ def watched(*people, detector_changes=None, seconds=2.0, cameras=True):
     return bench, detector, watch
 
 
+def counts_for(bench, watch, seconds):
+    """Asserts that a person counts for some seconds, and no longer 1.5 s later."""
+    look(bench, watch, seconds)
+    assert len(watch.people()) == 1
+    look(bench, watch, 1.5)
+    assert watch.people() == ()
+
+
 def look(bench, watch, seconds):
     for _ in range(round(seconds / 0.05)):
         bench.tick()
-        watch.step(STILL)
+        watch.step(np.zeros(3))
 
 
 @pytest.mark.parametrize("distance_m", [1.5, 2.0, 3.0, 3.5])
@@ -70,51 +80,48 @@ def depths_asked_for(people, *, with_lidar):
     return asked, watch.people()
 
 
-def test_depth_is_taken_only_where_a_person_may_be_near():
-    asked, _ = depths_asked_for([], with_lidar=True)
-    assert set(asked) == {False}
-    asked, people = depths_asked_for([person_at(3.5, 5.5)], with_lidar=True)
-    assert (asked[-1], len(people)) == (True, 1)
-
-
-def test_a_person_in_a_picture_without_depth_is_viewed_with_depth_at_once():
-    asked, people = depths_asked_for([person_at(3.5, 5.5)], with_lidar=False)
-    assert asked[:4] == [False, False, True, True]
-    assert len(people) == 1
+@pytest.mark.parametrize(
+    ("people", "with_lidar", "asked_first", "asked_last", "count"),
+    [
+        ([], True, [], False, 0),
+        ([PERSON], True, [], True, 1),
+        ([PERSON], False, [False, False, True, True], True, 1),
+    ],
+    ids=["nobody", "a person whom the LiDAR shows", "a person in a picture without depth"],
+)
+def test_depth_is_taken_only_where_a_person_may_be_near(people, with_lidar, asked_first, asked_last, count):
+    asked, found = depths_asked_for(people, with_lidar=with_lidar)
+    assert asked[: len(asked_first)] == asked_first
+    assert (asked[-1], len(found)) == (asked_last, count)
+    assert people or set(asked) == {False}
 
 
 def test_a_person_counts_when_seen_twice_and_the_second_view_comes_soon():
-    bench, _, watch = watched(person_at(3.5, 5.5), seconds=0.3)
+    bench, _, watch = watched(PERSON, seconds=0.3)
     assert watch.people() == ()
     look(bench, watch, 0.4)
     assert len(watch.people()) == 1
 
 
 def test_a_person_who_has_gone_is_forgotten():
-    bench, detector, watch = watched(person_at(3.5, 5.5))
-    bench.robot.blocks.remove(detector.people[0])
-    look(bench, watch, 0.5)
-    assert len(watch.people()) == 1
-    look(bench, watch, 1.5)
-    assert watch.people() == ()
+    bench, _, watch = watched(PERSON)
+    bench.robot.blocks.remove(PERSON)
+    counts_for(bench, watch, 0.5)
 
 
 @pytest.mark.parametrize(("stays", "remembered_s"), [(True, PeopleOptions().beside_s), (False, 2.0)])
 def test_a_person_out_of_view_is_remembered_while_an_obstacle_is_there(stays, remembered_s):
-    bench, detector, watch = watched(person_at(3.5, 5.5))
+    bench, _, watch = watched(PERSON)
     bench.robot.push(0.0, 0.0, math.pi)
     bench.robot.scan = lambda: None
     if not stays:
-        bench.robot.blocks.remove(detector.people[0])
+        bench.robot.blocks.remove(PERSON)
         bench.costmap.clear_obstacles()
-    look(bench, watch, remembered_s - 0.6)
-    assert len(watch.people()) == 1
-    look(bench, watch, 1.5)
-    assert watch.people() == ()
+    counts_for(bench, watch, remembered_s - 0.6)
 
 
 def test_a_person_out_of_view_is_remembered_while_scans_show_them():
-    bench, _, watch = watched(person_at(3.5, 5.5))
+    bench, _, watch = watched(PERSON)
     bench.robot.push(0.0, 0.0, math.pi)
     look(bench, watch, PeopleOptions().beside_s + 1.0)
     assert len(watch.people()) == 1
@@ -135,33 +142,33 @@ def test_people_are_published_and_also_when_none_is_left():
 
 
 def test_faint_detections_do_not_count():
-    _, _, watch = watched(person_at(3.5, 5.5), detector_changes={"score": 0.4})
+    _, detector, watch = watched(PERSON, detector_changes={"score": 0.4})
     assert watch.people() == ()
+    assert detector.pictures
 
 
 def test_a_detector_without_a_class_of_people_gets_no_pictures():
-    bench, detector, watch = watched(person_at(3.5, 5.5), detector_changes={"class_names": ("cube",)})
+    bench, detector, watch = watched(PERSON, detector_changes={"class_names": ("cube",)})
     assert (watch.people(), detector.pictures, bench.robot.images_taken) == ((), [], 0)
 
 
-def test_without_a_detector_or_cameras_no_picture_is_taken():
-    bench = Bench(START, unmapped=[person_at(3.5, 5.5)])
-    look(bench, PeopleWatch(bench.context()), 1.0)
-    assert bench.robot.images_taken == 0
-    _, detector, watch = watched(person_at(3.5, 5.5), cameras=False)
-    assert (watch.people(), detector.pictures) == ((), [])
-
-
 def test_errors_of_the_detector_are_raised():
-    bench = Bench(START)
-
     class Broken(PeopleDetector):
         def detect(self, pictures):
             raise RuntimeError("the network is gone")
 
+    bench = Bench(START)
     watch = PeopleWatch(replace(bench.context(), detector=Broken(bench, [])))
     with pytest.raises(RuntimeError, match="the network is gone"):
         look(bench, watch, 1.0)
+
+
+def test_without_a_detector_or_cameras_no_picture_is_taken():
+    bench = Bench(START, unmapped=[PERSON])
+    look(bench, PeopleWatch(bench.context()), 1.0)
+    assert bench.robot.images_taken == 0
+    _, detector, watch = watched(PERSON, cameras=False)
+    assert (watch.people(), detector.pictures) == ((), [])
 
 
 def seen(x, y, stamp_s):
@@ -224,7 +231,7 @@ def test_a_picture_that_comes_later_than_a_scan_counts_as_a_view():
 
 
 def test_scans_alone_track_people_where_the_options_say_so():
-    bench = Bench(START, unmapped=[person_at(3.5, 5.5)])
+    bench = Bench(START, unmapped=[PERSON])
     watch = PeopleWatch(bench.context(), PeopleOptions(track_m=6.0))
     look(bench, watch, 1.0)
     (one,) = watch.tracks()
@@ -233,10 +240,10 @@ def test_scans_alone_track_people_where_the_options_say_so():
 
 
 def test_a_person_out_of_sight_is_tracked_for_a_while():
-    bench = Bench(START, unmapped=[person_at(3.5, 5.5)])
+    bench = Bench(START, unmapped=[PERSON])
     watch = PeopleWatch(bench.context(), PeopleOptions(track_m=6.0))
     look(bench, watch, 1.0)
-    bench.robot.blocks.remove(person_at(3.5, 5.5))
+    bench.robot.blocks.remove(PERSON)
     look(bench, watch, PeopleOptions().hidden_s - 0.5)
     assert len(watch.tracks()) == 1
     look(bench, watch, 1.0)

@@ -30,23 +30,6 @@ def test_an_object_hides_a_part_of_its_surface():
     assert shares(scene([Can(0.9, 0.0, 0.1, 0.3, GREY)]))["table"].hidden > 0.02
 
 
-def test_two_pictures_add_up():
-    left = scene([], X_WC=camera_pose(np.array([0.5, 0.0, 1.15]), np.array([1.1, 0.5, 0.75])))
-    right = scene([], X_WC=camera_pose(np.array([0.5, 0.0, 1.15]), np.array([1.1, -0.5, 0.75])))
-    assert shares(left, right)["table"].seen > shares(left)["table"].seen + 0.1
-
-
-def test_a_part_seen_once_stays_seen():
-    hidden = scene([Can(0.9, 0.0, 0.1, 0.3, GREY)])
-    assert shares(scene([]), hidden)["table"] == shares(scene([]))["table"]
-
-
-def test_without_depth_nothing_is_seen():
-    image = scene([])
-    image.depth_m[:] = np.nan
-    assert shares(image)["table"] == SurfaceShares(0.0, 0.0)
-
-
 def test_a_surface_elsewhere_is_out_of_view():
     assert shares(scene([]), surfaces=(TABLE, AWAY))["shelf"].out_of_view == 1.0
 
@@ -56,7 +39,20 @@ def test_shares_are_described_in_words():
     assert str(SurfaceShares(1.0, 0.0)) == "100 % seen"
 
 
-AT_W = np.array([1.0, 0.0, 0.80])
+def test_two_pictures_add_up():
+    left = scene([], X_WC=camera_pose(np.array([0.5, 0.0, 1.15]), np.array([1.1, 0.5, 0.75])))
+    right = scene([], X_WC=camera_pose(np.array([0.5, 0.0, 1.15]), np.array([1.1, -0.5, 0.75])))
+    assert shares(left, right)["table"].seen > shares(left)["table"].seen + 0.1
+
+
+def test_a_part_seen_once_stays_seen():
+    assert shares(scene([]), scene([Can(0.9, 0.0, 0.1, 0.3, GREY)]))["table"] == shares(scene([]))["table"]
+
+
+def test_without_depth_nothing_is_seen():
+    image = scene([])
+    image.depth_m[:] = np.nan
+    assert shares(image)["table"] == SurfaceShares(0.0, 0.0)
 
 
 def _can(x, y=0.0, colour=RED):
@@ -65,16 +61,11 @@ def _can(x, y=0.0, colour=RED):
 
 def _rests(first, second):
     before, after = scene(first, noise_m=0.001), scene(second, noise_m=0.002)
-    return is_at_rest(before, after, RigidTransform(), AT_W, 0.25)
+    return is_at_rest(before, after, RigidTransform(), np.array([1.0, 0.0, 0.80]), 0.25)
 
 
 def test_noise_alone_does_not_move_an_object():
     assert _rests([_can(1.0)], [_can(1.0)])
-
-
-@pytest.mark.parametrize("moved_m", [(0.02, 0.0), (0.0, 0.02), (0.3, 0.3)])
-def test_an_object_that_has_moved_is_not_at_rest(moved_m):
-    assert not _rests([_can(1.0)], [_can(1.0 + moved_m[0], moved_m[1])])
 
 
 def test_an_object_that_is_gone_is_not_at_rest():
@@ -83,3 +74,8 @@ def test_an_object_that_is_gone_is_not_at_rest():
 
 def test_changes_farther_away_do_not_count():
     assert _rests([_can(1.0), _can(1.0, 0.4, BLUE)], [_can(1.0), _can(1.0, 0.5, BLUE)])
+
+
+@pytest.mark.parametrize("moved_m", [(0.02, 0.0), (0.0, 0.02), (0.3, 0.3)])
+def test_an_object_that_has_moved_is_not_at_rest(moved_m):
+    assert not _rests([_can(1.0)], [_can(1.0 + moved_m[0], moved_m[1])])

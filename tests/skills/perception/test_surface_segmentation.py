@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from table_scene import BLUE, CAMERA, COKE, GREEN, GREY, RED, TABLE, Can, scene, seen_as
+from table_scene import BLUE, CAMERA, COKE, GREEN, GREY, RED, TABLE, Can, box_of, scene, seen_as
 
 from skills.api import Detection, LocalisationEstimate, Surface
 from skills.perception.detection_3d import detections_3d
@@ -27,6 +27,12 @@ def viewed(image, X_WO=None, surface=TABLE):
     return view
 
 
+def detected_in(image, name="coke", colour=RED, detection=None):
+    """The object of a colour in 3D."""
+    (detected,) = detections_3d(image, PLACE, [detection or seen_as(name, image, colour)], [TABLE])
+    return detected
+
+
 def test_a_can_is_one_cluster_at_its_position():
     (cluster,) = viewed(scene([COKE])).clusters
     assert cluster.shape.round
@@ -36,15 +42,22 @@ def test_a_can_is_one_cluster_at_its_position():
     assert cluster.base_m == pytest.approx(0.75, abs=0.004)
 
 
+def test_a_localisation_error_shifts_the_can_as_a_whole():
+    (cluster,) = viewed(scene([COKE]), X_WO=RigidTransform([0.02, -0.02, 0.02])).clusters
+    assert cluster.shape.centre == pytest.approx((0.97, -0.12), abs=0.008)
+    assert cluster.base_m == pytest.approx(0.77, abs=0.004)
+
+
 def test_the_box_in_the_picture_holds_the_can():
     image = scene([COKE])
     (cluster,) = viewed(image).clusters
-    u0, v0, u1, v1 = cluster.box
-    red = np.argwhere(np.all(image.colour == RED, axis=-1))
-    assert abs(u0 - red[:, 1].min()) <= 3
-    assert abs(u1 - red[:, 1].max()) <= 3
-    assert abs(v0 - red[:, 0].min()) <= 3
-    assert 0 <= red[:, 0].max() - v1 <= 6
+    u0, v0, u1, v1 = box_of(image, RED)
+    assert cluster.box[:3] == pytest.approx((u0, v0, u1 - 1.0), abs=3)
+    assert 0 <= v1 - 1.0 - cluster.box[3] <= 6
+
+
+def test_the_camera_is_where_the_scene_has_it():
+    assert scene([]).frames.pose("hand_camera").translation() == pytest.approx(CAMERA)
 
 
 def test_two_cans_are_two_clusters():
@@ -52,11 +65,8 @@ def test_two_cans_are_two_clusters():
     assert sorted(round(cluster.shape.centre[1], 1) for cluster in viewed(image).clusters) == [-0.1, 0.2]
 
 
-def test_a_localisation_error_shifts_the_can_as_a_whole():
-    wrong = RigidTransform([0.02, -0.02, 0.02])
-    (cluster,) = viewed(scene([COKE]), X_WO=wrong).clusters
-    assert cluster.shape.centre == pytest.approx((0.97, -0.12), abs=0.008)
-    assert cluster.base_m == pytest.approx(0.77, abs=0.004)
+def test_a_gap_of_two_centimetres_divides_two_cans():
+    assert len(viewed(scene([COKE, Can(COKE.x, COKE.y + 0.086, 0.033, 0.115, BLUE)])).clusters) == 2
 
 
 def test_an_empty_table_has_no_clusters():
@@ -73,56 +83,38 @@ def test_a_surface_out_of_the_picture_is_not_judged():
 
 
 def test_a_grey_picture_has_clusters_without_colour():
-    image = scene([COKE])
-    grey = Image(**{**image.__dict__, "colour": None})
-    (cluster,) = viewed(grey).clusters
+    (cluster,) = viewed(Image(**{**scene([COKE]).__dict__, "colour": None})).clusters
     assert np.ptp(cluster.points.colours, axis=1).max() == 0
 
 
 def test_the_cluster_of_a_detection_is_the_one_in_its_box():
-    blue = Can(0.95, 0.12, 0.033, 0.115, BLUE)
-    image = scene([COKE, blue])
-    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
-    cluster = matching_cluster(viewed(image).clusters, detected)
-    assert cluster.shape.centre == pytest.approx((blue.x, blue.y), abs=0.008)
+    image = scene([COKE, Can(0.95, 0.12, 0.033, 0.115, BLUE)])
+    detected, clusters = detected_in(image, colour=BLUE), viewed(image).clusters
+    assert matching_cluster(clusters, detected).shape.centre == pytest.approx((0.95, 0.12), abs=0.008)
 
 
 def test_a_detection_beside_all_clusters_has_none():
     image = scene([COKE, Can(0.95, 0.12, 0.033, 0.115, BLUE)])
-    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image, BLUE)], [TABLE])
-    only_red = tuple(c for c in viewed(image).clusters if c.shape.centre[1] < 0.0)
-    assert matching_cluster(only_red, detected) is None
+    detected, clusters = detected_in(image, colour=BLUE), viewed(image).clusters
+    assert matching_cluster(tuple(c for c in clusters if c.shape.centre[1] < 0.0), detected) is None
 
 
 def test_a_detected_object_is_split_from_the_object_that_it_touches():
-    beside = Can(COKE.x, COKE.y + 0.068, 0.033, 0.115, BLUE)
-    image = scene([COKE, beside])
-    view = viewed(image)
+    image = scene([COKE, Can(COKE.x, COKE.y + 0.068, 0.033, 0.115, BLUE)])
+    view, detected = viewed(image), detected_in(image)
     assert len(view.clusters) == 1
-    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
     alone = split_detected(view, detected)
     assert len(alone.clusters) == 2
     assert matching_cluster(alone.clusters, detected).shape.centre == pytest.approx((COKE.x, COKE.y), abs=0.012)
 
 
-def test_a_single_object_stays_whole():
-    image = scene([COKE])
-    (detected,) = detections_3d(image, PLACE, [seen_as("coke", image)], [TABLE])
-    view = viewed(image)
-    assert split_detected(view, detected) is view
-
-
-def test_a_box_that_leaves_out_the_top_does_not_split_the_object():
-    image = scene([Can(0.95, -0.1, 0.033, 0.24, RED)])
+@pytest.mark.parametrize(("height_m", "cut"), [(0.115, 0.0), (0.24, 0.4)], ids=["whole", "box without the top"])
+def test_a_single_object_stays_whole(height_m, cut):
+    image = scene([Can(0.95, -0.1, 0.033, height_m, RED)])
     u0, v0, u1, v1 = seen_as("beer", image).box
-    low = Detection("beer", 0.8, (u0, v0 + 0.4 * (v1 - v0), u1, v1))
-    (detected,) = detections_3d(image, PLACE, [low], [TABLE])
+    low = Detection("beer", 0.8, (u0, v0 + cut * (v1 - v0), u1, v1))
     view = viewed(image)
-    assert split_detected(view, detected) is view
-
-
-def test_the_camera_is_where_the_scene_has_it():
-    assert scene([]).frames.pose("hand_camera").translation() == pytest.approx(CAMERA)
+    assert split_detected(view, detected_in(image, detection=low)) is view
 
 
 # heights over the surface (m) of points in one column -> which of them may rest on it
@@ -137,8 +129,7 @@ def test_the_camera_is_where_the_scene_has_it():
     ids=["what stands", "a board above", "a thing below a board", "a thing whose foot is hidden"],
 )
 def test_points_above_a_gap_do_not_rest_on_the_surface(heights_m, rest):
-    xy = np.tile([0.51, 0.31], (len(heights_m), 1))
-    assert tuple(may_rest(xy, np.array(heights_m))) == rest
+    assert tuple(may_rest(np.tile([0.51, 0.31], (len(heights_m), 1)), np.array(heights_m))) == rest
 
 
 def test_neighbouring_columns_are_judged_alone():
@@ -233,12 +224,6 @@ def test_one_object_of_several_parts_stays_one(parts, colours):
     assert parts_of(parts, colours)[1] == 1
 
 
-# the cans are seen from 0.8 m with half of the hand camera's pixels
-def test_a_gap_of_two_centimetres_divides_two_cans():
-    beside = Can(COKE.x, COKE.y + 0.086, 0.033, 0.115, BLUE)
-    assert len(viewed(scene([COKE, beside])).clusters) == 2
-
-
 def test_a_low_bar_stays_whole_where_the_noise_of_the_surface_hides_a_part_of_it():
     halves = [Can(1.0, y, 0.012, 0.014, GREEN) for y in np.arange(-0.1, 0.1, 0.012) if abs(y) > 0.01]
     assert len(viewed(scene(halves)).clusters) == 1
@@ -247,9 +232,8 @@ def test_a_low_bar_stays_whole_where_the_noise_of_the_surface_hides_a_part_of_it
 def test_the_pieces_of_a_detected_object_are_joined():
     pieces = [Can(1.0, y, 0.012, 0.014, GREEN) for y in (-0.09, -0.08, -0.07, 0.07, 0.08, 0.09)]
     image = scene([*pieces, Can(1.2, 0.2, 0.033, 0.115, BLUE)])
-    view = viewed(image)
+    view, detected = viewed(image), detected_in(image, "wrench", GREEN)
     assert len(view.clusters) == 3
-    (detected,) = detections_3d(image, PLACE, [seen_as("wrench", image, GREEN)], [TABLE])
     joined = split_detected(view, detected)
     assert len(joined.clusters) == 2
     assert matching_cluster(joined.clusters, detected).shape.length_m == pytest.approx(0.2, abs=0.02)
@@ -257,17 +241,15 @@ def test_the_pieces_of_a_detected_object_are_joined():
 
 def test_a_handle_lower_than_the_noise_of_single_points_belongs_to_a_detected_wrench():
     head = [Can(1.0, y, 0.012, 0.014, GREEN) for y in (-0.09, -0.08, -0.07)]
-    handle = [Can(1.0, y, 0.012, 0.006, GREEN) for y in np.arange(-0.06, 0.1, 0.01)]
-    image = scene([*head, *handle])
+    image = scene([*head, *(Can(1.0, y, 0.012, 0.006, GREEN) for y in np.arange(-0.06, 0.1, 0.01))])
     (alone,) = viewed(image).clusters
-    (detected,) = detections_3d(image, PLACE, [seen_as("wrench", image, GREEN)], [TABLE])
-    (whole,) = split_detected(viewed(image), detected).clusters
+    (whole,) = split_detected(viewed(image), detected_in(image, "wrench", GREEN)).clusters
     assert alone.shape.length_m < 0.07
     assert whole.shape.length_m == pytest.approx(0.2, abs=0.02)
 
 
 def test_a_neighbour_within_the_box_of_a_large_detected_object_stays_one_of_its_own():
     image = scene([Can(0.95, 0.0, 0.05, 0.25, RED), Can(1.12, 0.13, 0.033, 0.115, RED)])
-    (detected,) = detections_3d(image, PLACE, [seen_as("extinguisher", image)], [TABLE])
-    whole = replace(detected, pixels=np.argwhere(np.all(image.colour == RED, axis=-1))[:, ::-1])
+    pixels = np.argwhere(np.all(image.colour == RED, axis=-1))[:, ::-1]
+    whole = replace(detected_in(image, "extinguisher"), pixels=pixels)
     assert len(split_detected(viewed(image), whole).clusters) == 2

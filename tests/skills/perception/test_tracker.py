@@ -1,5 +1,3 @@
-"""Tracks over several views."""
-
 from dataclasses import FrozenInstanceError
 
 import numpy as np
@@ -8,12 +6,10 @@ from made_detections import detected_3d
 
 from skills.perception.tracker import Tracker
 
-CLASSES = ("beer", "coke", "hammer")
-
 
 def tracker_of(*pictures, in_view=True):
     """Tracker after some pictures, each a list of detections."""
-    tracker = Tracker(CLASSES)
+    tracker = Tracker(("beer", "coke", "hammer"))
     for seen in pictures:
         tracker.update(seen, lambda track: in_view)
     return tracker
@@ -22,15 +18,12 @@ def tracker_of(*pictures, in_view=True):
 LEFT, RIGHT = (0.0, 0.1, 1.0), (0.0, -0.1, 1.0)
 
 
-def test_two_views_from_different_viewpoints_confirm_a_track():
-    (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(1.01, eye=RIGHT)]).snapshot()
-    assert track.is_confirmed()
-    assert (track.views, track.class_name) == (2, "coke")
-
-
-def test_two_views_from_one_viewpoint_do_not_confirm_a_track():
-    (track,) = tracker_of([detected_3d(eye=LEFT)], [detected_3d(eye=LEFT)]).snapshot()
-    assert (track.views, track.is_confirmed()) == (1, False)
+@pytest.mark.parametrize(
+    ("second", "views", "confirmed"), [(detected_3d(1.01, eye=RIGHT), 2, True), (detected_3d(eye=LEFT), 1, False)]
+)
+def test_two_views_confirm_a_track_only_from_different_viewpoints(second, views, confirmed):
+    (track,) = tracker_of([detected_3d(eye=LEFT)], [second]).snapshot()
+    assert (track.views, track.class_name, track.is_confirmed()) == (views, "coke", confirmed)
 
 
 def test_positions_are_fused_by_their_covariances():
@@ -55,13 +48,31 @@ def test_the_error_of_fused_positions_agrees_with_the_covariance():
     assert 0.8 < np.mean(errors) < 2.2  # two for two dimensions, less for the jitter that is allowed for
 
 
-def test_a_far_detection_is_another_object():
-    assert len(tracker_of([detected_3d(1.0)], [detected_3d(1.3)]).snapshot()) == 2
+SURE = [[detected_3d()]] * 3
+CLOSE = [detected_3d(1.0), detected_3d(1.03)]
 
 
-def test_two_objects_in_one_picture_are_never_one_track():
-    close = [detected_3d(1.0), detected_3d(1.03)]
-    assert len(tracker_of(close, close).snapshot()) == 2
+@pytest.mark.parametrize(
+    ("pictures", "count"),
+    [
+        ([[detected_3d(1.0)], [detected_3d(1.3)]], 2),
+        ([CLOSE, CLOSE], 2),
+        ([*SURE, [detected_3d(1.04, name="hammer")]], 2),
+        ([*SURE, [detected_3d(1.005, name="hammer")]], 1),
+    ],
+    ids=["far", "in one picture", "another class", "another class at the same position"],
+)
+def test_a_far_or_different_detection_begins_another_track(pictures, count):
+    assert len(tracker_of(*pictures).snapshot()) == count
+
+
+@pytest.mark.parametrize(
+    "pictures",
+    [[[], []], [[detected_3d(score=0.45)]], [[detected_3d(score=0.9)], [], [], []]],
+    ids=["no detection", "a faint detection", "a detection that is missed in three pictures"],
+)
+def test_without_a_lasting_detection_there_is_no_track(pictures):
+    assert tracker_of(*pictures).snapshot() == ()
 
 
 def test_an_object_detected_as_two_classes_is_the_better_one():
@@ -70,16 +81,9 @@ def test_an_object_detected_as_two_classes_is_the_better_one():
     assert track.class_name == "coke"
 
 
-def test_a_detection_of_another_class_is_another_object_unless_at_the_same_position():
-    sure = [[detected_3d()], [detected_3d()], [detected_3d()]]
-    assert len(tracker_of(*sure, [detected_3d(1.04, name="hammer")]).snapshot()) == 2
-    assert len(tracker_of(*sure, [detected_3d(1.005, name="hammer")]).snapshot()) == 1
-
-
 def test_class_belief_follows_the_scores_of_all_views():
-    (track,) = tracker_of(
-        [detected_3d(score=0.55, name="beer")], [detected_3d(score=0.9)], [detected_3d(score=0.9)]
-    ).snapshot()
+    seen = detected_3d(score=0.55, name="beer"), detected_3d(score=0.9), detected_3d(score=0.9)
+    (track,) = tracker_of(*([each] for each in seen)).snapshot()
     assert track.class_name == "coke"
     assert track.classes["coke"] > 0.9
     assert sum(track.classes.values()) == pytest.approx(1.0, abs=0.01)
@@ -96,11 +100,15 @@ def test_a_class_that_was_only_likely_at_first_may_win():
     assert track.classes["hammer"] > 0.8
 
 
-def test_a_missed_track_loses_belief_and_is_forgotten():
+def test_a_missed_track_loses_belief():
     # odds 9 of a score of 0.9, times 0.15 / 0.88 for each picture that should show it
     beliefs = [t.belief for n in range(3) for t in tracker_of([detected_3d(score=0.9)], *[[]] * n).snapshot()]
     assert beliefs == pytest.approx([0.9, 0.605, 0.207], abs=0.001)
-    assert tracker_of([detected_3d(score=0.9)], *[[]] * 3).snapshot() == ()
+
+
+def test_belief_never_reaches_certainty():
+    surest, missed = (tracker_of(*[[detected_3d(score=0.97)]] * 40, *[[]] * n).snapshot()[0].belief for n in (0, 2))
+    assert (surest, missed < 0.97) == (0.999, True)
 
 
 @pytest.mark.parametrize("score", [0.5, 0.7, 0.9])
@@ -108,26 +116,9 @@ def test_the_belief_of_a_new_track_is_its_score(score):
     assert tracker_of([detected_3d(score=score)]).snapshot()[0].belief == pytest.approx(score)
 
 
-def test_belief_never_reaches_certainty():
-    (track,) = tracker_of(*[[detected_3d(score=0.97)]] * 40).snapshot()
-    assert track.belief == 0.999
-    (track,) = tracker_of(*[[detected_3d(score=0.97)]] * 40, [], []).snapshot()
-    assert track.belief < 0.97
-
-
 def test_a_track_out_of_view_keeps_its_belief():
     (track,) = tracker_of([detected_3d()], [], [], in_view=False).snapshot()
     assert (track.belief, track.missed) == (0.9, 0)
-
-
-def test_a_track_last_seen_as_another_class_is_not_confirmed():
-    # twice surely a beer, then a coke: still likelier a beer
-    seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
-    doubt = [detected_3d(name="coke", score=0.55, eye=LEFT)]
-    (track,) = tracker_of(*seen, doubt).snapshot()
-    assert (track.class_name, track.is_confirmed()) == ("beer", False)
-    (track,) = tracker_of(*seen, doubt, seen[0]).snapshot()
-    assert (track.class_name, track.is_confirmed()) == ("beer", True)
 
 
 def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
@@ -136,9 +127,24 @@ def test_a_track_that_was_confirmed_and_then_missed_is_no_longer_confirmed():
     assert not tracker_of(*seen, [], []).snapshot()[0].is_confirmed()
 
 
+def test_a_track_last_seen_as_another_class_is_not_confirmed():
+    # twice surely a beer, then a coke: still likelier a beer
+    seen = [[detected_3d(name="beer", eye=LEFT)], [detected_3d(name="beer", eye=RIGHT)]]
+    doubt = [detected_3d(name="coke", score=0.55, eye=LEFT)]
+    for pictures, confirmed in (((*seen, doubt), False), ((*seen, doubt, seen[0]), True)):
+        (track,) = tracker_of(*pictures).snapshot()
+        assert (track.class_name, track.is_confirmed()) == ("beer", confirmed)
+
+
 def test_a_track_has_its_latest_and_its_best_detection():
     (track,) = tracker_of([detected_3d(score=0.95, stamp=1.0)], [detected_3d(score=0.7, stamp=2.0)]).snapshot()
     assert (track.last_seen_s, track.best.stamp_s) == (2.0, 1.0)
+
+
+def test_a_label_keeps_its_size_when_a_segment_is_seen_after_it():
+    labelled = detected_3d(name="coke", eye=LEFT, stamp=1.0)
+    (track,) = tracker_of([labelled], [detected_3d(name="thing", score=0.7, eye=RIGHT, stamp=2.0)]).snapshot()
+    assert (track.latest.class_name, track.last_seen_s) == ("coke", 2.0)
 
 
 def test_a_snapshot_does_not_change_afterwards():
@@ -150,15 +156,7 @@ def test_a_snapshot_does_not_change_afterwards():
         before[0].belief = 1.0
 
 
-def test_a_faint_detection_begins_no_track():
-    assert tracker_of([detected_3d(score=0.45)]).snapshot() == ()
-
-
-# scores           odds: s / (1 - s), then times the root of that over those of 0.25    belief  views  confirmed
-# 0.5, 0.3         1 x 1.134                                                           0.53    2      no
-# 0.5, 0.4         1 x 1.414                                                           0.59    2      no
-# 0.5, 0.5         1 x 1.732                                                           0.63    2      yes
-# 0.6, 0.4         1.5 x 1.414                                                         0.68    2      yes
+# odds: s / (1 - s) of the first score, times the root of the odds of the second over those of 0.25
 @pytest.mark.parametrize(
     ("scores", "belief", "confirmed"),
     [((0.5, 0.3), 0.53, False), ((0.5, 0.4), 0.59, False), ((0.5, 0.5), 0.63, True), ((0.6, 0.4), 0.68, True)],
@@ -170,9 +168,7 @@ def test_a_faint_detection_supports_a_track_a_little(scores, belief, confirmed):
     assert (track.views, track.is_confirmed()) == (len(scores), confirmed)
 
 
-# the faint detection   seen last at   told
-# of the same class    2 s            what was seen surely
-# of another           1 s            the same
+# class of the faint detection at 2 s, which is not what was surely seen at 1 s -> when the track was seen last
 @pytest.mark.parametrize(("name", "last_seen_s"), [("coke", 2.0), ("beer", 1.0)])
 def test_a_faint_detection_only_renews_the_time_of_the_track(name, last_seen_s):
     seen = [detected_3d(score=0.8, stamp=1.0)], [detected_3d(name=name, score=0.4, stamp=2.0)]
@@ -182,9 +178,8 @@ def test_a_faint_detection_only_renews_the_time_of_the_track(name, last_seen_s):
 
 
 def test_a_faint_detection_takes_no_track_from_a_sure_one():
-    (track,) = tracker_of(
-        [detected_3d(score=0.8)], [detected_3d(1.0, score=0.4), detected_3d(1.02, score=0.7)]
-    ).snapshot()
+    seen = [detected_3d(score=0.8)], [detected_3d(1.0, score=0.4), detected_3d(1.02, score=0.7)]
+    (track,) = tracker_of(*seen).snapshot()
     assert track.latest.detection.score == 0.7
 
 
@@ -192,10 +187,6 @@ def test_the_order_of_the_detections_of_a_picture_does_not_matter():
     both = [detected_3d(1.0), detected_3d(1.2)]
     places = [sorted(t.position_W[0] for t in tracker_of(both, seen).snapshot()) for seen in (both, both[::-1])]
     assert places[0] == pytest.approx(places[1])
-
-
-def test_an_empty_tracker_has_no_tracks():
-    assert tracker_of([], []).snapshot() == ()
 
 
 # pictures, one after the other      class     confirmed   something stands there
@@ -213,9 +204,3 @@ def test_a_segment_gives_a_position_and_no_class(names, class_name, confirmed):
     first, second = (detected_3d(name=n, score=s, eye=e) for n, s, e in zip(names, scores, (LEFT, RIGHT), strict=True))
     (track,) = tracker_of([first], [second]).snapshot()
     assert (track.class_name, track.is_confirmed(), track.exists()) == (class_name, confirmed, True)
-
-
-def test_a_label_keeps_its_size_when_a_segment_is_seen_after_it():
-    labelled = detected_3d(name="coke", eye=LEFT, stamp=1.0)
-    (track,) = tracker_of([labelled], [detected_3d(name="thing", score=0.7, eye=RIGHT, stamp=2.0)]).snapshot()
-    assert (track.latest.class_name, track.last_seen_s) == ("coke", 2.0)

@@ -29,16 +29,13 @@ def test_a_darker_picture_is_still_alike():
     assert likeness(darker, drawn(label=WHITE)[None]) > 0.7
 
 
+def test_a_view_keeps_the_proportions_and_the_middle():
+    rows, columns = np.nonzero(drawn(size=(40, 80))[..., 3] > 127)
+    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (0, 23, 6, 17)
+
+
 @pytest.mark.parametrize(
-    "other",
-    [drawn(BLUE), drawn(size=(90, 45)), drawn(label=WHITE)],
-    ids=["colour", "outline", "edges"],
+    "other", [drawn(BLUE), drawn(size=(90, 45)), drawn(label=WHITE)], ids=["colour", "outline", "edges"]
 )
 def test_one_difference_is_enough_to_be_unlike(other):
     assert likeness(other, drawn()[None]) < 0.35
-
-
-def test_a_view_keeps_the_proportions_and_the_middle():
-    view = drawn(size=(40, 80))
-    rows, columns = np.nonzero(view[..., 3] > 127)
-    assert (rows.min(), rows.max(), columns.min(), columns.max()) == (0, 23, 6, 17)

@@ -9,7 +9,7 @@ from planar_robot import TWO_ROOMS, Bench, Box
 from tag_pictures import picture_of
 
 from plant.robots.robot_kind import robot_kind
-from skills.api import Cause, Failed, Running, Succeeded, Tag
+from skills.api import Cause, Failed, Succeeded, Tag
 from skills.estimate.monte_carlo import MonteCarloOptions
 from skills.estimate.particle_filter import FilterOptions
 from skills.relocalise.skill import Relocalise, RelocaliseInputs
@@ -33,26 +33,21 @@ TWIN_ROOMS = (
 """Two rooms alike, turned by nothing, under a corridor that has a cupboard at one end; wide doors."""
 
 
-def outcome(bench, inputs=None, context=None):
-    """Run the skill to its end; the last step, and what it said on the way."""
+def outcome(bench, context=None, **inputs):
+    """Runs the skill to its end; the last step, and what it said on the way."""
     skill, said = Relocalise(context or bench.context()), []
-    skill.begin(inputs or RelocaliseInputs())
-    while isinstance(step := skill.step(), Running):
-        said.append(step.message)
-        bench.tick()
-        assert bench.clock.now() < 120.0
-    skill.end()
-    return step, list(dict.fromkeys(said))
+    step = skill.step
+    skill.step = lambda: said.append(step()) or said[-1]
+    last = bench.run(skill, RelocaliseInputs(**inputs), limit_s=120.0)
+    return last, list(dict.fromkeys(each.message for each in said[:-1]))
 
 
 def lost_bench(to, **options):
     """A robot that was carried off, and whose localiser has noticed."""
     bench = Bench(START, **options)
-    for _ in range(10):
-        bench.tick()
+    bench.tick(10)
     bench.robot.carry_off(to)
-    for _ in range(12):
-        bench.tick()
+    bench.tick(12)
     assert not bench.localiser.estimate().localised
     return bench
 
@@ -67,55 +62,35 @@ def test_it_finds_the_robot_anywhere_standing_still():
     assert math.isclose(bench.robot.pose.yaw_rad, FAR.yaw_rad)
 
 
-def test_a_robot_that_knows_its_place_is_left_alone():
-    bench = Bench(START)
-    for _ in range(10):
-        bench.tick()
-    step, said = outcome(bench)
-    assert step.message == "the scans agree with the map already"
-    assert said == ["seeing whether scans agree"]
-
-
 def strange_bench():
     """A robot in a place that no map knows."""
     spots = np.random.default_rng(5).uniform(20.0, 26.0, (60, 2))
     pillars = [Box(x, y, x + 0.15, y + 0.15) for x, y in spots if math.hypot(x - 23, y - 23) > 1]
     bench = Bench(Pose2D(23.0, 23.0, 0.3), surveyed=TWO_ROOMS, unmapped=pillars, believed_start=START)
-    for _ in range(20):
-        bench.tick()
+    bench.tick(20)
     return bench
 
 
 def test_when_no_pose_fits_it_turns_slowly_and_gives_up():
     bench = strange_bench()
-    step, said = outcome(bench, RelocaliseInputs(turns=3, drives=0))
+    step, said = outcome(bench, turns=3, drives=0)
     assert step == Failed(Cause.POSTCONDITION, "no place on the map fits what the robot sees")
     assert "turning slowly to see more" in said
     assert abs(bench.robot.pose.yaw_rad - 0.3 - math.pi / 2) < 0.2
     assert not bench.robot.driving
 
 
-class Nowhere(KnownPlace):
-    """A localiser that never finds the place."""
-
-    def __init__(self):
-        super().__init__()
-        self.localised = False
-
-    def search(self, scan, belief, radius_m):
-        return None
-
-
 def never_localised(bench):
-    bench.localiser = Nowhere()
-    for _ in range(20):
-        bench.tick()
+    """Bench whose localiser never finds the place."""
+    bench.localiser = KnownPlace()
+    bench.localiser.localised, bench.localiser.search = False, lambda scan, belief, radius_m: None
+    bench.tick(20)
     return bench
 
 
 def test_after_a_round_of_turns_it_drives_elsewhere_and_keeps_clear():
     bench = never_localised(Bench(START))
-    step, said = outcome(bench, RelocaliseInputs(turns=2, drives=2))
+    step, said = outcome(bench, turns=2, drives=2)
     assert step.cause is Cause.POSTCONDITION
     assert "driving to see more" in said
     assert bench.robot.travelled_m > 0.3
@@ -126,17 +101,22 @@ def test_after_a_round_of_turns_it_drives_elsewhere_and_keeps_clear():
 
 def test_without_space_it_neither_turns_nor_drives():
     bench = never_localised(Bench(Pose2D(0.0, 0.0, 0.0), surveyed=CLOSET))
-    step, _ = outcome(bench, RelocaliseInputs(turns=3, drives=3))
+    step, _ = outcome(bench, turns=3, drives=3)
     assert step.cause is Cause.POSTCONDITION
-    assert bench.robot.travelled_m == 0.0
-    assert bench.robot.pose.yaw_rad == 0.0
+    assert (bench.robot.travelled_m, bench.robot.pose.yaw_rad) == (0.0, 0.0)
+
+
+def twin_bench(start, seed):
+    """A robot with unknown start in one of two equal rooms."""
+    component = MonteCarloOptions(particles=FilterOptions(seed=seed))
+    bench = Bench(start, surveyed=TWIN_ROOMS, component=component, start_known=False)
+    bench.tick()
+    return bench
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_in_one_of_two_equal_rooms_it_finds_out_which(seed):
-    component = MonteCarloOptions(particles=FilterOptions(seed=seed))
-    bench = Bench(Pose2D(2.0, 1.5, 0.3), surveyed=TWIN_ROOMS, component=component, start_known=False)
-    bench.tick()
+    bench = twin_bench(Pose2D(2.0, 1.5, 0.3), seed)
     step, said = outcome(bench)
     assert isinstance(step, Succeeded), step
     assert "turning slowly to see more" in said
@@ -151,20 +131,27 @@ def test_a_robot_that_refuses_to_move_is_an_execution_failure():
     assert step == Failed(Cause.EXECUTION, "The robot refused to drive: it sits.")
 
 
-def test_without_new_scans_it_says_so():
-    bench = lost_bench(FAR)
-    old = bench.robot.scan()
-    bench.robot.scan = lambda: old
-    for _ in range(10):
-        bench.tick()
-    step, _ = outcome(bench)
-    assert step == Failed(Cause.PRECONDITION, "there are no new scans to find the place by")
-
-
 def test_a_localiser_that_cannot_search_is_a_failed_precondition():
     bench = Bench(START)
     step, _ = outcome(bench, context=dataclasses.replace(bench.context(), localiser=object()))
     assert step.cause is Cause.PRECONDITION
+
+
+def test_without_new_scans_it_says_so():
+    bench = lost_bench(FAR)
+    old = bench.robot.scan()
+    bench.robot.scan = lambda: old
+    bench.tick(10)
+    step, _ = outcome(bench)
+    assert step == Failed(Cause.PRECONDITION, "there are no new scans to find the place by")
+
+
+def test_a_robot_that_knows_its_place_is_left_alone():
+    bench = Bench(START)
+    bench.tick(10)
+    step, said = outcome(bench)
+    assert step.message == "the scans agree with the map already"
+    assert said == ["seeing whether scans agree"]
 
 
 def test_searching_changes_nothing_until_it_is_accepted():
@@ -200,9 +187,7 @@ def tagged(bench, monkeypatch):
 
 
 def test_a_tag_on_a_wall_tells_one_room_from_another_alike(monkeypatch):
-    component = MonteCarloOptions(particles=FilterOptions(seed=1))
-    bench = Bench(Pose2D(3.6, 1.5, 0.0), surveyed=TWIN_ROOMS, component=component, start_known=False)
-    bench.tick()
+    bench = twin_bench(Pose2D(3.6, 1.5, 0.0), seed=1)
     step, said = outcome(bench, context=tagged(bench, monkeypatch))
     assert isinstance(step, Succeeded), step
     assert "looking for tags" in said

@@ -14,8 +14,7 @@ from skills.testing.robot import ScriptedRobot, Start
 def test_the_estimated_pose_is_that_of_the_robot():
     clock, start = VirtualClock(), Pose2D(1.0, -1.0, 0.5)
     robot, place = ScriptedRobot(clock, start=Start(pose=start)), KnownPlace(start)
-    lease = robot.acquire_lease("test")
-    robot.drive(0.4, 0.1, 0.2, until_s=2.0, lease=lease)
+    robot.drive(0.4, 0.1, 0.2, until_s=2.0, lease=robot.acquire_lease("test"))
     clock.advance(2.0)
     place.update(robot)
     seen = Pose2D.from_transform(place.estimate().X_WO @ robot.odometry().X_OB)
@@ -26,8 +25,7 @@ def test_the_estimated_pose_is_that_of_the_robot():
 def test_a_lost_pose_can_be_searched_and_accepted():
     robot, place = ScriptedRobot(VirtualClock()), KnownPlace()
     place.localised = False
-    found = place.search(robot.scan(), place.estimate(), None)
-    place.accept(found)
+    place.accept(place.search(robot.scan(), place.estimate(), None))
     assert place.estimate().localised
     assert isinstance(place, SearchingLocaliser)
 

@@ -8,16 +8,16 @@ import time
 from pathlib import Path
 
 
-def square(number: int) -> int:
+def square(number):
     return number * number
 
 
-def slow_square(number: int) -> int:
+def slow_square(number):
     time.sleep(0.05)
     return number * number
 
 
-def square_or_die(item: tuple[int, str]) -> int:
+def square_or_die(item):
     """Dies by SIGKILL the first time that it has a number divisible by 10."""
     number, folder = item
     mark = Path(folder) / str(number)
@@ -27,17 +27,17 @@ def square_or_die(item: tuple[int, str]) -> int:
     return number * number
 
 
-def always_die(number: int) -> int:
+def always_die(number):
     if number == 3:
         os.kill(os.getpid(), signal.SIGKILL)
     return number
 
 
-def never_end(number: int) -> None:
+def never_end(number):
     sys.stdout.write("begun\n")
     sys.stdout.flush()
     threading.Event().wait()
 
 
-def divide(number: int) -> float:
+def divide(number):
     return 1 / number

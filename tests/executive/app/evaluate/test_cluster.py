@@ -63,20 +63,18 @@ def test_an_exception_of_the_function_is_raised_by_the_iterator(address):
         list(workers.map_items(cheap_run.divide, [1, 0]))
 
 
-def test_a_worker_with_two_threads_is_refused():
-    with (
-        distributed.LocalCluster(n_workers=1, threads_per_worker=2, processes=False, **QUIET) as started,
-        pytest.raises(InputError, match="has 2 threads, and a mission needs a process"),
-        scheduler_at(started.scheduler_address),
-    ):
-        pass
+UNFIT = [
+    ({"n_workers": 1, "threads_per_worker": 2}, "has 2 threads, and a mission needs a process"),
+    ({"n_workers": 0, "protocol": "tcp"}, r"has no workers; start one: dask worker tcp://"),
+]
 
 
-def test_a_scheduler_without_workers_is_told(monkeypatch):
+@pytest.mark.parametrize(("workers", "says"), UNFIT)
+def test_a_cluster_whose_workers_have_threads_or_that_has_none_is_refused(monkeypatch, workers, says):
     monkeypatch.setattr(module, "ANSWER_S", 0.3)
     with (
-        distributed.LocalCluster(n_workers=0, processes=False, protocol="tcp", **QUIET) as started,
-        pytest.raises(InputError, match=r"has no workers; start one: dask worker tcp://"),
+        distributed.LocalCluster(processes=False, **workers, **QUIET) as started,
+        pytest.raises(InputError, match=says),
         scheduler_at(started.scheduler_address),
     ):
         pass
@@ -89,33 +87,25 @@ def test_a_scheduler_that_does_not_answer_is_told(named, monkeypatch):
         pass
 
 
-def test_workers_that_are_all_gone_are_told_and_what_has_landed_is_kept(options, monkeypatch):
+def remove_workers(cluster):
+    cluster.scale(0)
+    cluster.sync(cluster._correct_state)
+
+
+GONE = [
+    (remove_workers, r"no worker has been connected for 0\.5 s; start workers again; finished"),
+    (lambda cluster: cluster.close(), "the scheduler has stopped answering"),
+]
+
+
+@pytest.mark.parametrize(("end", "says"), GONE)
+def test_workers_or_a_scheduler_that_are_gone_are_told_and_what_has_landed_is_kept(options, monkeypatch, end, says):
     monkeypatch.setattr(module, "GONE_S", 0.5)
     started = distributed.LocalCluster(n_workers=1, **options)
     landed = []
-    with (
-        started,
-        pytest.raises(InputError, match=r"no worker has been connected for 0\.5 s; start workers again; finished"),
-        scheduler_at(started.scheduler_address) as workers,
-    ):
+    with started, pytest.raises(InputError, match=says), scheduler_at(started.scheduler_address) as workers:
         for finished in workers.map_items(cheap_run.slow_square, range(200)):
             landed.append(finished.item)
             if len(landed) == 3:
-                started.scale(0)
-                started.sync(started._correct_state)
-    assert 3 <= len(landed) < 200
-
-
-def test_a_scheduler_that_stops_is_told_and_what_has_landed_is_kept(options):
-    started = distributed.LocalCluster(n_workers=1, **options)
-    landed = []
-    with (
-        started,
-        pytest.raises(InputError, match="the scheduler has stopped answering"),
-        scheduler_at(started.scheduler_address) as workers,
-    ):
-        for finished in workers.map_items(cheap_run.slow_square, range(200)):
-            landed.append(finished.item)
-            if len(landed) == 3:
-                started.close()
+                end(started)
     assert 3 <= len(landed) < 200

@@ -1,9 +1,13 @@
 """Scenario files become runs."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from executive.app.evaluate.evaluation_file import is_evaluation, load_evaluation
 from skills.files.errors import InputError
+from skills.files.yaml_source import read_yaml
 
 
 def load(tmp_path, text):
@@ -32,19 +36,14 @@ def test_an_id_is_that_of_the_content_wherever_the_files_lie(tmp_path):
     assert (ids[0] == ids[1], changed == ids[0]) == (True, False)
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("missions: [nowhere.yaml]\n", "scenario.yaml:1: there is no file 'nowhere.yaml'"),
-        ("missions: [go on]\nseeds: many\n", "scenario.yaml:2: 'many' is no range of seeds"),
-        ("missions: [go on]\nvariations:\n  lihgt: [dim]\n", "scenario.yaml:3: unknown"),
-        ("missions: [go on, go on]\nseeds: [1]\n", "1 of the runs stand in it twice"),
-    ],
-)
-def test_errors_name_their_line(tmp_path, text, says):
-    with pytest.raises(InputError) as raised:
-        load(tmp_path, text)
-    assert says in str(raised.value)
+REFUSED = read_yaml(Path(__file__).with_name("refused_evaluations.yaml")).data
+
+
+@pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])
+def test_errors_name_their_line(tmp_path, case):
+    where = f"{case['place']}: " if "place" in case else ""
+    with pytest.raises(InputError, match=re.escape(where + case["message"])):
+        load(tmp_path, case["input"])
 
 
 def test_a_mission_file_is_no_evaluation_file(tmp_path):

@@ -1,18 +1,12 @@
 """What results say: claims against verdicts, groups, and the page that shows them."""
 
+from collections import Counter
+
 import pytest
 
+from executive.app.evaluate import summary
 from executive.app.evaluate.results import Case, Evidence, Results, RunSpec, Standing
-from executive.app.evaluate.summary import (
-    Rate,
-    cases_to_inspect,
-    comparisons_of,
-    fisher,
-    groups_of,
-    mcnemar,
-    standing_rows,
-    to_page,
-)
+from executive.app.evaluate.summary import Rate, cases_to_inspect, comparisons_of, fisher, groups_of, mcnemar
 from executive.app.report import RunReport
 from executive.mission.request import Request
 from executive.words.goal import RefereeReport
@@ -38,44 +32,26 @@ CASES = (
 )
 
 
-@pytest.mark.parametrize(
-    ("number", "standing"),
-    [
-        (0, Standing.FULFILLED),
-        (2, Standing.FALSE_CLAIM),
-        (3, Standing.NOT_JUDGED),
-        (4, Standing.FAILED),
-        (5, Standing.FAILED),
-        (6, Standing.FULFILLED_YET_FAILED),
-        (7, Standing.REFUSED),
-        (8, Standing.BROKEN),
-    ],
+STANDINGS = (
+    *("FULFILLED", "FULFILLED", "FALSE_CLAIM", "NOT_JUDGED", "FAILED", "FAILED"),
+    *("FULFILLED_YET_FAILED", "REFUSED", "BROKEN"),
 )
-def test_a_run_stands_where_its_claim_meets_its_verdict(number, standing):
-    assert CASES[number].standing is standing
+
+
+def test_a_run_stands_where_its_claim_meets_its_verdict():
+    assert tuple(case.standing.name for case in CASES) == STANDINGS
 
 
 def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
-    rows = {row.standing: row for row in standing_rows(CASES)}
-    assert {standing: row.rate.successes for standing, row in rows.items()} == {
-        Standing.FULFILLED: 2,
-        Standing.FALSE_CLAIM: 1,
-        Standing.NOT_JUDGED: 1,
-        Standing.FAILED: 2,
-        Standing.FULFILLED_YET_FAILED: 1,
-        Standing.REFUSED: 1,
-        Standing.BROKEN: 1,
-    }
+    rows = {row.standing: row for row in summary.standing_rows(CASES)}
+    assert {standing.name: row.rate.successes for standing, row in rows.items()} == Counter(STANDINGS)
     assert rows[Standing.FAILED].causes == {"PLANNING": 2}
     # 2 of 9: Wilson's interval by hand
     assert rows[Standing.FULFILLED].rate.interval_text == "6.3% to 54.7%"
 
 
-def test_cases_to_inspect_begin_with_false_claims():
+def test_cases_to_inspect_begin_with_false_claims_and_are_explained_by_the_referee_or_the_robot():
     assert [each.run.request.seed for each in cases_to_inspect(CASES)] == [3, 4, 5, 6, 7, 8, 9]
-
-
-def test_a_false_claim_is_explained_by_the_referee_and_a_failure_by_the_robot():
     assert (CASES[2].why, CASES[4].why) == ("the hammer is on the floor", "no path")
 
 
@@ -89,27 +65,22 @@ def test_the_page_lists_each_run_to_inspect_with_its_sentence_and_the_commands(t
     log = tmp_path / CASES[2].run.id
     log.mkdir()
     found = Results(CASES, {"scenario": "random.yaml", "code": "1", "logs": str(tmp_path)})
-    page = to_page(found, lambda _: Evidence(), lambda _: "errand run --say x")
+    page = summary.to_page(found, lambda _: Evidence(), lambda _: "errand run --say x")
     assert "claimed, not fulfilled: FALSE CLAIM</b> fetch me the hammer 3, flat, seed 3" in page
     assert page.count("errand run --say x\n") == 7
     assert page.count(f"errand run --say x\nerrand log {log}/log.mcap\n") == 1
     assert "fetch me the hammer 1," not in page
 
 
-def test_wilson_interval_of_81_of_263_is_that_of_newcombe_1998():
-    assert Rate(81, 263).interval() == pytest.approx((0.2553, 0.3662), abs=5e-5)
+# 81 of 263 is that of Newcombe, 1998.
+@pytest.mark.parametrize(("rate", "interval"), [(Rate(81, 263), (0.2553, 0.3662)), (Rate(10, 10), (0.7225, 1.0))])
+def test_the_interval_of_a_rate_is_that_of_wilson(rate, interval):
+    assert rate.interval() == pytest.approx(interval, abs=5e-5)
 
 
-def test_the_interval_of_ten_successes_in_ten_runs_reaches_below_one():
-    assert Rate(10, 10).interval() == pytest.approx((0.7225, 1.0), abs=5e-5)
-
-
-def test_mcnemar_counts_only_pairs_that_differ():
+def test_mcnemar_counts_only_pairs_that_differ_and_fisher_knows_the_lady_tasting_tea():
     # 8 to 1: 2 * (1 + 9) / 2**9
     assert (mcnemar(8, 1), mcnemar(0, 0)) == (pytest.approx(20 / 512), 1.0)
-
-
-def test_fisher_of_the_lady_tasting_tea():
     assert fisher(Rate(3, 4), Rate(1, 4)) == pytest.approx(0.4857, abs=1e-4)
 
 

@@ -15,13 +15,8 @@ from skills.navigate.skill import Navigate, NavigateInputs
 from skills.robot import Pose2D
 
 OPTIONS = (
-    "-q",
-    "-p",
-    "no:cacheprovider",
-    "-p",
-    "no:warnings",
-    "--continue-on-collection-errors",
-    "--import-mode=importlib",
+    *("-q", "-p", "no:cacheprovider", "-p", "no:warnings"),
+    *("--continue-on-collection-errors", "--import-mode=importlib"),
 )
 
 
@@ -115,8 +110,7 @@ def test_the_bench_runs_a_skill_with_faults(skill_bench, scripted_robot, virtual
 def test_a_context_can_be_made_for_a_robot(skill_context, make_scripted_robot):
     robot = make_scripted_robot(name="Bob")
     context = skill_context(robot)
-    assert context.robot.name == "Bob"
-    assert context.pose() == Pose2D(0.0, 0.0, 0.0)
+    assert (context.robot.name, context.pose()) == ("Bob", Pose2D(0.0, 0.0, 0.0))
     skill = Stow(context)
     skill.begin(StowInputs())
     assert skill.step() is not None

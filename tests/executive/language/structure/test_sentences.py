@@ -12,6 +12,7 @@ from executive.language.understand import Status, ask_until_clear, understand
 from executive.words.condition import DoorOpen
 from executive.words.steps import steps_from_yaml, steps_to_yaml
 from tests.executive.language.notation import as_noted, noted
+from tests.tables import table
 
 HERE = Path(__file__).parent
 
@@ -40,27 +41,15 @@ def test_a_near_miss_is_refused_with_its_words(meant, world, sentence, part):
     assert part.lower() in answer.reason.lower()
 
 
-@pytest.mark.parametrize(
-    ("sentence", "notes"),
-    [
-        ("take Robin home", ("I take Robin's home to be the living room",)),
-        (
-            "follow me to the kitchen, then bring me a coke",
-            ("I bring it to the place where you have spoken to me, not to where you are then",),
-        ),
-        ("bring me a coke, then follow me", ()),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "notes"))
 def test_a_note_says_which_place_is_meant(meant, sentence, notes):
-    assert meant(sentence).notes == notes
+    assert meant(sentence).notes == tuple(notes)
 
 
 def test_a_door_with_a_plug_in_is_opened_and_no_other(parser, worlds):
-    doors = [
-        door.model_copy(update={"opens": {"plugin": "http"}} if "office" in door.between else {})
-        for door in worlds["shop"].doors
-    ]
-    knowledge = worlds["shop"].model_copy(update={"doors": tuple(doors)})
+    opens = {"opens": {"plugin": "http"}}
+    doors = tuple(door.model_copy(update=opens if "office" in door.between else {}) for door in worlds["shop"].doors)
+    knowledge = worlds["shop"].model_copy(update={"doors": doors})
     understood = partial(understand, parser=parser, knowledge=knowledge, require_wake=False)
     assert noted(understood("please open the office door for me").steps) == 'Open "office" - "side aisle"'
     assert "cannot open the bathroom door myself" in understood("open the bathroom door").reason
@@ -81,19 +70,18 @@ def test_all_commands_stand_in_their_order(meant):
 )
 def test_plain_commands_have_no_steps(meant, sentence):
     answer = meant(sentence)
-    assert answer.commands
-    assert answer.steps == ()
+    assert answer.commands and answer.steps == ()
+
+
+def test_a_door_that_could_be_several_is_asked_about(meant):
+    answer = meant("every ten minutes look whether the kitchen door is open", "shop")
+    doors = tuple(f"door between kitchen and {room}" for room in ("back aisle", "staff room"))
+    assert (answer.status, answer.question.candidates) == (Status.QUESTION, doors)
 
 
 def test_it_needs_no_punctuation_where_that_is_clear(meant):
     with_commas = meant("If there is a beer in the kitchen, bring it, otherwise get a coke.")
     assert meant("if there is a beer in the kitchen bring it otherwise get a coke").steps == with_commas.steps
-
-
-def test_a_door_that_could_be_several_is_asked_about(meant):
-    answer = meant("every ten minutes look whether the kitchen door is open", "shop")
-    assert answer.status is Status.QUESTION
-    assert answer.question.candidates == ("door between kitchen and back aisle", "door between kitchen and staff room")
 
 
 @pytest.mark.parametrize(
@@ -105,20 +93,16 @@ def test_the_answer_tells_which_door(parser, worlds, reply, room):
     assert answer.steps[0].condition == DoorOpen(door=("kitchen", room))
 
 
-@pytest.mark.parametrize(
-    "sentence", ["look whether the door is open", "every ten minutes look whether the door is open"]
-)
-def test_a_world_without_doors_has_none_to_look_at(parser, worlds, sentence):
-    knowledge = worlds["flat"].model_copy(update={"doors": ()})
+@pytest.mark.parametrize("often", ["", "every ten minutes "])
+def test_a_world_without_doors_has_none_to_look_at(parser, worlds, often):
+    knowledge, sentence = worlds["flat"].model_copy(update={"doors": ()}), f"{often}look whether the door is open"
     answer = understand(sentence, parser=parser, knowledge=knowledge, require_wake=False)
-    assert (answer.status, answer.steps) == (Status.REFUSED, ())
-    assert "no door here" in answer.reason
+    assert (answer.status, answer.steps) == (Status.REFUSED, ()) and "no door here" in answer.reason
 
 
 def test_there_needs_an_earlier_place(meant):
     answer = meant("if Robin is there bring him a beer")
-    assert answer.status is Status.QUESTION
-    assert "there" in answer.reason
+    assert (answer.status, "there" in answer.reason) == (Status.QUESTION, True), answer.reason
 
 
 def test_a_time_that_could_be_two_is_noted(meant):
@@ -128,21 +112,17 @@ def test_a_time_that_could_be_two_is_noted(meant):
 
 def test_blocks_nest_no_deeper_than_two(meant):
     answer = meant("twice, three times, twice, say hello")
-    assert MOST_NESTED == 2
-    assert answer.status is Status.REFUSED
-    assert "two sentences" in answer.reason
+    assert (MOST_NESTED, answer.status, "two sentences" in answer.reason) == (2, Status.REFUSED, True), answer.reason
 
 
 def test_memory_has_the_last_object(meant):
-    answer = meant("if there is a beer in the kitchen bring it to Robin")
-    assert [str(command) for command in meant("bring it to the office", memory=answer.memory).commands][-1].startswith(
-        "Take [beer]"
-    )
+    memory = meant("if there is a beer in the kitchen bring it to Robin").memory
+    assert str(meant("bring it to the office", memory=memory).commands[-1]).startswith("Take [beer]")
 
 
 def test_names_alone_keep_conditions_refused(parser):
-    answer = understand("if there is milk, bring me a glass", parser=parser, knowledge=None, require_wake=False)
-    assert answer.status is Status.REFUSED
+    text = "if there is milk, bring me a glass"
+    assert understand(text, parser=parser, knowledge=None, require_wake=False).status is Status.REFUSED
 
 
 TOLD = (

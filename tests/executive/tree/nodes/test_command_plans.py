@@ -1,13 +1,10 @@
 """Several objects by count: one trip for each."""
 
-import pytest
-
 from executive.app.goal_conditions import conditions_of
 from executive.run.outcome import Outcome
 from executive.tree.board import Constant
 from executive.words.goal import GoalKind
 from skills.api import Succeeded
-from skills.files.errors import InputError
 
 TWO = (
     "Take [Nothing] to [kitchen] and do [grasp] to [2 drink]",
@@ -44,29 +41,6 @@ def test_the_condition_is_one_of_two_things(compiled, run_tree, knowledge, scrip
     tree = compiled(*TWO)
     grasped, placed = conditions_of(tree, run_tree(tree).robots[0])
     assert (grasped.kind, grasped.count, placed.kind, placed.count) == (GoalKind.GRASPED, 2, GoalKind.PLACED, 2)
-
-
-@pytest.mark.parametrize(
-    ("get", "bring", "says"),
-    [
-        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [2 drink] to [Sam]", "cannot be handed over"),
-        (
-            "Take [Nothing] to [kitchen] and do [grasp] to [2 drink]",
-            "Take [2 drink] to [start]",
-            "cannot be handed over",
-        ),
-        ("Take [Nothing] to [Nothing] and do [grasp] to [2 drink]", "Take [2 drink] to [bedroom]", "where to take"),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [2 drink] to [shelf]", "look like those"),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [99 drink]", "Take [99 drink] to [bedroom]", "too many trips"),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [3 drink] to [bedroom]", "in one go"),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [2 drink]", "Take [2 coke] to [bedroom]", "in one go"),
-        ("Take [Nothing] to [kitchen] and do [grasp] to [some drink]", "Take [some drink] to [bedroom]", "open number"),
-    ],
-)
-def test_a_command_without_trips_is_refused(compiled, get, bring, says):
-    with pytest.raises(InputError, match=says) as error:
-        compiled(get, f"{bring} and do [Nothing] to [Nothing]")
-    assert error.value.hint
 
 
 GET = "Take [Nothing] to [kitchen] and do [grasp] to [coke]"

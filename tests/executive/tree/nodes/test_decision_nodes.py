@@ -3,9 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from py_trees.common import Status
 
-from executive.tree.behaviour import suspend
 from executive.tree.nodes.decision_nodes import Check, Decide, Decision, MustHold, MustNotBegin, View
 from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.search import ANSWER_TOPIC
@@ -14,9 +12,8 @@ from executive.tree.nodes.wait import Pause, WaitFor, WaitUntilClock
 from executive.words.condition import AllOf, AnyOf, ButtonPressed, Look, Not, ValueIs
 from executive.words.expression import Expression, Template
 from skills.api import Cause, Failed
-from tests.executive.tree.scripted import Leaf, letters, tick
+from tests.executive.tree.scripted import Leaf, R, S, play, tick
 
-R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 KEY, FIRST, SECOND = "alice/decided", "alice/look-1/answer", "alice/look-2/answer"
 
 
@@ -51,29 +48,24 @@ def decision(condition, *answers):
 # Decisions: true, false, or not known yet.
 
 
+# at (s), when the robot has taken something and lost charge; expression -> whether it holds
 @pytest.mark.parametrize(
-    ("text", "holds"),
+    ("at_s", "text", "holds"),
     [
-        ("battery > 0.8", True),
-        ("localised and not holding", True),
-        ("elapsed == 0", True),
-        ("clock == '08:00'", True),
-        ("clock > '08:30'", False),
+        (0.0, "battery > 0.8", True),
+        (0.0, "clock == '08:00'", True),
+        (0.0, "clock > '08:30'", False),
+        (0.0, "elapsed == 0", True),
+        (0.0, "localised and not holding", True),
+        (1800.0, "elapsed == 1800 and clock == '08:30' and holding and battery < 0.2", True),
+        (17 * 3600.0, "clock == '01:00'", True),
     ],
 )
-def test_readings(view, text, holds):
+def test_readings_are_those_of_the_moment(view, clock, robot, at_s, text, holds):
+    if at_s:
+        clock.advance(at_s)
+        robot.holding, robot.charge = True, 0.1
     assert value(text).holds(view) is holds
-
-
-def test_readings_are_those_of_the_moment(view, clock, robot):
-    clock.advance(1800.0)
-    robot.holding, robot.charge = True, 0.1
-    assert value("elapsed == 1800 and clock == '08:30' and holding and battery < 0.2").holds(view)
-
-
-def test_the_clock_goes_over_midnight(view, clock):
-    clock.advance(17 * 3600.0)
-    assert value("clock == '01:00'").holds(view)
 
 
 def test_values_are_read_from_the_blackboard(view, run_context):
@@ -140,37 +132,16 @@ def test_an_answer_is_not_known_before_the_look(view, run_context):
 
 
 # Decide: takes the looks only as long as it needs them.
-#
-#   decision     look 1     look 2    status   answer  looks taken
-#   value        -          -         S        true    -
-#   all          S false    -         S        false   1
-#   all          S true     RS true   R S      true    1, 2
-#   any          S true     -         S        true    1
-#   any          RS false   S false   R S      false   1, 2
-#   any+value    -          -         S        true    -        (the value is true already)
-#   all          F          -         F        -       1
-#   all          S true     E         F ERROR  -       1, 2
-BOTH = decision(AllOf(all=(LOOK, LOOK)), FIRST, SECOND)
-EITHER = decision(AnyOf(any=(LOOK, LOOK)), FIRST, SECOND)
-OR_CHARGED = AnyOf(any=(AnyOf(any=(LOOK, LOOK)), ValueIs(expression="battery > 0.1")))
-DECIDE = [
-    (value("battery > 0.1"), ("S", True), ("S", True), "S", True, []),
-    (BOTH, ("S", False), ("S", True), "S", False, ["+one"]),
-    (BOTH, ("S", True), ("RS", True), "RS", True, ["+one", "+two"]),
-    (EITHER, ("S", True), ("S", True), "S", True, ["+one"]),
-    (EITHER, ("RS", False), ("S", False), "RS", False, ["+one", "+two"]),
-    (decision(OR_CHARGED, FIRST, SECOND), ("S", True), ("S", True), "S", True, []),
-    (BOTH, ("F", True), ("S", True), "F", None, ["+one"]),
-    (BOTH, ("S", True), ("E", True), "F", None, ["+one", "+two"]),
-]
 
 
 @pytest.fixture
-def decide(run_context):
-    """The node, and what was done to its looks."""
+def log():
+    return []
 
-    def make(decision, one=("S", True), two=("S", True), log=None):
-        log = [] if log is None else log
+
+@pytest.fixture
+def decide(run_context, log):
+    def make(decision, one=("S", True), two=("S", True)):
         looks = [
             Leaf(script, name, log, put=lambda key=key, answer=answer: run_context.board.put(key, answer))
             for name, key, (script, answer) in (("one", FIRST, one), ("two", SECOND, two))
@@ -188,63 +159,57 @@ def decide(run_context):
     return make
 
 
-@pytest.mark.parametrize(("decision", "one", "two", "expected", "answer", "taken"), DECIDE)
-def test_decide(decide, run_context, decision, one, two, expected, answer, taken):
-    log = []
-    root = decide(decision, one, two, log)
-    assert letters(root, len(expected)) == expected
-    assert (run_context.board.values().get(KEY), log) == (answer, taken)
-    if answer is None:
-        assert root.message.startswith("cannot tell whether it is so")
-        assert root.cause is (Cause.ERROR if two[0] == "E" else Cause.EXECUTION)
-    else:
-        assert (root.cause, root.message) == (None, f"{'yes' if answer else 'no'}: it is so")
+BOTH = decision(AllOf(all=(LOOK, LOOK)), FIRST, SECOND)
+EITHER = decision(AnyOf(any=(LOOK, LOOK)), FIRST, SECOND)
+CHARGED = value("battery > 0.1")
+OR_CHARGED = decision(AnyOf(any=(AnyOf(any=(LOOK, LOOK)), ValueIs(expression="battery > 0.1"))), FIRST, SECOND)
+ERROR, EXECUTION, PRECONDITION = Cause.ERROR, Cause.EXECUTION, Cause.PRECONDITION
+YES, NO, UNKNOWN = "yes: it is so", "no: it is so", "cannot tell whether it is so"
+NO_VALUE = "it is so: 'n' has no value yet"
+# decision  look 1  look 2  status  cause  answer  sentence  looks taken  children in the end
+DECIDE = [
+    (BOTH, ("F", True), ("S", True), "F", EXECUTION, None, UNKNOWN, "+one", "FI"),
+    (BOTH, ("RRS", True), ("S", True), "R|RS", None, True, YES, "+one ~one +two", "SS"),
+    (BOTH, ("S", False), ("S", True), "S", None, False, NO, "+one", "SI"),
+    (BOTH, ("S", True), ("E", True), "F", ERROR, None, UNKNOWN, "+one +two", "SF"),
+    (BOTH, ("S", True), ("RR", True), "RI", Cause.CANCELLED, None, "", "+one +two -two", "SI"),
+    (BOTH, ("S", True), ("RS", True), "RS", None, True, YES, "+one +two", "SS"),
+    (BOTH, ("S", True), ("S", True), "SS", None, True, YES, "+one +two +one +two", "SS"),
+    (CHARGED, ("S", True), ("S", True), "S", None, True, YES, "", ""),
+    (EITHER, ("RS", False), ("S", False), "RS", None, False, NO, "+one +two", "SS"),
+    (EITHER, ("S", True), ("S", True), "S", None, True, YES, "+one", "SI"),
+    (OR_CHARGED, ("S", True), ("S", True), "S", None, True, YES, "", "II"),
+    (decision(LOOK, "alice/never"), ("S", True), ("S", True), "F", ERROR, None, "", "+one", "S"),
+    (
+        value("n > 2", n="alice/n"),
+        ("S", True),
+        ("S", True),
+        "F",
+        Cause.PRECONDITION,
+        None,
+        "it is so: 'n' has no value yet",
+        "",
+        "",
+    ),
+]
 
 
-def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context):
-    log = []
-    root = decide(decision(LOOK, FIRST), one=("RRS", True), log=log)
+@pytest.mark.parametrize(("decision", "one", "two", "expected", "cause", "answer", "says", "taken", "ends"), DECIDE)
+def test_decide(decide, run_context, log, decision, one, two, expected, cause, answer, says, taken, ends):
+    root = decide(decision, one, two)
+    assert play(root, expected) == expected
+    assert (run_context.board.values().get(KEY), root.cause, " ".join(log)) == (answer, cause, taken)
+    assert "".join(child.status.value[0] for child in root.children) == ends
+    assert root.message.startswith(says)
+    assert says in ("", UNKNOWN) or root.message == says
+
+
+def test_decide_lets_a_look_end_that_has_left_its_answer(decide, run_context, log):
+    root = decide(decision(LOOK, FIRST), one=("RRS", True))
     tick(root)
     run_context.board.put(FIRST, True)
-    assert letters(root, 2) == "RS"
+    assert play(root, "RS") == "RS"
     assert (log, root.children[0].status) == (["+one"], S)
-
-
-def test_decide_looks_again_when_it_starts_again(decide):
-    log = []
-    root = decide(BOTH, log=log)
-    assert letters(root, 2) == "SS"
-    assert log == ["+one", "+two"] * 2
-
-
-def test_decide_with_a_value_that_nothing_has_given(decide):
-    root = decide(value("n > 2", n="alice/n"))
-    assert letters(root, 1) == "F"
-    assert (root.cause, root.message) == (Cause.PRECONDITION, "it is so: 'n' has no value yet")
-
-
-def test_decide_with_looks_that_leave_no_answer_is_an_error(decide, run_context):
-    root = decide(decision(LOOK, "alice/never"))
-    assert letters(root, 1) == "F"
-    assert root.cause is Cause.ERROR
-
-
-def test_decide_cancelled_stops_the_look(decide):
-    log = []
-    root = decide(BOTH, two=("RR", True), log=log)
-    tick(root)
-    root.stop(N)
-    assert (root.status, root.cause, log[-1]) == (N, Cause.CANCELLED, "-two")
-    assert [child.status for child in root.children] == [S, N]
-
-
-def test_decide_goes_on_with_its_look_after_a_suspension(decide):
-    log = []
-    root = decide(BOTH, one=("RRS", True), log=log)
-    tick(root)
-    suspend(root)
-    assert letters(root, 2) == "RS"
-    assert log == ["+one", "+two"]
 
 
 # Check: the decision is an answer of the mission.
@@ -254,7 +219,7 @@ def test_decide_goes_on_with_its_look_after_a_suspension(decide):
 def test_check(run_context, published, script, answer, expected):
     child = Leaf(script, put=lambda: run_context.board.put(KEY, answer))
     root = Check(path_id="alice/check", name="check", child=child, question="so?", key=KEY, context=run_context)
-    assert letters(root, len(expected)) == expected
+    assert play(root, expected) == expected
     told = [(message["question"], message["answer"]) for topic, message in published if topic == ANSWER_TOPIC]
     assert told == ([] if expected == "F" else [("so?", answer)])
     assert root.cause is (Cause.EXECUTION if expected == "F" else None)
@@ -280,39 +245,24 @@ def wait(run_context):
     return make
 
 
-def answering(run_context, script, *answers, log=None):
+# decision  answers  asked again after (s)  status at each second  cause  ticks of the decision  last done to it
+@pytest.mark.parametrize(
+    ("script", "answers", "every_s", "expected", "cause", "ticks", "last"),
+    [
+        ("RE", [], 0.0, "RF", ERROR, 2, "+decide"),
+        ("RR", [], 0.0, "RI", Cause.CANCELLED, 1, "-decide"),
+        ("RSS", [False, True], 3.0, "RRRRS", None, 3, "+decide"),
+        ("S", [False, False, True], 0.0, "RRS", None, 3, "+decide"),
+    ],
+)
+def test_wait_until_the_answer_is_true(
+    wait, run_context, clock, script, answers, every_s, expected, cause, ticks, last
+):
     left = list(answers)
-    return Leaf(script, "decide", log, put=lambda: run_context.board.put(KEY, left.pop(0)))
-
-
-def test_wait_until_the_answer_is_true(wait, run_context):
-    root = wait(answering(run_context, "S", False, False, True))
-    assert letters(root, 3) == "RRS"
-
-
-def test_wait_asks_again_when_it_is_time(wait, run_context, clock):
-    child = answering(run_context, "RSS", False, True)
-    root = wait(child, every_s=3.0)
-    found = []
-    for _ in range(5):
-        found += tick(root)
-        clock.advance(1.0)
-    assert found == [R, R, R, R, S]
-    assert child.ticks == 3
-
-
-def test_wait_fails_with_its_decision(wait):
-    root = wait(Leaf("RE"))
-    assert letters(root, 2) == "RF"
-    assert root.cause is Cause.ERROR
-
-
-def test_wait_cancelled_stops_the_decision(wait):
-    log = []
-    root = wait(Leaf("RR", "decide", log))
-    tick(root)
-    root.stop(N)
-    assert (root.status, root.cause, log[-1]) == (N, Cause.CANCELLED, "-decide")
+    child = Leaf(script, "decide", put=lambda: run_context.board.put(KEY, left.pop(0)))
+    root = wait(child, every_s)
+    assert play(root, expected, clock) == expected
+    assert (root.cause, child.ticks, child.log[-1]) == (cause, ticks, last)
 
 
 def test_wait_for_a_button_counts_presses_from_when_it_begins(wait, run_context, pressed):
@@ -321,9 +271,9 @@ def test_wait_for_a_button_counts_presses_from_when_it_begins(wait, run_context,
     )
     root = wait(decide)
     pressed["go"] = 1
-    assert letters(root, 2) == "RR"
+    assert play(root, "RR") == "RR"
     pressed["go"] = 2
-    assert letters(root, 2) == "SR"
+    assert play(root, "SR") == "SR"
 
 
 @pytest.mark.parametrize(
@@ -351,8 +301,7 @@ def set_values(run_context, values, kinds, **keys):
 def test_set_works_values_out_in_order(run_context):
     values = {"alice/a": Expression("1 + 1"), "alice/b": Expression("a * 2"), "alice/t": Template("{a} of {b}")}
     kinds = {"alice/a": float, "alice/b": float, "alice/t": str}
-    root = set_values(run_context, values, kinds, a="alice/a", b="alice/b")
-    assert letters(root, 1) == "S"
+    assert play(set_values(run_context, values, kinds, a="alice/a", b="alice/b"), "S") == "S"
     assert run_context.board.values() == {"alice/a": 2.0, "alice/b": 4.0, "alice/t": "2 of 4"}
     assert isinstance(run_context.board.get("alice/a"), float)
 
@@ -360,9 +309,8 @@ def test_set_works_values_out_in_order(run_context):
 def test_set_fails_at_the_first_without_a_value_and_keeps_those_before(run_context):
     values = {"alice/a": Expression("1"), "alice/b": Expression("1 / (a - 1)"), "alice/c": Expression("3")}
     root = set_values(run_context, values, dict.fromkeys(values, float), a="alice/a")
-    assert letters(root, 1) == "F"
-    assert root.cause is Cause.PRECONDITION
-    assert "divides by zero" in root.message
+    assert play(root, "F") == "F"
+    assert (root.cause, "divides by zero" in root.message) == (Cause.PRECONDITION, True)
     assert run_context.board.values() == {"alice/a": 1.0}
 
 
@@ -389,27 +337,31 @@ def test_must_hold_waits_for_what_is_not_known_yet(run_context):
     assert isinstance(MustHold(decision(LOOK, FIRST), "so").for_run(run_context).check(run_context), Waiting)
 
 
-def test_must_not_begin_calls_once_until_it_was_false_in_between(run_context, robot):
-    watch = MustNotBegin(value("holding"), "it holds").for_run(run_context)
-    watch.begin(run_context)
-    found = []
-    for holding in (False, True, True, False, True):
-        robot.holding = holding
-        found.append(isinstance(watch.check(run_context), Failed))
-        if found[-1]:
-            watch.note_call()
+@pytest.fixture
+def calls(run_context):
+    """Whether a watch calls at each value that is set."""
+
+    def watched(decision, set_value, values):
+        watch, found = MustNotBegin(decision, "so").for_run(run_context), []
+        watch.begin(run_context)
+        for each in values:
+            set_value(each)
+            found.append(isinstance(watch.check(run_context), Failed))
+            if found[-1]:
+                watch.note_call()
+        return found
+
+    return watched
+
+
+def test_must_not_begin_calls_once_until_it_was_false_in_between(calls, robot):
+    holding = (False, True, True, False, True)
+    found = calls(value("holding"), lambda holds: setattr(robot, "holding", holds), holding)
     assert found == [False, True, False, False, True]
 
 
-def test_must_not_begin_is_called_once_by_each_press(run_context, pressed):
-    watch = MustNotBegin(button("go"), "go").for_run(run_context)
-    watch.begin(run_context)
-    found = []
-    for presses in (0, 1, 1, 2, 2):
-        pressed["go"] = presses
-        found.append(isinstance(watch.check(run_context), Failed))
-        if found[-1]:
-            watch.note_call()
+def test_must_not_begin_is_called_once_by_each_press(calls, pressed):
+    found = calls(button("go"), lambda presses: pressed.update(go=presses), (0, 1, 1, 2, 2))
     assert found == [False, True, False, True, False]
 
 
@@ -418,7 +370,6 @@ def test_a_pause_lasts_on_the_robots_clock(context, clock):
     leaf = Pause(path_id="alice/p", name="p", duration_s=0.5, clock=context.clock)
     said = []
     for step_s in (0.4, 0.1, 0.0):
-        leaf.tick_once()
-        said.append(leaf.status)
+        said += tick(leaf)
         clock.advance(step_s)
-    assert said == [Status.RUNNING, Status.RUNNING, Status.SUCCESS]
+    assert said == [R, R, S]

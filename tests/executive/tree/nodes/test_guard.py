@@ -3,8 +3,6 @@
 import dataclasses
 
 import pytest
-from py_trees.behaviours import StatusQueue
-from py_trees.common import Status
 
 from executive.tree.nodes.guard import (
     BatteryAtLeast,
@@ -21,7 +19,9 @@ from executive.tree.nodes.guard import (
 from executive.words.policy import StaleData
 from skills.api import Cause, Failed, ObjectKind
 from skills.robot import Lease, Pose2D
-from tests.executive.tree.scripted import F, N, Queue, R, S, tick
+from tests.executive.tree.scripted import F, Leaf, N, R, S, Switch, tick
+
+FELL = Failed(Cause.EXECUTION, "the flag fell")
 
 
 class Readings(Condition):
@@ -56,31 +56,25 @@ def readings():
     return Readings()
 
 
-@pytest.mark.parametrize("policy", StaleData)
-def test_fresh_readings_are_judged_under_every_policy(readings, context, clock, policy):
-    clock.advance(1.0)
-    assert readings.fresh(policy).check(context) is None
-    assert readings.asked == 1
+OLD = Failed(Cause.PRECONDITION, "the last reading of the sensor is 1.5 s old")
+WAITS = Waiting("waits for the sensor: the last reading of the sensor is 1.5 s old")
 
 
-def test_accept_judges_by_what_there_is(readings, context, clock):
-    clock.advance(60.0)
-    assert readings.fresh(StaleData.ACCEPT).check(context) is None
-    assert readings.asked == 1
-
-
-def test_fail_counts_an_old_reading_as_violated_at_once(readings, context, clock):
-    clock.advance(1.5)
-    verdict = readings.fresh(StaleData.FAIL).check(context)
-    assert verdict == Failed(Cause.PRECONDITION, "the last reading of the sensor is 1.5 s old")
-    assert readings.asked == 0
+# policy, age of the reading (s) -> verdict
+@pytest.mark.parametrize(
+    ("policy", "age_s", "verdict"),
+    [*[(policy, 1.0, None) for policy in StaleData], (StaleData.ACCEPT, 60.0, None), (StaleData.FAIL, 1.5, OLD)],
+)
+def test_only_readings_that_count_are_judged(readings, context, clock, policy, age_s, verdict):
+    clock.advance(age_s)
+    assert readings.fresh(policy).check(context) == verdict
+    assert readings.asked == (verdict is None)
 
 
 def test_wait_waits_and_goes_on_with_a_new_reading(readings, context, clock):
     condition = readings.fresh(StaleData.WAIT)
     clock.advance(1.5)
-    said = "waits for the sensor: the last reading of the sensor is 1.5 s old"
-    assert condition.check(context) == Waiting(said)
+    assert condition.check(context) == WAITS
     readings.taken_s = 1.5
     assert condition.check(context) is None
     clock.advance(3.0)
@@ -104,32 +98,27 @@ def test_a_reading_that_never_came_is_named(readings, context):
     assert readings.fresh(StaleData.FAIL).check(context).message == "there is no reading of the sensor yet"
 
 
-def guard_of(context, condition, *script):
-    child = StatusQueue(name="child", queue=list(script), eventually=script[-1])
-    return Guard(path_id="alice/g", name="g", child=child, condition=condition, context=context), child
+def guard_of(context, condition, child):
+    return Guard(path_id="a/g", name="g", child=child, condition=condition, context=context)
 
 
 def test_a_guard_that_waits_ticks_nothing_below(readings, context, clock):
     # reading   fresh  old    fresh
     # guard     R      R      S
-    guard, _ = guard_of(context, readings.fresh(StaleData.WAIT), R, S)
-    said = []
-    for stamp_s in (0.0, None, 2.0):
-        readings.taken_s = readings.taken_s if stamp_s is None else stamp_s
-        guard.tick_once()
-        said.append(guard.status)
-        clock.advance(2.0 if stamp_s == 0.0 else 0.0)
-    assert said == [R, R, S]
+    guard = guard_of(context, readings.fresh(StaleData.WAIT), Leaf("RS"))
+    assert tick(guard) == [R]
+    clock.advance(2.0)
+    assert tick(guard) == [R]
+    readings.taken_s = 2.0
+    assert tick(guard) == [S]
 
 
 def test_a_guard_may_wait_before_it_begins(readings, context, clock):
     clock.advance(5.0)
-    guard, child = guard_of(context, readings.fresh(StaleData.WAIT), S)
-    guard.tick_once()
-    assert (guard.status, child.status) == (R, Status.INVALID)
+    guard = guard_of(context, readings.fresh(StaleData.WAIT), Leaf("S"))
+    assert (tick(guard), guard.children[0].status) == ([R], N)
     readings.taken_s = 5.0
-    guard.tick_once()
-    assert (guard.status, readings.begun) == (S, 1)
+    assert (tick(guard), readings.begun) == ([S], 1)
 
 
 def test_holding_waits_while_the_gripper_tells_nothing_new(context, robot, clock):
@@ -204,44 +193,31 @@ def test_the_mission_stands_while_another_holds_the_lease(context, robot):
     assert OwnLease().check(context) == Waiting("the tablet holds the lease of Alice")
 
 
-class Flag:
-    """A condition that the test switches."""
-
-    def __init__(self) -> None:
-        self.bad = False
-        self.begun = 0
-
-    def for_run(self, context):
-        return self
-
-    def begin(self, context) -> None:
-        self.begun += 1
-
-    def check(self, context):
-        return Failed(Cause.EXECUTION, "the flag fell") if self.bad else None
+def test_guard_halts_its_child_when_the_condition_breaks(context):
+    switch, child = Switch(), Leaf("RRRS")
+    root = guard_of(context, switch, child)
+    assert tick(root, 2) == [R, R]
+    switch.verdict = FELL
+    assert tick(root) == [F]
+    assert (root.cause, root.message, child.log, switch.begun) == (
+        Cause.EXECUTION,
+        "the flag fell",
+        ["+leaf", "-leaf"],
+        1,
+    )
 
 
-def test_guard_halts_its_child_when_the_condition_breaks(context, clock):
-    flag, child = Flag(), Queue(R, R, R, S)
-    root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
-    assert tick(root, 2, clock) == [R, R]
-    flag.bad = True
-    assert tick(root, 1, clock) == [F]
-    assert (root.cause, root.message, child.stopped, flag.begun) == (Cause.EXECUTION, "the flag fell", 1, 1)
+def test_guard_does_not_begin_its_child_when_the_condition_is_broken_before(context):
+    switch = Switch()
+    switch.verdict = FELL
+    root = guard_of(context, switch, Leaf("S"))
+    assert (tick(root), root.children[0].status) == ([F], N)
 
 
-def test_guard_does_not_begin_its_child_when_the_condition_is_broken_before(context, clock):
-    flag, child = Flag(), Queue(S)
-    flag.bad = True
-    root = Guard(path_id="a/g", name="g", child=child, condition=flag, context=context)
-    assert tick(root, 1, clock) == [F]
-    assert child.status == N
-
-
-def test_guard_passes_its_child_on(context, clock):
-    root = Guard(path_id="a/g", name="g", child=Queue(R, F), condition=Flag(), context=context)
-    assert tick(root, 2, clock) == [R, F]
-    assert (root.cause, root.message) == (Cause.EXECUTION, "slipped")
+def test_guard_passes_its_child_on(context):
+    root = guard_of(context, Switch(), Leaf("RF"))
+    assert tick(root, 2) == [R, F]
+    assert (root.cause, root.message) == (Cause.EXECUTION, "leaf F")
 
 
 def test_holding_ignores_short_losses_and_reports_long_ones(context, clock, robot):
@@ -249,6 +225,7 @@ def test_holding_ignores_short_losses_and_reports_long_ones(context, clock, robo
     # held  yes   no         yes        no  no
     condition = Holds("coke")
     condition.begin(context)
+    assert condition.check(context).cause is Cause.PRECONDITION
     robot.holding = True
     assert condition.check(context) is None
     for dt_s, held in ((0.05, False), (0.05, True), (0.6, False)):
@@ -256,59 +233,49 @@ def test_holding_ignores_short_losses_and_reports_long_ones(context, clock, robo
         robot.holding = held
         assert condition.check(context) is None
     clock.advance(0.05)
-    failure = condition.check(context)
-    assert failure is not None
-    assert (failure.cause, failure.message) == (Cause.EXECUTION, "the coke was lost on the way")
+    assert condition.check(context) == Failed(Cause.EXECUTION, "the coke was lost on the way")
 
 
-def test_holding_nothing_at_the_start_is_a_precondition(context, robot):
-    condition = Holds("coke")
-    condition.begin(context)
-    failure = condition.check(context)
-    assert failure is not None
-    assert failure.cause is Cause.PRECONDITION
+@pytest.fixture
+def held(context, robot):
+    """A guard around a child while the gripper holds the coke, up to the place where it is put down."""
+
+    def make(script, until_put_down=True):
+        robot.holding = True
+        return guard_of(context, Holds("coke", "home", until_put_down), Leaf(script))
+
+    return make
 
 
 @pytest.mark.parametrize(("until_put_down", "status"), [(False, F), (True, S)])
-def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(context, clock, robot, until_put_down, status):
-    robot.holding = True
-    child = Queue(R, S)
-    root = Guard(path_id="a/g", name="g", child=child, condition=Holds("coke", "home", until_put_down), context=context)
+def test_a_guard_contradicts_a_success_when_the_gripper_is_empty_then(held, clock, robot, until_put_down, status):
+    root = held("RS", until_put_down)
     assert tick(root, 1, clock) == [R]
-    child.update = lambda: (setattr(robot, "holding", False), S)[1]  # it falls in the tick in which the drive ends
+    # it falls in the tick in which the drive ends
+    root.children[0].update = lambda: (setattr(robot, "holding", False), S)[1]
     assert tick(root, 1, clock) == [status]
     assert root.cause is (None if until_put_down else Cause.EXECUTION)
 
 
 # Whether it is offered when it is gone from the closed gripper -> whether the guard breaks
 @pytest.mark.parametrize(("offered", "breaks"), [(False, True), (True, False)])
-def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(context, clock, robot, offered, breaks):
-    robot.holding = True
-    condition = Holds("coke", "home", until_put_down=True)
-    root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)
+def test_the_guard_leaves_an_offered_object_to_the_skill_that_offers_it(held, context, clock, robot, offered, breaks):
+    root = held("R")
     assert tick(root, 1, clock) == [R]
     robot.holding, context.payload.offered = False, offered
     assert (F in tick(root, 12, clock)) is breaks
 
 
-def test_the_guard_does_not_grip_again_what_a_skill_lets_go(context, clock, robot):
-    robot.holding = True
-    condition = Holds("coke", "home", until_put_down=True)
-    root = Guard(path_id="a/g", name="g", child=Queue(*[R] * 20), condition=condition, context=context)
+def test_the_guard_does_not_grip_again_what_a_skill_lets_go(held, context, clock, robot):
+    root = held("R")
     assert tick(root, 1, clock) == [R]
     robot.clamp_force_n, context.payload.offered = 0.0, True  # the fingers open slowly
     assert F not in tick(root, 12, clock)
     assert robot.clamp_force_n == 0.0
 
 
-def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, clock, robot):
+def test_a_guard_takes_another_object_in_the_gripper_for_what_it_is(context, robot):
     robot.holding, context.payload.kind = True, ObjectKind("hammer")
-    root = Guard(
-        path_id="a/g",
-        name="g",
-        child=Queue(S),
-        condition=Holds("beer", "to Robin", known_as=("beer",)),
-        context=context,
-    )
-    assert tick(root, 1, clock) == [F]
+    root = guard_of(context, Holds("beer", "to Robin", known_as=("beer",)), Leaf("S"))
+    assert tick(root) == [F]
     assert (root.cause, root.message) == (Cause.PRECONDITION, "the gripper holds the hammer, not the beer")

@@ -1,61 +1,19 @@
 """Watches by priority above a mission: status tables."""
 
 import pytest
-from py_trees.behaviour import Behaviour
-from py_trees.common import Status
 
-from executive.tree.behaviour import Explained
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.guard import Waiting
 from executive.tree.nodes.interrupts import Interrupt, Interrupts, Monitor
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from skills.api import Cause, Failed
+from tests.executive.tree.scripted import Leaf, N, S, Switch, table
 
-R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 LOW = Failed(Cause.PRECONDITION, "the battery is at 10%")
 
 
-class Switch:
-    """A condition whose verdict is set by hand."""
-
-    def __init__(self):
-        self.verdict, self.begun = None, 0
-
-    def for_run(self, context):
-        return self
-
-    def begin(self, context):
-        self.begun += 1
-
-    def note_call(self):
-        pass
-
-    def check(self, context):
-        return self.verdict
-
-
-class Work(Explained, Behaviour):
-    """Works for some ticks, then ends; counts how often it began, was suspended and stopped."""
-
-    def __init__(self, name, ticks=2, end=S):
-        super().__init__(name)
-        self.path_id, self.ticks, self.end = f"alice/{name}", ticks, end
-        self.begun = self.suspended = self.left = 0
-        self.clear_explanation()
-
-    def initialise(self):
-        self.begun += 1
-        self.left = self.ticks
-
-    def update(self):
-        self.left -= 1
-        self.message = f"{self.name} works"
-        status = R if self.left > 0 else self.end
-        self.cause = Cause.EXECUTION if status == F else None
-        return status
-
-    def suspend(self):
-        self.suspended += 1
+def work(name, script="RS"):
+    return Leaf(script, name, restarts=True)
 
 
 class Bench:
@@ -63,8 +21,8 @@ class Bench:
 
     def __init__(self, context, *, mission=None, spares=(), uses=3, charge=None):
         self.stop, self.battery, self.urgent, self.lost = Switch(), Switch(), Switch(), Switch()
-        self.charge, self.find_out = charge or Work("charge"), Work("find-out")
-        self.mission = mission or Work("mission", ticks=5)
+        self.charge, self.find_out = charge or work("charge"), work("find-out")
+        self.mission = mission or work("mission", "RRRRS")
         watches = [
             Monitor(path_id="alice/stop", name="stop", condition=self.stop, context=context),
             self._interrupt("battery", self.charge, (self.battery, self.urgent), spares, uses, context),
@@ -79,12 +37,7 @@ class Bench:
         )  # fmt: skip
 
     def tick(self, ticks=1):
-        """Statuses of the root and its children after each tick."""
-        rows = []
-        for _ in range(ticks):
-            self.root.tick_once()
-            rows.append((self.root.status, *(child.status for child in self.root.children)))
-        return rows
+        return table(self.root, ticks)
 
 
 @pytest.fixture
@@ -94,51 +47,51 @@ def bench(context):
 
 def test_without_any_call_the_mission_runs_and_the_interrupts_stay_idle(bench):
     #                       root stop batt lost mission
-    assert bench.tick(5) == [(R, S, N, N, R)] * 4 + [(S, S, N, N, S)]
-    assert (bench.root.cause, bench.root.message) == (None, "mission works")
+    assert bench.tick(5) == ["RSIIR"] * 4 + ["SSIIS"]
+    assert (bench.root.cause, bench.root.message) == (None, "mission S")
 
 
 def test_a_call_suspends_the_mission_which_goes_on_afterwards(bench):
     bench.tick(2)
     bench.battery.verdict = LOW
-    assert bench.tick() == [(R, S, R, N, R)]
-    assert bench.root.message == "the battery is at 10%: charge works"
+    assert bench.tick() == ["RSRIR"]
+    assert bench.root.message == "the battery is at 10%: charge R"
     bench.battery.verdict = None
-    assert bench.tick(3) == [(R, S, S, N, R), (R, S, S, N, R), (S, S, S, N, S)]
-    assert (bench.mission.begun, bench.mission.suspended > 0, bench.charge.begun) == (1, True, 1)
+    assert bench.tick(3) == ["RSSIR", "RSSIR", "SSSIS"]
+    assert (bench.mission.begun, "~mission" in bench.mission.log, bench.charge.begun) == (1, True, 1)
 
 
 def test_an_interrupt_under_way_comes_to_its_end_though_the_call_is_over(context):
-    bench = Bench(context, charge=Work("charge", ticks=4))
+    bench = Bench(context, charge=work("charge", "RRRS"))
     bench.battery.verdict = LOW
     bench.tick()
     bench.battery.verdict = None
-    assert [row[2] for row in bench.tick(4)] == [R, R, S, S]
+    assert [row[2] for row in bench.tick(4)] == ["R", "R", "S", "S"]
 
 
 def test_a_more_important_call_suspends_a_less_important_one(bench):
     bench.tick()
     bench.lost.verdict = Failed(Cause.PRECONDITION, "lost")
-    assert bench.tick() == [(R, S, N, R, R)]
+    assert bench.tick() == ["RSIRR"]
     bench.battery.verdict = LOW
-    assert bench.tick() == [(R, S, R, R, R)]
-    assert (bench.find_out.suspended, bench.find_out.left) == (1, 1)
+    assert bench.tick() == ["RSRRR"]
+    assert (bench.find_out.log, bench.find_out.place) == (["+find-out", "~find-out"], 1)
     bench.battery.verdict = bench.lost.verdict = None
-    assert bench.tick() == [(R, S, S, S, R)]  # both come to their end, and the mission goes on
+    assert bench.tick() == ["RSSSR"]  # both come to their end, and the mission goes on
 
 
 def test_a_failed_interrupt_ends_the_mission_with_its_cause(context):
-    bench = Bench(context, charge=Work("charge", ticks=1, end=F))
+    bench = Bench(context, charge=work("charge", "F"))
     bench.tick()
     bench.battery.verdict = LOW
-    assert bench.tick() == [(F, S, F, N, N)]
-    assert (bench.root.cause, bench.root.message) == (Cause.EXECUTION, "the battery is at 10%: charge works")
+    assert bench.tick() == ["FSFII"]
+    assert (bench.root.cause, bench.root.message) == (Cause.EXECUTION, "the battery is at 10%: charge F")
 
 
 def test_an_interrupt_is_done_so_often_and_no_more(context):
-    bench = Bench(context, uses=2, charge=Work("charge", ticks=1))
+    bench = Bench(context, uses=2, charge=work("charge", "S"))
     bench.battery.verdict = LOW
-    assert [row[0] for row in bench.tick(3)] == [R, R, F]
+    assert [row[0] for row in bench.tick(3)] == ["R", "R", "F"]
     assert bench.root.message == "the battery is at 10%, again after 2 times battery"
     assert bench.charge.begun == 2
 
@@ -146,7 +99,7 @@ def test_an_interrupt_is_done_so_often_and_no_more(context):
 def test_a_violated_monitor_ends_the_mission(bench):
     bench.tick(2)
     bench.stop.verdict = Failed(Cause.CANCELLED, "stopped")
-    assert bench.tick() == [(F, F, N, N, N)]
+    assert bench.tick() == ["FFIII"]
     assert (bench.root.cause, bench.root.message) == (Cause.CANCELLED, "stopped")
 
 
@@ -154,25 +107,25 @@ def test_a_waiting_monitor_holds_all_below(bench):
     bench.lost.verdict = Failed(Cause.PRECONDITION, "lost")
     bench.tick()
     bench.stop.verdict = Waiting("the stop button is pressed")
-    assert bench.tick(2) == [(R, R, N, R, N)] * 2
-    assert (bench.root.message, bench.find_out.left) == ("the stop button is pressed", 1)
+    assert bench.tick(2) == ["RRIRI"] * 2
+    assert (bench.root.message, bench.find_out.place) == ("the stop button is pressed", 1)
     bench.stop.verdict = bench.lost.verdict = None
-    assert bench.tick(2) == [(R, S, N, S, R), (R, S, N, S, R)]
+    assert bench.tick(2) == ["RSISR", "RSISR"]
 
 
 def test_a_call_that_cannot_tell_yet_holds_the_mission(bench):
     bench.lost.verdict = Waiting("no scan yet")
-    assert bench.tick() == [(R, S, N, N, N)]
+    assert bench.tick() == ["RSIII"]
     assert bench.root.message == "no scan yet"
 
 
 def test_a_new_start_begins_all_conditions_and_counts_from_zero(context):
-    bench = Bench(context, uses=1, mission=Work("mission", ticks=1))
+    bench = Bench(context, uses=1, mission=work("mission", "S"))
     for times in (1, 2):
         bench.battery.verdict = LOW
-        assert [row[0] for row in bench.tick()] == [R]
+        assert [row[0] for row in bench.tick()] == ["R"]
         bench.battery.verdict = None
-        assert [row[0] for row in bench.tick()] == [S]
+        assert [row[0] for row in bench.tick()] == ["S"]
         assert (bench.stop.begun, bench.battery.begun, bench.urgent.begun) == (times, times, times)
 
 
@@ -190,9 +143,9 @@ def test_a_call_waits_for_the_handling_of_an_object_unless_it_is_urgent(context,
     bench = Bench(context, mission=skill_mission(context, make, script, "stow"), spares={"stow"})
     bench.tick()
     bench.battery.verdict = LOW
-    assert bench.tick() == [(R, S, N, N, R)]
+    assert bench.tick() == ["RSIIR"]
     bench.urgent.verdict = LOW
-    assert bench.tick() == [(R, S, R, N, R)]
+    assert bench.tick() == ["RSRIR"]
 
 
 def test_the_suspended_leaf_begins_again(context, make, script, robot):
@@ -203,7 +156,7 @@ def test_the_suspended_leaf_begins_again(context, make, script, robot):
     bench.tick()
     assert (script.begun, script.ended, robot.driving) == (["stow"], ["stow"], False)
     bench.battery.verdict = None
-    assert [row[0] for row in bench.tick(3)] == [R, R, S]
+    assert [row[0] for row in bench.tick(3)] == ["R", "R", "S"]
     assert script.begun == ["stow", "stow"]
 
 

@@ -9,12 +9,13 @@ from executive.run.outcome import Outcome
 from executive.tree.board import Constant
 from executive.words.goal import GoalKind
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, Succeeded
-from skills.files.errors import InputError
 from skills.robot import Pose2D
 from tests.visitors import OnTick
 
 TO_ROBIN = "Take [Nothing] to [Robin] and do [Nothing] to [Nothing]"
 GREET = "Take [Nothing] to [hall] and do [greet] to [some person]"
+TAKEN = "somebody at (1.00, 0.00) in the hall, taken for Robin"
+POST = Cause.POSTCONDITION
 ROOMS = {"hall": (0.0, 0.0), "kitchen": (4.0, 0.0), "bedroom": (-4.0, 0.0), "bathroom": (0.5, 4.0)}
 
 
@@ -87,17 +88,29 @@ def result_of(compiled, run_tree, control, asked):
     return run
 
 
-def test_robot_asks_each_person_in_the_usual_room_until_one_is_meant(result_of, there, asked):
-    there |= {"Sam": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall")}
-    result = result_of(TO_ROBIN)
-    assert result.outcome is Outcome.SUCCESS, result.message
-    assert asked[0] == ["Are you Robin?", "Are you Robin?"]
+ELSEWHERE, HERE = {"Maya": (4.0, 1.0, "kitchen")}, {"Sam": (1.0, 0.0, "hall")}
 
 
-def test_the_claim_says_where_the_person_is(result_of, there):
-    there["Robin"] = (4.0, 1.0, "kitchen")
+# who is where; outcome, cause, sentence (its beginning), questions
+@pytest.mark.parametrize(
+    ("people", "cause", "says", "count"),
+    [
+        ({**HERE, "Robin": (-1.0, 1.0, "hall")}, None, "somebody at (-1.00, 1.00) in the hall is Robin", 2),
+        ({"Robin": (4.0, 1.0, "kitchen")}, None, "somebody at (4.00, 1.00) in the kitchen is Robin", 1),
+        ({**HERE, **ELSEWHERE}, POST, "Robin is not found: somebody at (1.00, 0.00) in the hall is not Robin", 2),
+        ({"mute": (1.0, 0.0, "hall")}, None, f"{TAKEN}, which nobody confirmed", None),
+        ({"mute": (4.0, 1.0, "kitchen")}, POST, "", None),  # not taken for Robin elsewhere
+    ],
+)
+def test_robot_asks_each_person_until_one_is_meant_and_says_who_it_is(
+    result_of, there, asked, people, cause, says, count
+):
+    there |= people
     result = result_of(TO_ROBIN)
-    assert (result.outcome, result.message) == (Outcome.SUCCESS, "somebody at (4.00, 1.00) in the kitchen is Robin")
+    assert (result.outcome is Outcome.SUCCESS, result.cause) == (cause is None, cause)
+    assert result.message.startswith(says)
+    assert set(asked[0]) == {"Are you Robin?"}
+    assert count is None or len(asked[0]) == count
 
 
 def test_a_person_who_is_not_in_the_usual_room_is_looked_for_in_the_nearest_others_first(result_of, there, script):
@@ -134,38 +147,14 @@ def test_a_room_that_cannot_be_reached_is_the_cause(result_of, there, script):
     assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.PLANNING)
 
 
-def test_robot_says_that_the_person_is_not_found_when_all_others_say_no(result_of, there):
-    there |= {"Sam": (1.0, 0.0, "hall"), "Maya": (4.0, 1.0, "kitchen")}
-    result = result_of(TO_ROBIN)
-    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
-    assert result.message.startswith("Robin is not found: somebody at (1.00, 0.00) in the hall is not Robin")
-
-
-def test_the_claim_says_that_nobody_confirmed_who_it_is(result_of, there):
-    there["mute"] = (1.0, 0.0, "hall")
-    result = result_of(TO_ROBIN)
-    assert result.outcome is Outcome.SUCCESS
-    assert result.message == "somebody at (1.00, 0.00) in the hall, taken for Robin, which nobody confirmed"
-
-
-def test_somebody_who_does_not_answer_elsewhere_is_not_taken_for_the_person(result_of, there):
-    there["mute"] = (4.0, 1.0, "kitchen")
-    result = result_of(TO_ROBIN)
-    assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.POSTCONDITION)
-
-
-def test_the_only_known_person_in_the_usual_room_is_not_asked(result_of, there, asked, knowledge):
+@pytest.mark.parametrize(("guests", "questions"), [({}, []), ({"guest": (-0.5, 0.0, "hall")}, ["Are you Robin?"])])
+def test_the_only_known_person_is_asked_only_where_several_people_are_seen(
+    result_of, there, asked, knowledge, guests, questions
+):
     del knowledge.people["Sam"]
-    there["Robin"] = (1.0, 0.0, "hall")
+    there |= {**guests, "Robin": (1.0, 0.0, "hall")}
     assert result_of(TO_ROBIN).outcome is Outcome.SUCCESS
-    assert asked[0] == []
-
-
-def test_the_only_known_person_is_asked_where_several_people_are_seen(result_of, there, asked, knowledge):
-    del knowledge.people["Sam"]
-    there |= {"guest": (1.0, 0.0, "hall"), "Robin": (-1.0, 1.0, "hall")}
-    assert result_of(TO_ROBIN).outcome is Outcome.SUCCESS
-    assert asked[0][0] == "Are you Robin?"
+    assert asked[0][:1] == questions
 
 
 def test_a_person_who_was_met_is_followed_without_a_second_search(result_of, there, script, asked):
@@ -266,9 +255,3 @@ def test_the_goal_condition_of_a_command_about_people(compiled, text, kind, pers
     (part,) = compiled(text).parts
     assert (part.goal.kind, part.goal.person) == (kind, person)
     assert [region.name for region in part.goal.goal] == regions
-
-
-def test_a_command_that_does_not_say_where_the_people_are_is_refused(compiled):
-    with pytest.raises(InputError, match="where the people are") as error:
-        compiled("Take [Nothing] to [Nothing] and do [greet] to [some person]")
-    assert error.value.hint

@@ -3,19 +3,20 @@
 from dataclasses import replace
 
 import pytest
-from py_trees.common import Status
 
 from executive.tree.nodes.composites import MemorySequence
 from executive.tree.nodes.policies import AskOperator, GoBack, RememberPose, Retry, Skip, Summary, Timeout
 from skills.api import Cause
 from skills.robot import Pose2D
-from tests.executive.tree.scripted import F, N, Queue, R, S, tick
+from tests.executive.tree.scripted import F, Leaf, N, R, S, play, tick
+
+CANCELLED, ERROR, EXECUTION, TIMEOUT = Cause.CANCELLED, Cause.ERROR, Cause.EXECUTION, Cause.TIMEOUT
 
 
 class Operator:
     """Gives answers, each at the second look."""
 
-    def __init__(self, *answers: str) -> None:
+    def __init__(self, *answers):
         self.answers, self.asked, self.looks, self.withdrawn = list(answers), [], 0, 0
 
     def __call__(self, question):
@@ -38,13 +39,29 @@ def skip(child):
     return Skip(path_id="a/skip", name="skip", child=child, step="step 1")
 
 
+# child  status  cause  sentence  skipped
+@pytest.mark.parametrize(
+    ("script", "expected", "cause", "message", "skipped"),
+    [
+        ("C", "F", CANCELLED, "leaf C", None),
+        ("E", "F", ERROR, "leaf E", None),
+        ("FS", "SS", None, "leaf S", None),  # it forgets when it starts again
+        ("RF", "RS", None, "skipped: leaf F", "leaf F"),
+    ],
+)
+def test_a_skip_turns_failure_into_success_and_keeps_the_reason(script, expected, cause, message, skipped):
+    root = skip(Leaf(script))
+    assert play(root, expected) == expected
+    assert (root.cause, root.message, root.skipped) == (cause, message, skipped)
+
+
 @pytest.fixture
 def ask(context):
-    def build(child, operator, text=None):
+    def build(script, operator, text=None):
         return AskOperator(
             path_id="a/ask",
             name="ask",
-            child=child,
+            child=Leaf(script),
             step="step 1",
             options=("retry", "skip", "stop"),
             default="stop",
@@ -56,192 +73,131 @@ def ask(context):
     return build
 
 
-def test_a_skip_turns_failure_into_success_and_keeps_the_reason():
-    # child  R   F
-    # skip   R   S
-    root = skip(Queue(R, F))
-    assert tick(root, 2) == [R, S]
-    assert (root.skipped, root.cause, root.message) == ("slipped", None, "skipped: slipped")
-
-
-def test_a_skip_forgets_when_it_starts_again():
-    root = skip(Queue(F, S))
-    assert (tick(root, 2), root.skipped) == ([S, S], None)
-
-
-@pytest.mark.parametrize("cause", [Cause.ERROR, Cause.CANCELLED])
-def test_defects_and_cancels_are_not_skipped(cause):
-    root = skip(Queue(F, cause=cause))
-    assert (tick(root, 1), root.cause, root.skipped) == ([F], cause, None)
-
-
-def test_the_answer_retry_starts_the_child_again(ask):
-    # child   R   F       S
-    # answer          R
-    # ask     R   R   R   R   S
-    operator = Operator("retry")
-    root = ask(Queue(R, F, S), operator)
-    assert tick(root, 5) == [R, R, R, R, S]
-    assert (root.skipped, operator.asked[0].text) == (None, "slipped. What now?")
-
-
-@pytest.mark.parametrize(("answer", "end"), [("skip", S), ("stop", F)])
-def test_the_answers_skip_and_stop_end_it(ask, answer, end):
+# child   R   F       S
+# answer          R
+# ask     R   R   R   R   S
+#
+# child  answer  text  status  cause  skipped  question
+@pytest.mark.parametrize(
+    ("script", "answer", "text", "expected", "cause", "skipped", "question"),
+    [
+        ("F", "skip", "What now?", "RRS", None, "leaf F", "What now? (leaf F)"),
+        ("F", "stop", "What now?", "RRF", EXECUTION, None, "What now? (leaf F)"),
+        ("RFS", "retry", None, "RRRRS", None, None, "leaf F. What now?"),
+    ],
+)
+def test_the_operators_answer_decides(ask, script, answer, text, expected, cause, skipped, question):
     operator = Operator(answer)
-    root = ask(Queue(F), operator, text="What now?")
-    assert tick(root, 3) == [R, R, end]
-    assert operator.asked[0].text == "What now? (slipped)"
-    assert (root.skipped, root.cause) == (("slipped", None) if end == S else (None, Cause.EXECUTION))
+    root = ask(script, operator, text)
+    assert play(root, expected) == expected
+    assert (root.cause, root.skipped, operator.asked[0].text) == (cause, skipped, question)
 
 
 def test_stopping_takes_the_question_back(ask):
     operator = Operator("skip")
-    root = ask(Queue(F), operator)
-    tick(root, 1)
-    root.stop(N)
-    assert (operator.withdrawn, root.status, root.cause) == (1, N, Cause.CANCELLED)
+    root = ask("F", operator)
+    assert play(root, "RI") == "RI"
+    assert (operator.withdrawn, root.cause) == (1, CANCELLED)
 
 
 def test_a_defect_is_not_asked_about(ask):
     operator = Operator()
-    assert (tick(ask(Queue(F, cause=Cause.ERROR), operator), 1), operator.asked) == ([F], [])
+    assert (play(ask("E", operator), "F"), operator.asked) == ("F", [])
 
 
-@pytest.mark.parametrize(("back", "says"), [(S, "is back where it started"), (F, "could not go back: slipped")])
-def test_a_drive_back_ends_with_the_first_failure(back, says):
-    # action  R   F
-    # back          R   S or F
-    # root  R   R   R   F
-    action, way = Queue(R, F, cause=Cause.PLANNING), Queue(R, back, name="back")
-    root = GoBack(path_id="a/return", name="return", children=[action, way])
-    assert tick(root, 4) == [R, R, R, F]
-    assert (root.cause, root.message) == (Cause.PLANNING, f"slipped; the robot {says}")
-
-
-def test_there_is_no_drive_back_after_success():
-    action, way = Queue(R, S), Queue(S, name="back")
-    assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 2) == [R, S]
-    assert way.status == N
-
-
-def test_there_is_no_drive_back_after_a_defect():
-    action, way = Queue(F, cause=Cause.ERROR), Queue(S, name="back")
-    assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 1) == [F]
-    assert way.status == N
-
-
-def test_a_new_start_of_go_back_begins_with_its_work():
-    action, way = Queue(F, S), Queue(S, name="back")
-    assert tick(GoBack(path_id="a/return", name="return", children=[action, way]), 3) == [R, F, S]
+# action  back  status  cause  sentence  back in the end
+@pytest.mark.parametrize(
+    ("action", "back", "expected", "cause", "message", "end"),
+    [
+        ("E", "S", "F", ERROR, "action E", N),
+        ("FS", "S", "RFS", None, "action S", N),  # a new start begins with the action
+        ("RP", "RF", "RRRF", Cause.PLANNING, "action P; the robot could not go back: back F", F),
+        ("RP", "RS", "RRRF", Cause.PLANNING, "action P; the robot is back where it started", S),
+        ("RS", "S", "RS", None, "action S", N),
+    ],
+)
+def test_a_drive_back_ends_with_the_first_failure(action, back, expected, cause, message, end):
+    root = GoBack(path_id="a/return", name="return", children=[Leaf(action, "action"), Leaf(back, "back")])
+    assert play(root, expected) == expected
+    assert (root.cause, root.message, root.children[1].status) == (cause, message, end)
 
 
 @pytest.mark.parametrize(
     ("first", "steps", "status", "says"),
     [
-        (F, ("a/skip", "a/other"), S, "done, but skipped: step 1 (slipped)"),
-        (F, ("a/skip",), F, "all steps were skipped: step 1 (slipped)"),
-        (S, ("a/skip",), S, "goes on"),
+        ("F", ("a/skip", "a/other"), S, "done, but skipped: step 1 (leaf F)"),
+        ("F", ("a/skip",), F, "all steps were skipped: step 1 (leaf F)"),
+        ("S", ("a/skip",), S, "leaf S"),
     ],
 )
 def test_the_summary_names_what_was_skipped(first, steps, status, says):
-    root = Summary(path_id="a/summary", name="summary", child=skip(Queue(first)), steps=steps)
-    assert tick(root, 1) == [status]
+    root = Summary(path_id="a/summary", name="summary", child=skip(Leaf(first)), steps=steps)
+    assert tick(root) == [status]
     assert says in root.message
 
 
+def remember(context, patience_s=1.0):
+    return RememberPose(path_id="a/m/start", name="start", key="alice/m/pose", context=context, patience_s=patience_s)
+
+
 def test_remember_pose_writes_the_pose(context):
-    leaf = RememberPose(path_id="alice/m/start", name="start", key="alice/m/pose", context=context)
-    leaf.tick_once()
-    assert leaf.status == Status.SUCCESS
+    assert tick(remember(context)) == [S]
     assert context.board.get("alice/m/pose") == Pose2D(0.0, 0.0, 0.0)
 
 
 def test_remember_pose_waits_until_localised_and_gives_up(context, clock):
     context.localiser.localised = False
-    leaf = RememberPose(path_id="alice/m/start", name="start", key="alice/m/pose", context=context, patience_s=1.0)
-    leaf.tick_once()
-    assert leaf.status == Status.RUNNING
-    clock.advance(1.1)
-    leaf.tick_once()
-    assert (leaf.status, leaf.cause) == (Status.FAILURE, Cause.PRECONDITION)
+    leaf = remember(context)
+    assert tick(leaf, 2, clock, dt_s=1.1) == [R, F]
+    assert leaf.cause is Cause.PRECONDITION
 
 
-def timeout(child, clock, limit_s=1.5):
-    return Timeout(path_id="a/t", name="t", child=child, limit_s=limit_s, clock=clock)
+# child  status at each second, with a limit of 1.5 s  cause  how often the child is stopped
+@pytest.mark.parametrize(
+    ("script", "expected", "cause", "stopped"),
+    [
+        ("RRF", "RRF", EXECUTION, 0),
+        ("RRR", "RRF", TIMEOUT, 1),
+        ("RRRRS", "RRFRS", None, 1),  # it starts again
+        ("RRRR", "RI", CANCELLED, 1),
+        ("RRS", "RRF", TIMEOUT, 0),  # even when success comes late
+        ("RS", "RS", None, 0),
+    ],
+)
+def test_a_timeout_fails_on_the_robots_clock(clock, script, expected, cause, stopped):
+    child = Leaf(script)
+    root = Timeout(path_id="a/t", name="t", child=child, limit_s=1.5, clock=clock)
+    assert play(root, expected, clock) == expected
+    assert (root.cause, child.log.count("-leaf"), child.status == R) == (cause, stopped, False)
 
 
-def retry(child, attempts=3, causes=frozenset({Cause.EXECUTION})):
-    return Retry(path_id="a/r", name="r", child=child, attempts=attempts, causes=causes)
+def retry(child):
+    return Retry(path_id="a/r", name="r", child=child, attempts=3, causes=frozenset({EXECUTION}))
 
 
-@pytest.mark.parametrize("last", [R, S])
-def test_timeout_fails_on_the_robots_clock_even_when_success_comes_late(clock, last):
-    # time     1   2   3      limit 1.5 s after 1 s
-    # child    R   R   R or S
-    # timeout  R   R   F
-    child = Queue(R, R, last, R)
-    root = timeout(child, clock)
-    assert tick(root, 3, clock) == [R, R, F]
-    assert root.cause is Cause.TIMEOUT
-    assert child.status != R
-
-
-def test_timeout_stops_a_running_child(clock):
-    child = Queue(R, R, R, R)
-    tick(timeout(child, clock), 3, clock)
-    assert child.stopped == 1
-
-
-def test_timeout_lets_success_in_time_and_failure_pass(clock):
-    assert tick(timeout(Queue(R, S), clock), 2, clock) == [R, S]
-    root = timeout(Queue(R, R, F), clock)
-    assert tick(root, 3, clock) == [R, R, F]
-    assert root.cause is Cause.EXECUTION
-
-
-def test_timeout_starts_again_after_an_end(clock):
-    root = timeout(Queue(R, R, R, R, S), clock)
-    assert tick(root, 3, clock) == [R, R, F]
-    assert tick(root, 2, clock) == [R, S]
-
-
-def test_retry_tries_again_one_tick_later_until_it_works(clock):
-    # child  F  F  S
-    # retry  R  R  S
-    root = retry(Queue(F, F, S))
-    assert tick(root, 2, clock) == [R, R]
-    assert "attempt 3 of 3, since slipped" in root.message
-    assert tick(root, 1, clock) == [S]
-
-
-def test_retry_is_bounded_and_says_how_often(clock):
-    root = retry(Queue(F, F, F))
-    assert tick(root, 3, clock) == [R, R, F]
-    assert (root.cause, root.message) == (Cause.EXECUTION, "slipped (after 3 attempts)")
-
-
-@pytest.mark.parametrize("cause", [Cause.TIMEOUT, Cause.ERROR, Cause.PRECONDITION])
-def test_retry_leaves_other_causes_alone(clock, cause):
-    root = retry(Queue(F, S, cause=cause))
-    assert tick(root, 1, clock) == [F]
+# child  status of three attempts  cause  sentence
+@pytest.mark.parametrize(
+    ("script", "expected", "cause", "message"),
+    [
+        ("BS", "F", Cause.PRECONDITION, "leaf B"),
+        ("ES", "F", ERROR, "leaf E"),
+        ("FFF", "RR", None, "attempt 3 of 3, since leaf F"),
+        ("FFF", "RRF", EXECUTION, "leaf F (after 3 attempts)"),
+        ("FFFFFS", "RRFRRS", None, "leaf S"),  # it counts from one after an end
+        ("FFS", "RRS", None, "leaf S"),
+        ("RR", "RI", CANCELLED, None),
+        ("TS", "F", TIMEOUT, "leaf T"),
+    ],
+)
+def test_a_retry_tries_again_one_tick_later_and_is_bounded(script, expected, cause, message):
+    root = retry(Leaf(script))
+    assert play(root, expected) == expected
     assert root.cause is cause
+    assert message is None or root.message == message
 
 
-def test_retry_begins_a_sequence_at_its_first_step(clock):
-    first, second = Queue(S, R, S), Queue(F, S)
+def test_retry_begins_a_sequence_at_its_first_step():
+    first, second = Leaf("SRS", "first"), Leaf("FS", "second")
     root = retry(MemorySequence(path_id="a/s", name="s", children=[first, second]))
-    assert tick(root, 3, clock) == [R, R, S]
-    assert first.status == S
-
-
-def test_retry_counts_from_one_after_an_end(clock):
-    root = retry(Queue(F, F, F, F, F, S))
-    assert tick(root, 3, clock) == [R, R, F]
-    assert tick(root, 3, clock) == [R, R, S]
-
-
-def test_interrupted_decorators_say_so(context, clock):
-    for root in (timeout(Queue(R, R), clock), retry(Queue(R, R))):
-        tick(root, 1, clock)
-        root.stop(N)
-        assert (root.cause, root.children[0].status) == (Cause.CANCELLED, N)
+    assert play(root, "RRS") == "RRS"
+    assert (first.begun, second.begun, first.status) == (2, 2, S)

@@ -11,6 +11,7 @@ from executive.tree.board import Constant, FromBoard
 from executive.tree.nodes.skill_leaf import SkillLeaf
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, Failed, Part, Running, Skill, Succeeded, Zone, ZoneKind
+from tests.executive.tree.scripted import N, tick
 
 
 @dataclass(frozen=True)
@@ -18,11 +19,9 @@ class Inputs:
     number: int = 0
 
 
-def leaf_of(
-    context: Any, steps: list[Any], *, limit_s: float = 10.0, inputs: Any = None, outputs: Any = None, **more: Any
-):
+def leaf_of(context, steps, *, limit_s=10.0, inputs=None, outputs=None, **more):
     """A leaf whose skill gives these steps in turn (an exception is raised); `log` tells what was called."""
-    log: list[str] = []
+    log = []
 
     class Listed(Skill[Inputs]):
         name = "listed"
@@ -60,160 +59,105 @@ def leaf_of(
     return leaf, log
 
 
-def tick(leaf: SkillLeaf, clock: Any, times: int = 1) -> list[Status]:
-    statuses = []
-    for _ in range(times):
-        clock.advance(1.0)
-        leaf.tick_once()
-        statuses.append(leaf.status)
-    return statuses
+def play(leaf, clock, ticks):
+    """First letters of the leaf's statuses, at each second."""
+    return "".join(status.value[0] for status in tick(leaf, ticks, clock))
 
 
-def test_status_follows_the_steps(context, clock):
-    # tick:    1        2        3
-    # step:    Running  Running  Succeeded
-    # status:  RUNNING  RUNNING  SUCCESS
-    leaf, log = leaf_of(context, [Running("a", 0.5), Running("b"), Succeeded("done")])
-    assert tick(leaf, clock) == [Status.RUNNING]
+A, B, DONE = Running("a"), Running("b"), Succeeded("done")
+NO_WAY, SLIPPED = Failed(Cause.PLANNING, "no way through"), Failed(Cause.EXECUTION, "slipped")
+THREE, COUNTED = Succeeded("", {"count": "three"}), {"outputs": {"count": "alice/c"}, "declared": {"count": int}}
+ABSENT = {"inputs": {"number": FromBoard("alice/test/absent")}}
+NOT_WRITTEN = "listed raised KeyError: nothing was written to the blackboard under 'alice/test/absent' yet"
+NO_STEPS = (None, True, Status.SUCCESS, "done")
+Ends = type("Ends", (KeyboardInterrupt,), {})
+DEFECTS = (ValueError("bad sum"), SystemExit(3), BaseException("gone"), Ends("now"))
+LIMIT, ERROR = {"limit_s": 1.5}, Cause.ERROR
+
+
+# steps of the skill, what else there is; status at each second, cause, sentence, calls (begin, step, end)
+@pytest.mark.parametrize(
+    ("steps", "more", "expected", "cause", "message", "calls"),
+    [
+        ([A, B, DONE], {}, "RRS", None, "done", "bssse"),
+        ([NO_WAY], {}, "F", Cause.PLANNING, "no way through", "bse"),
+        ([SLIPPED], {}, "FF", Cause.EXECUTION, "slipped", "bsebse"),
+        ([A, B, A], LIMIT, "RRF", Cause.TIMEOUT, "listed took longer than 1.5 s (a)", "bssse"),
+        ([A, B, DONE], LIMIT, "RRF", Cause.TIMEOUT, "listed took longer than 1.5 s (done)", "bssse"),
+        ([A, B, SLIPPED], LIMIT, "RRF", Cause.EXECUTION, "slipped", "bssse"),
+        ([], {"begin_raises": True}, "F", ERROR, "listed raised ValueError: no begin", "be"),
+        ([DONE], {"end_raises": True}, "F", ERROR, "listed raised RuntimeError: no end", "bse"),
+        ([], ABSENT, "F", ERROR, NOT_WRITTEN, ""),
+        ([DONE], COUNTED, "F", ERROR, "listed gave nothing on port 'count', not whole number", "bse"),
+        ([THREE], COUNTED, "F", ERROR, "listed gave str on port 'count', not whole number", "bse"),
+        *[([each], {}, "F", ERROR, f"listed gave back {each!r} instead of a step", "bse") for each in NO_STEPS],
+        *[([each], {}, "F", ERROR, f"listed raised {type(each).__name__}: {each}", "bse") for each in DEFECTS],
+    ],
+)
+def test_a_leaf_ends_as_its_skill_and_ends_the_skill(context, clock, steps, more, expected, cause, message, calls):
+    leaf, log = leaf_of(context, steps, **more)
+    assert play(leaf, clock, len(expected)) == expected
+    assert (leaf.cause, leaf.message, "".join(each[0] for each in log)) == (cause, message, calls)
+    assert (leaf.active, "alice/c" in context.board) == (False, False)
+
+
+def test_a_running_leaf_shows_sentence_and_progress_of_its_skill(context, clock):
+    leaf, _ = leaf_of(context, [Running("a", 0.5)])
+    assert play(leaf, clock, 1) == "R"
     assert (leaf.message, leaf.progress, leaf.active) == ("a", 0.5, True)
-    assert tick(leaf, clock, 2) == [Status.RUNNING, Status.SUCCESS]
-    assert (leaf.message, leaf.cause, leaf.active) == ("done", None, False)
-    assert log == ["begin 0", "step", "step", "step", "end"]
-
-
-def test_failure_keeps_the_skills_cause_and_sentence(context, clock):
-    leaf, log = leaf_of(context, [Failed(Cause.PLANNING, "no way through")])
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert (leaf.cause, leaf.message) == (Cause.PLANNING, "no way through")
-    assert log[-1] == "end"
-
-
-@pytest.mark.parametrize("late", [Running("still"), Succeeded("too late")])
-def test_time_over_is_a_timeout_even_for_a_late_success(context, clock, late):
-    # time:    1 s      2 s      3 s      (limit 1.5 s after the start at 1 s)
-    # status:  RUNNING  RUNNING  FAILURE
-    leaf, log = leaf_of(context, [Running("a"), Running("b"), late], limit_s=1.5)
-    assert tick(leaf, clock, 3) == [Status.RUNNING, Status.RUNNING, Status.FAILURE]
-    assert leaf.cause is Cause.TIMEOUT
-    assert "1.5 s" in leaf.message
-    assert log[-1] == "end"
 
 
 def test_speed_limits_lengthen_the_time_of_a_drive(context, clock, robot, monkeypatch):
     monkeypatch.setattr(robot, "capabilities", spot_capabilities, raising=False)
-    corners = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
-    hall = Zone("hall", ZoneKind.SPEED_LIMIT, corners, share=0.5)
-    leaf, _ = leaf_of(
-        dataclasses.replace(context, zones=(hall,)), [Running("a"), Running("b"), Succeeded("there")], limit_s=1.5
-    )
-    assert tick(leaf, clock, 3)[-1] is Status.SUCCESS
+    hall = Zone("hall", ZoneKind.SPEED_LIMIT, ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), share=0.5)
+    leaf, _ = leaf_of(dataclasses.replace(context, zones=(hall,)), [A, B, DONE], limit_s=1.5)
+    assert play(leaf, clock, 3) == "RRS"
 
 
-def test_a_late_failure_keeps_its_own_cause(context, clock):
-    leaf, _ = leaf_of(context, [Running("a"), Failed(Cause.EXECUTION, "slipped")], limit_s=0.5)
-    assert tick(leaf, clock, 2) == [Status.RUNNING, Status.FAILURE]
-    assert leaf.cause is Cause.EXECUTION
-
-
-def test_exception_in_step_is_an_error_with_its_traceback_in_the_log(context, clock, published):
-    leaf, log = leaf_of(context, [ValueError("bad sum")])
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert (leaf.cause, leaf.message) == (Cause.ERROR, "listed raised ValueError: bad sum")
-    assert log[-1] == "end"
+def test_the_log_has_the_traceback_of_an_exception(context, clock, published):
+    play(leaf_of(context, [ValueError("bad sum")])[0], clock, 1)
     topic, message = published[-1]
-    assert topic == "errors"
-    assert "ValueError: bad sum" in message["traceback"]
-
-
-def test_exception_in_begin_is_an_error_and_the_skill_is_ended(context, clock):
-    leaf, log = leaf_of(context, [], begin_raises=True)
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert leaf.cause is Cause.ERROR
-    assert log == ["begin 0", "end"]
-
-
-def test_exception_in_end_turns_success_into_an_error(context, clock):
-    leaf, _ = leaf_of(context, [Succeeded("done")], end_raises=True)
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert (leaf.cause, leaf.message) == (Cause.ERROR, "listed raised RuntimeError: no end")
-
-
-@pytest.mark.parametrize("garbage", [None, True, Status.SUCCESS, "done"])
-def test_a_step_that_is_no_step_is_refused(context, clock, garbage):
-    leaf, log = leaf_of(context, [garbage])
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert leaf.cause is Cause.ERROR
-    assert log[-1] == "end"
+    assert (topic, "ValueError: bad sum" in message["traceback"]) == ("errors", True)
 
 
 def test_interruption_ends_the_skill_once_and_says_what_it_was_doing(context, clock):
     leaf, log = leaf_of(context, [Running("driving")] * 5)
-    tick(leaf, clock)
-    leaf.stop(Status.INVALID)
-    assert (leaf.status, leaf.cause, leaf.message) == (Status.INVALID, Cause.CANCELLED, "stopped while: driving")
-    leaf.stop(Status.INVALID)
+    play(leaf, clock, 1)
+    leaf.stop(N)
+    assert (leaf.status, leaf.cause, leaf.message) == (N, Cause.CANCELLED, "stopped while: driving")
+    leaf.stop(N)
     assert log.count("end") == 1
 
 
 def test_reset_of_a_finished_leaf_forgets_without_ending_again(context, clock):
     leaf, log = leaf_of(context, [Failed(Cause.PLANNING, "no")])
-    tick(leaf, clock)
-    leaf.stop(Status.INVALID)
+    play(leaf, clock, 1)
+    leaf.stop(N)
     assert (leaf.cause, leaf.message, log.count("end")) == (None, "", 1)
-
-
-def test_each_attempt_gets_a_new_skill(context, clock):
-    leaf, log = leaf_of(context, [Failed(Cause.EXECUTION, "first step again")])
-    assert tick(leaf, clock, 2) == [Status.FAILURE, Status.FAILURE]
-    assert log == ["begin 0", "step", "end"] * 2
 
 
 def test_inputs_come_from_constants_and_the_board(context, clock):
     context.board.put("alice/test/n", 42)
     for binding, expected in ((Constant(7), "begin 7"), (FromBoard("alice/test/n"), "begin 42")):
         leaf, log = leaf_of(context, [Succeeded("")], inputs={"number": binding})
-        tick(leaf, clock)
+        play(leaf, clock, 1)
         assert log[0] == expected
-
-
-def test_an_input_that_nobody_wrote_is_an_error(context, clock):
-    leaf, log = leaf_of(context, [], inputs={"number": FromBoard("alice/test/absent")})
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert "alice/test/absent" in leaf.message
-    assert log == []
 
 
 def test_outputs_go_to_the_board(context, clock):
     step = Succeeded("done", {"count": 3})
     leaf, _ = leaf_of(context, [step], outputs={"count": "alice/test/count"}, declared={"count": int})
-    tick(leaf, clock)
+    play(leaf, clock, 1)
     assert context.board.get("alice/test/count") == 3
-
-
-@pytest.mark.parametrize("given", [{}, {"count": "three"}])
-def test_missing_or_wrongly_typed_outputs_are_an_error(context, clock, given):
-    leaf, _ = leaf_of(context, [Succeeded("done", given)], outputs={"count": "alice/c"}, declared={"count": int})
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert leaf.cause is Cause.ERROR
-    assert "alice/c" not in context.board
 
 
 def test_keyboard_interrupt_is_not_swallowed(context, clock):
     leaf, _ = leaf_of(context, [KeyboardInterrupt()])
     with pytest.raises(KeyboardInterrupt):
-        tick(leaf, clock)
+        play(leaf, clock, 1)
     assert leaf.active
     leaf.abandon()
     assert not leaf.active
-
-
-@pytest.mark.parametrize(
-    "defect", [SystemExit(3), BaseException("gone"), type("Ends", (KeyboardInterrupt,), {})("now")]
-)
-def test_a_skill_that_raises_what_is_no_exception_fails_with_its_name(context, clock, defect):
-    leaf, _ = leaf_of(context, [defect])
-    assert tick(leaf, clock) == [Status.FAILURE]
-    assert (leaf.cause, leaf.message) == (Cause.ERROR, f"listed raised {type(defect).__name__}: {defect}")
 
 
 def stow_of(log, *steps, called="stow", part=Part.ARM):
@@ -245,16 +189,13 @@ def armed(context, robot, monkeypatch):
     return context
 
 
-@pytest.mark.parametrize("last", [Succeeded("stowed"), Failed(Cause.PLANNING, "no way")])
+@pytest.mark.parametrize("last", [Succeeded("stowed"), NO_WAY])
 def test_an_arm_that_may_be_anywhere_is_brought_in_before_the_skill_begins(armed, clock, last):
-    calls: list[str] = []
+    calls = []
     leaf, log = leaf_of(armed, [Succeeded("gone")], first=(stow_of(calls, Running("stowing"), last),))
-    assert tick(leaf, clock, 2) == [Status.RUNNING] * 2
+    assert play(leaf, clock, 2) == "RR"
     assert (calls, log) == (["begin stow", "end stow"], ["begin 0"])
-    assert tick(leaf, clock) == [Status.SUCCESS]
-
-
-NO_WAY = Failed(Cause.PLANNING, "no way")
+    assert play(leaf, clock, 1) == "S"
 
 
 @pytest.mark.parametrize(
@@ -267,31 +208,31 @@ NO_WAY = Failed(Cause.PLANNING, "no way")
     ],
 )
 def test_robot_backs_off_where_the_arm_has_no_path_and_stows_again(armed, clock, stow, back, begun):
-    calls: list[str] = []
+    calls = []
     first = (
         stow_of(calls, stow),
         stow_of(calls, back, called="back_off", part=Part.BASE),
         stow_of(calls, Succeeded("stowed"), called="stow again"),
     )
     leaf, log = leaf_of(armed, [Succeeded("gone")], first=first)
-    assert tick(leaf, clock, len(begun) + 1)[-1] == Status.SUCCESS
+    assert play(leaf, clock, len(begun) + 1)[-1] == "S"
     assert calls == [f"{when} {each}" for each in begun for when in ("begin", "end")]
     assert log[0] == "begin 0"
 
 
 def test_an_arm_that_is_where_it_is_to_be_stays_there(armed, clock):
     armed.arm_order.anywhere = False
-    calls: list[str] = []
+    calls = []
     leaf, _ = leaf_of(armed, [Succeeded("gone")], first=(stow_of(calls),))
-    assert tick(leaf, clock) == [Status.SUCCESS]
+    assert play(leaf, clock, 1) == "S"
     assert calls == []
 
 
 def test_a_halt_while_the_arm_is_brought_in_ends_that(armed, clock):
-    calls: list[str] = []
+    calls = []
     leaf, log = leaf_of(armed, [], first=(stow_of(calls, *[Running("stowing")] * 9),))
-    tick(leaf, clock, 2)
-    leaf.stop(Status.INVALID)
+    play(leaf, clock, 2)
+    leaf.stop(N)
     assert (calls, log, leaf.active) == (["begin stow", "end stow"], [], False)
     assert armed.arm_order.anywhere
 
@@ -308,12 +249,12 @@ def test_a_halt_while_the_arm_is_brought_in_ends_that(armed, clock):
 def test_a_leaf_notes_whether_the_arm_may_be_anywhere(context, clock, uses, step, anywhere):
     leaf, _ = leaf_of(context, [step])
     leaf.skill.uses = frozenset(uses)
-    tick(leaf, clock)
+    play(leaf, clock, 1)
     assert context.arm_order.anywhere is anywhere
 
 
 def test_a_halted_skill_that_uses_the_arm_may_leave_it_anywhere(context, clock):
     leaf, _ = leaf_of(context, [Running("reaching")] * 3)
-    tick(leaf, clock)
-    leaf.stop(Status.INVALID)
+    play(leaf, clock, 1)
+    leaf.stop(N)
     assert context.arm_order.anywhere

@@ -3,16 +3,14 @@
 from dataclasses import replace
 
 import pytest
-from py_trees.common import Status
 
 from executive.run.control import Control
-from executive.tree.behaviour import suspend
 from executive.tree.nodes.search import ANSWER_TOPIC
 from executive.tree.nodes.speech import SPEECH_TOPIC, AskPeople
 from executive.words.expression import Template
 from skills.api import Cause
+from tests.executive.tree.scripted import F, N, R, S, play, tick
 
-R, S, F, N = Status.RUNNING, Status.SUCCESS, Status.FAILURE, Status.INVALID
 KEY, ID = "alice/answer", "alice/ask"
 
 
@@ -87,14 +85,10 @@ def test_answers(ask, answered, published, choices, names, gives, said, answer):
 @pytest.mark.parametrize("said", ["many", "nan", "inf", "-inf", "1e300", "1e16", "3 beers"])
 def test_an_answer_that_is_no_number_is_asked_for_again(ask, answered, control, published, said):
     root = ask(choices=(), names={}, gives=float)
-    root.tick_once()
-    control.answer(ID, said)
-    root.tick_once()
-    assert root.status == R
+    assert answered(root, said)[0] == R
     assert root.message == f"asks: I did not understand '{said}'. tea or coffee?"
     control.answer(ID, "7")
-    root.tick_once()
-    assert root.status == S
+    assert tick(root) == [S]
 
 
 def test_the_question_is_put_aloud_and_to_the_operator(ask, control, published):
@@ -119,12 +113,9 @@ def test_the_question_is_put_aloud_and_to_the_operator(ask, control, published):
 def test_nobody_answers(ask, run_context, control, clock, default, gives, choices, status, answer):
     root = ask(default=default, gives=gives, choices=choices)
     root.tick_once()
-    clock.advance(9.9)
-    root.tick_once()
-    assert root.status == R
-    clock.advance(0.2)
-    root.tick_once()
-    assert (root.status, run_context.board.values().get(KEY)) == (status, answer)
+    assert tick(root, 1, clock, 9.9) == [R]
+    assert tick(root, 1, clock, 0.2) == [status]
+    assert run_context.board.values().get(KEY) == answer
     assert root.cause is (Cause.TIMEOUT if status == F else None)
     assert control.state.questions == ()
 
@@ -133,41 +124,27 @@ def test_answers_that_mean_nothing_give_no_more_time(ask, control, clock):
     root = ask(choices=(), names={"kitchen": "kitchen"})
     root.tick_once()
     for _ in range(3):
-        clock.advance(3.0)
         control.answer(ID, "mars")
-        root.tick_once()
-        assert root.status == R
-    clock.advance(1.1)
-    root.tick_once()
-    assert (root.status, root.cause) == (F, Cause.TIMEOUT)
+        assert tick(root, 1, clock, 3.0) == [R]
+    assert (tick(root, 1, clock, 1.1), root.cause) == ([F], Cause.TIMEOUT)
 
 
 def test_a_text_without_a_value_fails(ask, control):
     root = ask(text="{n} teas?", n="alice/n")
-    root.tick_once()
-    assert (root.status, root.cause, control.state.questions) == (F, Cause.PRECONDITION, ())
+    assert (tick(root), root.cause, control.state.questions) == ([F], Cause.PRECONDITION, ())
 
 
-def test_cancelled_it_takes_the_question_back(ask, control, run_context):
+def test_cancelled_it_takes_the_question_back_and_asks_again_when_it_starts_again(ask, answered, control, run_context):
     root = ask()
-    root.tick_once()
-    root.stop(N)
+    assert play(root, "RI") == "RI"
     assert (root.status, root.cause, control.state.questions) == (N, Cause.CANCELLED, ())
     assert KEY not in run_context.board
-
-
-def test_it_asks_again_after_a_cancel(ask, answered, control):
-    root = ask()
-    root.tick_once()
-    root.stop(N)
     assert answered(root, "tea") == (S, "tea")
 
 
-def test_a_suspension_leaves_the_question_open(ask, answered, control):
+def test_a_suspension_leaves_the_question_open(ask, control):
     root = ask()
-    root.tick_once()
-    suspend(root)
+    assert play(root, "R|") == "R|"
     assert len(control.state.questions) == 1
     control.answer(ID, "coffee")
-    root.tick_once()
-    assert root.status == S
+    assert tick(root) == [S]

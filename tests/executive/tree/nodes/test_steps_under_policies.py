@@ -5,16 +5,14 @@ import pytest
 from executive.run.control import Control
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
-from executive.words.command import parse_command
+from executive.words.command import Command, parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from executive.words.policy import Guards, OnFailure, OperatorQuestion, Policy
 from skills.api import Cause, Failed, Running, Succeeded
 from skills.robot import Battery
 
-GO = {
-    place: parse_command(f"Take [Nothing] to [{place}] and do [Nothing] to [Nothing]") for place in ("hall", "bedroom")
-}
+GO = {place: Command(goal=place) for place in ("hall", "bedroom")}
 FIND = parse_command("Take [Nothing] to [kitchen] and do [grasp] to [coke]")
 BASE = "alice/round"
 NONE = Policy()
@@ -23,11 +21,8 @@ NONE = Policy()
 @pytest.fixture
 def compile_steps(knowledge, registry):
     def compile_it(*steps, policy=NONE):
-        return compile_mission(
-            Mission(name="round", robot="Alice", steps=steps).with_policy(policy),
-            knowledge=knowledge,
-            registry=registry,
-        )
+        mission = Mission(name="round", robot="Alice", steps=steps).with_policy(policy)
+        return compile_mission(mission, knowledge=knowledge, registry=registry)
 
     return compile_it
 
@@ -104,8 +99,12 @@ def test_on_failure_retry_means_once_more(play, nowhere):
     assert "(after 2 attempts)" in result.message
 
 
+def goes_on(skill):
+    return Running("goes on and on")
+
+
 def test_a_timeout_counts_the_robots_clock_for_each_attempt(play, script, clock):
-    script.ends["navigate"] = lambda skill: Running("goes on and on")
+    script.ends["navigate"] = goes_on
     result = play(step(GO["hall"], timeout_s=3.0, retries=1))
     assert (result.outcome, result.cause) == (Outcome.FAILURE, Cause.TIMEOUT)
     assert "not done within 3 s (after 2 attempts)" in result.message
@@ -113,7 +112,7 @@ def test_a_timeout_counts_the_robots_clock_for_each_attempt(play, script, clock)
 
 
 def test_the_whole_mission_has_a_timeout(play, script, clock):
-    script.ends["navigate"] = lambda skill: Running("goes on and on")
+    script.ends["navigate"] = goes_on
     result = play(step(GO["hall"]), policy=Policy(timeout_s=2.0))
     assert (result.outcome, result.cause, clock.now() < 2.5) == (Outcome.FAILURE, Cause.TIMEOUT, True)
 
@@ -151,7 +150,7 @@ def test_nobody_to_ask_means_the_default_answer(play, nowhere, clock):
         (["retry", "retry", "stop"], Outcome.FAILURE, "found no coke"),
     ],
 )
-def test_the_operators_answer_decides(compile_steps, run_tree, nowhere, answers, outcome, says):
+def test_the_operators_answer_decides(play, nowhere, answers, outcome, says):
     control, asked, left = Control(attended=True, pace=None), [], list(answers)
 
     def answering(progress):
@@ -160,8 +159,7 @@ def test_the_operators_answer_decides(compile_steps, run_tree, nowhere, answers,
             control.answer(question.id, left.pop(0))
 
     ask = {"on_failure": OnFailure.ASK, "question": OperatorQuestion(text=None, limit_s=60.0, default="stop")}
-    tree = compile_steps(step(FIND, **ask), step(GO["hall"]))
-    result = run_tree(tree, control=control, observer=answering).robots[0]
+    result = play(step(FIND, **ask), step(GO["hall"]), control=control, observer=answering)
     assert (result.outcome, says in result.message, left) == (outcome, True, [])
     assert {question.id for question in asked} == {f"{BASE}/step-1/ask"}
     assert asked[0].options == ("retry", "skip", "stop")
@@ -199,28 +197,20 @@ def test_a_guard_on_the_place(compile_steps):
 
 
 def test_the_nodes_of_a_policy_stand_around_the_step_in_this_order(compile_steps):
-    policy = {
-        "timeout_s": 9.0,
-        "retries": 1,
-        "on_failure": OnFailure.SKIP,
-        "guards": Guards(battery=0.3, localised=True, time_s=60.0),
-    }
-    tree = compile_steps(step(GO["hall"], **policy), step(GO["bedroom"]))
+    guards = Guards(battery=0.3, localised=True, time_s=60.0)
+    policy = Policy(timeout_s=9.0, retries=1, on_failure=OnFailure.SKIP, guards=guards)
+    tree = compile_steps(Do.from_command(GO["hall"]).with_policy(policy), step(GO["bedroom"]))
     parts = [node.path_id.removeprefix(f"{BASE}/") for node in tree.root.walk() if "/step-1/" in node.path_id]
-    assert parts == [
-        "step-1/skip", "step-1/guard-battery", "step-1/guard-time", "step-1/guard-localised", "step-1/retries",
-        "step-1/timeout",
-    ]  # fmt: skip
+    names = ("skip", "guard-battery", "guard-time", "guard-localised", "retries", "timeout")
+    assert parts == [f"step-1/{name}" for name in names]
 
 
-def test_a_cancel_while_asking_takes_the_question_back(compile_steps, run_tree, nowhere):
+def test_a_cancel_while_asking_takes_the_question_back(play, nowhere):
     control = Control(attended=True, pace=None)
 
     def cancelling(progress):
         if control.state.questions:
             control.cancel("enough")
 
-    result = run_tree(compile_steps(step(FIND, on_failure=OnFailure.ASK)), control=control, observer=cancelling).robots[
-        0
-    ]
+    result = play(step(FIND, on_failure=OnFailure.ASK), control=control, observer=cancelling)
     assert (result.outcome, control.state.questions) == (Outcome.CANCELLED, ())

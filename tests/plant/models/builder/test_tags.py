@@ -1,6 +1,8 @@
 """AprilTags as files: to print, as plates, and on imported models."""
 
+import shutil
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -16,15 +18,6 @@ from skills.perception.fiducials import find_tags
 from skills.robot import FrameTree, Image, Intrinsics
 
 LENS = Intrinsics(640, 480, 552.0, 552.0, 320.0, 240.0)
-BOX_SDF = """<?xml version="1.0"?>
-<sdf version="1.9">
-  <model name="crate">
-    <link name="crate">
-      <visual name="visual"><geometry><box><size>0.2 0.16 0.3</size></box></geometry></visual>
-    </link>
-  </model>
-</sdf>
-"""
 
 
 def test_a_printed_tag_has_its_size_and_a_white_margin():
@@ -55,9 +48,8 @@ def before(X_WT, distance_m):
 
 
 def test_the_plate_of_a_tag_is_seen_where_it_stands(tmp_path):
-    X_WT = RigidTransform(
-        RotationMatrix(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])), [1.0, 0.5, 0.4]
-    )
+    R_WT = RotationMatrix(np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
+    X_WT = RigidTransform(R_WT, [1.0, 0.5, 0.4])
     (found,) = seen(write_plate(tmp_path, 520, 0.146), X_WT, before(X_WT, 1.0), 520, 0.146)
     assert found.X_OT.IsNearlyEqualTo(X_WT, 0.02)
 
@@ -65,7 +57,7 @@ def test_the_plate_of_a_tag_is_seen_where_it_stands(tmp_path):
 @pytest.fixture
 def crate(tmp_path):
     """Folder of an imported box of 0.2 x 0.16 x 0.3 m."""
-    (tmp_path / "crate.sdf").write_text(BOX_SDF)
+    shutil.copy(Path(__file__).with_name("crate.sdf"), tmp_path)
     facts = {"mass_kg": 1.0, "com_m": (0.0, 0.0, 0.0), "inertia_kg_m2": (0.01, 0.01, 0.01, 0.0, 0.0, 0.0)}
     size = {"size_m": (0.2, 0.16, 0.3), "collision_parts": 1, "triangles": 12}
     write_imported(tmp_path, ImportedObject(name="crate", class_name="crate", **facts, **size))

@@ -1,5 +1,7 @@
 """A Fetch on a bare floor, put back to its start before each test."""
 
+from pathlib import Path
+
 import pytest
 
 from plant.diagram import DiagramConfig, LooseModel, build_diagram
@@ -8,18 +10,10 @@ from plant.robots.robot_kind import PlacedRobot
 from skills.robot import Pose2D
 from tests.plant.kept_engine import KeptEngine
 
-FLOOR = """<sdf version="1.7"><model name="floor"><link name="floor">
-<collision name="floor"><pose>0 0 -0.1 0 0 0</pose><geometry><box><size>20 20 0.2</size></box></geometry></collision>
-<visual name="floor"><pose>0 0 -0.1 0 0 0</pose><geometry><box><size>20 20 0.2</size></box></geometry>
-<material><diffuse>0.5 0.4 0.3 1</diffuse></material></visual>
-</link></model></sdf>"""
-
 
 @pytest.fixture(scope="session")
-def floor(tmp_path_factory):
-    path = tmp_path_factory.mktemp("floor") / "floor.sdf"
-    path.write_text(FLOOR)
-    return LooseModel("floor", path, Pose2D(0.0, 0.0, 0.0).transform(), fixed=True)
+def floor():
+    return LooseModel("floor", Path(__file__).with_name("floor.sdf"), Pose2D(0.0, 0.0, 0.0).transform(), fixed=True)
 
 
 @pytest.fixture(scope="session")

@@ -13,31 +13,22 @@ from plant.robots.fetch.robot import lidar_spec
 from plant.robots.fetch.wheels import Axle, WheelOdometer
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, BaseKind, CommandState, LeaseError, Mount, Pose2D
-
-WALL = """<sdf version="1.7"><model name="wall"><link name="wall">
-<collision name="wall"><geometry><box><size>0.2 6 1</size></box></geometry></collision></link></model></sdf>"""
+from tests.plant.boxes import fixed_box
 
 
 def test_the_lidar_sees_220_degrees_in_662_points():
-    azimuths = lidar_spec().azimuths_rad()[lidar_spec().visible_columns()]
-    assert len(azimuths) == 662
-    assert math.degrees(azimuths[-1] - azimuths[0]) == pytest.approx(220.0, abs=0.1)
-    assert math.degrees(azimuths[0] + azimuths[-1]) == pytest.approx(0.0, abs=0.5)
+    azimuths = np.degrees(lidar_spec().azimuths_rad()[lidar_spec().visible_columns()])
+    assert (len(azimuths), azimuths[-1] - azimuths[0]) == (662, pytest.approx(220.0, abs=0.1))
+    assert azimuths[0] + azimuths[-1] == pytest.approx(0.0, abs=0.5)
 
 
 def test_the_scan_measures_the_distance_of_a_wall(floor, tmp_path):
     """A wall's face at x = 2.9 m, the robot at 0: the scan's middle lies there in the body frame."""
-    path = tmp_path / "wall.sdf"
-    path.write_text(WALL)
-    wall = LooseModel("wall", path, Pose2D(3.0, 0.0, 0.0).transform(0.5), fixed=True)
-    world = build_diagram(
-        DiagramConfig(models=[floor, wall], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.0, 0.0, 0.0))], render=False)
-    )
-    scan = Engine(world).robots["Bob"].scan()
+    wall, bob = fixed_box(tmp_path, "wall", "0.2 6 1", "3 0 0.5"), PlacedRobot("Bob", "fetch", Pose2D(0.0, 0.0, 0.0))
+    scan = Engine(build_diagram(DiagramConfig(models=[floor, wall], robots=[bob], render=False))).robots["Bob"].scan()
     points_B = scan.points_B()
     ahead = points_B[np.abs(points_B[:, 1]) < 0.3]
-    assert float(np.median(ahead[:, 0])) == pytest.approx(2.9, abs=0.02)
-    assert scan.ranges_m.shape == (1, 662)
+    assert (float(np.median(ahead[:, 0])), scan.ranges_m.shape) == (pytest.approx(2.9, abs=0.02), (1, 662))
 
 
 def test_equal_wheel_turns_count_as_straight_and_opposite_ones_as_a_turn():
@@ -61,11 +52,9 @@ def test_odometry_follows_a_driven_arc(engine, fetch, lease):
 
 def test_capabilities_describe_a_wheeled_robot():
     known = fetch_capabilities()
-    assert known.base_kind is BaseKind.DIFFERENTIAL
+    assert (known.base_kind, known.pitch_range_rad) == (BaseKind.DIFFERENTIAL, (0.0, 0.0))
     assert [camera.mount for camera in known.cameras] == [Mount.HEAD]
-    assert known.lidar_height_m == pytest.approx(0.288, abs=0.001)
-    assert known.pitch_range_rad == (0.0, 0.0)
-    assert len(known.arm.joint_names) == 7
+    assert (known.lidar_height_m, len(known.arm.joint_names)) == (pytest.approx(0.288, abs=0.001), 7)
 
 
 def test_the_head_pose_of_the_capabilities_equals_the_plants(engine, fetch, lease):
@@ -74,9 +63,8 @@ def test_the_head_pose_of_the_capabilities_equals_the_plants(engine, fetch, leas
     engine.advance(2.0)
     plant, bob = engine.world.plant, engine.world.robots["Bob"]
     link = plant.GetBodyByName("head_tilt", bob.instance)
-    X_BF = plant.EvalBodyPoseInWorld(engine.context, bob.body).inverse() @ plant.EvalBodyPoseInWorld(
-        engine.context, link
-    )
+    X_WB, X_WF = (plant.EvalBodyPoseInWorld(engine.context, body) for body in (bob.body, link))
+    X_BF = X_WB.inverse() @ X_WF
     angles = fetch.joints().position_rad
     told = fetch.capabilities().head.X_BF(angles["head_pan"], angles["head_tilt"])
     np.testing.assert_allclose(told.GetAsMatrix34(), X_BF.GetAsMatrix34(), atol=0.01)
@@ -86,6 +74,10 @@ TRAVELLING_M = 0.37743 + 0.02
 BOX = """<sdf version="1.7"><model name="box"><link name="box">
 <inertial><mass>0.3</mass><inertia><ixx>0.0003</ixx><iyy>0.0003</iyy><izz>0.0003</izz></inertia></inertial>
 <collision name="box"><geometry><box><size>0.05 0.05 0.12</size></box></geometry></collision></link></model></sdf>"""
+
+
+def near_m(height_m):
+    return pytest.approx(height_m, abs=0.01)
 
 
 def pose(engine):
@@ -121,14 +113,13 @@ def test_it_turns_a_quarter_on_the_spot_within_two_degrees(engine, fetch, lease)
     fetch.drive(0.0, 0.0, 0.5, until_s=math.pi / 2 / 0.5 + 0.5 * (0.5 / 2.5 - 0.5 / 6.0), lease=lease)
     engine.advance(5.0)
     x, y, yaw, _ = pose(engine)
-    assert yaw == pytest.approx(math.pi / 2, abs=math.radians(2.0))
-    assert (x, y) == pytest.approx((x0, y0), abs=0.01)
+    assert (yaw, (x, y)) == (pytest.approx(math.pi / 2, abs=math.radians(2.0)), pytest.approx((x0, y0), abs=0.01))
 
 
-def test_fetch_refuses_to_drive_sideways(engine, fetch, lease):
-    command = fetch.drive(0.3, 0.1, 0.0, until_s=1.0, lease=lease)
-    assert fetch.command_status(command).state is CommandState.REFUSED
-    assert "sideways" in fetch.command_status(command).reason
+def test_fetch_refuses_to_drive_sideways_and_to_pitch(engine, fetch, lease):
+    aside = fetch.command_status(fetch.drive(0.3, 0.1, 0.0, until_s=1.0, lease=lease))
+    pitched = fetch.command_status(fetch.stand(0.5, 0.1, until_s=1.0, lease=lease))
+    assert [aside.state, pitched.state] == [CommandState.REFUSED] * 2 and "sideways" in aside.reason
     engine.advance(0.5)
     assert pose(engine)[0] == pytest.approx(0.5, abs=1e-3)
 
@@ -170,56 +161,47 @@ def test_the_lift_moves_up_and_down_at_its_speed(engine, fetch, lease):
     engine.advance(2.5)
     assert fetch.command_status(up).state is CommandState.RUNNING
     engine.advance(1.0)
-    assert fetch.command_status(up).state is CommandState.DONE
-    assert pose(engine)[3] == pytest.approx(TRAVELLING_M + 0.3, abs=0.01)
+    assert (fetch.command_status(up).state, pose(engine)[3]) == (CommandState.DONE, near_m(TRAVELLING_M + 0.3))
     down = fetch.sit(until_s=10.0, lease=lease)
     engine.advance(4.0)
-    assert fetch.command_status(down).state is CommandState.DONE
-    assert pose(engine)[3] == pytest.approx(0.377, abs=0.01)
+    assert (fetch.command_status(down).state, pose(engine)[3]) == (CommandState.DONE, near_m(0.377))
 
 
 def test_the_lidar_stays_at_its_height_when_the_lift_goes_up(engine, fetch, lease):
     fetch.stand(TRAVELLING_M + 0.2, 0.0, until_s=10.0, lease=lease)
     engine.advance(3.0)
     scan = fetch.scan()
-    assert scan.X_BL.translation()[2] + scan.X_OB.translation()[2] == pytest.approx(0.2878, abs=0.01)
+    assert scan.X_BL.translation()[2] + scan.X_OB.translation()[2] == near_m(0.2878)
 
 
-def test_a_pitch_is_refused(fetch, lease):
-    command = fetch.stand(0.5, 0.1, until_s=1.0, lease=lease)
-    assert fetch.command_status(command).state is CommandState.REFUSED
-
-
-def test_the_head_turns_to_its_goal(engine, fetch, lease):
+def test_the_head_turns_to_its_goal_and_refuses_one_out_of_reach(engine, fetch, lease):
     command = fetch.point_head(0.8, 0.4, until_s=5.0, lease=lease)
     engine.advance(2.0)
     assert fetch.command_status(command).state is CommandState.DONE
     angles = fetch.joints().position_rad
     assert (angles["head_pan"], angles["head_tilt"]) == pytest.approx((0.8, 0.4), abs=0.02)
+    far = fetch.point_head(2.0, 0.0, until_s=5.0, lease=lease)
+    assert "pan 2.00 rad must lie in [-1.57, 1.57]" in fetch.command_status(far).reason
 
 
-def test_a_head_that_cannot_turn_so_far_refuses(fetch, lease):
-    command = fetch.point_head(2.0, 0.0, until_s=5.0, lease=lease)
-    assert "pan 2.00 rad must lie in [-1.57, 1.57]" in fetch.command_status(command).reason
+def arm_by(fetch, lease, offsets_rad, seconds):
+    """Commands the stowed arm to turn its joints."""
+    start = np.array(fetch.capabilities().arm.stowed_rad)
+    path = ArmTrajectory(np.array([0.0, seconds]), np.array([start, start + offsets_rad]))
+    return fetch.move_arm(path, until_s=10.0, lease=lease), start + offsets_rad
 
 
 def test_the_arm_follows_a_trajectory_to_its_end(engine, fetch, lease):
-    names = fetch.capabilities().arm.joint_names
-    start = np.array(fetch.capabilities().arm.stowed_rad)
-    goal = start + [-0.6, -0.5, 0.3, -0.3, 0.4, -0.4, 0.5]
-    command = fetch.move_arm(ArmTrajectory(np.array([0.0, 2.0]), np.array([start, goal])), until_s=10.0, lease=lease)
+    command, goal = arm_by(fetch, lease, [-0.6, -0.5, 0.3, -0.3, 0.4, -0.4, 0.5], 2.0)
     engine.advance(4.0)
     assert fetch.command_status(command).state is CommandState.DONE
     read = fetch.joints().position_rad
-    np.testing.assert_allclose([read[name] for name in names], goal, atol=0.03)
+    np.testing.assert_allclose([read[name] for name in fetch.capabilities().arm.joint_names], goal, atol=0.03)
 
 
 def test_a_trajectory_that_is_too_fast_is_refused(fetch, lease):
     """shoulder_pan turns at 1.256 rad/s at most."""
-    start = np.array(fetch.capabilities().arm.stowed_rad)
-    goal = start - [1.0, 0, 0, 0, 0, 0, 0]
-    path = ArmTrajectory(np.array([0.0, 0.5]), np.array([start, goal]))
-    command = fetch.move_arm(path, until_s=10.0, lease=lease)
+    command, _ = arm_by(fetch, lease, [-1.0, 0, 0, 0, 0, 0, 0], 0.5)
     assert "at most 1.3 is allowed" in fetch.command_status(command).reason
 
 
@@ -230,9 +212,8 @@ def test_the_stowed_arm_stays_within_the_footprint(engine):
     far_m = 0.0
     for name in (*bob.kind.capabilities().arm.joint_names, "left_finger", "right_finger"):
         link = plant.GetBodyByName(name, bob.instance)
-        X_BaseLink = plant.EvalBodyPoseInWorld(engine.context, bob.base).inverse() @ plant.EvalBodyPoseInWorld(
-            engine.context, link
-        )
+        X_WBase, X_WL = (plant.EvalBodyPoseInWorld(engine.context, body) for body in (bob.base, link))
+        X_BaseLink = X_WBase.inverse() @ X_WL
         for shape in plant.GetCollisionGeometriesForBody(link):
             box = inspector.GetObbInGeometryFrame(shape)
             signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1)
@@ -272,11 +253,9 @@ def boxed(floor, tmp_path):
     """A Fetch with a box between its open fingers, which falls unless they close."""
     path = tmp_path / "box.sdf"
     path.write_text(BOX)
-    box = LooseModel("box", path, Pose2D(5.0, 5.0, 0.0).transform(0.06))
-    world = build_diagram(
-        DiagramConfig(models=[floor, box], robots=[PlacedRobot("Bob", "fetch", Pose2D(0.0, 0.0, 0.0))], render=False)
-    )
-    return Engine(world)
+    box, bob = LooseModel("box", path, Pose2D(5.0, 5.0, 0.0).transform(0.06)), Pose2D(0.0, 0.0, 0.0)
+    config = DiagramConfig(models=[floor, box], robots=[PlacedRobot("Bob", "fetch", bob)], render=False)
+    return Engine(build_diagram(config))
 
 
 def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
@@ -301,8 +280,7 @@ def test_the_gripper_closes_on_a_box_and_carries_it(boxed):
         boxed.advance(0.025)
     for _ in range(10):
         boxed.advance(0.1)
-    assert bob.command_status(closed).state is CommandState.DONE
-    assert bob.gripper().holding
+    assert bob.command_status(closed).state is CommandState.DONE and bob.gripper().holding
     assert bob.gripper().opening == pytest.approx(0.05, abs=0.004)
     assert bob.gripper().force_n == pytest.approx(40.0, abs=8.0)
     X_HO = plant.EvalBodyPoseInWorld(boxed.context, hand).inverse() @ plant.EvalBodyPoseInWorld(boxed.context, box)

@@ -1,21 +1,9 @@
+from pathlib import Path
+
 from plant.robots.spot.model import simplify_obj
 
 # A square of two triangles with an edge of 1 m, and a sliver of a tenth of a millimetre at its corner.
-SOUP = """mtllib material.mtl
-usemtl material_0
-v 0 0 0
-v 1 0 0
-v 0 1 0
-v 1 0 0
-v 1 1 0
-v 0 1 0.00001
-v 0.0001 0 0
-vn 0 0 1
-vt 0 0
-f 1/1/1 2/1/1 3/1/1
-f 4/1/1 5/1/1 6/1/1
-f 1/1/1 7/1/1 3/1/1
-"""
+SOUP = Path(__file__).with_name("soup.obj").read_text()
 
 
 def rows(kind):
@@ -23,14 +11,9 @@ def rows(kind):
     return [line[1:] for line in lines if line[0] == kind]
 
 
-def test_vertices_of_one_cell_are_joined_and_faces_share_them():
+def test_vertices_of_one_cell_are_joined_and_a_face_whose_corners_merge_vanishes():
     first, second = ({int(corner.split("//")[0]) for corner in face} for face in rows("f"))
-    assert len(rows("v")) == 4
-    assert len(first & second) == 2
-
-
-def test_a_face_whose_corners_merge_vanishes():
-    assert len(rows("f")) == 2
+    assert (len(rows("v")), len(first & second)) == (4, 2)
 
 
 def test_normals_stay_with_their_faces():

@@ -19,12 +19,14 @@ def truth(engine):
     return np.array(model.floating_base.pose(engine.world.plant.GetPositions(engine.context)))
 
 
+def states(spot, *commands):
+    return [spot.command_status(each).state for each in commands]
+
+
 def arm_to(spot, offset_rad, seconds):
     start = np.array([spot.joints().position_rad[name] for name in spot.capabilities().arm.joint_names])
     start[1] = max(start[1], -3.14)
-    goal = start.copy()
-    goal[1] += offset_rad
-    return ArmTrajectory(np.array([0.0, seconds]), np.array([start, goal]))
+    return ArmTrajectory(np.array([0.0, seconds]), np.array([start, start + [0.0, offset_rad, 0.0, 0.0, 0.0, 0.0]]))
 
 
 def test_drive_moves_the_body_at_the_commanded_velocity(engine, spot, lease):
@@ -56,12 +58,10 @@ def test_speed_and_acceleration_are_limited(engine, spot, lease):
 
 
 def test_stop_only_stops_the_command_it_names(engine, spot, lease):
-    old = spot.drive(0.3, 0.0, 0.0, until_s=5.0, lease=lease)
-    new = spot.drive(0.6, 0.0, 0.0, until_s=5.0, lease=lease)
+    old, new = (spot.drive(vx, 0.0, 0.0, until_s=5.0, lease=lease) for vx in (0.3, 0.6))
     spot.stop(lease=lease, only=old)
     engine.advance(0.1)
-    assert spot.command_status(old).state is CommandState.STOPPED
-    assert spot.command_status(new).state is CommandState.RUNNING
+    assert states(spot, old, new) == [CommandState.STOPPED, CommandState.RUNNING]
 
 
 def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, spot, lease):
@@ -70,9 +70,8 @@ def test_a_second_holder_is_refused_until_it_takes_the_lease(engine, spot, lease
     spot.drive(0.5, 0, 0, until_s=9.0, lease=lease)
     other = spot.take_lease("other")
     engine.advance(1.0)
-    refused = spot.drive(0.5, 0, 0, until_s=9.0, lease=lease)
-    assert spot.command_status(refused).state is CommandState.REFUSED
-    assert "other" in spot.command_status(refused).reason
+    refused = spot.command_status(spot.drive(0.5, 0, 0, until_s=9.0, lease=lease))
+    assert (refused.state, "other" in refused.reason) == (CommandState.REFUSED, True)
     assert truth(engine)[0] == pytest.approx(0.5, abs=0.01)
     assert spot.command_status(spot.stop(lease=other)).state is CommandState.DONE
 
@@ -83,26 +82,25 @@ def test_a_lease_of_an_earlier_start_does_not_count(engine, spot, lease):
     assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.NO_LEASE)
 
 
+# verb, its arguments (for the arm: how far and how fast it turns), when it ends
 @pytest.mark.parametrize(
-    ("begin", "cause"),
+    ("verb", "arguments", "until_s", "cause"),
     [
-        (lambda spot, lease: spot.drive(np.nan, 0.0, 0.0, until_s=9.0, lease=lease), CommandCause.INVALID),
-        (lambda spot, lease: spot.stand(2.0, 0.0, until_s=9.0, lease=lease), CommandCause.INVALID),
-        (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 0.1), until_s=9.0, lease=lease), CommandCause.INVALID),
-        (lambda spot, lease: spot.point_head(0.0, 0.0, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
-        (lambda spot, lease: spot.dock(520, until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
-        (lambda spot, lease: spot.undock(until_s=9.0, lease=lease), CommandCause.UNSUPPORTED),
-        (
-            lambda spot, lease: spot.open_door(DoorHandle((1.0, 0.0, 0.5), True, True), until_s=9.0, lease=lease),
-            CommandCause.UNSUPPORTED,
-        ),
-        (lambda spot, lease: spot.sit(until_s=0.0, lease=lease), CommandCause.LATE),
-        (lambda spot, lease: spot.move_arm(arm_to(spot, 1.5, 3.0), until_s=0.2, lease=lease), CommandCause.LATE),
-        (lambda spot, lease: spot.drive(0.1, 0.0, 0.0, until_s=0.2, lease=lease), CommandCause.NONE),
+        ("drive", (np.nan, 0.0, 0.0), 9.0, CommandCause.INVALID),
+        ("stand", (2.0, 0.0), 9.0, CommandCause.INVALID),
+        ("move_arm", (1.5, 0.1), 9.0, CommandCause.INVALID),
+        ("point_head", (0.0, 0.0), 9.0, CommandCause.UNSUPPORTED),
+        ("dock", (520,), 9.0, CommandCause.UNSUPPORTED),
+        ("undock", (), 9.0, CommandCause.UNSUPPORTED),
+        ("open_door", (DoorHandle((1.0, 0.0, 0.5), True, True),), 9.0, CommandCause.UNSUPPORTED),
+        ("sit", (), 0.0, CommandCause.LATE),
+        ("move_arm", (1.5, 3.0), 0.2, CommandCause.LATE),
+        ("drive", (0.1, 0.0, 0.0), 0.2, CommandCause.NONE),
     ],
 )
-def test_a_command_that_does_not_succeed_has_its_cause(engine, spot, lease, begin, cause):
-    command = begin(spot, lease)
+def test_a_command_that_does_not_succeed_has_its_cause(engine, spot, lease, verb, arguments, until_s, cause):
+    given = (arm_to(spot, *arguments),) if verb == "move_arm" else arguments
+    command = getattr(spot, verb)(*given, until_s=until_s, lease=lease)
     engine.advance(0.4)
     assert spot.command_status(command).cause is cause
 
@@ -147,20 +145,16 @@ def test_an_expired_arm_command_holds_the_arm_in_place(engine, spot, lease):
     ("offset_rad", "seconds", "word"), [(4.0, 10.0, "joint limits"), (1.5, 0.1, "rad/s"), (-1.0, 5.0, "joint limits")]
 )
 def test_impossible_arm_trajectories_are_refused(spot, lease, offset_rad, seconds, word):
-    command = spot.move_arm(arm_to(spot, offset_rad, seconds), until_s=20.0, lease=lease)
-    assert spot.command_status(command).state is CommandState.REFUSED
-    assert word in spot.command_status(command).reason
+    status = spot.command_status(spot.move_arm(arm_to(spot, offset_rad, seconds), until_s=20.0, lease=lease))
+    assert (status.state, word in status.reason) == (CommandState.REFUSED, True), status.reason
 
 
 def test_gripper_opens_and_closes_and_holds_nothing(engine, spot, lease):
-    spot.set_gripper(1.0, 30.0, until_s=5.0, lease=lease)
-    engine.advance(2.0)
-    assert spot.gripper().opening == pytest.approx(1.0, abs=0.05)
-    closing = spot.set_gripper(0.0, 30.0, until_s=10.0, lease=lease)
-    engine.advance(3.0)
-    assert spot.command_status(closing).state is CommandState.DONE
-    assert spot.gripper().opening == pytest.approx(0.0, abs=0.05)
-    assert not spot.gripper().holding
+    for opening in (1.0, 0.0):
+        command = spot.set_gripper(opening, 30.0, until_s=engine.now() + 7.0, lease=lease)
+        engine.advance(3.0)
+        assert spot.gripper().opening == pytest.approx(opening, abs=0.05)
+    assert (states(spot, command), spot.gripper().holding) == ([CommandState.DONE], False)
 
 
 def test_stand_changes_height_and_pitch_and_sit_refuses_to_drive(engine, spot, lease):
@@ -171,14 +165,14 @@ def test_stand_changes_height_and_pitch_and_sit_refuses_to_drive(engine, spot, l
     sit = spot.sit(until_s=9.0, lease=lease)
     engine.advance(3.0)
     assert spot.command_status(sit).state is CommandState.DONE
-    refused = spot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)
-    assert "sits" in spot.command_status(refused).reason
+    assert "sits" in spot.command_status(spot.drive(0.5, 0.0, 0.0, until_s=9.0, lease=lease)).reason
 
 
-def test_a_command_that_has_expired_already_is_refused(engine, spot, lease):
+def test_a_command_that_has_expired_already_is_refused_and_an_unknown_one_raises(engine, spot, lease):
     engine.advance(1.0)
-    command = spot.drive(0.5, 0.0, 0.0, until_s=0.5, lease=lease)
-    assert "expires" in spot.command_status(command).reason
+    assert "expires" in spot.command_status(spot.drive(0.5, 0.0, 0.0, until_s=0.5, lease=lease)).reason
+    with pytest.raises(KeyError):
+        spot.command_status(999)
 
 
 def test_an_engine_that_was_put_back_runs_like_a_new_one(kept_spot):
@@ -194,11 +188,6 @@ def test_an_engine_that_was_put_back_runs_like_a_new_one(kept_spot):
     (new, _), first, second = (walked(begin()) for begin in (new_engine, kept_spot.again, kept_spot.again))
     np.testing.assert_allclose(first[0], new, rtol=0.0, atol=1e-6)
     np.testing.assert_array_equal(np.concatenate(first), np.concatenate(second))
-
-
-def test_unknown_command_ids_raise(spot):
-    with pytest.raises(KeyError):
-        spot.command_status(999)
 
 
 def test_a_stopped_robot_stands_within_a_fifth_of_a_second(engine, spot, lease):
@@ -218,10 +207,8 @@ def test_efforts_of_joints_are_those_that_the_solver_applies(monkeypatch):
             "plant.diagram.MultibodyPlantConfig",
             lambda sampled=sampled, **given: MultibodyPlantConfig(**{**given, "use_sampled_output_ports": sampled}),
         )
-        world = build_diagram(
-            DiagramConfig(robots=[PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))], visuals=False, render=False)
-        )
-        engine = Engine(world)
+        alice = PlacedRobot("Alice", "spot", Pose2D(0.0, 0.0, 0.0))
+        engine = Engine(world := build_diagram(DiagramConfig(robots=[alice], visuals=False, render=False)))
         spot, model = engine.robots["Alice"], world.robots["Alice"]
         spot.drive(0.4, 0.0, 0.3, until_s=2.0, lease=spot.acquire_lease("test"))
         engine.advance(0.7)

@@ -13,6 +13,7 @@ from skills.files.errors import InputError
 from skills.files.yaml_source import read_yaml
 from skills.manipulation.arm.kinematics import arm_model
 from skills.robot import BaseKind, Mount
+from tests.tables import table
 
 ARM = ["shoulder_yaw", "shoulder_pitch", "elbow", "wrist_roll", "wrist_pitch", "hand_roll"]
 
@@ -64,17 +65,7 @@ def test_a_robot_may_have_no_gripper_or_no_arm(tmp_path, options):
     assert not (tmp_path / "made/tests/grasp.skilltest.yaml").exists()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("link: laser", "link: lazer", r"robot.yaml:\d+: there is no link 'lazer' in robot.urdf; did you mean 'laser'"),
-        ("wrist_roll, wrist_pitch", "wrist_pitch, wrist_roll", "joint wrist_pitch does not follow elbow"),
-        ("hand: {link: left_finger", "hand: {link: laser", "link laser is not behind the arm's last joint"),
-        ("along: x, closing: y", "along: y, closing: y", "same axis as along"),
-        ("link: camera_optical_frame", "link: elbow_link", "link elbow_link carries no camera"),
-        ("[shoulder_yaw, ", "[", "stowed has 6 angles, and the arm 5 joints"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "wrong_parts"))
 def test_a_wrong_part_is_named_with_its_line(rover_package, tmp_path, old, new, message):
     shutil.copytree(rover_package, tmp_path / "changed")
     path = tmp_path / "changed/robot.yaml"
@@ -100,15 +91,7 @@ def test_a_package_in_another_folder_is_given(rover_urdf, tmp_path):
     assert (tmp_path / "made/errand_robot_rover/robot.yaml").is_file()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("meshes/base.stl", "meshes/other.stl", "no folder of package 'rover_description' with meshes/other.stl"),
-        ("rover_description/meshes/base.stl", "elsewhere/base.stl", "--package elsewhere=DIR"),
-        ('<mass value="2.0"/><inertia ixx="', '<mass value="2.0"/><inertia ixx="9', "an inertia that no body has"),
-        ('effort="90"', 'effort="0"', "joint shoulder_pitch has no limit of effort"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "wrong_urdfs"))
 def test_a_urdf_that_the_plant_cannot_use_is_refused_with_its_line(rover_urdf, tmp_path, old, new, message):
     text = rover_urdf.read_text()
     assert old in text

@@ -5,23 +5,18 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from plant.diagram import DiagramConfig, LooseModel, build_diagram
+from plant.diagram import DiagramConfig, build_diagram
 from plant.engine import Engine
 from plant.robots import robot_kind as kinds
 from plant.robots.robot_kind import PlacedRobot
 from skills.robot import ArmTrajectory, CommandState, Pose2D
+from tests.plant.boxes import fixed_box
 from tests.plant.kept_engine import KeptEngine
-
-FLOOR = """<sdf version="1.7"><model name="floor"><link name="floor">
-<collision name="floor"><pose>0 0 -0.1 0 0 0</pose><geometry><box><size>20 20 0.2</size></box></geometry></collision>
-</link></model></sdf>"""
 
 
 @pytest.fixture(scope="module")
 def kept_rover(rover_package, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("floor")
-    (folder / "floor.sdf").write_text(FLOOR)
-    floor = LooseModel("floor", folder / "floor.sdf", Pose2D(0.0, 0.0, 0.0).transform(), fixed=True)
+    floor = fixed_box(tmp_path_factory.mktemp("floor"), "floor", "20 20 0.2", "0 0 -0.1")
     entry = EntryPoint("rover", f"{rover_package.name}:KIND", kinds.GROUP)
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(rover_package.parent)

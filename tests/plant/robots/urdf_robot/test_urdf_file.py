@@ -5,6 +5,7 @@ import pytest
 
 from plant.robots.urdf_robot.urdf_file import UrdfFile
 from skills.files.errors import InputError
+from tests.tables import table
 
 JOINT = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>'
 
@@ -20,32 +21,14 @@ def test_an_axis_has_length_one(tmp_path):
     assert urdf.joints["j"].axis.tolist() == [0.0, 0.0, 1.0]
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "message"),
-    [
-        ("<robot>\n<link>", 2, "broken XML"),
-        ("<sdf/>", 1, "begins with <sdf>"),
-        ('<robot>\n<link name="a"/>\n<link name="a"/></robot>', 3, "two of <link> are named 'a'"),
-        ('<robot><link name="a"/>\n' + JOINT + "</robot>", 2, "there is no link 'b' for its child"),
-        ('<robot><link name="a"/><link name="b"/></robot>', None, "no tree"),
-        (f'<robot><link name="a"/><link name="b"/>\n{JOINT.replace("0 0 2", "0 0 up")}</robot>', 2, "is not 3 numbers"),
-        (f'<robot><link name="a"/><link name="b"/>\n{JOINT.replace("0 0 2", "0 0 0")}</robot>', 2, "has a zero axis"),
-        (f'<robot><link name="a"/><link name="b"/>\n{JOINT.replace("revolute", "screw")}</robot>', 2, "type 'screw'"),
-    ],
-)
-def test_a_file_that_is_no_urdf_is_refused_with_its_line(tmp_path, text, line, message):
+@pytest.mark.parametrize(*table(__file__, "wrong_files"))
+def test_a_file_that_is_no_urdf_is_refused_with_its_line(tmp_path, text, change, line, message):
     with pytest.raises(InputError, match=message) as refused:
-        UrdfFile(written(tmp_path, text))
+        UrdfFile(written(tmp_path, text.replace("JOINT", JOINT.replace(*change) if any(change) else JOINT)))
     assert refused.value.line == line and refused.value.hint
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("robot.urdf.xacro", "<robot/>"),
-        ("robot.urdf", '<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arm/></robot>'),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "xacro"))
 def test_a_xacro_file_is_named_so(tmp_path, name, text):
     with pytest.raises(InputError, match=r"it is a xacro file.*`xacro FILE > robot.urdf`"):
         UrdfFile(written(tmp_path, text, name))

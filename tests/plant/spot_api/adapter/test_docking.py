@@ -16,47 +16,36 @@ def step(powered):
 
 
 def dock(step, station=DOCK_ID):
-    return step.robot.dock(station, until_s=step.now() + 30.0, lease=step.lease)
+    return step.robot.dock(station, **step.until_in(30.0))
 
 
 def undock(step):
-    return step.robot.undock(until_s=step.now() + 30.0, lease=step.lease)
-
-
-def status(step, command):
-    """Waits for the end of a command."""
-    assert step.until(lambda: step.robot.command_status(command).state is not CommandState.RUNNING, 40.0)
-    return step.robot.command_status(command)
+    return step.robot.undock(**step.until_in(30.0))
 
 
 def test_the_robot_leaves_its_dock_and_returns_to_it(step):
-    assert step.robot.capabilities().docks
-    assert step.connection.docked()
-    assert status(step, undock(step)).state is CommandState.DONE
-    assert not step.connection.docked()
+    assert (step.robot.capabilities().docks, step.connection.docked()) == (True, True)
+    assert (step.ends(undock(step)).state, step.connection.docked()) == (CommandState.DONE, False)
     assert step.robot.odometry().pose.x_m > 0.7
-    assert status(step, dock(step)).state is CommandState.DONE
-    assert step.connection.docked()
+    assert (step.ends(dock(step)).state, step.connection.docked()) == (CommandState.DONE, True)
 
 
-def test_a_robot_that_stands_on_no_dock_does_not_undock(step):
-    status(step, undock(step))
-    again = status(step, undock(step))
-    assert (again.state, again.cause) == (CommandState.REFUSED, CommandCause.INVALID)
-    assert "no dock" in again.reason
-
-
-def test_an_unknown_dock_is_refused_with_its_cause(step):
-    status(step, undock(step))
-    refused = status(step, dock(step, station=7))
-    assert (refused.state, refused.cause) == (CommandState.REFUSED, CommandCause.BLOCKED)
+@pytest.mark.parametrize(
+    ("command", "cause", "reason"),
+    [(undock, CommandCause.INVALID, "no dock"), (lambda step: dock(step, station=7), CommandCause.BLOCKED, "")],
+    ids=["undocks again", "to an unknown dock"],
+)
+def test_a_robot_that_stands_on_no_dock_does_not_undock_or_dock_elsewhere(step, command, cause, reason):
+    step.ends(undock(step))
+    refused = step.ends(command(step))
+    assert (refused.state, refused.cause, reason in refused.reason) == (CommandState.REFUSED, cause, True)
 
 
 def test_stop_ends_the_undocking(step):
     command = undock(step)
     step.advance(1.0)
     step.robot.stop(lease=step.lease, only=command)
-    assert step.robot.command_status(command).cause is CommandCause.STOPPED
+    assert step.status(command).cause is CommandCause.STOPPED
     step.advance(1.0)
     x_m = step.robot.odometry().pose.x_m
     step.advance(1.0)
@@ -66,10 +55,10 @@ def test_stop_ends_the_undocking(step):
 def test_a_drive_replaces_the_undocking(step):
     command = undock(step)
     step.advance(1.5)
-    step.robot.drive(0.1, 0.0, 0.0, until_s=step.now() + 0.5, lease=step.lease)
-    assert "replaced" in step.robot.command_status(command).reason
+    step.drive(0.1, 0.5)
+    assert "replaced" in step.status(command).reason
 
 
 def test_undocking_needs_the_lease(step):
     step.lease = replace(step.lease, number=0)
-    assert status(step, undock(step)).cause is CommandCause.NO_LEASE
+    assert step.ends(undock(step)).cause is CommandCause.NO_LEASE

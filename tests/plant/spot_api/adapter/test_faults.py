@@ -1,15 +1,7 @@
-"""Every status of every response of the adapter, against a server with that fault; `test_refusals` has commands.
-
-feedback  each status of a part: done or running if it says so, else its cause, and nothing moves on
-lease     each status but OK: LeaseError; a lease that is not retained does not count
-picture   each status but OK: NoImageError
-scan      each status but OK: the last scan
-power     each status but success and in progress: an error with its cause
-clock     each status but OK: an error, and the clock stays as it was
-cut       commands are refused, those that run end, and nothing moves on
-"""
+"""Every status of every response of the adapter, against a server with that fault; `test_refusals` has commands."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -33,9 +25,9 @@ from tests.plant.spot_api.lock_step import PASSWORD, USER, LockStep, scripted
 from tests.plant.spot_api.proxy import Proxy
 
 API = "bosdyn.api."
-COMMAND, FEEDBACK = API + "RobotCommandService/RobotCommand", API + "RobotCommandService/RobotCommandFeedback"
+FEEDBACK = API + "RobotCommandService/RobotCommandFeedback"
 WITHIN_S, EXPIRY_S = 1.0, 3.0
-ARM_RAD = np.array([0.0, -0.9, 1.8, 0.0, -0.9, 0.0])
+TO_ARM_RAD = np.array([spot_capabilities().arm.stowed_rad, [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]])
 VERBS_OF = {
     "mobility_command_feedback": ("drive", "stand", "sit"),
     "arm_command_feedback": ("move_arm",),
@@ -70,11 +62,8 @@ def feedbacks():
     """A verb, a path in its feedback, the value of its status and its name."""
     found = robot_command_pb2.RobotCommandFeedbackResponse.DESCRIPTOR.fields_by_name["feedback"].message_type
     for path, enum in status_fields(found, "feedback."):
-        field = path.split(".")[-2]
-        for number, name in statuses(enum):
-            yield from (
-                pytest.param(verb, path, enum, number, name, id=f"{verb}-{name}") for verb in VERBS_OF.get(field, ())
-            )
+        for verb, (number, name) in product(VERBS_OF.get(path.split(".")[-2], ()), statuses(enum)):
+            yield pytest.param(verb, path, enum, number, name, id=f"{verb}-{name}")
 
 
 @pytest.fixture(scope="module")
@@ -98,21 +87,18 @@ def step(shared):
     return shared
 
 
-def sent(step, verb, until_s=math.inf):
+SENDS = {
+    "drive": lambda robot, end: robot.drive(0.4, 0.0, 0.2, **end),
+    "stand": lambda robot, end: robot.stand(0.42, 0.1, **end),
+    "sit": lambda robot, end: robot.sit(**end),
+    "move_arm": lambda robot, end: robot.move_arm(ArmTrajectory(np.array([0.0, 4.0]), TO_ARM_RAD), **end),
+    "set_gripper": lambda robot, end: robot.set_gripper(1.2, 40.0, **end),
+}
+
+
+def sent(step, verb):
     """Sends a verb that takes longer than a second."""
-    robot, end = step.robot, {"until_s": until_s, "lease": step.lease}
-    end["until_s"] = min(until_s, step.now() + EXPIRY_S)
-    if verb == "drive":
-        return robot.drive(0.4, 0.0, 0.2, **end)
-    if verb == "stand":
-        return robot.stand(0.42, 0.1, **end)
-    if verb == "sit":
-        return robot.sit(**end)
-    if verb == "move_arm":
-        return robot.move_arm(ArmTrajectory(np.array([0.0, 4.0]), np.array([step.served.q_rad, ARM_RAD])), **end)
-    if verb == "set_gripper":
-        return robot.set_gripper(1.2, 40.0, **end)
-    return robot.stop(lease=step.lease)
+    return SENDS[verb](step.robot, step.until_in(EXPIRY_S))
 
 
 def ended(step, command, within_s=WITHIN_S):
@@ -132,38 +118,36 @@ def moves(step):
 def test_a_command_ends_as_its_feedback_says(step, verb, path, enum, number, name):
     begun_s = step.now()
     with step.server.faults.fault(FEEDBACK, Fault(fields={path: number})):
-        command = sent(step, verb)
-        status = ended(step, command)
+        status = ended(step, sent(step, verb))
+    late = name == "STATUS_COMMAND_TIMED_OUT"
     if name in GOING:
         assert status.state is not CommandState.STOPPED or status.cause is CommandCause.LATE
-        return
-    if name in SUCCESS or (verb == "drive" and name == "STATUS_COMMAND_TIMED_OUT"):
+    elif name in SUCCESS or (verb == "drive" and late):
         assert status.state is CommandState.DONE
-        return
-    late = name == "STATUS_COMMAND_TIMED_OUT"
-    cause = CommandCause.LATE if late else trouble(enum, number).cause
-    assert (status.state, status.cause, bool(status.reason)) == (CommandState.STOPPED, cause, True)
-    step.advance(begun_s + WITHIN_S - step.now())
-    assert name in ROBOT_ENDED or not moves(step)
+    else:
+        cause = CommandCause.LATE if late else trouble(enum, number).cause
+        assert (status.state, status.cause, bool(status.reason)) == (CommandState.STOPPED, cause, True)
+        step.advance(begun_s + WITHIN_S - step.now())
+        assert name in ROBOT_ENDED or not moves(step)
 
 
 @pytest.mark.parametrize(
-    ("call", "take", "status"),
+    ("verb", "number"),
     [
-        (f"{API}LeaseService/{name}Lease", name == "Take", number)
-        for name, response in (("Acquire", lease_pb2.AcquireLeaseResponse), ("Take", lease_pb2.TakeLeaseResponse))
-        for number, _ in statuses(response.DESCRIPTOR.enum_types_by_name["Status"], "STATUS_OK")
+        *(("acquire", number) for number, _ in statuses(lease_pb2.AcquireLeaseResponse.Status.DESCRIPTOR, "STATUS_OK")),
+        *(("take", number) for number, _ in statuses(lease_pb2.TakeLeaseResponse.Status.DESCRIPTOR, "STATUS_OK")),
     ],
 )
-def test_a_lease_that_is_not_given_is_an_error(step, call, take, status):
+def test_a_lease_that_is_not_given_is_an_error(step, verb, number):
     step.robot.return_lease(step.lease)
     step.connection.give_back()
-    with step.server.faults.fault(call, Fault(fields={"status": status}, handled=False)), pytest.raises(LeaseError):
-        (step.robot.take_lease if take else step.robot.acquire_lease)("test")
+    fault = Fault(fields={"status": number}, handled=False)
+    with step.server.faults.fault(f"{API}LeaseService/{verb.title()}Lease", fault), pytest.raises(LeaseError):
+        getattr(step.robot, f"{verb}_lease")("test")
     assert step.robot.lease_holder() is None
 
 
-RESULTS = statuses(lease_pb2.LeaseUseResult.DESCRIPTOR.enum_types_by_name["Status"], "STATUS_OK", "STATUS_UNMANAGED")
+RESULTS = statuses(lease_pb2.LeaseUseResult.Status.DESCRIPTOR, "STATUS_OK", "STATUS_UNMANAGED")
 
 
 @pytest.mark.parametrize(("number", "name"), RESULTS, ids=[name for _, name in RESULTS])
@@ -179,17 +163,14 @@ def test_a_lease_that_is_not_retained_does_not_count(step, number, name):
 
 @pytest.mark.parametrize("number", [n for n, _ in statuses(image_pb2.ImageResponse.Status.DESCRIPTOR, "STATUS_OK")])
 def test_a_picture_that_is_not_taken_is_an_error(step, number):
-    with (
-        step.server.faults.fault(f"{API}ImageService/GetImage", Fault(fields={"image_responses.status": number})),
-        pytest.raises(NoImageError),
-    ):
+    fault = Fault(fields={"image_responses.status": number})
+    with step.server.faults.fault(f"{API}ImageService/GetImage", fault), pytest.raises(NoImageError):
         step.robot.image("hand")
 
 
-CLOUDS = statuses(point_cloud_pb2.PointCloudResponse.Status.DESCRIPTOR, "STATUS_OK")
-
-
-@pytest.mark.parametrize("number", [number for number, _ in CLOUDS])
+@pytest.mark.parametrize(
+    "number", [n for n, _ in statuses(point_cloud_pb2.PointCloudResponse.Status.DESCRIPTOR, "STATUS_OK")]
+)
 def test_a_scan_that_does_not_come_leaves_the_last_one(step, number):
     before = step.robot.scan()
     fault = Fault(fields={"point_cloud_responses.status": number})
@@ -200,15 +181,15 @@ def test_a_scan_that_does_not_come_leaves_the_last_one(step, number):
     assert step.robot.scan() is not before
 
 
-POWERS = statuses(power_pb2.DESCRIPTOR.enum_types_by_name["PowerCommandStatus"], "STATUS_IN_PROGRESS", "STATUS_SUCCESS")
+POWER = power_pb2.PowerCommandStatus.DESCRIPTOR
 
 
-@pytest.mark.parametrize("number", [number for number, _ in POWERS])
+@pytest.mark.parametrize("number", [n for n, _ in statuses(POWER, "STATUS_IN_PROGRESS", "STATUS_SUCCESS")])
 def test_power_that_is_not_switched_is_an_error_with_its_cause(step, number):
     fault = Fault(fields={"status": number}, handled=False)
     with step.server.faults.fault(f"{API}PowerService/PowerCommand", fault), pytest.raises(LostError) as lost:
         step.connection.power(False)
-    assert lost.value.cause is trouble(power_pb2.DESCRIPTOR.enum_types_by_name["PowerCommandStatus"], number).cause
+    assert lost.value.cause is trouble(POWER, number).cause
     step.advance(0.1)
     assert step.robot.powered
 

@@ -1,11 +1,4 @@
-"""The adapter against the server, in lock-step.
-
-drive              as asked, until its end or 0.6 s
-expired, NaN       refused
-lease taken        refused, lease_holder() names the other until it returns it
-E-stop             a fault
-no answer          old readings: drive refused, later a fault
-"""
+"""The adapter against the server, in lock-step."""
 
 import math
 import time
@@ -28,25 +21,13 @@ from plant.spot_api.server.faults import Fault
 from skills.files.errors import InputError
 from skills.robot import ArmTrajectory, CommandCause, CommandState, FrameTree, LeaseError, NoImageError
 from skills.testing.blocks import Block
-from tests.plant.spot_api.lock_step import LockStep, scripted
+from tests.plant.spot_api.lock_step import FailedCall, LockStep, scripted
+from tests.tables import table
 
 COMMANDS, TIME = "bosdyn.api.RobotCommandService", "bosdyn.api.TimeSyncService"
 STATE = "bosdyn.api.RobotStateService/GetRobotState"
 NUMBERED = robot_command_pb2.RobotCommandResponse(robot_command_id=7)
 READY_RAD = [0.0, -0.9, 1.8, 0.0, -0.9, 0.0]
-
-
-class Silent(grpc.RpcError):
-    """Call that fails with a code."""
-
-    def __init__(self, code):
-        self._code = code
-
-    def code(self):
-        return self._code
-
-    def details(self):
-        return "cut"
 
 
 def pose(step):
@@ -58,19 +39,16 @@ def test_readings_are_those_of_the_robot_behind_the_server(step):
     ours, theirs = step.robot, step.served
     assert ours.odometry().X_OB.IsNearlyEqualTo(theirs.odometry().X_OB, 1e-6)
     assert ours.joints().position_rad == pytest.approx(theirs.joints().position_rad)
-    assert ours.battery().charge == pytest.approx(theirs.battery().charge)
-    assert ours.faults() == ()
+    assert (ours.battery().charge, ours.faults()) == (pytest.approx(theirs.battery().charge), ())
     assert ours.imu() is None
 
 
 def test_a_scan_has_the_ranges_of_the_lidar(step):
     step.advance(0.2)
-    ours, theirs = step.robot.scan(), step.served.scan()
-    points, expected = ours.points_B(), theirs.points_B()
-    assert np.min(points[np.abs(points[:, 1]) < 0.2][:, 0]) == pytest.approx(
-        np.min(expected[np.abs(expected[:, 1]) < 0.2][:, 0]), abs=0.02
-    )
-    assert ours.X_BL.IsNearlyEqualTo(theirs.X_BL, 1e-6)
+    scans = step.robot.scan(), step.served.scan()
+    ours_m, theirs_m = (np.min(p[np.abs(p[:, 1]) < 0.2][:, 0]) for p in (scan.points_B() for scan in scans))
+    assert ours_m == pytest.approx(theirs_m, abs=0.02)
+    assert scans[0].X_BL.IsNearlyEqualTo(scans[1].X_BL, 1e-6)
 
 
 @pytest.mark.parametrize("source", ["hand", "frontleft"])
@@ -88,32 +66,25 @@ def test_an_unknown_camera_is_an_error(step):
 
 
 def test_a_drive_ends_at_its_time(standing):
-    command = standing.robot.drive(0.5, 0.0, 0.0, until_s=standing.now() + 0.4, lease=standing.lease)
-    assert standing.done(command)
-    assert standing.robot.command_status(command).state is CommandState.DONE
+    command = standing.drive(0.5, 0.4)
+    assert standing.done(command) and standing.status(command).state is CommandState.DONE
     standing.advance(0.3)
     x_m = pose(standing).x_m
-    assert x_m == pytest.approx(0.18, abs=0.04)
     standing.advance(0.5)
-    assert pose(standing).x_m == pytest.approx(x_m, abs=1e-6)
+    assert (x_m, pose(standing).x_m) == (pytest.approx(0.18, abs=0.04), pytest.approx(x_m, abs=1e-6))
 
 
-def test_a_drive_that_nobody_renews_stops_after_six_tenths_of_a_second(standing):
-    standing.robot.drive(0.5, 0.0, 0.0, until_s=standing.now() + 60.0, lease=standing.lease)
+# speed, end -> how far it goes: 0.6 s when nobody renews the drive, and at 0.8 m/s at most
+@pytest.mark.parametrize(("vx", "seconds", "x_m", "off_m"), [(0.5, 60.0, 0.28, 0.04), (1.6, 0.5, 0.35, 0.07)])
+def test_a_drive_that_nobody_renews_stops_and_none_is_faster_than_the_adapter_allows(standing, vx, seconds, x_m, off_m):
+    standing.drive(vx, seconds)
     standing.advance(2.0)
-    assert pose(standing).x_m == pytest.approx(0.28, abs=0.04)
-
-
-def test_no_drive_is_faster_than_the_adapter_allows(standing):
-    standing.robot.drive(1.6, 0.0, 0.0, until_s=standing.now() + 0.5, lease=standing.lease)
-    standing.advance(1.0)
-    assert pose(standing).x_m == pytest.approx(0.35, abs=0.07)
+    assert pose(standing).x_m == pytest.approx(x_m, abs=off_m)
 
 
 def test_a_drive_keeps_the_posture_asked_for(standing):
-    low = standing.robot.stand(0.46, 0.1, until_s=standing.now() + 5.0, lease=standing.lease)
-    assert standing.done(low)
-    standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
+    assert standing.done(standing.robot.stand(0.46, 0.1, **standing.until_in(5.0)))
+    standing.drive(0.2, 0.3)
     standing.advance(0.5)
     assert standing.served.height_m == pytest.approx(0.46, abs=0.01)
 
@@ -122,11 +93,10 @@ def test_a_posture_that_was_refused_is_not_kept(standing, monkeypatch):
     refused = robot_command_pb2.RobotCommandResponse.STATUS_BEHAVIOR_FAULT
     answer = robot_command_pb2.RobotCommandResponse(status=refused)
     with monkeypatch.context() as patch:
-        service = standing.connection._stubs["robot-command"]
-        patch.setattr(service, "RobotCommand", lambda _, timeout: answer)
-        low = standing.robot.stand(0.46, 0.1, until_s=standing.now() + 5.0, lease=standing.lease)
-    assert standing.robot.command_status(low).cause is CommandCause.FAULT
-    standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
+        patch.setattr(standing.connection._stubs["robot-command"], "RobotCommand", lambda _, timeout: answer)
+        low = standing.robot.stand(0.46, 0.1, **standing.until_in(5.0))
+    assert standing.status(low).cause is CommandCause.FAULT
+    standing.drive(0.2, 0.3)
     standing.advance(0.5)
     assert standing.served.height_m == pytest.approx(0.52, abs=0.01)
 
@@ -140,7 +110,7 @@ class Gripped:
     def OverrideGrasp(self, request, timeout):
         self.silent -= 1
         if self.silent >= 0:
-            raise Silent(self.code)
+            raise FailedCall(self.code)
         self.heard.append(request.carry_state_override.override_request)
         return manipulation_api_pb2.ApiGraspOverrideResponse()
 
@@ -171,36 +141,28 @@ def test_only_the_holder_of_the_lease_says_what_is_carried(standing):
 
 
 @pytest.mark.parametrize(
-    ("velocity", "ahead_s", "reason", "cause"),
-    [
-        ((math.nan, 0.0, 0.0), 1.0, "not finite", CommandCause.INVALID),
-        ((0.1, 0.0, 0.0), -1.0, "expires", CommandCause.LATE),
-    ],
+    ("vx", "ahead_s", "reason", "cause"),
+    [(math.nan, 1.0, "not finite", CommandCause.INVALID), (0.1, -1.0, "expires", CommandCause.LATE)],
 )
-def test_a_drive_that_cannot_be_is_refused(standing, velocity, ahead_s, reason, cause):
-    command = standing.robot.drive(*velocity, until_s=standing.now() + ahead_s, lease=standing.lease)
-    status = standing.robot.command_status(command)
+def test_a_drive_that_cannot_be_is_refused(standing, vx, ahead_s, reason, cause):
+    status = standing.status(standing.drive(vx, ahead_s))
     assert (status.state, reason in status.reason, status.cause) == (CommandState.REFUSED, True, cause)
 
 
 def test_a_drive_without_power_has_that_cause(step):
-    lease = step.robot.acquire_lease("test")
-    command = step.robot.drive(0.1, 0.0, 0.0, until_s=step.now() + 0.5, lease=lease)
-    assert step.robot.command_status(command).cause is CommandCause.UNPOWERED
+    step.lease = step.robot.acquire_lease("test")
+    assert step.status(step.drive(0.1, 0.5)).cause is CommandCause.UNPOWERED
 
 
-def test_a_drive_may_last_as_long_as_the_capabilities_say(standing):
+def test_a_drive_lasts_as_the_capabilities_say_and_a_lease_has_the_epoch_of_the_robot(standing):
     assert standing.robot.capabilities().drive_expiry_s == 0.6
-
-
-def test_a_lease_has_the_epoch_of_the_robot(standing):
     assert standing.lease.epoch == standing.connection.lease.epoch != ""
 
 
 def move_arm(standing, lasts_s, ahead_s=8.0):
     """Begins to move the arm to its ready posture."""
     path = ArmTrajectory(np.array([0.0, lasts_s]), np.array([standing.served.q_rad, READY_RAD]))
-    return standing.robot.move_arm(path, until_s=standing.now() + ahead_s, lease=standing.lease)
+    return standing.robot.move_arm(path, **standing.until_in(ahead_s))
 
 
 def stays(standing, after_s=0.2, off_rad=1e-3):
@@ -212,23 +174,16 @@ def stays(standing, after_s=0.2, off_rad=1e-3):
 
 
 def test_the_arm_follows_a_trajectory_and_holds_there(standing):
-    command = move_arm(standing, 1.5)
-    assert standing.done(command)
-    assert standing.robot.command_status(command).state is CommandState.DONE
-    assert standing.served.q_rad == pytest.approx(READY_RAD, abs=0.04)
-    assert stays(standing)
+    assert standing.ends(move_arm(standing, 1.5)).state is CommandState.DONE
+    assert standing.served.q_rad == pytest.approx(READY_RAD, abs=0.04) and stays(standing)
 
 
 def test_a_command_that_is_not_done_in_time_is_stopped(standing):
-    command = move_arm(standing, 3.0, ahead_s=0.3)
-    assert standing.done(command)
-    assert "expired" in standing.robot.command_status(command).reason
-    assert stays(standing)
+    assert "expired" in standing.ends(move_arm(standing, 3.0, ahead_s=0.3)).reason and stays(standing)
 
 
 def test_the_gripper_goes_to_an_opening(standing):
-    command = standing.robot.set_gripper(0.8, 40.0, until_s=standing.now() + 5.0, lease=standing.lease)
-    assert standing.done(command)
+    assert standing.done(standing.robot.set_gripper(0.8, 40.0, **standing.until_in(5.0)))
     assert standing.robot.gripper().opening == pytest.approx(0.8, abs=0.05)
 
 
@@ -236,7 +191,7 @@ def test_an_arm_that_leaves_its_path_is_stopped(standing, monkeypatch):
     """Something turns a joint of the arm by 0.2 rad while it moves."""
     command = move_arm(standing, 3.0)
     standing.advance(0.5)
-    assert standing.robot.command_status(command).state is CommandState.RUNNING
+    assert standing.status(command).state is CommandState.RUNNING
     joints = type(standing.served).joints
 
     def pushed(robot):
@@ -247,8 +202,7 @@ def test_an_arm_that_leaves_its_path_is_stopped(standing, monkeypatch):
     standing.advance(0.05)
     status = standing.robot.command_status(command)
     assert (status.state, status.cause) == (CommandState.STOPPED, CommandCause.BLOCKED)
-    assert "0.20 rad off its path" in status.reason
-    assert stays(standing, 0.0, off_rad=0.21)
+    assert "0.20 rad off its path" in status.reason and stays(standing, 0.0, off_rad=0.21)
 
 
 @pytest.mark.parametrize(
@@ -261,8 +215,7 @@ def test_an_arm_without_feedback_is_stopped(standing, code, cause):
         standing.advance(0.1)
         standing.advance(0.1)
     status = standing.robot.command_status(command)
-    assert (status.state, status.cause) == (CommandState.STOPPED, cause)
-    assert stays(standing, 0.1)
+    assert (status.state, status.cause) == (CommandState.STOPPED, cause) and stays(standing, 0.1)
 
 
 def test_nothing_moves_by_clocks_that_were_synchronised_long_ago(standing):
@@ -270,17 +223,12 @@ def test_nothing_moves_by_clocks_that_were_synchronised_long_ago(standing):
         for _ in range(32):
             standing.advance(1.0)
         trajectory = ArmTrajectory(np.array([0.5]), np.array([READY_RAD]))
-        until_s, lease = standing.now() + 1.0, standing.lease
-        refused = [
-            standing.robot.drive(0.2, 0.0, 0.0, until_s=until_s, lease=lease),
-            standing.robot.stand(0.5, 0.0, until_s=until_s, lease=lease),
-            standing.robot.move_arm(trajectory, until_s=until_s, lease=lease),
-            standing.robot.set_gripper(0.5, 20.0, until_s=until_s, lease=lease),
-        ]
-        assert all("clocks" in standing.robot.command_status(command).reason for command in refused)
+        until, robot = standing.until_in(1.0), standing.robot
+        refused = [robot.drive(0.2, 0.0, 0.0, **until), robot.stand(0.5, 0.0, **until)]
+        refused += [robot.move_arm(trajectory, **until), robot.set_gripper(0.5, 20.0, **until)]
+        assert all("clocks" in standing.status(command).reason for command in refused)
     standing.advance(0.1)
-    command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=lease)
-    assert standing.robot.command_status(command).state is CommandState.RUNNING
+    assert standing.status(standing.drive(0.2)).state is CommandState.RUNNING
 
 
 def test_the_robots_clock_is_measured_again_when_it_jumps(standing):
@@ -289,12 +237,10 @@ def test_the_robots_clock_is_measured_again_when_it_jumps(standing):
         standing.robot.poll()
         standing.robot_time_s = lambda: standing.server.computer.now_s() - 100.0
         standing.robot.poll()
-        command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=standing.lease)
-        assert "clocks" in standing.robot.command_status(command).reason
+        assert "clocks" in standing.status(standing.drive(0.2)).reason
     del standing.robot_time_s
     standing.advance(0.1)
-    command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=standing.lease)
-    assert standing.robot.command_status(command).state is CommandState.RUNNING
+    assert standing.status(standing.drive(0.2)).state is CommandState.RUNNING
 
 
 def test_the_height_is_that_over_the_feet_and_a_robot_off_its_feet_is_not_driven(standing):
@@ -304,8 +250,7 @@ def test_the_height_is_that_over_the_feet_and_a_robot_off_its_feet_is_not_driven
         standing.advance(0.1)
         assert "no foot is on the floor, so the height is unknown" in standing.robot.faults()
         assert standing.robot.odometry().X_OB.translation()[2] == pytest.approx(z_m)
-        command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.2, lease=standing.lease)
-        assert standing.robot.command_status(command).cause is CommandCause.FAULT
+        assert standing.status(standing.drive(0.2)).cause is CommandCause.FAULT
     sunk = Fault(fields={"robot_state.foot_state.foot_position_rt_body.z": -0.4})
     with standing.server.faults.fault(STATE, sunk):
         standing.advance(0.1)
@@ -322,17 +267,7 @@ def test_only_severe_faults_count(step, severity, counts):
     assert ("hot" in step.robot.faults()) is counts
 
 
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
-        ({"image_responses.status": 3}, "STATUS_SOURCE_DATA_ERROR"),
-        ({"image_responses.shot.image.data": b"x"}, "cannot be decoded"),
-        ({"image_responses.shot.image.format": 3, "image_responses.shot.image.pixel_format": 6}, "pixel format 6"),
-        ({"image_responses.source.pinhole.intrinsics.focal_length.x": 0.0}, "lacks its intrinsics"),
-        ({"image_responses.shot.frame_name_image_sensor": "periscope"}, "periscope"),
-        ({"header.error.code": 2}, "CODE_INTERNAL_SERVER_ERROR"),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "pictures", ({"image_responses.shot.image.data": b"x"}, "cannot be decoded")))
 def test_a_picture_that_cannot_be_used_is_no_picture(step, fields, said):
     fault = step.server.faults.fault("bosdyn.api.ImageService/GetImage", Fault(fields=fields))
     with fault, pytest.raises(NoImageError, match=said):
@@ -341,11 +276,9 @@ def test_a_picture_that_cannot_be_used_is_no_picture(step, fields, said):
 
 def test_intrinsics_and_frames_are_those_of_each_picture(step):
     before = step.robot.image("hand")
-    moved = {
-        "image_responses.source.pinhole.intrinsics.focal_length.x": 500.0,
-        "image_responses.shot.frame_name_image_sensor": "frontleft",
-    }
-    with step.server.faults.fault("bosdyn.api.ImageService/GetImage", Fault(fields=moved)):
+    moved = {"source.pinhole.intrinsics.focal_length.x": 500.0, "shot.frame_name_image_sensor": "frontleft"}
+    fault = Fault(fields={f"image_responses.{name}": value for name, value in moved.items()})
+    with step.server.faults.fault("bosdyn.api.ImageService/GetImage", fault):
         picture = step.robot.image("hand")
     assert (before.intrinsics.fx != 500.0, picture.intrinsics.fx) == (True, 500.0)
     other = step.robot.image("frontleft")
@@ -391,8 +324,7 @@ def test_without_a_lidar_the_depth_cameras_make_the_scan(credentials):
         points = step.robot.scan().points_B()
         ahead = points[(np.abs(points[:, 1]) < 0.2) & (points[:, 2] > -0.3)]
         assert ahead[:, 0].min() == pytest.approx(1.9, abs=0.05)
-        assert np.linalg.norm(points, axis=1).max() < 4.5
-        assert "no LiDAR" in step.robot.sensors.notes[0]
+        assert np.linalg.norm(points, axis=1).max() < 4.5 and "no LiDAR" in step.robot.sensors.notes[0]
         first = step.robot.scan()
         step.advance(0.5)
         assert step.robot.scan().stamp_s > first.stamp_s
@@ -415,51 +347,43 @@ def test_the_robots_own_avoidance_is_on_with_the_padding_asked_for(standing, mon
     assert not params.obstacle_params.disable_vision_body_obstacle_avoidance
 
 
-@pytest.mark.parametrize("until_s", [math.nan, 1.0])
-def test_numbers_that_are_not_finite_are_refused(standing, until_s):
-    lease, bad = standing.lease, math.nan if until_s == 1.0 else 0.1
-    until_s += standing.now()
-    commands = [
-        standing.robot.drive(bad, 0.0, 0.0, until_s=until_s, lease=lease),
-        standing.robot.stand(0.5, bad, until_s=until_s, lease=lease),
-        standing.robot.set_gripper(bad, 20.0, until_s=until_s, lease=lease),
-    ]
-    assert {standing.robot.command_status(command).cause for command in commands} == {CommandCause.INVALID}
+@pytest.mark.parametrize("seconds", [math.nan, 1.0])
+def test_numbers_that_are_not_finite_are_refused(standing, seconds):
+    robot, until, bad = standing.robot, standing.until_in(seconds), math.nan if seconds == 1.0 else 0.1
+    commands = [robot.drive(bad, 0.0, 0.0, **until), robot.stand(0.5, bad, **until)]
+    commands += [robot.set_gripper(bad, 20.0, **until)]
+    assert {standing.status(command).cause for command in commands} == {CommandCause.INVALID}
 
 
 def test_stop_ends_the_drive_and_not_the_gripper(standing):
-    drive = standing.robot.drive(0.5, 0.0, 0.0, until_s=standing.now() + 0.6, lease=standing.lease)
+    drive = standing.drive(0.5, 0.6)
     standing.advance(0.1)
     stop = standing.robot.stop(lease=standing.lease)
-    assert standing.robot.command_status(drive).state is CommandState.STOPPED
-    assert standing.robot.command_status(stop).state is not CommandState.REFUSED
+    assert standing.status(drive).state is CommandState.STOPPED
+    assert standing.status(stop).state is not CommandState.REFUSED
     x_m = pose(standing).x_m
     standing.advance(0.5)
     assert pose(standing).x_m == pytest.approx(x_m, abs=0.02)
 
 
 def test_a_later_command_replaces_an_earlier_one(standing):
-    first = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.5, lease=standing.lease)
-    standing.robot.drive(0.0, 0.0, 0.2, until_s=standing.now() + 0.5, lease=standing.lease)
-    assert "replaced" in standing.robot.command_status(first).reason
+    first = standing.drive(0.2, 0.5)
+    standing.drive(0.0, 0.5, wz=0.2)
+    assert "replaced" in standing.status(first).reason
 
 
 def test_a_taken_lease_refuses_commands_and_says_who_took_it(standing, credentials):
     other = Connection(Address("127.0.0.1", standing.server.port, credentials.certificate), "user", "right")
     other.acquire(take=True)
-    command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.5, lease=standing.lease)
-    status = standing.robot.command_status(command)
-    assert status.state is CommandState.REFUSED
-    assert "errand" in status.reason
-    assert status.cause is CommandCause.NO_LEASE
-    assert standing.robot.lease_holder().holder == "errand"
+    status = standing.status(standing.drive(0.2, 0.5))
+    assert (status.state, status.cause) == (CommandState.REFUSED, CommandCause.NO_LEASE)
+    assert "errand" in status.reason and standing.robot.lease_holder().holder == "errand"
     other.give_back()
     assert standing.until(lambda: standing.robot.lease_holder() is None)
 
 
 def test_a_lease_that_another_holds_is_not_acquired(step, credentials):
-    other = Connection(Address("127.0.0.1", step.server.port, credentials.certificate), "user", "right")
-    other.acquire()
+    Connection(Address("127.0.0.1", step.server.port, credentials.certificate), "user", "right").acquire()
     with pytest.raises(LeaseError, match="held by errand"):
         step.robot.acquire_lease("test")
     assert step.robot.take_lease("test") == step.robot.lease_holder()
@@ -473,21 +397,19 @@ def test_a_pressed_estop_is_a_fault(standing):
 
 def test_a_robot_that_does_not_answer_is_not_driven_and_becomes_a_fault(standing, monkeypatch):
     def silent(*_, **__):
-        raise Silent(grpc.StatusCode.UNAVAILABLE)
+        raise FailedCall(grpc.StatusCode.UNAVAILABLE)
 
     monkeypatch.setattr(standing.connection._stubs["robot-state"], "GetRobotState", silent)
     standing.advance(1.0)
-    command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.5, lease=standing.lease)
-    status = standing.robot.command_status(command)
+    status = standing.status(standing.drive(0.2, 0.5))
     assert ("old" in status.reason, status.cause) == (True, CommandCause.NO_ANSWER)
     standing.advance(3.0)
     assert any("has not answered" in fault for fault in standing.robot.faults())
 
 
-@pytest.mark.parametrize(("password", "said"), [("wrong", "refuses user 'user'")])
-def test_a_wrong_password_is_one_error(step, credentials, password, said):
-    with pytest.raises(InputError, match=said):
-        Connection(Address("127.0.0.1", step.server.port, credentials.certificate), "user", password)
+def test_a_wrong_password_is_one_error(step, credentials):
+    with pytest.raises(InputError, match="refuses user 'user'"):
+        Connection(Address("127.0.0.1", step.server.port, credentials.certificate), "user", "wrong")
 
 
 def test_a_robot_that_is_not_there_is_one_error(monkeypatch, credentials):
@@ -503,9 +425,9 @@ def test_a_lidar_that_does_not_answer_stops_neither_heartbeat_nor_drive(standing
     with standing.server.faults.fault("bosdyn.api.PointCloudService/GetPointCloud", fault):
         standing.advance(0.3)
         assert standing.robot.heartbeat._beat_s > 0.0
-        command = standing.robot.drive(0.2, 0.0, 0.0, until_s=standing.now() + 0.3, lease=standing.lease)
+        command = standing.drive(0.2, 0.3)
         standing.advance(0.1)
-        assert standing.robot.command_status(command).state is CommandState.RUNNING
+        assert standing.status(command).state is CommandState.RUNNING
         begun_s = time.monotonic()
         standing.advance(0.1)  # it is not asked again at once
         assert time.monotonic() - begun_s < 0.4

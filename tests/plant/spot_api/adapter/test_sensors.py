@@ -1,8 +1,4 @@
-"""The place that GraphNav gives a robot behind its API.
-
-no map, not localised, lost, no anchors   None
-localised                                 pose of `odom` in the seed frame
-"""
+"""The place that GraphNav gives a robot behind its API."""
 
 import pytest
 from bosdyn.api.graph_nav import graph_nav_pb2, map_pb2

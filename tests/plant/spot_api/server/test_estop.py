@@ -1,11 +1,4 @@
-"""The E-stop.
-
-endpoints                 level
-none                      cut
-tablet                    none (released)
-registered, not answered  cut
-released                  none; silent beyond its time: settle, later cut
-"""
+"""The E-stop."""
 
 import pytest
 from bosdyn.api import estop_pb2
@@ -27,15 +20,22 @@ def now(monkeypatch):
     return time
 
 
+@pytest.fixture
+def service(now):
+    return EstopService(Tablet.NONE)
+
+
+def config_of(service):
+    return service.GetEstopConfig(estop_pb2.GetEstopConfigRequest(), CALL).active_config.unique_id
+
+
 def registered(service):
     """Registers one endpoint with a time limit of 2 s; returns it."""
     endpoint = estop_pb2.EstopEndpoint(role="PDB_rooted", name="mine", timeout=duration(2.0))
-    config = service.GetEstopConfig(estop_pb2.GetEstopConfigRequest(), CALL).active_config
-    request = estop_pb2.SetEstopConfigRequest(
-        config=estop_pb2.EstopConfig(endpoints=[endpoint]), target_config_id=config.unique_id
-    )
-    config = service.SetEstopConfig(request, CALL).active_config
-    request = estop_pb2.RegisterEstopEndpointRequest(target_config_id=config.unique_id, new_endpoint=endpoint)
+    config = estop_pb2.EstopConfig(endpoints=[endpoint])
+    request = estop_pb2.SetEstopConfigRequest(config=config, target_config_id=config_of(service))
+    number = service.SetEstopConfig(request, CALL).active_config.unique_id
+    request = estop_pb2.RegisterEstopEndpointRequest(target_config_id=number, new_endpoint=endpoint)
     request.target_endpoint.role = "PDB_rooted"
     answer = service.RegisterEstopEndpoint(request, CALL)
     assert answer.status == estop_pb2.RegisterEstopEndpointResponse.STATUS_SUCCESS
@@ -43,50 +43,40 @@ def registered(service):
 
 
 def check_in(service, endpoint, level, challenge=0):
-    return service.EstopCheckIn(
-        estop_pb2.EstopCheckInRequest(
-            endpoint=endpoint, challenge=challenge, response=~challenge & MASK, stop_level=level
-        ),
-        CALL,
-    )
+    answer = {"challenge": challenge, "response": ~challenge & MASK}
+    return service.EstopCheckIn(estop_pb2.EstopCheckInRequest(endpoint=endpoint, stop_level=level, **answer), CALL)
 
 
 def released(service):
     """Registers an endpoint, learns its challenge and releases it."""
     endpoint = registered(service)
-    challenge = check_in(service, endpoint, CUT).challenge
-    answer = check_in(service, endpoint, NONE, challenge)
+    answer = check_in(service, endpoint, NONE, check_in(service, endpoint, CUT).challenge)
     assert answer.status == estop_pb2.EstopCheckInResponse.STATUS_OK
     return endpoint, answer.challenge
 
 
 @pytest.mark.parametrize(("tablet", "level"), [(Tablet.TABLET, NONE), (Tablet.NONE, CUT)])
-def test_only_the_tablet_releases_a_robot_without_other_endpoints(tablet, level):
-    assert EstopService(tablet).level() == level
-
-
-def test_a_new_configuration_replaces_the_tablet(now):
-    service = EstopService(Tablet.TABLET)
+def test_only_the_tablet_releases_a_robot_without_other_endpoints_until_it_is_replaced(now, tablet, level):
+    service = EstopService(tablet)
+    assert service.level() == level
     registered(service)
     assert service.level() == CUT
 
 
-def test_an_endpoint_is_released_by_the_answer_to_its_challenge(now):
-    service = EstopService(Tablet.NONE)
-    released(service)
+def test_an_endpoint_is_released_by_the_answer_to_its_challenge_and_a_stop_counts_at_once(service):
+    endpoint, challenge = released(service)
     assert service.level() == NONE
+    check_in(service, endpoint, SETTLE, challenge)
+    assert service.level() == SETTLE
 
 
-def test_a_wrong_answer_does_not_release(now):
-    service = EstopService(Tablet.NONE)
-    endpoint = registered(service)
-    answer = check_in(service, endpoint, NONE, challenge=1)
+def test_a_wrong_answer_does_not_release(service):
+    answer = check_in(service, registered(service), NONE, challenge=1)
     assert answer.status == estop_pb2.EstopCheckInResponse.STATUS_INCORRECT_CHALLENGE_RESPONSE
     assert service.level() == CUT
 
 
-def test_silence_settles_the_robot_and_then_cuts_the_power(now):
-    service = EstopService(Tablet.NONE)
+def test_silence_settles_the_robot_and_then_cuts_the_power(now, service):
     released(service)
     levels = []
     for silent_s in (1.9, 2.1, 4.9, 5.1):
@@ -95,32 +85,21 @@ def test_silence_settles_the_robot_and_then_cuts_the_power(now):
     assert levels == [NONE, SETTLE, SETTLE, CUT]
 
 
-def test_a_stop_counts_at_once(now):
-    service = EstopService(Tablet.NONE)
-    endpoint, challenge = released(service)
-    check_in(service, endpoint, SETTLE, challenge)
-    assert service.level() == SETTLE
-
-
-def test_the_configuration_cannot_be_replaced_while_motors_are_on(now):
+@pytest.mark.parametrize(
+    ("motors_on", "target", "status"),
+    [
+        (True, "", estop_pb2.SetEstopConfigResponse.STATUS_MOTORS_ON),
+        (False, "old", estop_pb2.SetEstopConfigResponse.STATUS_INVALID_ID),
+    ],
+)
+def test_the_configuration_is_replaced_neither_while_motors_are_on_nor_by_an_old_name(now, motors_on, target, status):
     service = EstopService(Tablet.TABLET)
-    service.motors_on = True
-    answer = service.SetEstopConfig(estop_pb2.SetEstopConfigRequest(), CALL)
-    assert answer.status == estop_pb2.SetEstopConfigResponse.STATUS_MOTORS_ON
-    assert service.level() == NONE
+    service.motors_on = motors_on
+    answer = service.SetEstopConfig(estop_pb2.SetEstopConfigRequest(target_config_id=target), CALL)
+    assert (answer.status, service.level()) == (status, NONE)
 
 
-def test_an_old_configuration_is_named(now):
-    service = EstopService(Tablet.TABLET)
-    answer = service.SetEstopConfig(estop_pb2.SetEstopConfigRequest(target_config_id="old"), CALL)
-    assert answer.status == estop_pb2.SetEstopConfigResponse.STATUS_INVALID_ID
-
-
-def test_a_deregistered_endpoint_stops_the_robot(now):
-    service = EstopService(Tablet.NONE)
-    endpoint, _ = released(service)
-    config = service.GetEstopConfig(estop_pb2.GetEstopConfigRequest(), CALL).active_config
-    request = estop_pb2.DeregisterEstopEndpointRequest(target_endpoint=endpoint, target_config_id=config.unique_id)
-    answer = service.DeregisterEstopEndpoint(request, CALL)
-    assert answer.status == estop_pb2.DeregisterEstopEndpointResponse.STATUS_SUCCESS
-    assert service.level() == CUT
+def test_a_deregistered_endpoint_stops_the_robot(service):
+    target = {"target_endpoint": released(service)[0], "target_config_id": config_of(service)}
+    answer = service.DeregisterEstopEndpoint(estop_pb2.DeregisterEstopEndpointRequest(**target), CALL)
+    assert (answer.status, service.level()) == (estop_pb2.DeregisterEstopEndpointResponse.STATUS_SUCCESS, CUT)

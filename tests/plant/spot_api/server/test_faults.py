@@ -1,9 +1,4 @@
-"""Faults that a test sets for calls of the server.
-
-request lost, answer lost   the deadline passes; only with the answer lost the robot has done it
-late                        the answer comes, later
-gRPC code, field            as set; not handled: the robot does nothing
-"""
+"""Faults that a test sets for calls of the server."""
 
 import math
 import time
@@ -16,6 +11,7 @@ from bosdyn.client.exceptions import InternalServerError, TimedOutError, UnableT
 
 from plant.spot_api.server.faults import Fault
 
+INVALID = lease_pb2.TakeLeaseResponse.STATUS_INVALID_RESOURCE
 TAKE, STATE = "bosdyn.api.LeaseService/TakeLease", "bosdyn.api.RobotStateService/GetRobotState"
 
 
@@ -32,8 +28,7 @@ def is_claimed(served):
 def test_a_lost_call_is_not_answered_before_the_deadline(served, leases, lost, done):
     with served.server.faults.fault(TAKE, Fault(**{lost: math.inf})), pytest.raises(TimedOutError):
         leases.take(timeout=0.2)
-    assert is_claimed(served) is done
-    assert leases.take(timeout=1.0)
+    assert is_claimed(served) is done and leases.take(timeout=1.0)
 
 
 def test_a_late_answer_comes_late(served):
@@ -51,27 +46,22 @@ def test_a_call_that_is_not_handled_changes_nothing(served, leases, handled):
     assert is_claimed(served) is handled
 
 
-def test_a_status_and_an_error_of_the_header_are_as_set(served, leases):
-    status = lease_pb2.TakeLeaseResponse.STATUS_INVALID_RESOURCE
-    with (
-        served.server.faults.fault(TAKE, Fault(fields={"status": status})),
-        pytest.raises(bosdyn.client.lease.InvalidResourceError),
-    ):
-        leases.take()
-    with (
-        served.server.faults.fault(TAKE, Fault(fields={"header.error.code": 2}, handled=False)),
-        pytest.raises(InternalServerError),
-    ):
+@pytest.mark.parametrize(
+    ("fault", "error"),
+    [
+        (Fault(fields={"status": INVALID}), bosdyn.client.lease.InvalidResourceError),
+        (Fault(fields={"header.error.code": 2}, handled=False), InternalServerError),
+    ],
+)
+def test_a_status_and_an_error_of_the_header_are_as_set(served, leases, fault, error):
+    with served.server.faults.fault(TAKE, fault), pytest.raises(error):
         leases.take()
 
 
 def test_a_field_in_a_list_is_set_in_each_element(served):
-    images = served.login().ensure_client("image")
-    fault = Fault(fields={"image_responses.status": 4})
-    with (
-        served.server.faults.fault("bosdyn.api.ImageService/GetImage", fault),
-        pytest.raises(bosdyn.client.image.ImageDataError),
-    ):
+    images, failed = served.login().ensure_client("image"), bosdyn.client.image.ImageDataError
+    fault = served.server.faults.fault("bosdyn.api.ImageService/GetImage", Fault(fields={"image_responses.status": 4}))
+    with fault, pytest.raises(failed):
         images.get_image_from_sources(["frontleft_fisheye_image", "hand_color_image"])
 
 

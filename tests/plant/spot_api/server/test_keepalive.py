@@ -1,9 +1,4 @@
-"""Keepalive policies.
-
-silent for    3 s: lease stale     15 s: motors off
-checked in    the times start again
-removed       nothing happens
-"""
+"""Keepalive policies."""
 
 import time
 
@@ -61,17 +56,16 @@ def service(computer, now):
 
 def added(service):
     """Adds the usual policy; returns its number."""
-    body = lease_pb2.Lease(resource="body")
-    policy = keepalive_pb2.Policy(
-        name="mine",
-        actions=[
-            Action(lease_stale=Action.LeaseStale(leases=[body]), after=duration(3.0)),
-            Action(controlled_motors_off=Action.ControlledMotorsOff(), after=duration(15.0)),
-        ],
-    )
+    stale = Action.LeaseStale(leases=[lease_pb2.Lease(resource="body")])
+    off = Action(controlled_motors_off=Action.ControlledMotorsOff(), after=duration(15.0))
+    policy = keepalive_pb2.Policy(name="mine", actions=[Action(lease_stale=stale, after=duration(3.0)), off])
     answer = service.ModifyPolicy(keepalive_pb2.ModifyPolicyRequest(to_add=policy), CALL)
     assert answer.status == keepalive_pb2.ModifyPolicyResponse.STATUS_OK
     return answer.added_policy.policy_id
+
+
+def check_in(service, number):
+    return service.CheckIn(keepalive_pb2.CheckInRequest(policy_id=number), CALL).status
 
 
 def passed(service, now, seconds):
@@ -90,8 +84,7 @@ def test_a_check_in_starts_the_times_again(service, computer, now):
     number = added(service)
     for _ in range(5):
         passed(service, now, 2.0)
-        answer = service.CheckIn(keepalive_pb2.CheckInRequest(policy_id=number), CALL)
-        assert answer.status == keepalive_pb2.CheckInResponse.STATUS_OK
+        assert check_in(service, number) == keepalive_pb2.CheckInResponse.STATUS_OK
     assert computer.done == []
 
 
@@ -99,9 +92,7 @@ def test_a_removed_policy_does_nothing(service, computer, now):
     number = added(service)
     service.ModifyPolicy(keepalive_pb2.ModifyPolicyRequest(policy_ids_to_remove=[number]), CALL)
     passed(service, now, 60.0)
-    assert computer.done == []
-    answer = service.CheckIn(keepalive_pb2.CheckInRequest(policy_id=number), CALL)
-    assert answer.status == keepalive_pb2.CheckInResponse.STATUS_INVALID_POLICY_ID
+    assert (computer.done, check_in(service, number)) == ([], keepalive_pb2.CheckInResponse.STATUS_INVALID_POLICY_ID)
 
 
 def test_the_status_names_what_is_being_done(service, now):
@@ -119,11 +110,8 @@ def test_an_action_that_is_not_simulated_is_refused(service):
 
 
 def test_a_silent_client_of_the_sdk_loses_its_motors(spot):
-    client = spot.robot.ensure_client("keepalive")
-    policy = keepalive_pb2.Policy(
-        name="short", actions=[Action(controlled_motors_off=Action.ControlledMotorsOff(), after=duration(0.3))]
-    )
-    client.modify_policy(to_add=policy)
+    off = Action(controlled_motors_off=Action.ControlledMotorsOff(), after=duration(0.3))
+    spot.robot.ensure_client("keepalive").modify_policy(to_add=keepalive_pb2.Policy(name="short", actions=[off]))
     while spot.robot.is_powered_on():
         time.sleep(0.02)
     assert spot.served.scripted.height_m < 0.3

@@ -20,6 +20,7 @@ from pydrake.math import RotationMatrix
 from plant.spot_api.server.computer import Pace
 from plant.spot_api.server.manipulation import _allows, _only_from_above
 from plant.spot_api.server.rays import first_hit_m
+from tests.tables import table
 
 Api = manipulation_api_pb2
 PACE = Pace.CLIENT
@@ -56,8 +57,7 @@ class Scripted:
 def picker(spot):
     """A picker of the server."""
     made = Scripted()
-    service = next(each for each in spot.served.server.services if each.name == "manipulation")
-    service._picker = made
+    next(each for each in spot.served.server.services if each.name == "manipulation")._picker = made
     return made
 
 
@@ -66,8 +66,7 @@ def client(spot):
 
 
 def started(spot, **request):
-    answer = client(spot).manipulation_api_command(Api.ManipulationApiRequest(**request))
-    return answer.manipulation_cmd_id
+    return client(spot).manipulation_api_command(Api.ManipulationApiRequest(**request)).manipulation_cmd_id
 
 
 def feedback(spot, number):
@@ -104,22 +103,15 @@ def ray(x, y, z, frame="body"):
     return {"ray_start_rt_frame": start, "ray_end_rt_frame": end, "frame_name": frame}
 
 
-def test_the_robot_walks_to_the_wall_that_a_ray_meets(spot):
-    number = started(spot, walk_to_object_ray_in_world=Api.WalkToObjectRayInWorld(**ray(1.0, 0.0, 0.0)))
-    states = outcome(spot, number)
+@pytest.mark.parametrize(("offset", "distance_m"), [({}, 0.9), ({"offset_distance": FloatValue(value=1.3)}, 1.3)])
+def test_the_robot_walks_to_the_wall_that_a_ray_meets_up_to_the_clients_distance(spot, offset, distance_m):
+    states = outcome(spot, started(spot, walk_to_object_ray_in_world={**ray(1.0, 0.0, 0.0), **offset}))
     assert states[-2:] == [Api.MANIP_STATE_WALKING_TO_OBJECT, Api.MANIP_STATE_DONE]
-    assert get_odom_tform_body(spot.tree).x == pytest.approx(1.7 - 0.9, abs=0.06)
-
-
-def test_the_distance_of_a_walk_is_the_clients(spot):
-    given = Api.WalkToObjectRayInWorld(**ray(1.0, 0.0, 0.0), offset_distance=FloatValue(value=1.3))
-    outcome(spot, started(spot, walk_to_object_ray_in_world=given))
-    assert get_odom_tform_body(spot.tree).x == pytest.approx(1.7 - 1.3, abs=0.06)
+    assert get_odom_tform_body(spot.tree).x == pytest.approx(1.7 - distance_m, abs=0.06)
 
 
 def test_the_robot_walks_to_what_a_pixel_shows_and_tells_where_it_is(spot):
-    given = pixel(spot)
-    number = started(spot, walk_to_object_in_image=Api.WalkToObjectInImage(**given))
+    number = started(spot, walk_to_object_in_image=pixel(spot))
     outcome(spot, number)
     tree = feedback(spot, number).transforms_snapshot_manipulation_data
     found = get_a_tform_b(tree, "odom", "walkto_raycast_intersection")
@@ -130,13 +122,13 @@ def test_the_robot_walks_to_what_a_pixel_shows_and_tells_where_it_is(spot):
 
 
 def test_a_ray_that_meets_nothing_moves_nothing(spot):
-    number = started(spot, walk_to_object_ray_in_world=Api.WalkToObjectRayInWorld(**ray(0.0, 0.0, 1.0)))
+    number = started(spot, walk_to_object_ray_in_world=ray(0.0, 0.0, 1.0))
     assert outcome(spot, number)[-1] == Api.MANIP_STATE_GRASP_FAILED_TO_RAYCAST_INTO_MAP
     assert get_odom_tform_body(spot.tree).x == pytest.approx(0.0, abs=0.01)
 
 
 def test_another_command_ends_a_walk(spot):
-    number = started(spot, walk_to_object_ray_in_world=Api.WalkToObjectRayInWorld(**ray(1.0, 0.0, 0.0)))
+    number = started(spot, walk_to_object_ray_in_world=ray(1.0, 0.0, 0.0))
     outcome(spot, number, (Api.MANIP_STATE_WALKING_TO_OBJECT,))
     spot.commands.robot_command(Build.stop_command())
     assert outcome(spot, number)[-1] == Api.MANIP_STATE_GRASP_FAILED
@@ -144,26 +136,16 @@ def test_another_command_ends_a_walk(spot):
     assert not any(spot.served.scripted.velocity)
 
 
-@pytest.mark.parametrize(
-    ("held", "no_plan", "state"),
-    [
-        (True, False, Api.MANIP_STATE_GRASP_SUCCEEDED),
-        (False, True, Api.MANIP_STATE_GRASP_PLANNING_NO_SOLUTION),
-        (False, False, Api.MANIP_STATE_GRASP_FAILED),
-    ],
-)
+@pytest.mark.parametrize(*table(__file__, "picks"))
 def test_a_pick_ends_as_its_attempt(spot, picker, held, no_plan, state):
-    given = Api.PickObjectInImage(**pixel(spot), walk_gaze_mode=Api.PICK_NO_AUTO_WALK_OR_GAZE)
-    number = started(spot, pick_object_in_image=given)
+    number = started(spot, pick_object_in_image={**pixel(spot), "walk_gaze_mode": Api.PICK_NO_AUTO_WALK_OR_GAZE})
     outcome(spot, number, (Api.MANIP_STATE_SEARCHING_FOR_GRASP,))
     picker.held, picker.no_plan = held, no_plan
-    assert outcome(spot, number)[-1] == state
-    assert picker.ended == 1
+    assert (Api.ManipulationFeedbackState.Name(outcome(spot, number)[-1]), picker.ended) == (state, 1)
 
 
 def test_an_object_out_of_reach_is_walked_to_before_it_is_picked(spot, picker):
-    point = geometry_pb2.Vec3(x=1.5, z=0.3)
-    number = started(spot, pick_object=Api.PickObject(frame_name="odom", object_rt_frame=point))
+    number = started(spot, pick_object={"frame_name": "odom", "object_rt_frame": {"x": 1.5, "z": 0.3}})
     states = outcome(spot, number, (Api.MANIP_STATE_SEARCHING_FOR_GRASP,))
     assert Api.MANIP_STATE_WALKING_TO_OBJECT in states
     assert get_odom_tform_body(spot.tree).x == pytest.approx(0.6, abs=0.06)
@@ -175,55 +157,24 @@ def test_a_defect_of_the_picker_ends_the_pick_and_not_the_server(spot, picker, c
         raise RuntimeError("a defect")
 
     picker.step = fail
-    given = Api.PickObjectRayInWorld(**ray(1.0, 0.0, 0.0), walk_gaze_mode=Api.PICK_AUTO_GAZE)
-    assert outcome(spot, started(spot, pick_object_ray_in_world=given))[-1] == Api.MANIP_STATE_GRASP_FAILED
+    number = started(spot, pick_object_ray_in_world={**ray(1.0, 0.0, 0.0), "walk_gaze_mode": Api.PICK_AUTO_GAZE})
+    assert (outcome(spot, number)[-1], picker.ended) == (Api.MANIP_STATE_GRASP_FAILED, 1)
     assert "a defect" in caplog.text
-    assert picker.ended == 1
     block_until_arm_arrives(spot.commands, spot.commands.robot_command(Build.arm_ready_command()), timeout_sec=8.0)
 
 
 def test_another_command_stops_a_pick(spot, picker):
-    given = Api.PickObjectRayInWorld(**ray(1.0, 0.0, 0.0), walk_gaze_mode=Api.PICK_AUTO_GAZE)
-    number = started(spot, pick_object_ray_in_world=given)
+    number = started(spot, pick_object_ray_in_world={**ray(1.0, 0.0, 0.0), "walk_gaze_mode": Api.PICK_AUTO_GAZE})
     outcome(spot, number, (Api.MANIP_STATE_SEARCHING_FOR_GRASP,))
     spot.commands.robot_command(Build.arm_ready_command())
-    assert outcome(spot, number)[-1] == Api.MANIP_STATE_GRASP_FAILED
-    assert picker.ended == 1
-
-
-def pick(**fields):
-    return {"pick_object": Api.PickObject(**{"frame_name": "odom", **fields})}
+    assert (outcome(spot, number)[-1], picker.ended) == (Api.MANIP_STATE_GRASP_FAILED, 1)
 
 
 def oriented(**constraint):
     return Api.GraspParams(allowable_orientation=[Api.AllowableOrientation(**constraint)])
 
 
-@pytest.mark.parametrize(
-    ("request_", "said"),
-    [
-        ({}, "no command"),
-        ({"pick_object_execute_plan": Api.PickObjectExecutePlan()}, "pick_object_execute_plan"),
-        (pick(frame_name="moon"), "moon"),
-        (pick(object_rt_frame=geometry_pb2.Vec3(x=math.nan)), "nan"),
-        (pick(grasp_params=Api.GraspParams(grasp_params_frame_name="moon")), "moon"),
-        (pick(grasp_params=oriented(squeeze_grasp=Api.SqueezeGrasp())), "squeeze"),
-        (
-            pick(
-                grasp_params=Api.GraspParams(position_constraint=Api.GRASP_POSITION_CONSTRAINT_FIXED_AT_USER_POSITION)
-            ),
-            "fixed position",
-        ),
-        (pick(grasp_params=oriented(vector_alignment_with_tolerance=Api.VectorAlignmentWithTolerance())), "no length"),
-        ({"walk_to_object_ray_in_world": Api.WalkToObjectRayInWorld(**ray(0.0, 0.0, 0.0))}, "no length"),
-        ({"walk_to_object_in_image": Api.WalkToObjectInImage()}, "focal_length"),
-        (
-            {"pick_object_ray_in_world": Api.PickObjectRayInWorld(**ray(1, 0, 0), walk_gaze_mode=Api.PICK_PLAN_ONLY)},
-            "PICK_PLAN_ONLY",
-        ),
-    ],
-    ids=lambda value: value if isinstance(value, str) else "",
-)
+@pytest.mark.parametrize(*table(__file__, "refused"))
 def test_a_task_that_cannot_be_done_is_an_invalid_request(spot, picker, request_, said):
     with pytest.raises(InvalidRequestError, match=said):
         started(spot, **request_)
@@ -232,76 +183,56 @@ def test_a_task_that_cannot_be_done_is_an_invalid_request(spot, picker, request_
 
 def test_a_camera_frame_that_is_its_own_parent_is_an_invalid_request(spot):
     given = pixel(spot)
-    edge = given["transforms_snapshot_for_camera"].child_to_parent_edge_map["odom"]
-    edge.parent_frame_name = "odom"
+    given["transforms_snapshot_for_camera"].child_to_parent_edge_map["odom"].parent_frame_name = "odom"
     with pytest.raises(InvalidRequestError, match="circle"):
-        started(spot, walk_to_object_in_image=Api.WalkToObjectInImage(**given))
+        started(spot, walk_to_object_in_image=given)
 
 
-def test_a_server_without_a_picker_refuses_picks(spot):
+def test_a_server_without_a_picker_or_with_motors_off_refuses_tasks_and_knows_no_other(spot):
     with pytest.raises(InvalidRequestError, match="plans grasps"):
-        started(spot, **pick())
-
-
-def test_a_task_with_motors_off_is_an_invalid_request(spot):
-    spot.robot.power_off(cut_immediately=True, timeout_sec=10, update_frequency=20.0)
-    with pytest.raises(InvalidRequestError, match="motors are off"):
-        started(spot, walk_to_object_ray_in_world=Api.WalkToObjectRayInWorld(**ray(1.0, 0.0, 0.0)))
-
-
-def test_feedback_of_an_unknown_task_is_an_invalid_request(spot):
+        started(spot, pick_object={"frame_name": "odom"})
     with pytest.raises(InvalidRequestError):
         feedback(spot, 4711)
+    spot.robot.power_off(cut_immediately=True, timeout_sec=10, update_frequency=20.0)
+    with pytest.raises(InvalidRequestError, match="motors are off"):
+        started(spot, walk_to_object_ray_in_world=ray(1.0, 0.0, 0.0))
 
 
 def test_a_grasp_from_above_is_told_from_one_from_the_side(spot):
     snapshot = spot.served.server.computer.snapshot
 
     def aligned(axis, to):
-        alignment = Api.VectorAlignmentWithTolerance(
-            axis_on_gripper_ewrt_gripper=geometry_pb2.Vec3(**axis),
-            axis_to_align_with_ewrt_frame=geometry_pb2.Vec3(**to),
-            threshold_radians=0.17,
-        )
-        return _allows(oriented(vector_alignment_with_tolerance=alignment), snapshot)
+        axes = {"axis_on_gripper_ewrt_gripper": axis, "axis_to_align_with_ewrt_frame": to}
+        return _allows(oriented(vector_alignment_with_tolerance={**axes, "threshold_radians": 0.17}), snapshot)
 
     top, side = aligned({"x": 1}, {"z": -1}), aligned({"y": 1}, {"z": 1})
     down, rolled = RotationMatrix.MakeYRotation(math.pi / 2), RotationMatrix.MakeXRotation(math.pi / 2)
     assert (top(down), top(rolled), side(down), side(rolled)) == (True, False, False, True)
-    assert (_only_from_above(top), _only_from_above(side)) == (True, False)
-    assert not _only_from_above(_allows(Api.GraspParams(), snapshot))
+    either = _allows(Api.GraspParams(), snapshot)
+    assert list(map(_only_from_above, (top, side, either))) == [True, False, False]
 
 
 def test_a_rotation_with_tolerance_allows_rotations_near_it(spot):
-    half = math.sqrt(0.5)
-    rotation = Api.RotationWithTolerance(
-        rotation_ewrt_frame=geometry_pb2.Quaternion(w=half, y=half), threshold_radians=0.2
-    )
-    allows = _allows(oriented(rotation_with_tolerance=rotation), spot.served.server.computer.snapshot)
-    assert allows(RotationMatrix.MakeYRotation(math.pi / 2 + 0.15))
-    assert not allows(RotationMatrix.MakeYRotation(math.pi / 2 + 0.25))
+    down = {"rotation_ewrt_frame": {"w": math.sqrt(0.5), "y": math.sqrt(0.5)}, "threshold_radians": 0.2}
+    allows = _allows(oriented(rotation_with_tolerance=down), spot.served.server.computer.snapshot)
+    rotations = [RotationMatrix.MakeYRotation(math.pi / 2 + off_rad) for off_rad in (0.15, 0.25)]
+    assert list(map(allows, rotations)) == [True, False]
 
 
 def test_a_ray_meets_the_first_points_beside_it():
     wall = np.array([[2.0, y, z] for y in np.linspace(-1, 1, 101) for z in np.linspace(-1, 1, 101)])
-    nearer = wall - [1.0, 0.5, 0.0]
-    ahead = np.array([1.0, 0.0, 0.0])
-    assert first_hit_m(np.zeros(3), ahead, wall) == pytest.approx(2.0)
-    assert first_hit_m(np.zeros(3), ahead, np.concatenate([wall, nearer])) == pytest.approx(1.0)
-    assert first_hit_m(np.zeros(3), ahead, np.concatenate([wall, nearer]), 1.5) == pytest.approx(2.0)
-    assert first_hit_m(np.zeros(3), -ahead, wall) is None
+    both, ahead = np.concatenate([wall, wall - [1.0, 0.5, 0.0]]), np.array([1.0, 0.0, 0.0])
+    found_m = [first_hit_m(np.zeros(3), ahead, *each) for each in ((wall,), (both,), (both, 1.5))]
+    assert found_m == pytest.approx([2.0, 1.0, 2.0]) and first_hit_m(np.zeros(3), -ahead, wall) is None
 
 
-def said(spot, **fields):
+def said(spot, holding, carry=None):
     """A client's word on the item in the gripper."""
-    made = Api.ApiGraspOverrideRequest()
-    if "holding" in fields:
-        Override = Api.ApiGraspOverride
-        word = Override.OVERRIDE_HOLDING if fields["holding"] else Override.OVERRIDE_NOT_HOLDING
-        made.api_grasp_override.override_request = word
-    if "carry" in fields:
-        made.carry_state_override.override_request = fields["carry"]
-    client(spot).grasp_override_command(made)
+    Override = Api.ApiGraspOverride
+    word = Override.OVERRIDE_HOLDING if holding else Override.OVERRIDE_NOT_HOLDING
+    carried = {} if carry is None else {"carry_state_override": {"override_request": carry}}
+    request = Api.ApiGraspOverrideRequest(api_grasp_override={"override_request": word}, **carried)
+    client(spot).grasp_override_command(request)
 
 
 def held(spot):
@@ -334,10 +265,11 @@ def test_nothing_is_carried_by_an_empty_gripper(spot):
         said(spot, holding=False, carry=State.CARRY_STATE_CARRIABLE)
 
 
-def test_the_robot_is_told_what_it_must_keep(spot):
-    said(spot, holding=True, carry=State.CARRY_STATE_CARRIABLE)
-    time.sleep(0.1)
-    assert spot.served.scripted.carries
-    said(spot, holding=True, carry=State.CARRY_STATE_NOT_CARRIABLE)
-    time.sleep(0.1)
-    assert not spot.served.scripted.carries
+@pytest.mark.parametrize(
+    ("state", "carries"), [(State.CARRY_STATE_CARRIABLE, True), (State.CARRY_STATE_NOT_CARRIABLE, False)]
+)
+def test_the_robot_is_told_what_it_must_keep(spot, state, carries):
+    for carry in (State.CARRY_STATE_CARRIABLE, state):
+        said(spot, holding=True, carry=carry)
+        time.sleep(0.1)
+    assert spot.served.scripted.carries is carries

@@ -35,11 +35,9 @@ def test_a_few_boxes_make_the_walls_of_two_rooms():
 def test_rooms_and_the_door_between_them_are_found(tmp_path, resolution_m):
     world_from_grid(tmp_path, two_rooms(resolution_m), start=None, wall_height_m=2.5)
     known = yaml.safe_load((tmp_path / "knowledge.yaml").read_text())
-    assert set(known["places"]) == {"room 1", "room 2"}
-    (door,) = known["doors"]
-    assert set(door["between"]) == {"room 1", "room 2"}
-    assert door["at"] == pytest.approx([4.15, -0.05], abs=0.1)
-    assert door["width"] == pytest.approx(0.9, abs=0.06)
+    (door,), rooms = known["doors"], {"room 1", "room 2"}
+    assert (set(known["places"]), set(door["between"])) == (rooms, rooms)
+    assert (door["at"], door["width"]) == (pytest.approx([4.15, -0.05], abs=0.1), pytest.approx(0.9, abs=0.06))
 
 
 def test_the_walls_stand_where_the_map_has_them(tmp_path):
@@ -49,18 +47,19 @@ def test_the_walls_stand_where_the_map_has_them(tmp_path):
     built = build_diagram(DiagramConfig(directives=world.directives_path, render=False))
     scene = built.scene_graph.GetMyContextFromRoot(built.diagram.CreateDefaultContext())
     query = built.scene_graph.get_query_output_port().Eval(scene)
-    for x, y, z in ((1.05, 0.0, 1.0), (4.15, 1.0, 2.4), (3.0, 2.15, 0.1)):
-        assert min(each.distance for each in query.ComputeSignedDistanceToPoint([x, y, z])) < 0.0
-    for x, y, z in ((2.0, 0.0, 1.0), (4.15, -0.05, 0.5), (3.0, 2.15, 2.6)):
-        assert min(each.distance for each in query.ComputeSignedDistanceToPoint([x, y, z])) > 0.05
+
+    def near_m(*p_W):
+        return min(each.distance for each in query.ComputeSignedDistanceToPoint(p_W))
+
+    assert max(near_m(1.05, 0.0, 1.0), near_m(4.15, 1.0, 2.4), near_m(3.0, 2.15, 0.1)) < 0.0
+    assert min(near_m(2.0, 0.0, 1.0), near_m(4.15, -0.05, 0.5), near_m(3.0, 2.15, 2.6)) > 0.05
 
 
 def test_coarse_maps_are_cut_into_small_cells(tmp_path):
     cells = np.full((12, 12), OCCUPIED, np.uint8)
     cells[1:-1, 1:-1] = FREE
     world_from_grid(tmp_path, Grid(cells, (0.0, 0.0), 0.4), start=None, wall_height_m=2.5)
-    head = (tmp_path / "map" / "scan.pgm").read_bytes()[:12]
-    assert head.startswith(b"P5\n96 96\n")
+    assert (tmp_path / "map" / "scan.pgm").read_bytes().startswith(b"P5\n96 96\n")
     assert "resolution: 0.05" in (tmp_path / "map" / "scan.yaml").read_text()
 
 
@@ -68,10 +67,9 @@ def test_coarse_maps_are_cut_into_small_cells(tmp_path):
     ("value", "why"), [(OCCUPIED, "no cell of it is free"), (UNKNOWN, "no cell"), (FREE, "wide enough")]
 )
 def test_a_map_without_room_for_the_robot_is_refused(tmp_path, value, why):
+    grid = Grid(np.full((8, 8), value, np.uint8), (0.0, 0.0), 0.05)
     with pytest.raises(WorldError, match=why):
-        world_from_grid(
-            tmp_path, Grid(np.full((8, 8), value, np.uint8), (0.0, 0.0), 0.05), start=None, wall_height_m=2.5
-        )
+        world_from_grid(tmp_path, grid, start=None, wall_height_m=2.5)
 
 
 @pytest.mark.parametrize("start", [Pose2D(4.15, 1.0, 0.0), Pose2D(50.0, 0.0, 0.0), Pose2D(4.15, -0.05, 1.57)])

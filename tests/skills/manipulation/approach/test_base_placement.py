@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from scripted_robot import CAPABILITIES, GRIPPER, MODEL
+from table_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectKind, ObjectObservation
 from skills.manipulation.approach.base_placement import (
@@ -19,19 +19,15 @@ from skills.manipulation.grasp.planning import GeometricGraspPlanner
 from skills.manipulation.grasp.reach import observed_target, reached_grasps
 from skills.navigate.footprint import Footprint
 from skills.robot import Pose2D
+from skills.testing.blocks import Block
+from skills.testing.estimators import BlockCostmap
 
 CAN = ObjectObservation(0.0, ObjectKind("coke"), (2.15, 0.0, 0.807), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
 CANDIDATES = partial(GeometricGraspPlanner().candidates, p_BS=MODEL.p_BS, gripper=GRIPPER)
 
 
-class _Table:
-    """A table top from x = 2 on; the floor before it is free."""
-
-    def clearance_m(self, points_W):
-        return np.maximum(0.0, 2.0 - np.asarray(points_W)[:, 0])
-
-    def update(self, robot, localisation):
-        pass
+TABLE = BlockCostmap([Block(2.0, -9.0, 9.0, 9.0)])
+"""A table top from x = 2 on; the floor before it is free."""
 
 
 def _grasp_cost(X_WB, seen):
@@ -41,7 +37,7 @@ def _grasp_cost(X_WB, seen):
 
 def _poses(reach_cost=lambda pose: 0.0):
     distances_m, here = CAPABILITIES.arm.standing_m, Pose2D(0.5, 0.3, 0.0)
-    free = free_placements((2.15, 0.0), here, _Table(), Footprint.of(CAPABILITIES), distances_m, distances_m[0])
+    free = free_placements((2.15, 0.0), here, TABLE, Footprint.of(CAPABILITIES), distances_m, distances_m[0])
     return reachable_placements(free, reach_cost)
 
 
@@ -66,8 +62,7 @@ def test_places_out_of_reach_are_left_out():
 
 
 def test_a_can_is_within_reach_from_the_best_place_but_not_from_afar():
-    best = _poses()[0].pose
-    assert _grasp_cost(best.transform(0.52), CAN) == 0.0
+    assert _grasp_cost(_poses()[0].pose.transform(0.52), CAN) == 0.0
     assert _grasp_cost(Pose2D(0.0, 0.0, 0.0).transform(0.52), CAN) is None
 
 
@@ -95,8 +90,7 @@ def test_an_observation_keeps_its_axes_when_the_body_is_turned():
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.57, 2.4])
 def test_a_hammer_at_any_angle_is_within_reach_from_some_pose(yaw):
     hammer = ObjectObservation(0.0, ObjectKind("hammer"), (2.15, 0.0, 0.765), (0.33, 0.12, 0.03), yaw, 1.0, "bench")
-    found = _poses(lambda pose: _grasp_cost(pose.transform(0.52), hammer))
-    assert found
+    assert _poses(lambda pose: _grasp_cost(pose.transform(0.52), hammer))
 
 
 def test_a_place_with_a_better_grasp_is_preferred():

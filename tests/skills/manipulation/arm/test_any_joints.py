@@ -40,15 +40,15 @@ def test_solutions_put_the_hand_at_the_pose_and_differ(model):
         assert all(np.max(np.abs(a - b)) > 0.02 for n, a in enumerate(found) for b in found[:n])
 
 
+def test_solutions_keep_a_margin_from_the_limits(model):
+    for _, X_BH in poses(model, 10):
+        assert all(model.within_limits(q, 0.1) for q in model.inverse(X_BH, 0.1))
+
+
 def test_a_solution_near_a_posture_is_found(model):
     for q_rad, X_BH in poses(model, 20):
         found = model.nearest_inverse(X_BH, q_rad + 0.03)
         assert found is not None and np.max(np.abs(found - q_rad)) < 0.2
-
-
-def test_solutions_keep_a_margin_from_the_limits(model):
-    for _, X_BH in poses(model, 10):
-        assert all(model.within_limits(q, 0.1) for q in model.inverse(X_BH, 0.1))
 
 
 def test_a_pose_out_of_reach_has_none(model):

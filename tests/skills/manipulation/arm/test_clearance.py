@@ -25,7 +25,7 @@ SHAPES = {
 }
 
 
-def touches(kind: Kind, X_BS: RigidTransform, padding_m: float) -> bool:
+def touches(kind, X_BS, padding_m):
     """Whether a shape that hangs on no joint comes within a padding of the box at the origin."""
     _, half_m, radius_m = SHAPES[kind]
     rotation, place = X_BS.rotation().matrix()[None], X_BS.translation()[None]
@@ -36,7 +36,7 @@ def touches(kind: Kind, X_BS: RigidTransform, padding_m: float) -> bool:
     return touching(np.zeros(0, dtype=bool), padding_m, np.zeros((1, 0)), *no_joints, *group, *shape, *box)
 
 
-def distances_m(kind: Kind, poses: list[RigidTransform]) -> list[float]:
+def distances_m(kind, poses):
     """Drake's signed distances of the shape at each pose from the box at the origin."""
     graph = SceneGraph()
     source = graph.RegisterSource("test")
@@ -55,18 +55,18 @@ def distances_m(kind: Kind, poses: list[RigidTransform]) -> list[float]:
     return found
 
 
-def random_poses(count: int) -> list[RigidTransform]:
+def random_poses(count):
     rng = np.random.default_rng(3)
     return [RigidTransform(_turned(rng), rng.uniform(-0.4, 0.4, 3)) for _ in range(count)]
 
 
-def _turned(rng: np.random.Generator) -> RotationMatrix:
+def _turned(rng):
     axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     return RotationMatrix(axes * np.sign(np.linalg.det(axes)))
 
 
 @pytest.mark.parametrize("kind", SHAPES)
-def test_shapes_that_drake_finds_within_the_padding_touch(kind: Kind) -> None:
+def test_shapes_that_drake_finds_within_the_padding_touch(kind):
     # never looser than Drake; stricter in few cases, at rims and corners
     poses = random_poses(300)
     away = distances_m(kind, poses)
@@ -78,7 +78,7 @@ def test_shapes_that_drake_finds_within_the_padding_touch(kind: Kind) -> None:
         assert 30 < sum(near) < 270
 
 
-def test_no_gap_of_two_boxes_is_wider_than_their_distance() -> None:
+def test_no_gap_of_two_boxes_is_wider_than_their_distance():
     poses = random_poses(300)
     half_m = np.array(SHAPES[Kind.BOX][1])
     for X_BS, distance_m in zip(poses, distances_m(Kind.BOX, poses), strict=True):

@@ -16,11 +16,11 @@ AT_HAND = Box(RigidTransform([0.85, 0.0, 0.2]), (0.1, 0.1, 0.1))
 
 
 @pytest.fixture(scope="module")
-def scene() -> ArmScene:
+def scene():
     return ArmScene(CAPABILITIES, MODEL, {})
 
 
-def test_boxes_in_another_frame_stand_where_that_frame_is(scene: ArmScene) -> None:
+def test_boxes_in_another_frame_stand_where_that_frame_is(scene):
     # frame F 2 m to the left: free; F at the body: in contact
     scene.set_boxes([AT_HAND], RigidTransform([0.0, 2.0, 0.0]))
     assert scene.free(AHEAD)
@@ -28,19 +28,23 @@ def test_boxes_in_another_frame_stand_where_that_frame_is(scene: ArmScene) -> No
     assert not scene.free(AHEAD)
 
 
-def test_the_touched_links_are_named(scene: ArmScene) -> None:
-    scene.set_boxes([AT_HAND])
-    assert any(AROUND in pair for pair in scene.contacts(AHEAD))
-
-
-def test_boxes_of_before_stand_where_they_stood_after_other_boxes(scene: ArmScene) -> None:
+def test_boxes_of_before_stand_where_they_stood_after_other_boxes(scene):
     scene.set_boxes([AT_HAND])
     with scene.with_only((), 0.0):
         assert scene.free(AHEAD)
     assert not scene.free(AHEAD)
 
 
-def test_the_padding_counts_for_boxes_set_later(scene: ArmScene) -> None:
+def test_the_touched_links_are_named(scene):
+    scene.set_boxes([AT_HAND])
+    assert any(AROUND in pair for pair in scene.contacts(AHEAD))
+
+
+def test_without_a_lift_every_pose_is_free_as_usual(scene):
+    assert scene.free_as_usual(AHEAD)
+
+
+def test_the_padding_counts_for_boxes_set_later(scene):
     # a box that ends 5 cm below the hand's origin, which is 3 to 4 cm high: free with 1 cm, too near with 10 cm
     below = Box(RigidTransform([0.85, 0.0, 0.2 - 0.05 - 0.1]), (0.1, 0.1, 0.1))
     scene.set_padding(0.10)
@@ -50,7 +54,7 @@ def test_the_padding_counts_for_boxes_set_later(scene: ArmScene) -> None:
     assert scene.free(AHEAD)
 
 
-def test_an_object_in_the_hand_stays_there_when_the_boxes_change(scene: ArmScene) -> None:
+def test_an_object_in_the_hand_stays_there_when_the_boxes_change(scene):
     far_ahead = Box(RigidTransform([1.4, 0.0, 0.2]), (0.1, 0.1, 0.1))
     scene.hold([Box(RigidTransform([0.5, 0.0, 0.0]), (0.5, 0.05, 0.05))])
     scene.set_boxes([far_ahead])
@@ -59,9 +63,8 @@ def test_an_object_in_the_hand_stays_there_when_the_boxes_change(scene: ArmScene
     assert scene.free(AHEAD)
 
 
-def test_checks_of_a_scene_do_not_depend_on_those_before(scene: ArmScene) -> None:
-    rng = np.random.default_rng(4)
-    turns = rng.uniform(MODEL.lower_rad, MODEL.upper_rad, (20, len(MODEL.names)))
+def test_checks_of_a_scene_do_not_depend_on_those_before(scene):
+    turns = np.random.default_rng(4).uniform(MODEL.lower_rad, MODEL.upper_rad, (20, len(MODEL.names)))
     scene.set_boxes([AT_HAND])
     first = [scene.free(q) for q in turns]
     scene.set_boxes(())
@@ -69,7 +72,7 @@ def test_checks_of_a_scene_do_not_depend_on_those_before(scene: ArmScene) -> Non
     assert [scene.free(q) for q in turns] == first
 
 
-def test_a_pose_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
+def test_a_pose_free_with_the_torso_up_may_touch_once_it_is_down():
     fetch = fetch_capabilities()
     raised_m = fetch.height_range_m[1] - fetch.standing_height_m
     usual_lift_m = fetch.standing_height_m - fetch.height_range_m[0]
@@ -85,11 +88,6 @@ def test_a_pose_free_with_the_torso_up_may_touch_once_it_is_down() -> None:
     usual = ArmScene(fetch, model, {fetch.lift_joint: usual_lift_m})
     usual.set_boxes([below])
     assert usual.free_as_usual(ahead)
-
-
-def test_without_a_lift_every_pose_is_free_as_usual(scene: ArmScene) -> None:
-    scene.set_boxes([AT_HAND])
-    assert scene.free_as_usual(AHEAD)
 
 
 # a cube with sides of 0.2 m at the origin: where another stands, how it is turned about z, how far it is off

@@ -35,6 +35,11 @@ def test_a_gripper_that_opens_lets_go_on_purpose_even_when_it_closes_again():
     assert judged(HELD, (0.6, 0.0, True), (0.9, 0.0, False), GONE, GONE) == [Grip.HELD] + [Grip.RELEASED] * 4
 
 
+def test_two_fingers_that_open_by_a_few_millimetres_let_go():
+    watch = hold_watch(fetch_capabilities())
+    assert judged((0.06, 40.0, True), (0.068, 0.0, False), watch=watch)[-1] is Grip.RELEASED
+
+
 def test_a_gripper_that_closes_about_the_object_slips():
     assert judged(HELD, (0.47, 80.0, True), (0.44, 80.0, True))[-2:] == [Grip.HELD, Grip.SLIPPING]
 
@@ -42,6 +47,18 @@ def test_a_gripper_that_closes_about_the_object_slips():
 def test_a_force_that_falls_is_a_slip_unless_it_comes_back_at_once():
     weak = (0.5, 30.0, True)
     assert judged(HELD, weak, HELD, weak, weak)[1:] == [Grip.HELD, Grip.HELD, Grip.HELD, Grip.SLIPPING]
+
+
+def test_noise_of_the_readings_is_no_slip():
+    noisy = [(0.5 + 0.012 * (-1) ** k, 80.0 + 3.0 * (-1) ** k, True) for k in range(200)]
+    assert set(judged(*noisy)) == {Grip.HELD}
+
+
+def test_after_it_was_gripped_again_the_next_slip_counts_from_how_it_is_held_then():
+    watch = HoldWatch()
+    assert judged(HELD, (0.44, 80.0, True), watch=watch)[-1] is Grip.SLIPPING
+    assert set(judged(*[(0.41, 118.0, True)] * 20, watch=watch, first=2)) == {Grip.HELD}
+    assert judged((0.35, 118.0, True), watch=watch, first=22) == [Grip.SLIPS_ON]
 
 
 def test_fingers_that_stay_apart_have_a_moment_to_feel_it_again():
@@ -52,18 +69,6 @@ def test_fingers_that_stay_apart_have_a_moment_to_feel_it_again():
 
 def test_fingers_that_close_after_it_was_gripped_again_have_lost_it():
     assert judged(HELD, (0.5, 1.0, True), (0.5, 1.0, True), GONE, GONE)[2:] == [Grip.SLIPPING, Grip.HELD, Grip.LOST]
-
-
-def test_after_it_was_gripped_again_the_next_slip_counts_from_how_it_is_held_then():
-    watch = HoldWatch()
-    assert judged(HELD, (0.44, 80.0, True), watch=watch)[-1] is Grip.SLIPPING
-    assert set(judged(*[(0.41, 118.0, True)] * 20, watch=watch, first=2)) == {Grip.HELD}
-    assert judged((0.35, 118.0, True), watch=watch, first=22) == [Grip.SLIPS_ON]
-
-
-def test_noise_of_the_readings_is_no_slip():
-    noisy = [(0.5 + 0.012 * (-1) ** k, 80.0 + 3.0 * (-1) ** k, True) for k in range(200)]
-    assert set(judged(*noisy)) == {Grip.HELD}
 
 
 def test_the_second_grip_is_half_as_strong_again_within_the_limit(spot):
@@ -83,11 +88,6 @@ def test_gripping_again_closes_more_firmly(spot):
 def test_two_fingers_that_slide_slip_by_millimetres(closed_m, grip):
     watch = hold_watch(fetch_capabilities())
     assert judged((0.06, 40.0, True), (0.06 - closed_m, 40.0, True), watch=watch)[-1] is grip
-
-
-def test_two_fingers_that_open_by_a_few_millimetres_let_go():
-    watch = hold_watch(fetch_capabilities())
-    assert judged((0.06, 40.0, True), (0.068, 0.0, False), watch=watch)[-1] is Grip.RELEASED
 
 
 def test_a_gripper_that_is_read_seldom_is_judged_by_two_readings_as_well(spot):

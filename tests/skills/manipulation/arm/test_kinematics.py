@@ -55,8 +55,7 @@ def test_a_point_out_of_reach_has_no_solution():
 
 
 def test_the_margin_keeps_solutions_away_from_the_limits():
-    q = MODEL.upper_rad - 0.01
-    X_BH = MODEL.X_BH(q)
+    X_BH = MODEL.X_BH(MODEL.upper_rad - 0.01)
     assert all(MODEL.within_limits(other, 0.1) for other in MODEL.inverse(X_BH, margin_rad=0.1))
 
 

@@ -46,12 +46,9 @@ def test_other_boxes_stand_around_for_a_while_only(scene):
     assert (blocked, scene.free(ahead)) == (False, False)
 
 
-def test_the_stowed_arm_is_free(scene):
-    assert scene.free(MODEL.stowed_rad)
-
-
-def test_an_arm_in_the_body_is_not_free(scene):
-    assert not scene.free(np.array([0.0, 0.45, 2.2, 0.0, 0.0, 0.0]))
+@pytest.mark.parametrize(("q", "free"), [(MODEL.stowed_rad, True), (np.array([0.0, 0.45, 2.2, 0.0, 0.0, 0.0]), False)])
+def test_an_arm_is_free_unless_it_is_in_the_body(scene, q, free):
+    assert scene.free(q) is free
 
 
 def test_a_box_in_the_arms_space_is_named_as_an_obstacle(scene):
@@ -61,8 +58,7 @@ def test_a_box_in_the_arms_space_is_named_as_an_obstacle(scene):
 
 
 def test_a_held_box_counts_as_part_of_the_arm(scene):
-    beyond = MODEL.X_BH(LEFT) @ np.array([0.45, 0.0, 0.0])
-    scene.set_boxes([Box(RigidTransform(beyond), (0.1, 0.1, 0.1))])
+    scene.set_boxes([Box(RigidTransform(MODEL.X_BH(LEFT) @ np.array([0.45, 0.0, 0.0])), (0.1, 0.1, 0.1))])
     assert scene.free(LEFT)
     scene.hold([Box(RigidTransform([0.35, 0.0, 0.0]), (0.3, 0.05, 0.05))])
     assert not scene.free(LEFT)
@@ -70,6 +66,10 @@ def test_a_held_box_counts_as_part_of_the_arm(scene):
 
 def test_a_free_motion_is_straight(scene):
     assert len(PLANNER.path(scene, MODEL.stowed_rad, LEFT, np.random.default_rng(1))) == 2
+
+
+def test_timing_a_motion_of_no_length_is_a_short_stay():
+    assert np.allclose(PLANNER.trajectory(np.array([LEFT, LEFT])).positions_rad[-1], LEFT)
 
 
 def test_a_wall_between_is_gone_round(scene):
@@ -89,8 +89,7 @@ def test_the_same_seed_plans_the_same_path(scene):
 
 def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
     scene.set_boxes([_wall_ahead()])
-    path = PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3))
-    trajectory = PLANNER.trajectory(path, scene=scene)
+    trajectory = PLANNER.trajectory(PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3)), scene=scene)
     times = np.arange(0.0, trajectory.times_s[-1], 0.08)
     q = np.stack([np.interp(times, trajectory.times_s, column) for column in trajectory.positions_rad.T], axis=1)
     speeds = np.diff(q, axis=0) / 0.08
@@ -98,11 +97,6 @@ def test_timing_keeps_speed_and_acceleration_limits_from_rest_to_rest(scene):
     assert np.abs(speeds[0]).max() < 0.2
     assert np.abs(np.diff(speeds, axis=0) / 0.08).max() < 5.0
     assert np.allclose(trajectory.positions_rad[-1], RIGHT)
-
-
-def test_timing_a_motion_of_no_length_is_a_short_stay():
-    trajectory = PLANNER.trajectory(np.array([LEFT, LEFT]))
-    assert np.allclose(trajectory.positions_rad[-1], LEFT)
 
 
 def test_a_straight_line_keeps_the_hands_orientation_and_path():
@@ -116,9 +110,8 @@ def test_a_straight_line_keeps_the_hands_orientation_and_path():
 
 
 def test_a_straight_line_out_of_reach_is_refused():
-    X_to = MODEL.X_BH(LEFT) @ RigidTransform([1.5, 0.0, 0.0])
     with pytest.raises(PlanningError, match="reach"):
-        PLANNER.line(MODEL, LEFT, X_to)
+        PLANNER.line(MODEL, LEFT, MODEL.X_BH(LEFT) @ RigidTransform([1.5, 0.0, 0.0]))
 
 
 def test_a_straight_line_into_a_box_is_refused(scene):
@@ -138,8 +131,7 @@ def test_timing_takes_about_as_long_as_the_acceleration_needs(way_rad):
 
 def test_a_start_in_contact_is_left_without_touching_anything_else(scene):
     # A box reaches 1 cm into the hand; the way leads out of it and on to the other side.
-    hand = MODEL.X_BH(LEFT).translation()
-    scene.set_boxes([Box(RigidTransform(hand + [0.0, 0.0, -0.13]), (0.1, 0.1, 0.2))])
+    scene.set_boxes([Box(RigidTransform(MODEL.X_BH(LEFT).translation() + [0.0, 0.0, -0.13]), (0.1, 0.1, 0.2))])
     assert not scene.free(LEFT)
     path = PLANNER.path(scene, LEFT, RIGHT, np.random.default_rng(3))
     touched = {pair for q in np.linspace(path[0], path[1], 8) for pair in scene.contacts(q)}

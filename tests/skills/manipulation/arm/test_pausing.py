@@ -112,26 +112,25 @@ def test_pauses_again_and_again_let_it_come_to_its_end(bench):
     assert skill.story == ["stand", "reach", "open"]
 
 
-def test_after_a_long_pause_it_looks_again(bench):
-    skill = Works(bench.context())
-    assert run(skill, bench, {6}, pause_s=11.0) == Succeeded("done again")
+def carried_away(robot):
+    robot.odometry_pose = type(robot.odometry_pose)(2.0, 0.0, 0.0)
 
 
-def test_when_the_robot_has_moved_it_looks_again(bench, robot):
-    def carried_away():
-        robot.odometry_pose = type(robot.odometry_pose)(2.0, 0.0, 0.0)
-
-    assert run(Works(bench.context()), bench, {6}, between=carried_away) == Succeeded("done again")
+def lose(robot):
+    robot.in_gripper_rad = None
 
 
-def test_when_the_object_was_lost_it_looks_again(bench, robot):
-    robot.in_gripper_rad = 0.3
-    robot.opening, robot.clamp_force_n = 0.3, 20.0
-
-    def lose():
-        robot.in_gripper_rad = None
-
-    assert run(Works(bench.context()), bench, {6}, between=lose) == Succeeded("done again")
+@pytest.mark.parametrize(
+    ("pause_s", "between"),
+    [(11.0, lambda robot: None), (0.5, carried_away), (0.5, lose)],
+    ids=["after a long pause", "when the robot has moved", "when the object was lost"],
+)
+def test_it_looks_again(bench, robot, pause_s, between):
+    if between is lose:
+        robot.in_gripper_rad = robot.opening = 0.3
+        robot.clamp_force_n = 20.0
+    again = run(Works(bench.context()), bench, {6}, pause_s=pause_s, between=lambda: between(robot))
+    assert again == Succeeded("done again")
 
 
 def test_a_skill_within_is_suspended_and_resumed(bench):
@@ -139,6 +138,14 @@ def test_a_skill_within_is_suspended_and_resumed(bench):
     skill.inner = Inner(bench.context())
     assert run(skill, bench, {2}) == Succeeded("done")
     assert skill.inner.log == ["begin", "end", "begin", "end"]
+
+
+def test_the_rest_of_a_trajectory_begins_where_the_arm_is():
+    whole = ArmTrajectory(np.array([0.0, 1.0, 2.0]), np.array([[0.0], [1.0], [3.0]]))
+    rest = rest_of(whole, 0.6, np.array([0.55]))
+    assert rest.times_s == pytest.approx([0.0, 0.5625, 1.5625])
+    assert rest.positions_rad[:, 0] == pytest.approx([0.55, 1.0, 3.0])
+    assert rest_of(whole, 9.0, np.array([3.2])).positions_rad[:, 0] == pytest.approx([3.0, 3.0])
 
 
 def test_a_command_that_somebody_else_stops_again_and_again_is_a_failure(bench, robot):
@@ -154,11 +161,3 @@ def test_a_command_that_somebody_else_stops_again_and_again_is_a_failure(bench, 
         bench.clock.advance(TICK_S)
     assert ended.cause is Cause.EXECUTION
     assert bench.clock.now() > PATIENCE_S
-
-
-def test_the_rest_of_a_trajectory_begins_where_the_arm_is():
-    whole = ArmTrajectory(np.array([0.0, 1.0, 2.0]), np.array([[0.0], [1.0], [3.0]]))
-    rest = rest_of(whole, 0.6, np.array([0.55]))
-    assert rest.times_s == pytest.approx([0.0, 0.5625, 1.5625])
-    assert rest.positions_rad[:, 0] == pytest.approx([0.55, 1.0, 3.0])
-    assert rest_of(whole, 9.0, np.array([3.2])).positions_rad[:, 0] == pytest.approx([3.0, 3.0])

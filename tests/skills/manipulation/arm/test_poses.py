@@ -18,13 +18,14 @@ from skills.manipulation.arm.poses import (
 )
 
 SHOULDER, TARGET = np.array([0.0, 0.0, 0.5]), np.array([1.0, 0.0, 0.3])
+FETCH = fetch_capabilities()
+FETCH_MODEL, LIFT = arm_model(FETCH), {FETCH.lift_joint: FETCH.standing_height_m - FETCH.height_range_m[0]}
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0], ids=["left", "right"])
 def test_places_beside_another_are_first_those_farther_out_on_its_side(side):
     eye = np.array([0.2, 0.3 * side, 0.9])
-    places = np.array(viewpoints_beside(SHOULDER, eye, TARGET))
-    farther_out = side * (places[:, 1] - eye[1]) > 0.03
+    farther_out = side * (np.array(viewpoints_beside(SHOULDER, eye, TARGET))[:, 1] - eye[1]) > 0.03
     assert farther_out.tolist() == [True, True, False, False, False]
 
 
@@ -39,15 +40,14 @@ def test_places_beside_another_are_six_centimetres_from_it_across_the_view():
 # how the hand was tilted as it took what it carries (rad below level)
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.35])
 def test_an_object_that_sticks_out_is_drawn_in_beside_the_body_as_upright_as_before(tilt_rad):
-    fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
-    scene = ArmScene(fetch, model, {fetch.lift_joint: fetch.standing_height_m - fetch.height_range_m[0]})
-    ahead = carry_configuration(scene, fetch.arm, hand_rotation(tilt_rad, 0.0, 1.0), model.stowed_rad)
-    drawn_in = tucked_configuration(scene, fetch.arm, model.X_BH(ahead).rotation(), ahead)
-    tips_m = [model.X_BH(q) @ np.array([fetch.gripper.tip_x_m, 0.0, 0.0]) for q in (ahead, drawn_in)]
+    scene = ArmScene(FETCH, FETCH_MODEL, LIFT)
+    ahead = carry_configuration(scene, FETCH.arm, hand_rotation(tilt_rad, 0.0, 1.0), FETCH_MODEL.stowed_rad)
+    drawn_in = tucked_configuration(scene, FETCH.arm, FETCH_MODEL.X_BH(ahead).rotation(), ahead)
+    tips_m = [FETCH_MODEL.X_BH(q) @ np.array([FETCH.gripper.tip_x_m, 0.0, 0.0]) for q in (ahead, drawn_in)]
     assert tips_m[0][0] > 0.65
     assert np.hypot(*tips_m[1][:2]) < 0.42
     assert scene.beyond_body_m(drawn_in)[0] < 0.1
-    tilts = [model.X_BH(q).rotation().matrix()[2] for q in (ahead, drawn_in)]
+    tilts = [FETCH_MODEL.X_BH(q).rotation().matrix()[2] for q in (ahead, drawn_in)]
     assert tilts[0] == pytest.approx(tilts[1], abs=1e-6)
     assert scene.free(drawn_in)
 
@@ -55,9 +55,8 @@ def test_an_object_that_sticks_out_is_drawn_in_beside_the_body_as_upright_as_bef
 # how the hand was tilted as it took what it carries (rad below level)
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.35, 0.7])
 def test_an_arm_that_carries_keeps_its_elbow_near_the_body(tilt_rad):
-    fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
-    scene = ArmScene(fetch, model, {fetch.lift_joint: fetch.standing_height_m - fetch.height_range_m[0]})
-    q = carry_configuration(scene, fetch.arm, hand_rotation(tilt_rad, 0.0, 1.0), model.stowed_rad)
+    scene = ArmScene(FETCH, FETCH_MODEL, LIFT)
+    q = carry_configuration(scene, FETCH.arm, hand_rotation(tilt_rad, 0.0, 1.0), FETCH_MODEL.stowed_rad)
     assert scene.beyond_body_m(q)[1] < 0.04  # 0.14 where nothing is said about it
 
 
@@ -74,11 +73,10 @@ def test_an_object_that_hangs_below_the_fingers_is_carried_hanging(tilt_rad):
 
 
 def test_an_object_that_cannot_be_drawn_in_is_refused():
-    fetch, model = fetch_capabilities(), arm_model(fetch_capabilities())
-    scene = ArmScene(fetch, model, {})
+    scene = ArmScene(FETCH, FETCH_MODEL, {})
     scene.set_boxes([Box(RigidTransform([0.4, 0.0, 0.6]), (0.3, 1.5, 0.8))])
     with pytest.raises(PlanningError, match="cannot be drawn in"):
-        tucked_configuration(scene, fetch.arm, hand_rotation(0.0, 0.0, 1.0), model.stowed_rad)
+        tucked_configuration(scene, FETCH.arm, hand_rotation(0.0, 0.0, 1.0), FETCH_MODEL.stowed_rad)
 
 
 def test_a_tall_object_is_seen_from_further_back_first():

@@ -24,6 +24,14 @@ def test_every_solution_puts_the_hand_where_it_was_within_the_limits():
             assert MODEL.within_limits(found)
 
 
+def test_joints_that_turn_without_end_come_within_half_a_turn_of_where_they_are():
+    q = configurations(1)[0]
+    turned = q + 2.0 * np.pi * np.array([0, 0, 1, 0, -2, 0, 3])
+    assert MODEL.turned_near(q, turned) == pytest.approx(turned)
+    assert MODEL.off_rad(q, turned) == pytest.approx(0.0, abs=1e-9)
+    assert np.allclose(MODEL.nearest_inverse(MODEL.X_BH(q), turned, 0.0), turned, atol=1e-6)
+
+
 def test_nine_of_ten_reachable_poses_have_a_solution_and_all_have_one_near_their_own():
     qs = configurations(200)
     found = [bool(MODEL.inverse(MODEL.X_BH(q), margin_rad=0.0)) for q in qs]
@@ -36,11 +44,3 @@ def test_a_pose_with_solutions_is_reached_and_a_far_one_is_not():
     assert MODEL.reaches(X_BH, 0.0) == bool(MODEL.inverse(X_BH, 0.0))
     assert not MODEL.reaches(RigidTransform([2.0, 0.0, 0.3]))
     assert MODEL.inverse(RigidTransform([2.0, 0.0, 0.3])) == ()
-
-
-def test_joints_that_turn_without_end_come_within_half_a_turn_of_where_they_are():
-    q = configurations(1)[0]
-    turned = q + 2.0 * np.pi * np.array([0, 0, 1, 0, -2, 0, 3])
-    assert MODEL.turned_near(q, turned) == pytest.approx(turned)
-    assert MODEL.off_rad(q, turned) == pytest.approx(0.0, abs=1e-9)
-    assert np.allclose(MODEL.nearest_inverse(MODEL.X_BH(q), turned, 0.0), turned, atol=1e-6)

@@ -61,15 +61,21 @@ def test_a_removed_object_is_forgotten_once_the_camera_sees_past_it():
     assert inside(solid_boxes(cells, BODY, 2.0, nothing_of), (1.2, 0.2, TABLE.height_m - 0.005))
 
 
+def test_boxes_of_chosen_cells_have_nothing_behind_them():
+    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
+    cells = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
+    boxes = boxes_around(cells, BODY, lambda p: p[:, 2] > 0.85)
+    assert inside(boxes, (0.97, 0.0, 0.9))
+    assert not inside(boxes, (1.15, 0.0, 0.9))
+
+
 def test_points_within_the_robots_outline_are_not_solid():
     can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
     own = Outline(RigidTransform([0.9, 0.1, 0.5]), np.array([0.0, -0.2]), np.array([0.2, 0.0]))
     everything = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
     rest = add_picture(NOTHING, picture(can), RigidTransform(), own)
-    middles = (everything + 0.5) * CELL_M
-    assert own.holds(middles).any()
-    kept = {tuple(cell) for cell in rest.tolist()}
-    assert kept < {tuple(cell) for cell in everything.tolist()}
+    assert own.holds((everything + 0.5) * CELL_M).any()
+    assert {tuple(cell) for cell in rest.tolist()} < {tuple(cell) for cell in everything.tolist()}
     assert not inside(solid_boxes(rest, BODY, 2.0, nothing_of), (0.97, 0.0, 0.9))
 
 
@@ -81,8 +87,7 @@ def test_excluded_cells_are_not_solid():
 
 
 def test_merged_boxes_cover_exactly_the_cells():
-    rng = np.random.default_rng(3)
-    cells = np.unique(rng.integers(-3, 4, (90, 3)), axis=0)
+    cells = np.unique(np.random.default_rng(3).integers(-3, 4, (90, 3)), axis=0)
     covered = [
         (x, y, z)
         for low, high in merge_cells(cells)
@@ -115,14 +120,6 @@ def test_only_the_last_views_are_stored():
     assert len(views) == 32
 
 
-def test_boxes_of_chosen_cells_have_nothing_behind_them():
-    can = Can(1.0, 0.0, 0.04, 0.3, (190, 15, 20))
-    cells = add_picture(NOTHING, picture(can), RigidTransform(), NOTHING_OWN)
-    boxes = boxes_around(cells, BODY, lambda p: p[:, 2] > 0.85)
-    assert inside(boxes, (0.97, 0.0, 0.9))
-    assert not inside(boxes, (1.15, 0.0, 0.9))
-
-
 def grid_of(*rectangles):
     """A grid of 2 m x 2 m with occupied rectangles (x0, y0, x1, y1) in m."""
     occupied = np.zeros((80, 80), dtype=bool)
@@ -142,8 +139,7 @@ DESK = Surface("desk", ((0.2, 1.0), (1.2, 1.0), (1.2, 1.6), (0.2, 1.6)), 0.75)
 
 def shows_wall(columns, *rectangle):
     (x0, y0, x1, y1), middles = rectangle, (columns + 0.5) * CELL_M
-    inner = (middles > (x0 - 0.03, y0 - 0.03)) & (middles < (x1 + 0.03, y1 + 0.03))
-    return bool(np.any(np.all(inner, axis=1)))
+    return bool(np.any(np.all((middles > (x0 - 0.03, y0 - 0.03)) & (middles < (x1 + 0.03, y1 + 0.03)), axis=1)))
 
 
 def test_walls_are_what_all_grids_show():
@@ -164,8 +160,7 @@ def test_the_edges_of_surfaces_and_single_posts_are_no_walls():
 
 
 def test_a_wall_is_solid_at_all_heights_of_the_arm_within_its_reach():
-    columns = wall_columns([grid_of(WALL)], ())
-    boxes = wall_boxes(columns, BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
+    boxes = wall_boxes(wall_columns([grid_of(WALL)], ()), BODY, 1.0, lambda p_W: p_W[:, 0] < 0.4)
     assert inside(boxes, (0.6, 0.05, 0.3))
     assert inside(boxes, (0.6, 0.05, 1.8))
     assert not inside(boxes, (0.2, 0.05, 1.0))

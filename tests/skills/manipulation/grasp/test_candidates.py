@@ -6,7 +6,7 @@ import pytest
 from plant.robots.fetch.kind import fetch_capabilities
 from plant.robots.spot.kind import spot_capabilities
 from skills.manipulation.arm.kinematics import arm_model
-from skills.manipulation.grasp.candidates import GraspCandidate, grasp_candidates
+from skills.manipulation.grasp.candidates import grasp_candidates
 from skills.manipulation.grasp.placements import Target
 from skills.manipulation.grasp.planning import within_reach
 
@@ -19,8 +19,7 @@ def _target(length, width, height, *, is_round=False, yaw=0.0, points=None, base
     if points is None:
         s, t = np.meshgrid(np.linspace(-0.5, 0.5, 60), np.linspace(-0.5, 0.5, 20))
         points = np.column_stack([s.ravel() * length, t.ravel() * width])
-    turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
-    xy = points @ turn + [x, 0.0]
+    xy = points @ np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]]) + [x, 0.0]
     cloud = np.column_stack([xy, np.full(len(xy), base + height)])
     return Target(cloud, (x, 0.0), yaw, length, width, height, base, is_round)
 
@@ -43,8 +42,12 @@ def _found(target):
     return grasp_candidates(target, MODEL.p_BS, GRIPPER)
 
 
+def _can(height_m=0.115, **how):
+    return _target(0.066, 0.066, height_m, is_round=True, **how)
+
+
 def test_a_can_is_taken_from_the_side_with_the_wrist_rolled():
-    best = grasp_candidates(_target(0.066, 0.066, 0.115, is_round=True), MODEL.p_BS, GRIPPER)[0]
+    best = _found(_can())[0]
     R = best.X_BH.rotation().matrix()
     assert abs(R[2, 2]) < 1e-9  # the gripper closes level
     assert R[0, 0] > 0.9  # the fingers point ahead
@@ -52,17 +55,16 @@ def test_a_can_is_taken_from_the_side_with_the_wrist_rolled():
 
 
 def test_the_can_lies_between_palm_and_fingertips_and_clear_of_the_fixed_gripper():
-    gripper = GRIPPER
-    best = grasp_candidates(_target(0.066, 0.066, 0.115, is_round=True), MODEL.p_BS, GRIPPER)[0]
+    best = _found(_can())[0]
     p_HT = best.X_BH.inverse() @ np.array([0.85, 0.0, 0.2 + 0.06])
-    assert gripper.palm_x_m + 0.033 < p_HT[0] < gripper.tip_x_m - 0.033
-    assert p_HT[2] - 0.033 > gripper.fixed_z_m + 0.005
+    assert GRIPPER.palm_x_m + 0.033 < p_HT[0] < GRIPPER.tip_x_m - 0.033
+    assert p_HT[2] - 0.033 > GRIPPER.fixed_z_m + 0.005
 
 
 # height -> the fingers can take it from above, too, with the palm over its top and the tips clear of the surface
 @pytest.mark.parametrize("height_m", [0.08, 0.115, 0.24])
 def test_an_upright_object_can_be_taken_from_above(height_m):
-    found = grasp_candidates(_target(0.066, 0.066, height_m, is_round=True), MODEL.p_BS, GRIPPER)
+    found = _found(_can(height_m))
     above = [each for each in found if each.X_BH.rotation().matrix()[2, 0] < -0.999]
     assert above
     assert above[0].cost > found[0].cost
@@ -74,8 +76,7 @@ def test_an_upright_object_can_be_taken_from_above(height_m):
 
 @pytest.mark.parametrize("yaw", [0.0, 0.8, 1.57, 2.5])
 def test_a_hammer_is_taken_across_its_handle(yaw):
-    candidates = grasp_candidates(_hammer(yaw), MODEL.p_BS, GRIPPER)
-    best = candidates[0]
+    best = _found(_hammer(yaw))[0]
     closing = best.X_BH.rotation().matrix()[:, 2]
     assert best.width_m < 0.04
     assert abs(closing @ [np.cos(yaw), np.sin(yaw), 0.0]) < 0.1
@@ -99,7 +100,7 @@ def test_fingers_do_not_close_on_the_round_jaws_of_a_wrench():
     assert best.width_m < 0.03
 
 
-def _tips_m(candidate: GraspCandidate, base_m: float, beside_m: float) -> list[float]:
+def _tips_m(candidate, base_m, beside_m):
     """How high over the surface the ends of the fixed finger and of the moving one at the object are."""
     fixed = (GRIPPER.fixed_tip_x_m, GRIPPER.fixed_z_m)
     moving = (GRIPPER.tip_x_m - 0.004, GRIPPER.fixed_z_m + candidate.width_m + beside_m)
@@ -113,13 +114,13 @@ def _tips_m(candidate: GraspCandidate, base_m: float, beside_m: float) -> list[f
     [(_hammer(0.6), 0.017, 0.003), (_target(0.05, 0.05, 0.05), 0.017, 0.003), (_wrench(0.3), 0.012, 0.001)],
 )
 def test_fingertips_keep_off_the_surface(target, beside_m, least_m):
-    for candidate in grasp_candidates(target, MODEL.p_BS, GRIPPER):
+    for candidate in _found(target):
         assert min(_tips_m(candidate, target.base_m, beside_m)) > least_m - 1e-6
 
 
 def test_a_thin_object_is_held_by_fingers_that_end_level():
     # 9.6 mm: straight from above the fixed finger, 11 mm shorter than the other can be, would pass over it
-    found = grasp_candidates(_wrench(0.3), MODEL.p_BS, GRIPPER)
+    found = _found(_wrench(0.3))
     assert found
     for candidate in found:
         assert max(_tips_m(candidate, _wrench(0.3).base_m, 0.012)) < 0.0096 - 0.003
@@ -140,18 +141,21 @@ def _screwdriver():
 
 
 def test_a_screwdriver_is_held_by_its_handle_with_no_finger_beyond_the_end():
-    best = _found(_screwdriver())[0]
-    along_m = (best.X_BH @ np.array([GRIPPER.tip_x_m, 0.0, 0.0]))[0] - 0.85
+    along_m = (_found(_screwdriver())[0].X_BH @ np.array([GRIPPER.tip_x_m, 0.0, 0.0]))[0] - 0.85
     assert 0.03 < along_m < 0.11 - 0.03 + 0.001
 
 
 def test_nobody_takes_a_sheet_of_paper():
-    assert grasp_candidates(_target(0.25, 0.02, 0.002), MODEL.p_BS, GRIPPER) == []
+    assert _found(_target(0.25, 0.02, 0.002)) == []
+
+
+def test_an_object_wider_than_the_gripper_has_no_candidates():
+    assert _found(_target(0.25, 0.2, 0.05)) == []
 
 
 def test_a_finger_that_would_touch_at_one_end_of_its_breadth_only_is_no_grasp():
     # a hammer's head, 35 mm along the handle, is wide over less than half of what a finger covers
-    assert all(candidate.width_m < 0.05 for candidate in grasp_candidates(_hammer(0.6), MODEL.p_BS, GRIPPER))
+    assert all(candidate.width_m < 0.05 for candidate in _found(_hammer(0.6)))
 
 
 @pytest.mark.parametrize("head_m", [0.08, 0.1, 0.11])
@@ -167,19 +171,15 @@ def test_an_object_shorter_than_the_fingers_are_broad_is_taken(length_m):
     assert _found(_target(length_m, length_m, length_m))
 
 
-def test_an_object_wider_than_the_gripper_has_no_candidates():
-    assert grasp_candidates(_target(0.25, 0.2, 0.05), MODEL.p_BS, GRIPPER) == []
-
-
 def test_candidates_come_best_first():
-    costs = [candidate.cost for candidate in grasp_candidates(_hammer(0.3), MODEL.p_BS, GRIPPER)]
+    costs = [candidate.cost for candidate in _found(_hammer(0.3))]
     assert costs == sorted(costs)
 
 
 def test_a_can_ahead_is_within_reach_and_one_across_the_room_is_not():
-    near, far = (_target(0.066, 0.066, 0.115, is_round=True, x=x) for x in (0.9, 2.0))
-    assert any(within_reach(MODEL, candidate, UP) for candidate in grasp_candidates(near, MODEL.p_BS, GRIPPER))
-    assert not any(within_reach(MODEL, candidate, UP) for candidate in grasp_candidates(far, MODEL.p_BS, GRIPPER))
+    near, far = (_can(x=x) for x in (0.9, 2.0))
+    assert any(within_reach(MODEL, candidate, UP) for candidate in _found(near))
+    assert not any(within_reach(MODEL, candidate, UP) for candidate in _found(far))
 
 
 def _by_two_fingers(target):
@@ -187,12 +187,15 @@ def _by_two_fingers(target):
 
 
 def test_two_fingers_close_about_the_middle_of_a_can():
-    can = _target(0.066, 0.066, 0.115, is_round=True)
-    best = _by_two_fingers(can)[0]
+    best = _by_two_fingers(_can())[0]
     x, _, z = best.X_BH.inverse() @ np.array([0.85, 0.0, 0.2 + 0.06])
     assert abs(best.X_BH.rotation().matrix()[2, 2]) < 1e-9  # the gripper closes level
     assert z == pytest.approx(0.0, abs=1e-9)
     assert TWO_FINGERS.palm_x_m + 0.033 < x < TWO_FINGERS.tip_x_m + 0.01
+
+
+def test_an_object_as_wide_as_the_open_fingers_is_not_taken():
+    assert _by_two_fingers(_target(0.12, TWO_FINGERS.max_grasp_m + 0.01, 0.12)) == []
 
 
 # object -> both fingertips end as high over the surface, under the object's top
@@ -205,7 +208,3 @@ def test_two_fingers_straight_from_above_end_level_at_a_lying_object(target):
         one, other = ((each.X_BH @ [TWO_FINGERS.tip_x_m, 0.0, z])[2] - target.base_m for z in (half_m, -half_m))
         assert one == pytest.approx(other, abs=1e-6)
         assert 0.0 < one < target.height_m
-
-
-def test_an_object_as_wide_as_the_open_fingers_is_not_taken():
-    assert _by_two_fingers(_target(0.12, TWO_FINGERS.max_grasp_m + 0.01, 0.12)) == []

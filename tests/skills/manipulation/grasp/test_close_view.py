@@ -31,8 +31,11 @@ def test_of_two_touching_objects_the_seen_one_is_the_target_and_the_other_an_obs
 def test_a_tall_object_is_seen_up_to_its_top():
     seen = ObjectObservation(0.0, ObjectKind("thing"), (1.0, 0.0, 1.05), (0.16, 0.16, 0.6), 0.0, 0.7, "table")
     image = scene([Can(1.0, 0.0, 0.04, 0.6, GREEN)], X_WC=camera_pose(np.array([0.1, 0.0, 1.5]), [1.0, 0.0, 1.0]))
-    view = examine(image, RigidTransform(), TABLE, seen, PLACE, (), 0.12)
-    assert view.target.height_m > 0.55
+    assert examine(image, RigidTransform(), TABLE, seen, PLACE, (), 0.12).target.height_m > 0.55
+
+
+def test_a_missing_object_is_not_seen():
+    assert examined([], ONE) is None
 
 
 def test_a_neighbour_is_reported_with_its_position_and_size():
@@ -43,10 +46,6 @@ def test_a_neighbour_is_reported_with_its_position_and_size():
     assert z == pytest.approx(TABLE.height_m + 0.5 * other.seen.size_m[2], abs=0.01)
     assert other.seen.size_m == pytest.approx((0.066, 0.066, 0.115), abs=0.015)
     assert p_WB + other.centre_B == pytest.approx(other.seen.position_W, abs=0.02)
-
-
-def test_a_missing_object_is_not_seen():
-    assert examined([], ONE) is None
 
 
 def test_a_wall_beside_the_object_is_an_obstacle_and_no_object_in_the_way():

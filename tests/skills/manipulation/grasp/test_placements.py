@@ -46,12 +46,6 @@ def _height_m(candidate):
     return float((candidate.X_BH @ np.array([GRIPPER.grip_x_m, 0.0, 0.0]))[2]) - BASE_M
 
 
-def test_a_bottle_that_is_too_wide_for_the_gripper_is_taken_by_its_neck():
-    best = _best(_big_bottle())
-    assert best.width_m == pytest.approx(0.03, abs=0.004)
-    assert _height_m(best) > 0.19
-
-
 def test_the_palm_stays_before_the_body_when_the_fingers_take_the_neck():
     found = [each for each in grasp_candidates(_big_bottle(), P_BS, GRIPPER) if each.tilt_rad == 0.0]
     beside_body = [each for each in found if _height_m(each) < 0.23]
@@ -62,11 +56,6 @@ def test_the_palm_stays_before_the_body_when_the_fingers_take_the_neck():
         assert palm_m < -0.07
 
 
-def test_a_slim_bottle_is_still_taken_by_its_body():
-    slim = _target(_drum(0.03, 0.0, 0.15), _drum(0.012, 0.15, 0.23), width_m=0.06, height_m=0.23)
-    assert _best(slim).width_m == pytest.approx(0.06, abs=0.004)
-
-
 def test_the_round_top_of_a_bottle_alone_costs_more_than_a_grasp_that_reaches_its_shoulder():
     bottle = _target(_drum(0.033, 0.0, 0.14), _drum(0.014, 0.14, 0.22), width_m=0.066, height_m=0.22)
     above = [each for each in placements(bottle, P_BS, 0.0) if each.below_top_m]
@@ -74,11 +63,29 @@ def test_the_round_top_of_a_bottle_alone_costs_more_than_a_grasp_that_reaches_it
     assert min(top) > max(deeper)
 
 
+def test_a_handle_beside_the_middle_costs_more_the_farther_it_is():
+    tank, handle = _drum(0.08, 0.0, 0.25), _bar(0.16, 0.02, 0.27, 0.30)
+    found = placements(_target(tank, handle, width_m=0.16, height_m=0.30), P_BS, 0.0)
+    above = sorted((each for each in found if each.below_top_m), key=lambda each: each.cost)
+    assert above[0].lever_m < above[-1].lever_m
+
+
 def test_a_tank_with_a_hose_beside_it_is_taken_below_the_hose():
     tank, hose = _drum(0.045, 0.0, 0.30), _drum(0.012, 0.1, 0.30) + [0.0, 0.06, 0.0]
     best = _best(_target(tank, hose, width_m=0.12, height_m=0.30))
     assert best.width_m == pytest.approx(0.09, abs=0.006)
     assert _height_m(best) < 0.1
+
+
+def test_a_bottle_that_is_too_wide_for_the_gripper_is_taken_by_its_neck():
+    best = _best(_big_bottle())
+    assert best.width_m == pytest.approx(0.03, abs=0.004)
+    assert _height_m(best) > 0.19
+
+
+def test_a_slim_bottle_is_still_taken_by_its_body():
+    slim = _target(_drum(0.03, 0.0, 0.15), _drum(0.012, 0.15, 0.23), width_m=0.06, height_m=0.23)
+    assert _best(slim).width_m == pytest.approx(0.06, abs=0.004)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.7, 1.5])
@@ -91,15 +98,12 @@ def test_a_wide_tank_is_taken_from_above_by_its_handle(yaw):
     assert best.lever_m < 0.05
 
 
-def test_a_handle_beside_the_middle_costs_more_the_farther_it_is():
-    tank, handle = _drum(0.08, 0.0, 0.25), _bar(0.16, 0.02, 0.27, 0.30)
-    found = placements(_target(tank, handle, width_m=0.16, height_m=0.30), P_BS, 0.0)
-    above = sorted((each for each in found if each.below_top_m), key=lambda each: each.cost)
-    assert above[0].lever_m < above[-1].lever_m
-
-
 def test_an_object_that_is_wide_over_all_its_height_has_no_placement_for_the_gripper():
     assert grasp_candidates(_target(_drum(0.08, 0.0, 0.3), width_m=0.16, height_m=0.3), P_BS, GRIPPER) == []
+
+
+def test_a_plate_has_no_rim_that_a_finger_enters():
+    assert grasp_candidates(_bowl(0.02), P_BS, GRIPPER) == []
 
 
 def _bowl(depth_m, *, radius_m=0.08, height_m=0.055):
@@ -117,7 +121,3 @@ def test_a_bowl_is_taken_by_its_rim_with_one_finger_inside():
     assert best.width_m < 0.03
     assert np.linalg.norm(rim) == pytest.approx(0.072, abs=0.01)
     assert abs(R[:2, 2] @ rim) > 0.95 * np.linalg.norm(rim)  # the gripper closes along the radius
-
-
-def test_a_plate_has_no_rim_that_a_finger_enters():
-    assert grasp_candidates(_bowl(0.02), P_BS, GRIPPER) == []

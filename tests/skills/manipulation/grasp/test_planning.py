@@ -41,14 +41,23 @@ def _why(*args, **kwargs):
 
 
 def test_out_of_reach_says_how_far():
-    why = _why(x=1.9)
-    assert why == "the beer is out of reach: 1.61 m from the shoulder, and the arm reaches 0.98 m"
+    assert _why(x=1.9) == "the beer is out of reach: 1.61 m from the shoulder, and the arm reaches 0.98 m"
 
 
 def test_of_two_others_the_one_that_stands_before_it_is_named():
     assert (
         _why((_obstacle("coke", 0.74, 0.0, width=0.5), _obstacle("cube", 0.85, 0.6))) == "the beer is behind the coke"
     )
+
+
+def test_a_close_object_behind_is_too_near():
+    wall = _obstacle("box", 0.87, 0.0, width=0.5)
+    assert _why((wall,)) == "the beer is too near the box"
+
+
+def test_an_obstacle_that_is_no_object_is_not_named():
+    wall = _obstacle("wall", 0.74, 0.0, width=0.5)
+    assert "would touch something" in _why((_obstacle("cube", 0.85, 0.6),), boxes=wall.boxes)
 
 
 def test_the_refusal_returns_the_objects_in_the_way_as_they_were_seen():
@@ -63,16 +72,6 @@ def test_of_two_objects_in_the_way_the_nearest_comes_first():
 
 def test_without_an_object_in_the_way_none_is_returned():
     assert _refused(x=1.9).outputs == {}
-
-
-def test_a_close_object_behind_is_too_near():
-    wall = _obstacle("box", 0.87, 0.0, width=0.5)
-    assert _why((wall,)) == "the beer is too near the box"
-
-
-def test_an_obstacle_that_is_no_object_is_not_named():
-    wall = _obstacle("wall", 0.74, 0.0, width=0.5)
-    assert "would touch something" in _why((_obstacle("cube", 0.85, 0.6),), boxes=wall.boxes)
 
 
 def test_the_cause_of_no_grasp_is_sought_among_a_bounded_number_of_candidates():

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from scripted_robot import CAPABILITIES, GRIPPER, MODEL
+from table_robot import CAPABILITIES, GRIPPER, MODEL
 
 from skills.api import ObjectKind, ObjectObservation, Surface
 from skills.manipulation.arm.collision import ArmScene, Box
@@ -45,16 +45,14 @@ def test_a_body_of_one_height_has_one():
     assert body_heights_m(0.0, fixed) == (0.52,)
 
 
-def _check(boxes):
-    return ReachCheck(
-        ArmScene(CAPABILITIES, MODEL, {}), boxes, HERE.transform(USUAL_M), CAN, CANDIDATES, GRIPPER.widest
-    )
-
-
 def test_a_can_that_stands_free_is_reached_from_the_usual_height_and_no_other_is_looked_at():
-    heights_m = (USUAL_M, LOW_M, HIGH_M)
-    found = _check(()).all(HERE.transform, heights_m)
+    found = _check(()).all(HERE.transform, (USUAL_M, LOW_M, HIGH_M))
     assert [reached.height_m for reached in found] == [USUAL_M]
+
+
+def test_boxes_stay_where_they_are_in_the_world_when_the_body_stands_elsewhere():
+    wall = Box(RigidTransform([0.7, 0.0, 0.2]), (0.04, 2.0, 2.0))
+    assert _check([wall]).best(Pose2D(1.75, 0.0, np.pi).transform, (USUAL_M,)) is not None
 
 
 def test_a_can_behind_a_wall_is_not_reached():
@@ -62,10 +60,10 @@ def test_a_can_behind_a_wall_is_not_reached():
     assert _check([wall]).best(HERE.transform, (USUAL_M, LOW_M, HIGH_M)) is None
 
 
-def test_boxes_stay_where_they_are_in_the_world_when_the_body_stands_elsewhere():
-    wall = Box(RigidTransform([0.7, 0.0, 0.2]), (0.04, 2.0, 2.0))
-    beyond = Pose2D(1.75, 0.0, np.pi)
-    assert _check([wall]).best(beyond.transform, (USUAL_M,)) is not None
+def _check(boxes):
+    return ReachCheck(
+        ArmScene(CAPABILITIES, MODEL, {}), boxes, HERE.transform(USUAL_M), CAN, CANDIDATES, GRIPPER.widest
+    )
 
 
 def test_the_space_about_an_object_holds_it_and_a_band_of_its_surface():
@@ -94,8 +92,7 @@ def test_an_upright_object_counts_as_square_to_the_fingers_of_a_slightly_tilted_
 def test_a_grasp_beside_a_neighbour_is_a_last_choice_but_a_choice():
     wall = Box(RigidTransform([0.7, 0.0, 0.2]), (0.04, 2.0, 2.0))
     free = _check(()).best(HERE.transform, (USUAL_M,))
-    beside = replace(_check(()), beside=[wall]).best(HERE.transform, (USUAL_M,))
-    assert beside.cost > free.cost + 0.5
+    assert replace(_check(()), beside=[wall]).best(HERE.transform, (USUAL_M,)).cost > free.cost + 0.5
 
 
 def test_the_arm_at_the_best_grasp_goes_from_the_shoulder_to_the_object():

@@ -1,8 +1,6 @@
-"""Tests of the reasons for refusing an object."""
-
 import numpy as np
 import pytest
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed
+from table_robot import MODEL, TableRobot, context_of, failed
 
 from plant.robots.spot.kind import spot_capabilities
 from skills.api import Cause, ObjectKind, ObjectObservation
@@ -25,7 +23,7 @@ def seen(name, size_m):
 
 
 def test_a_class_whose_lightest_is_too_heavy_is_refused_before_the_arm_moves():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     why = "the person weighs 9.0 kg at least, and the arm carries 5.0 kg at most"
     failed(Grasp(context_of(robot)), GraspInputs(seen("person", LARGE)), Cause.PRECONDITION, why)
     assert robot.arm_commands == []

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform
-from scripted_robot import MODEL
+from table_robot import MODEL
 from table_scene import GREEN, TABLE, Can, scene
 
 from skills.manipulation.arm.poses import camera_pose
@@ -48,11 +48,9 @@ def test_a_can_that_was_pushed_is_seen_where_it_is(X_BC, moved_m, seen_m):
 
 
 def test_an_object_too_near_for_depth_is_seen_by_its_outline():
-    now = replace(CAN, y=0.02)
-    image = scene([now], X_WC=AHEAD)
+    image = scene([replace(CAN, y=0.02)], X_WC=AHEAD)
     image = replace(image, depth_m=np.where(image.depth_m < 0.3, 0.0, image.depth_m).astype(np.float32))
-    found = measure_shift(target_of(CAN), image, AHEAD)
-    assert found.offset_B == pytest.approx([0.0, 0.02, 0.0], abs=0.006)
+    assert measure_shift(target_of(CAN), image, AHEAD).offset_B == pytest.approx([0.0, 0.02, 0.0], abs=0.006)
 
 
 @pytest.mark.parametrize("X_BC", [AHEAD, ABOVE])
@@ -63,13 +61,11 @@ def test_the_outline_of_a_missing_can_hardly_overlaps(X_BC):
 def test_an_empty_picture_gives_no_shift():
     image = scene([CAN], X_WC=ABOVE)
     blind = replace(image, depth_m=np.zeros_like(image.depth_m))
-    steep = camera_pose(MIDDLE + [0.0, 0.01, 0.12], MIDDLE)
-    assert measure_shift(target_of(CAN), blind, steep) is None
+    assert measure_shift(target_of(CAN), blind, camera_pose(MIDDLE + [0.0, 0.01, 0.12], MIDDLE)) is None
 
 
 def test_a_neighbour_is_not_taken_for_the_object():
-    beside = Can(1.0, 0.12, 0.033, 0.115, GREEN)
-    found = measure_shift(target_of(CAN), scene([CAN, beside], X_WC=AHEAD), AHEAD)
+    found = measure_shift(target_of(CAN), scene([CAN, Can(1.0, 0.12, 0.033, 0.115, GREEN)], X_WC=AHEAD), AHEAD)
     assert found.offset_B == pytest.approx(np.zeros(3), abs=0.006)
 
 

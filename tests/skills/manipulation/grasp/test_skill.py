@@ -1,12 +1,12 @@
 """Tests of failures of the grasp skill."""
 
 import numpy as np
+import pytest
 from pydrake.math import RigidTransform
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+from table_robot import MODEL, TableRobot, context_of, failed, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation, PlanningError, Running, Succeeded
 from skills.manipulation.grasp.skill import Grasp, GraspInputs
-from skills.robot import CommandState, CommandStatus
 
 SEEN = GraspInputs(
     ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.76), (0.066, 0.066, 0.115), 0.0, 1.0, "table")
@@ -14,41 +14,37 @@ SEEN = GraspInputs(
 BEER = ObjectObservation(0.0, ObjectKind("beer"), (0.8, 0.0, 0.8), (0.066, 0.066, 0.2), 0.0, 1.0, "table")
 
 
-def test_a_full_gripper_is_a_failed_precondition():
-    robot = ScriptedRobot(holding=True, opening=0.3)
-    failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "holds something already")
-    assert robot.arm_commands == []
-
-
 def test_a_missing_object_is_a_failed_precondition_and_the_arm_is_stowed():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "no longer where it was seen")
-    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
+    assert np.allclose(robot.q_rad, MODEL.stowed_rad, atol=1e-6)
     assert robot.opening == 0.0
 
 
 def test_a_refused_arm_is_a_failed_execution_with_the_robots_reason():
-    refused = CommandStatus(CommandState.REFUSED, "the arm is out of order")
-    robot = ScriptedRobot(arm_answers=dict.fromkeys(range(1, 99), refused))
+    robot = TableRobot(refuse_because={"move_arm": "the arm is out of order"})
     failed(Grasp(context_of(robot)), SEEN, Cause.EXECUTION, "the arm is out of order")
 
 
+def test_a_full_gripper_is_a_failed_precondition():
+    robot = TableRobot(holding=True, opening=0.3)
+    failed(Grasp(context_of(robot)), SEEN, Cause.PRECONDITION, "holds something already")
+    assert robot.arm_commands == []
+
+
 def test_a_second_attempt_starts_again():
-    robot = ScriptedRobot(holding=True, opening=0.3)
+    robot = TableRobot(holding=True, opening=0.3)
     skill = Grasp(context_of(robot))
     failed(skill, SEEN, Cause.PRECONDITION, "holds something already")
-    robot.holding, robot.opening = False, 0.0
+    robot.in_gripper_rad, robot.opening = None, 0.0
     failed(skill, SEEN, Cause.PRECONDITION, "no longer where it was seen")
 
 
 def test_after_a_failure_the_body_stands_at_its_usual_height():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     high = GraspInputs(ObjectObservation(0.0, ObjectKind("coke"), (0.9, 0.0, 0.96), (0.066, 0.066, 0.115), 0.0, 1.0))
-    heights = []
-    stand = robot.stand
-    robot.stand = lambda height_m, *args, **kwargs: heights.append(height_m) or stand(height_m, *args, **kwargs)
     failed(Grasp(context_of(robot)), high, Cause.PRECONDITION, "no longer where it was seen")
-    assert heights[0] > 0.55
+    assert robot.commanded("stand")[0][0] > 0.55
     assert robot.height_m == 0.52
 
 
@@ -65,15 +61,15 @@ class Heavy(Grasp):
 
 
 def test_an_object_that_is_too_heavy_is_set_down_and_refused_with_its_mass():
-    robot = ScriptedRobot(q=np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening=0.3)
-    before = MODEL.X_BH(robot.q).translation()
+    robot = TableRobot(np.array([0.0, -1.6, 1.6, 0.0, 0.4, 0.0]), holding=True, opening=0.3)
+    before = MODEL.X_BH(robot.q_rad).translation()
     why = "the coke weighs 5.6 kg, and the arm carries 5.0 kg at most"
     failed(Heavy(context_of(robot), 5.6), SEEN, Cause.PRECONDITION, why)
-    assert (MODEL.X_BH(robot.q).translation() - before)[2] < -0.09
+    assert (MODEL.X_BH(robot.q_rad).translation() - before)[2] < -0.09
 
 
 def test_an_object_that_the_arm_can_carry_is_not_set_down():
-    robot = ScriptedRobot(holding=True, opening=0.3)
+    robot = TableRobot(holding=True, opening=0.3)
     skill = Heavy(context_of(robot), 4.9)
     skill.begin(SEEN)
     assert isinstance(skill.step(), Succeeded)
@@ -97,11 +93,11 @@ class Touching(Grasp):
 
 def test_fingers_do_not_close_where_something_stopped_them_well_before_the_object():
     why = "the hand touched something 6 cm before it was about the coke"
-    failed(Touching(context_of(ScriptedRobot()), 0.06), SEEN, Cause.EXECUTION, why)
+    failed(Touching(context_of(TableRobot()), 0.06), SEEN, Cause.EXECUTION, why)
 
 
 def test_fingers_close_where_they_touch_the_surface_a_little_early():
-    assert isinstance(outcome(Touching(context_of(ScriptedRobot()), 0.01), SEEN), Succeeded)
+    assert isinstance(outcome(Touching(context_of(TableRobot()), 0.01), SEEN), Succeeded)
 
 
 def resumed(skill, inputs):
@@ -114,7 +110,7 @@ def resumed(skill, inputs):
 
 
 def test_an_object_held_after_a_restart_is_not_taken_again():
-    robot = ScriptedRobot(holding=True, opening=0.3, gripper_stops_rad=0.3)
+    robot = TableRobot(holding=True, opening=0.3)
     step = resumed(Grasp(context_of(robot)), SEEN)
     assert isinstance(step, Succeeded), step
     assert step.message == "the coke was in the gripper already; holding it"
@@ -122,18 +118,14 @@ def test_an_object_held_after_a_restart_is_not_taken_again():
 
 
 def test_after_a_restart_with_an_empty_gripper_the_robot_looks_before_it_takes():
-    robot = ScriptedRobot()
-    step = resumed(Grasp(context_of(robot)), SEEN)
+    step = resumed(Grasp(context_of(TableRobot())), SEEN)
     assert isinstance(step, Failed)
     assert "no longer where it was seen" in step.message
 
 
-def test_a_lost_object_undoes_the_grasp():
-    robot = ScriptedRobot()
-    skill = Grasp(context_of(robot))
-    assert skill.undone(SEEN) == "the coke is not in the gripper"
-    robot.holding = True
-    assert skill.undone(SEEN) is None
+@pytest.mark.parametrize(("holding", "why"), [(False, "the coke is not in the gripper"), (True, None)])
+def test_a_lost_object_undoes_the_grasp(holding, why):
+    assert Grasp(context_of(TableRobot(holding=holding))).undone(SEEN) == why
 
 
 class Behind(Grasp):
@@ -147,10 +139,10 @@ class Behind(Grasp):
 
 
 def test_a_failure_to_plan_returns_the_objects_in_the_way():
-    step = outcome(Behind(context_of(ScriptedRobot())), SEEN)
+    step = outcome(Behind(context_of(TableRobot())), SEEN)
     assert (step.cause, step.message) == (Cause.PLANNING, "the coke is behind the beer")
     assert step.outputs == {"tried": (), "in_the_way": (BEER,)}
 
 
 def test_another_failure_returns_that_no_object_is_in_the_way():
-    assert outcome(Grasp(context_of(ScriptedRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}
+    assert outcome(Grasp(context_of(TableRobot())), SEEN).outputs == {"tried": (), "in_the_way": ()}

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
-from scripted_robot import GRIPPER, MODEL, ScriptedRobot, context_of, outcome
+from table_robot import GRIPPER, MODEL, TableRobot, context_of, outcome
 
 from skills.api import Cause, Failed, ObjectKind, ObjectObservation
 from skills.manipulation.grasp.candidates import grasp_candidates
@@ -86,7 +86,7 @@ def test_a_failed_grasp_returns_its_try_and_the_next_attempt_takes_another():
     seen = ObjectObservation(0.0, ObjectKind("hammer"), (0.85, 0.0, 0.215), (0.2, 0.03, 0.03), 0.0, 1.0, "table")
     avoid = ()
     for count in (1, 2):
-        step = outcome(Slippery(context_of(ScriptedRobot())), GraspInputs(seen, avoid))
+        step = outcome(Slippery(context_of(TableRobot())), GraspInputs(seen, avoid))
         assert isinstance(step, Failed)
         assert (step.cause, len(step.outputs["tried"])) == (Cause.POSTCONDITION, count)
         avoid = step.outputs["tried"]

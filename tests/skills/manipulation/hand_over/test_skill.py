@@ -6,7 +6,8 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from analytic_scan import scan_of
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+from planar_people import LateAnswer
+from table_robot import MODEL, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, GREY, Can
 
 from skills.api import Cause, Failed, Running, Succeeded
@@ -14,7 +15,7 @@ from skills.geometry import facing_poses
 from skills.manipulation.arm.forces import levers_m
 from skills.manipulation.hand_over.skill import HandOver, HandOverInputs
 from skills.manipulation.hand_over.verification import Release
-from skills.robot import CommandState, Gripper, Pose2D, Scan
+from skills.robot import Gripper, Pose2D, Scan
 
 CARRYING = np.array([0.0, -3.0, 2.85, 0.0, 0.1, 1.57])
 P_HT = np.array([0.18, 0.0, 0.0])
@@ -22,7 +23,7 @@ BEER = HandOverInputs("Robin", "beer")
 PULL_S = 8.0
 
 
-class _Person(ScriptedRobot):
+class _Person(TableRobot):
     """Somebody stands before it and pulls from a time on; each scan has a new stamp, efforts are noisy."""
 
     pull_n, pull_s, lost_s = 15.0, PULL_S, math.inf
@@ -33,46 +34,20 @@ class _Person(ScriptedRobot):
 
     def joints(self):
         force_B = np.array([self.pull_n if self.now_s >= self.pull_s else 0.0, 0.0, 0.0])
-        efforts = self.noise.normal(0.0, 0.3, len(MODEL.names)) - force_B @ levers_m(MODEL, self.q, P_HT)
+        efforts = self.noise.normal(0.0, 0.3, len(MODEL.names)) - force_B @ levers_m(MODEL, self.q_rad, P_HT)
         return replace(super().joints(), effort_nm=dict(zip(MODEL.names, efforts.tolist(), strict=True)))
 
     def gripper(self):
         return replace(super().gripper(), holding=self.holding and self.now_s < self.lost_s)
 
 
-def _holding(**scripted):
-    return _Person(q=CARRYING.copy(), holding=True, opening=0.3, **scripted)
-
-
 ON_TRAY = (Can(0.85, 0.0, 0.033, 0.115, BLUE, base=0.94), Can(0.85, 0.0, 0.17, 0.01, GREY, base=0.93))
 """A beer on a tray, where Robin takes it."""
 
 
-def _before_robin(things=ON_TRAY, **how):
-    robot = _holding(scan_now=scan_of([(1.4, 0.0, 0.2)]), things=things)
-    for name, value in how.items():
-        setattr(robot, name, value)
-    return robot
-
-
-class _Operator:
-    """Answers the question at a time, and keeps what was asked."""
-
-    def __init__(self, clock, answer, at_s):
-        self.clock, self.answer, self.at_s, self.question, self.withdrawn = clock, answer, at_s, None, False
-
-    def __call__(self, question):
-        self.question = question
-        return self
-
-    def done(self):
-        return self.clock.now() >= self.at_s
-
-    def result(self):
-        return self.answer
-
-    def withdraw(self):
-        self.withdrawn = True
+def _before_robin(**values):
+    values = {"scan_now": scan_of([(1.4, 0.0, 0.2)]), "things": ON_TRAY, "holding": True, "opening": 0.3, **values}
+    return _Person(CARRYING, **values)
 
 
 def test_an_empty_gripper_is_a_failed_precondition():
@@ -80,62 +55,56 @@ def test_an_empty_gripper_is_a_failed_precondition():
 
 
 def test_nobody_in_sight_is_a_failed_precondition():
-    robot = _holding(scan_now=scan_of())
+    robot = _before_robin(scan_now=scan_of())
     failed(HandOver(context_of(robot)), HandOverInputs("Robin"), Cause.PRECONDITION, "nobody is seen near")
 
 
 @pytest.mark.parametrize("y", [-0.4, 0.0, 0.4])
 def test_the_object_is_held_out_near_the_person_without_contact(y):
-    robot = _holding(scan_now=scan_of([(1.4, y, 0.2)]))
+    robot = _before_robin(scan_now=scan_of([(1.4, y, 0.2)]), things=None)
     skill = HandOver(context_of(robot))
     skill.begin(BEER)
     while "holding the beer out" not in skill.step().message:
         robot.advance(0.1)
-    p_BT = MODEL.X_BH(robot.q) @ P_HT
-    off = math.hypot(p_BT[0] - 1.4, p_BT[1] - y)
-    assert 0.35 < off < 0.75
+    p_BT = MODEL.X_BH(robot.q_rad) @ P_HT
+    assert 0.35 < math.hypot(p_BT[0] - 1.4, p_BT[1] - y) < 0.75
     assert 0.7 < p_BT[2] + 0.52 < 1.1
     assert robot.holding
 
 
 def test_a_pull_opens_the_gripper_and_the_hand_is_drawn_in():
-    robot = _before_robin()
-    robot.carries = True
+    robot = _before_robin(carries=True)
     assert outcome(HandOver(context_of(robot)), BEER).message == "gave the beer to Robin"
     assert not (robot.holding or robot.carries)
-    assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+    assert robot.q_rad == pytest.approx(MODEL.stowed_rad, abs=0.06)
+
+
+def test_an_object_pulled_out_of_the_closed_gripper_is_given_when_seen_with_the_person():
+    robot = _before_robin(pull_n=0.0, lost_s=PULL_S)
+    assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
 
 
 class _Rolling(_Person):
     """The beer rolls on the tray until a time."""
 
-    rests_s = math.inf
-
     def image(self, source, *, visual=True, depth=True):
-        off_m = 0.03 * math.sin(7.0 * min(self.now_s, self.rests_s))
-        self.things = (replace(ON_TRAY[0], y=off_m), ON_TRAY[1])
+        self.things = (replace(ON_TRAY[0], y=0.03 * math.sin(7.0 * min(self.now_s, self.rests_s))), ON_TRAY[1])
         return super().image(source, visual=visual, depth=depth)
 
 
-@pytest.mark.parametrize("rests_s", [15.0, math.inf])
-def test_an_object_that_still_moves_is_not_given(rests_s):
-    robot = _Rolling(q=CARRYING.copy(), holding=True, opening=0.3, scan_now=scan_of([(1.4, 0.0, 0.2)]))
-    robot.rests_s = rests_s
+# Time at which the object comes to rest -> message
+@pytest.mark.parametrize(
+    ("rests_s", "message"),
+    [
+        (15.0, "gave the beer to Robin"),
+        (math.inf, "the beer still moves where it was released before Robin"),
+    ],
+)
+def test_an_object_that_still_moves_is_not_given(rests_s, message):
+    robot = _Rolling(CARRYING, holding=True, opening=0.3, scan_now=scan_of([(1.4, 0.0, 0.2)]), rests_s=rests_s)
     step = outcome(HandOver(context_of(robot)), BEER)
-    if math.isfinite(rests_s):
-        assert step.message == "gave the beer to Robin"
-        assert robot.now_s > rests_s
-    else:
-        assert (step.cause, step.message) == (
-            Cause.POSTCONDITION,
-            "the beer still moves where it was released before Robin",
-        )
-
-
-def test_the_hand_camera_looks_whether_the_person_has_it():
-    robot = _before_robin(things=())
-    failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was released")
-    assert robot.q == pytest.approx(MODEL.stowed_rad, abs=0.06)
+    assert step.message == message
+    assert robot.now_s > rests_s or step.cause is Cause.POSTCONDITION
 
 
 def test_the_hand_camera_stays_below_the_face_of_a_person():
@@ -158,17 +127,14 @@ def test_noise_and_a_light_touch_are_no_pull(pull_n):
     robot = _before_robin(pull_n=pull_n)
     failed(HandOver(context_of(robot)), BEER, Cause.TIMEOUT, "Robin did not take the beer within 20 s")
     assert robot.holding
-    assert robot.q == pytest.approx(CARRYING, abs=0.01)
+    assert robot.q_rad == pytest.approx(CARRYING, abs=0.01)
 
 
-def test_an_object_pulled_out_of_the_closed_gripper_is_given_when_seen_with_the_person():
-    robot = _before_robin(pull_n=0.0, lost_s=PULL_S)
-    assert isinstance(outcome(HandOver(context_of(robot)), BEER), Succeeded)
-
-
-def test_an_object_lost_while_held_out_and_not_seen_is_not_given():
-    robot = _before_robin(things=(), pull_n=0.0, lost_s=PULL_S)
+@pytest.mark.parametrize("lost", [{}, {"pull_n": 0.0, "lost_s": PULL_S}], ids=["released", "lost while held out"])
+def test_an_object_that_the_hand_camera_does_not_see_with_the_person_is_not_given(lost):
+    robot = _before_robin(things=(), **lost)
     failed(HandOver(context_of(robot)), BEER, Cause.POSTCONDITION, "the beer is not seen where it was released")
+    assert robot.q_rad == pytest.approx(MODEL.stowed_rad, abs=0.06)
 
 
 def test_an_object_that_stays_in_the_open_gripper_is_reported():
@@ -180,7 +146,7 @@ def test_an_object_that_stays_in_the_open_gripper_is_reported():
 @pytest.mark.parametrize(("answer", "given"), [("let go", True), ("hold on", False)])
 def test_the_operator_may_say_that_it_lets_go(answer, given):
     robot = _before_robin(pull_n=0.0)
-    operator = _Operator(robot, answer, at_s=PULL_S)
+    operator = LateAnswer(robot, answer, at_s=PULL_S)
     step = outcome(HandOver(replace(context_of(robot), ask=operator)), BEER)
     assert isinstance(step, Succeeded if given else Failed)
     assert operator.question.text == "Alice holds the beer out to Robin. Let go?"
@@ -206,12 +172,11 @@ def test_cancelled_at_any_tick_no_command_still_runs(every):
     count = sum(1 for _ in _ticks(whole, HandOver(context_of(whole))))
     for end in range(1, count + 1, every):
         robot = _before_robin()
-        operator = _Operator(robot, "hold on", at_s=math.inf)
+        operator = LateAnswer(robot, "hold on", at_s=math.inf)
         skill = HandOver(replace(context_of(robot), ask=operator))
         next(tick for tick in _ticks(robot, skill) if tick == end)
         skill.end()
-        running = {command for command, each in robot.status.items() if each.state is CommandState.RUNNING}
-        assert running <= set(robot.stopped)
+        assert robot.moving_parts == ()
         assert operator.withdrawn or operator.question is None
 
 
@@ -245,8 +210,7 @@ def test_after_a_restart_a_released_object_is_given():
 
 
 def test_poses_before_a_person_face_them_and_the_nearest_comes_first():
-    here = Pose2D(0.0, 0.0, 0.0)
-    poses = facing_poses((3.0, 0.0), here, 1.5)
+    poses = facing_poses((3.0, 0.0), Pose2D(0.0, 0.0, 0.0), 1.5)
     assert math.hypot(poses[0].x_m - 1.5, poses[0].y_m) < 0.01
     for pose in poses:
         off = math.atan2(-pose.y_m, 3.0 - pose.x_m) - pose.yaw_rad

@@ -6,12 +6,11 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 from analytic_scan import scan_of
-from head_robot import HEAD_CAPABILITIES, HEAD_MODEL, HeadRobot
 from pydrake.math import RigidTransform, RotationMatrix
-from scripted_robot import context_of, failed, outcome
+from table_robot import HEAD_CAPABILITIES, HEAD_MODEL, TableRobot, context_of, failed, outcome
 from table_scene import BLUE, GREY, RED, Can, scene
 
-from skills.api import Cause, Succeeded
+from skills.api import Cause, Succeeded, nobody_to_ask
 from skills.detection import Detection
 from skills.manipulation.arm.forces import levers_m
 from skills.manipulation.hand_over.skill import HandOver, HandOverInputs
@@ -39,7 +38,7 @@ CARRYING = next(
 RELEASE = Release(1.05, 0.0, 0.95, 1.07)
 
 
-class _BeforeRobin(HeadRobot):
+class _BeforeRobin(TableRobot):
     """Robin stands before it and pulls from a time on."""
 
     def scan(self):
@@ -47,12 +46,13 @@ class _BeforeRobin(HeadRobot):
 
     def joints(self):
         pull_B = np.array([15.0 if self.now_s >= PULL_S else 0.0, 0.0, 0.0])
-        efforts = (-pull_B @ levers_m(HEAD_MODEL, self.q, P_HT)).tolist()
+        efforts = (-pull_B @ levers_m(HEAD_MODEL, self.q_rad, P_HT)).tolist()
         return replace(super().joints(), effort_nm=dict(zip(HEAD_MODEL.names, efforts, strict=True)))
 
 
-def _robot(*things, **how):
-    return _BeforeRobin(q=CARRYING.copy(), holding=True, opening=0.06, things=things, **how)
+def _robot(*things, **values):
+    values = {"holding": True, "opening": 0.06, **values}
+    return _BeforeRobin(CARRYING, capabilities=HEAD_CAPABILITIES, things=things, **values)
 
 
 def _at_release(colour, base_m=LEVEL_M - 0.06):
@@ -69,7 +69,7 @@ def test_two_fingers_are_drawn_straight_back_from_a_released_object():
     skill.begin(COKE)
     while "holding the coke out" not in skill.step().message:
         robot.advance(0.1)
-    X_BH = HEAD_MODEL.X_BH(robot.q)
+    X_BH = HEAD_MODEL.X_BH(robot.q_rad)
     moved = len(robot.arm_commands)
     while not hasattr(skill.step(), "outputs"):
         robot.advance(0.1)
@@ -89,21 +89,20 @@ def test_the_arm_is_stowed_around_the_hands_that_bear_the_object():
             over_m = z + HEAD_CAPABILITIES.standing_height_m - (LEVEL_M - 0.06)
             assert max(abs(x - AHEAD_M), abs(y)) > 0.20 or not -0.10 < over_m < 0.02, "through the tray"
     assert HEAD_MODEL.X_BH(robot.arm_commands[-2].positions_rad[-1]).translation()[0] < 0.61  # near the body first
-    assert robot.q == pytest.approx(HEAD_MODEL.stowed_rad, abs=0.06)
+    assert robot.q_rad == pytest.approx(HEAD_MODEL.stowed_rad, abs=0.06)
 
 
-def test_an_object_seen_nowhere_is_not_given():
-    failed(HandOver(context_of(_robot())), COKE, Cause.POSTCONDITION, "not seen where it was released before Robin")
-
-
-def test_an_object_on_the_floor_fell():
-    robot = _robot(_at_release(RED, base_m=0.0))
-    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke fell to the floor before Robin")
-
-
-def test_something_else_that_is_not_as_high_is_not_the_object():
-    robot = _robot(_at_release(BLUE, base_m=0.80))
-    failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "not seen where it was released")
+@pytest.mark.parametrize(
+    ("things", "message"),
+    [
+        ((), "not seen where it was released before Robin"),
+        ((_at_release(RED, base_m=0.0),), "the coke fell to the floor before Robin"),
+        ((_at_release(BLUE, base_m=0.80),), "not seen where it was released"),
+    ],
+    ids=["nowhere", "on the floor", "something else that is not as high"],
+)
+def test_an_object_that_the_person_does_not_have_is_not_given(things, message):
+    failed(HandOver(context_of(_robot(*things))), COKE, Cause.POSTCONDITION, message)
 
 
 def test_an_object_that_the_closing_gripper_feels_is_still_in_it():
@@ -116,36 +115,19 @@ def test_an_object_that_the_closing_gripper_feels_is_still_in_it():
         return Gripper(robot.now_s, robot.opening, 5.0, not opened or robot.opening < 0.03)
 
     robot.gripper = feels
-    context = replace(context_of(robot), ask=_LetsGo)
+    context = replace(context_of(robot), ask=lambda question: nobody_to_ask(replace(question, default="let go")))
     failed(HandOver(context), COKE, Cause.POSTCONDITION, "the coke is still in the gripper")
     assert len(opened) > 1
 
 
-class _LetsGo:
-    """The operator says at once that it lets go."""
-
-    def __init__(self, question):
-        self.question = question
-
-    def done(self):
-        return True
-
-    def result(self):
-        return "let go"
-
-    def withdraw(self):
-        pass
-
-
 def test_a_head_that_does_not_turn_is_reported_in_one_sentence():
-    robot = _robot(_at_release(RED), head_refuses=True)
+    robot = _robot(_at_release(RED), refuse_because={"point_head": "the head is stuck"})
     failed(HandOver(context_of(robot)), COKE, Cause.POSTCONDITION, "the coke was released, but is not seen: the head")
 
 
 @pytest.mark.parametrize(("things", "given"), [((_at_release(RED),), True), ((), False)])
 def test_after_a_restart_it_looks_at_the_release_point(things, given):
-    robot = _robot(*things)
-    robot.holding = False
+    robot = _robot(*things, holding=False)
     skill = HandOver(context_of(robot))
     skill.checkpoint = {"lets_go": True, "release": asdict(Release(AHEAD_M, 0.0, 0.94, 1.06))}
     skill.resume(COKE)
@@ -194,19 +176,17 @@ def test_depth_shows_a_tall_object_whatever_its_class(things, stands):
     assert stands_at(scene(things), RigidTransform(), RELEASE) is stands
 
 
+TRAY, FLAT_RELEASE = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.92), Release(1.05, 0.0, 0.95, 0.97)
+
+
 # What is on a plate 2 cm below where a flat object was let go of -> whether something lies there
-@pytest.mark.parametrize(
-    ("things", "lies"),
-    [((Can(1.05, 0.0, 0.04, 0.025, GREY, base=0.93),), True), ((), False)],
-)
+@pytest.mark.parametrize(("things", "lies"), [((Can(1.05, 0.0, 0.04, 0.025, GREY, base=0.93),), True), ((), False)])
 def test_depth_shows_a_flat_object_on_a_level_plate(things, lies):
-    plate = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.92)
-    assert lies_at(scene((plate, *things)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97)) is lies
+    assert lies_at(scene((TRAY, *things)), RigidTransform(), FLAT_RELEASE) is lies
 
 
 def test_depth_cannot_separate_a_flat_object_from_its_support():
-    tray = Can(1.05, 0.0, 0.18, 0.01, GREY, base=0.945)
-    assert not stands_at(scene((tray,)), RigidTransform(), Release(1.05, 0.0, 0.95, 0.97))
+    assert not stands_at(scene((replace(TRAY, base=0.945),)), RigidTransform(), FLAT_RELEASE)
 
 
 def test_the_release_point_follows_from_the_box_in_the_hand():

@@ -56,16 +56,16 @@ def test_spots_keep_off_the_edges():
     assert found[:, 0].max() <= 1.6 - EDGE_M + 1e-9
 
 
+def test_a_small_surface_has_its_middle_as_spot():
+    small = Surface("stool", ((0.0, 0.0), (0.12, 0.0), (0.12, 0.12), (0.0, 0.12)), 0.4)
+    assert spots(small) == pytest.approx(np.array([[0.06, 0.06]]))
+
+
 def test_spots_within_a_forbidden_circle_are_left_out():
     found = clear_spots(spots(TABLE), [(1.3, 0.0, 0.25), (1.1, -0.4, 0.1)])
     assert 0 < len(found) < len(spots(TABLE))
     assert np.linalg.norm(found - [1.3, 0.0], axis=1).min() > 0.25
     assert np.linalg.norm(found - [1.1, -0.4], axis=1).min() > 0.1
-
-
-def test_a_small_surface_has_its_middle_as_spot():
-    small = Surface("stool", ((0.0, 0.0), (0.12, 0.0), (0.12, 0.12), (0.0, 0.12)), 0.4)
-    assert spots(small) == pytest.approx(np.array([[0.06, 0.06]]))
 
 
 def test_spots_near_an_object_are_not_free():
@@ -101,6 +101,13 @@ def test_the_part_of_a_surface_that_no_picture_shows_comes_after_the_free_part()
     assert not search.tight
 
 
+def test_a_hidden_surface_is_free_except_near_known_objects():
+    free = free_spots(unseen_view(TABLE, np.array([[1.3, 0.0, 0.78]])), spots(TABLE))
+    assert 0 < len(free) < len(spots(TABLE))
+    assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M - 0.04
+    assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), spots(TABLE))) == len(spots(TABLE))
+
+
 def test_a_narrow_object_fits_on_a_tight_spot_at_the_end_and_a_full_surface_says_what_stands_there():
     things = [(x, y) for x in (1.1, 1.25, 1.4, 1.55) for y in np.arange(-0.4, 0.4, 0.15)]
     search = SpotSearch(TABLE, SCREWDRIVER)
@@ -128,24 +135,16 @@ def test_a_long_object_fits_along_the_edge_of_a_narrow_board_only():
     assert [angle for angle, X in poses.items() if area.takes(X)] == [90.0]
 
 
-def test_an_outline_keeps_off_others_and_off_the_edge():
-    area = free_area(TABLE, SCREWDRIVER, _view(things=[(1.3, 0.0)]))
-    (lying,) = (X for angle, X in _above(SCREWDRIVER, (1.3, 0.3), along_rad=math.pi / 2).items() if angle == 90.0)
-    for shift_m, free in ((0.0, True), (-0.3 + 0.1 + BESIDE_M - 0.005, False), (0.1, False)):
-        assert area.takes(RigidTransform(lying.rotation(), lying.translation() + [0.0, shift_m, 0.0])) is free
-
-
 def test_an_object_that_is_larger_than_the_surface_may_stick_out():
     stool = Surface("stool", ((0.0, 0.0), (0.12, 0.0), (0.12, 0.12), (0.0, 0.12)), 0.4)
     assert free_area(stool, SCREWDRIVER).top is None
 
 
-def test_a_hidden_surface_is_free_except_near_known_objects():
-    standing = np.array([[1.3, 0.0, 0.78]])
-    free = free_spots(unseen_view(TABLE, standing), spots(TABLE))
-    assert 0 < len(free) < len(spots(TABLE))
-    assert np.linalg.norm(free - [1.3, 0.0], axis=1).min() > CLEARANCE_M - 0.04
-    assert len(free_spots(unseen_view(TABLE, np.empty((0, 3))), spots(TABLE))) == len(spots(TABLE))
+def test_an_outline_keeps_off_others_and_off_the_edge():
+    area = free_area(TABLE, SCREWDRIVER, _view(things=[(1.3, 0.0)]))
+    (lying,) = (X for angle, X in _above(SCREWDRIVER, (1.3, 0.3), along_rad=math.pi / 2).items() if angle == 90.0)
+    for shift_m, free in ((0.0, True), (-0.3 + 0.1 + BESIDE_M - 0.005, False), (0.1, False)):
+        assert area.takes(RigidTransform(lying.rotation(), lying.translation() + [0.0, shift_m, 0.0])) is free
 
 
 def test_spaced_spots_keep_their_order_and_distance():

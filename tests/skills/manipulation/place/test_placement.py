@@ -29,8 +29,7 @@ def test_a_held_object_reaches_below_the_hand_as_far_as_its_lowest_corner():
 
 
 def test_an_object_taken_from_above_is_placed_with_the_fingers_down_at_any_turn():
-    down = RotationMatrix.MakeYRotation(np.pi / 2)
-    turned = HeldObject(down, np.zeros((2, 3))).rotations(0.3)
+    turned = HeldObject(RotationMatrix.MakeYRotation(np.pi / 2), np.zeros((2, 3))).rotations(0.3)
     assert len(turned) == 8
     assert [each.matrix()[2, 0] for each in turned] == pytest.approx([-1.0] * 8)
 
@@ -51,8 +50,7 @@ def test_a_spot_is_left_out_where_the_open_hand_would_touch_a_tall_neighbour(bes
 @pytest.mark.parametrize(("top_m", "held"), [(-0.3, True), (0.1, False)])
 def test_the_held_object_is_checked_on_the_path_unless_it_touches_at_an_end(top_m, held):
     scene, can = ArmScene(spot_capabilities(), MODEL, {}), Box(RigidTransform([0.2, -0.08, 0.0]), (0.06, 0.16, 0.06))
-    above_B = RigidTransform(LEVEL_FORWARD, [0.8, 0.0, 0.25])
-    (q_goal, *_) = MODEL.inverse(above_B)
+    (q_goal, *_) = MODEL.inverse(RigidTransform(LEVEL_FORWARD, [0.8, 0.0, 0.25]))
     scene.set_boxes([Box(RigidTransform([1.0, 0.0, top_m - 0.05]), (0.3, 0.6, 0.1))])
     hold_on_path(lambda scene, q: q_goal, can)(scene, CARRYING)
     lower = MODEL.inverse(RigidTransform(LEVEL_FORWARD, [0.8, 0.0, top_m + 0.1]))[0]
@@ -76,8 +74,7 @@ def test_only_flat_objects_are_put_down_tilted(held, ways):
 @pytest.mark.parametrize(("ahead_m", "way"), [(0.75, (0.10, 0.0)), (0.82, (0.05, 0.0)), (0.95, (0.05, 0.3))])
 def test_a_far_spot_is_reached_from_lower_and_then_tilted(ahead_m, way):
     scene, spot_B = ArmScene(spot_capabilities(), MODEL, {}), np.array([ahead_m, 0.0, 0.3])
-    q_rad = above_goal([spot_B], HAMMER, RrtConnect(), [], 0.7)(scene, CARRYING)
-    X_BH = MODEL.X_BH(q_rad)
+    X_BH = MODEL.X_BH(above_goal([spot_B], HAMMER, RrtConnect(), [], 0.7)(scene, CARRYING))
     fingers = X_BH.rotation().matrix()[:, 0]
     lowest_m = X_BH.translation()[2] - HAMMER.drop_m(X_BH.rotation()) - spot_B[2]
     assert (lowest_m, math.asin(fingers[0])) == pytest.approx(way, abs=1e-6)

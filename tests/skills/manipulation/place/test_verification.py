@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scripted_robot import MODEL, Colours, ScriptedRobot, context_of
+from table_robot import MODEL, Colours, TableRobot, context_of
 from table_scene import BLUE, RED, Can
 from table_scene import TABLE as TOP
 
@@ -30,7 +30,7 @@ def done(skill, routine):
         skill.context.robot.advance(0.1)
 
 
-class _Sticky(ScriptedRobot):
+class _Sticky(TableRobot):
     """The gripper feels an object until the jaws have moved so many times; the arm bears it until then as well."""
 
     moves, sticks_for, load_kg = 0, 0, 0.0
@@ -44,14 +44,13 @@ class _Sticky(ScriptedRobot):
 
     def joints(self):
         load_kg = self.load_kg if self.moves < self.sticks_for else 0.0
-        efforts = SCENE.gravity_efforts(self.q) + 9.81 * load_kg * levers_m(MODEL, self.q, P_HT)[2]
+        efforts = SCENE.gravity_efforts(self.q_rad) + 9.81 * load_kg * levers_m(MODEL, self.q_rad, P_HT)[2]
         return replace(super().joints(), effort_nm=dict(zip(MODEL.names, efforts.tolist(), strict=True)))
 
 
 def _let_go(sticks_for, load_kg=0.0):
     """The number of moves of the jaws that it takes."""
-    robot = _Sticky(q=CARRYING.copy(), opening=0.3)
-    robot.sticks_for, robot.load_kg = sticks_for, load_kg
+    robot = _Sticky(CARRYING, opening=0.3, sticks_for=sticks_for, load_kg=load_kg)
     skill = Place(context_of(robot))
     done(skill, skill.let_go(load_kg or None))
     return robot.moves
@@ -80,7 +79,7 @@ def _seen(robot, *, before_W=NOTHING, kind=None, detector=None):
 
 
 def test_a_neighbour_that_stood_there_before_is_not_taken_for_the_object():
-    neighbour = ScriptedRobot(things=(Can(0.95, 0.08, 0.033, 0.115, RED),))
+    neighbour = TableRobot(things=(Can(0.95, 0.08, 0.033, 0.115, RED),))
     angles = np.linspace(0.0, 2.0 * np.pi, 60)
     rims_W = [
         [0.95, 0.08] + radius * np.column_stack([np.cos(angles), np.sin(angles)]) for radius in (0.01, 0.02, 0.033)
@@ -91,7 +90,7 @@ def test_a_neighbour_that_stood_there_before_is_not_taken_for_the_object():
 
 
 def test_a_flat_object_is_seen_by_its_class():
-    flat = ScriptedRobot(things=(Can(0.95, 0.0, 0.04, 0.004, BLUE),))
+    flat = TableRobot(things=(Can(0.95, 0.0, 0.04, 0.004, BLUE),))
     _seen(flat, kind="beer", detector=Colours())
     for kind, before_W in (("coke", NOTHING), (None, NOTHING), ("beer", SPOT_W[None, :])):
         with pytest.raises(SkillFailure, match="not seen"):

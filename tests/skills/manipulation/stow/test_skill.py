@@ -1,10 +1,10 @@
 """The stow skill: stowed when empty, near the body when holding."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from scripted_robot import MODEL, ScriptedRobot, context_of, failed, outcome
+from table_robot import MODEL, TableRobot, context_of, failed, outcome
 
 from skills.api import Cause, Succeeded
 from skills.manipulation.stow.skill import Stow, StowInputs
@@ -14,27 +14,23 @@ OUT = np.array([0.4, -1.6, 1.6, 0.0, 0.4, 0.0])
 
 
 def test_a_stowed_arm_is_left_alone():
-    robot = ScriptedRobot()
+    robot = TableRobot()
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
     assert robot.arm_commands == []
 
 
-def test_a_stretched_arm_is_stowed():
-    robot = ScriptedRobot(q=OUT.copy())
+@pytest.mark.parametrize("opening", [0.0, 1.4])
+def test_a_stretched_arm_is_stowed_with_its_gripper_closed(opening):
+    robot = TableRobot(OUT, opening=opening)
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
-    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
-
-
-def test_an_open_empty_gripper_is_closed_first():
-    robot = ScriptedRobot(q=OUT.copy(), opening=1.4)
-    outcome(Stow(context_of(robot)), StowInputs())
+    assert np.allclose(robot.q_rad, MODEL.stowed_rad, atol=1e-6)
     assert robot.opening == 0.0
 
 
 def test_a_held_object_is_drawn_in_and_stays_held():
-    robot = ScriptedRobot(q=OUT.copy(), holding=True, opening=0.3)
+    robot = TableRobot(OUT, holding=True, opening=0.3)
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
-    hand = MODEL.X_BH(robot.q).translation()
+    hand = MODEL.X_BH(robot.q_rad).translation()
     assert hand[0] < 0.52
     assert abs(hand[1]) < 0.2
     assert robot.opening == 0.3
@@ -42,29 +38,26 @@ def test_a_held_object_is_drawn_in_and_stays_held():
 
 def test_an_arm_that_is_stopped_is_a_failed_execution():
     stopped = dict.fromkeys(range(1, 99), CommandStatus(CommandState.STOPPED, "held fast"))
-    failed(Stow(context_of(ScriptedRobot(q=OUT.copy(), arm_answers=stopped))), StowInputs(), Cause.EXECUTION, "held")
+    failed(Stow(context_of(TableRobot(OUT.copy(), arm_answers=stopped))), StowInputs(), Cause.EXECUTION, "held")
 
 
 def test_an_arm_that_is_stopped_once_goes_on():
-    robot = ScriptedRobot(q=OUT.copy(), arm_answers={1: CommandStatus(CommandState.STOPPED, "an emergency stop")})
+    robot = TableRobot(OUT.copy(), arm_answers={1: CommandStatus(CommandState.STOPPED, "an emergency stop")})
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
 
 
-@dataclass
-class Raised(ScriptedRobot):
+class Raised(TableRobot):
     """Notes where the hand is ahead of the body whenever the body is sent to another height."""
 
-    hand_x_m: list[float] = field(default_factory=list)
-
     def stand(self, height_m, pitch_rad, *, until_s, lease):
-        self.hand_x_m.append(float(MODEL.X_BH(self.q).translation()[0]))
+        self.hand_x_m.append(float(MODEL.X_BH(self.q_rad).translation()[0]))
         return super().stand(height_m, pitch_rad, until_s=until_s, lease=lease)
 
 
 @pytest.mark.parametrize("holding", [True, False])
 def test_the_arm_comes_near_before_a_raised_body_is_lowered(holding):
     """Over a table, it would be pressed onto it."""
-    robot = Raised(q=OUT.copy(), holding=holding, opening=0.3 if holding else 0.0, height_m=0.62)
+    robot = Raised(OUT, holding=holding, opening=0.3 if holding else 0.0, height_m=0.62, hand_x_m=[])
     assert isinstance(outcome(Stow(context_of(robot)), StowInputs()), Succeeded)
     assert robot.height_m == pytest.approx(0.52)
     assert len(robot.hand_x_m) == 1
@@ -87,7 +80,7 @@ def most_left_m(robot):
 
 
 def test_the_arm_is_stowed_around_a_wall_of_the_map():
-    free, walled = ScriptedRobot(q=BEHIND.copy()), ScriptedRobot(q=BEHIND.copy())
+    free, walled = TableRobot(BEHIND.copy()), TableRobot(BEHIND.copy())
     assert isinstance(outcome(Stow(context_of(free)), StowInputs()), Succeeded)
     context = replace(context_of(walled), walls=wall(-0.2, 0.44, 1.2, 0.56))
     assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
@@ -95,8 +88,8 @@ def test_the_arm_is_stowed_around_a_wall_of_the_map():
 
 
 def test_walls_at_the_arm_by_a_small_error_of_the_pose_do_not_block_it():
-    robot = ScriptedRobot(q=OUT.copy())
+    robot = TableRobot(OUT.copy())
     x, y, _ = MODEL.X_BH(OUT).translation()
     context = replace(context_of(robot), walls=wall(x - 0.04, y - 0.6, x + 0.08, y + 0.6))
     assert isinstance(outcome(Stow(context), StowInputs()), Succeeded)
-    assert np.allclose(robot.q, MODEL.stowed_rad, atol=1e-6)
+    assert np.allclose(robot.q_rad, MODEL.stowed_rad, atol=1e-6)

@@ -42,12 +42,6 @@ def test_detection_in_all_views_has_the_mean_score_and_box(seen_in):
     assert found.box == pytest.approx(BOX)
 
 
-@pytest.mark.parametrize(("least_score", "told"), [(None, 0), (0.3, 1)])
-def test_faint_detections_are_returned_with_a_lower_least_score(seen_in, least_score, told):
-    each = ([Detection("hammer", 0.4, box)] for box in (BOX, MIRRORED, SMALL))
-    assert len(seen_in(*each, least_score=least_score)) == told
-
-
 def test_the_class_of_most_views_wins(seen_in):
     # hammer 0.6, 0.9, 0.9; coke 0.9, 0.3, 0
     both = [Detection("coke", 0.9, BOX, (("hammer", 0.6),))]
@@ -56,8 +50,18 @@ def test_the_class_of_most_views_wins(seen_in):
     assert found.alternatives == (("coke", pytest.approx(0.4)),)
 
 
+@pytest.mark.parametrize(("least_score", "told"), [(None, 0), (0.3, 1)])
+def test_faint_detections_are_returned_with_a_lower_least_score(seen_in, least_score, told):
+    each = ([Detection("hammer", 0.4, box)] for box in (BOX, MIRRORED, SMALL))
+    assert len(seen_in(*each, least_score=least_score)) == told
+
+
 def test_a_detection_in_one_view_has_a_low_score(seen_in):
     assert seen_in([Detection("hammer", 0.9, BOX)], [], []) == ()
+
+
+def test_an_empty_picture_has_no_detections(seen_in):
+    assert seen_in([], [], []) == ()
 
 
 def test_a_view_that_shows_an_object_too_small_does_not_count(seen_in):
@@ -86,13 +90,7 @@ def test_a_person_is_judged_at_the_whole_picture_unless_that_makes_them_small(se
     assert (found.class_name, found.score) == ("person", pytest.approx(0.8))
 
 
-# first view                               views taken
-# hammer 0.9                               1
-# hammer 0.9, coke 0.2                     1
-# nothing, or next to nothing              1
-# hammer 0.9, coke 0.4                     all: the coke may be one
-# hammer 0.9, may be a beer by 0.4         all
-# hammer 0.6                               all
+# first view -> number of views: all where another class or object may be there, or the score is low
 @pytest.mark.parametrize(
     ("first", "views"),
     [
@@ -126,10 +124,6 @@ def test_two_objects_of_a_class_stay_two(seen_in):
         [Detection("beer", 0.8, SMALL), Detection("beer", 0.7, (200.0, 150.0, 300.0, 200.0))],
     )
     assert [one.box for one in found] == [pytest.approx(BOX), pytest.approx(other)]
-
-
-def test_an_empty_picture_has_no_detections(seen_in):
-    assert seen_in([], [], []) == ()
 
 
 @pytest.mark.parametrize(

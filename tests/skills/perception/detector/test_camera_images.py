@@ -62,8 +62,14 @@ def test_a_picture_is_upside_down_when_its_camera_hangs_upside_down(roll_deg, tu
 
 def test_a_picture_that_looks_straight_down_is_not_rotated():
     down = RigidTransform(RotationMatrix(np.diag([1.0, -1.0, -1.0])), [1.05, 0.0, 1.6])
-    image = rolled(0.0)
-    assert not is_upside_down(replace(image, frames=FrameTree({"hand_camera": ("odom", down)})))
+    assert not is_upside_down(replace(rolled(0.0), frames=FrameTree({"hand_camera": ("odom", down)})))
+
+
+def test_boxes_of_a_rotated_picture_fit_the_original_picture():
+    image = rolled(np.pi)
+    (seen,) = detect_in_image(COKES, image)
+    (plain,) = COKES.detect([image.colour])[0]
+    assert seen.box == plain.box
 
 
 @pytest.mark.parametrize("roll_deg", [0, 78, -102, 172])
@@ -74,13 +80,6 @@ def test_a_picture_is_turned_so_that_its_top_is_up_with_its_boxes(roll_deg):
     (again,) = COKES.detect([picture])[0]
     assert found.box == pytest.approx(again.box, abs=1.0)
     assert found.box[3] - found.box[1] > found.box[2] - found.box[0]
-
-
-def test_boxes_of_a_rotated_picture_fit_the_original_picture():
-    image = rolled(np.pi)
-    (seen,) = detect_in_image(COKES, image)
-    (plain,) = COKES.detect([image.colour])[0]
-    assert seen.box == plain.box
 
 
 @pytest.mark.parametrize("roll_rad", [0.0, np.pi], ids=["upright", "on its head"])
@@ -98,6 +97,14 @@ def test_each_grey_picture_is_rotated_upright():
     assert detect_class_in_grey(detector, [upright, head], "coke") == [(), ()]
     assert np.array_equal(detector.shown[0], upright.grey)
     assert np.array_equal(detector.shown[1], head.grey[::-1, ::-1])
+
+
+def test_the_detector_sees_brightened_pictures():
+    detector, image = Recorder(), rolled(0.0)
+    dim = replace(image, colour=image.colour // 8)
+    detect_in_image(detector, dim)
+    (shown,) = detector.shown
+    assert shown.mean() > 1.5 * dim.colour.mean()
 
 
 def test_the_quick_search_is_used_if_the_detector_has_one():
@@ -124,24 +131,13 @@ def test_a_dim_picture_with_something_in_it_is_not_dark():
     assert not is_dark(replace(image, grey=grey))
 
 
-# mean   as bright as       ways
-# 120    120                left as it is
-# 20     100                five times
-# 5      40                 eight times, and no more
-@pytest.mark.parametrize(("mean", "shown"), [(120, 120), (20, 100), (5, 40)])
-def test_a_dim_picture_is_brightened(mean, shown):
-    assert brighten(np.full((4, 4, 3), mean, np.uint8)).mean() == shown
-
-
 def test_bright_pixels_of_a_dim_picture_stay_white():
     picture = np.full((10, 10), 10, np.uint8)
     picture[0, 0] = 200
     assert brighten(picture)[0, 0] == 255
 
 
-def test_the_detector_sees_brightened_pictures():
-    detector, image = Recorder(), rolled(0.0)
-    dim = replace(image, colour=image.colour // 8)
-    detect_in_image(detector, dim)
-    (shown,) = detector.shown
-    assert shown.mean() > 1.5 * dim.colour.mean()
+# mean -> mean as shown: left as it is, five times, and eight times at most
+@pytest.mark.parametrize(("mean", "shown"), [(120, 120), (20, 100), (5, 40)])
+def test_a_dim_picture_is_brightened(mean, shown):
+    assert brighten(np.full((4, 4, 3), mean, np.uint8)).mean() == shown

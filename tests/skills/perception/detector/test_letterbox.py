@@ -26,6 +26,20 @@ def test_a_picture_of_the_size_is_left_as_it_is():
     assert placed.scale_xy == (1.0, 1.0)
 
 
+def test_grey_is_the_same_in_all_channels():
+    picture = noise(480, 640)
+    filled, _ = letterbox(picture)
+    assert np.array_equal(filled, np.repeat(picture[:, :, None], 3, axis=2))
+
+
+def test_one_of_a_batch_is_filled_in_place():
+    batch = np.zeros((2, HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
+    fill_letterbox(np.full((10, 10), 9, dtype=np.uint8), batch[1])
+    assert not batch[0].any()
+    assert batch[1, 0, 0].tolist() == [9, 9, 9]
+    assert batch[1, 0, -1].tolist() == [PADDING] * 3
+
+
 @pytest.mark.parametrize(
     # picture (w, h) -> inside (w, h) of the letterbox
     ("size", "inside"),
@@ -49,20 +63,6 @@ def test_a_picture_is_scaled_to_fit_and_padded_at_right_and_bottom(size, inside)
     assert filled.shape == (HEIGHT_PX, WIDTH_PX, 3)
 
 
-def test_grey_is_the_same_in_all_channels():
-    picture = noise(480, 640)
-    filled, _ = letterbox(picture)
-    assert np.array_equal(filled, np.repeat(picture[:, :, None], 3, axis=2))
-
-
-def test_one_of_a_batch_is_filled_in_place():
-    batch = np.zeros((2, HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
-    fill_letterbox(np.full((10, 10), 9, dtype=np.uint8), batch[1])
-    assert not batch[0].any()
-    assert batch[1, 0, 0].tolist() == [9, 9, 9]
-    assert batch[1, 0, -1].tolist() == [PADDING] * 3
-
-
 @pytest.mark.parametrize("size", [(320, 240), (1920, 1080), (333, 777), (5, 3)])
 def test_boxes_convert_back_to_the_picture(size):
     placed = Letterbox(*size)
@@ -80,8 +80,7 @@ def test_the_box_of_an_object_lies_on_it_in_both_pictures():
 
 
 def test_boxes_beyond_the_picture_are_clipped():
-    placed = Letterbox(1280, 720)
-    found = placed.to_picture(np.array([[-5.0, 300.0, 640.0, 480.0]]))
+    found = Letterbox(1280, 720).to_picture(np.array([[-5.0, 300.0, 640.0, 480.0]]))
     assert found.tolist() == [[0.0, 600.0, 1280.0, 720.0]]
 
 

@@ -43,11 +43,10 @@ def test_the_number_of_proposals_is_limited():
 @pytest.mark.parametrize(
     ("box", "expected"),
     [
-        ((100, 100, 184, 184), (22, 22, 106, 106)),
-        ((0, 0, 168, 84), (22, 43, 106, 85)),
-        ((50, 50, 60, 60), (43, 43, 85, 85)),
+        ((100, 100, 184, 184), (22, 22, 106, 106)),  # as large as in the crop
+        ((0, 0, 168, 84), (22, 43, 106, 85)),  # twice as large
+        ((50, 50, 60, 60), (43, 43, 85, 85)),  # very small
     ],
-    ids=["as large as in the chip", "twice as large", "very small"],
 )
 def test_a_proposal_is_in_the_middle_of_its_crop_and_fills_two_thirds_of_it(box, expected):
     crop = crop_map(np.array(box, np.float32))
@@ -93,32 +92,29 @@ def test_a_detection_has_class_score_and_box(detector):
     assert detector.class_names == CLASSES
 
 
-def test_detections_are_sorted_by_score_and_cut_at_the_threshold(detector):
-    things = [("beer", 0.6, (0, 0, 50, 50)), ("coke", 0.8, (300, 0, 350, 50)), ("hammer", 0.48, (100, 100, 200, 200))]
-    (found,) = detector.detect([picture_of(*things)])
-    assert [one.class_name for one in found] == ["coke", "beer"]
-
-
-def test_a_lower_threshold_gives_more_detections(file):
-    detector = load_detector(file, DetectorOptions(threshold=0.1))
-    assert len(detector.detect([picture_of(("beer", 0.2, (0, 0, 50, 50)))])[0]) == 1
-
-
 def test_a_detection_has_alternative_classes(detector):
-    things = [
-        HAMMER,
-        ("coke", 0.3, (100, 50, 200, 78)),
-        ("beer", 0.4, (100, 50, 200, 80)),
-        ("beer", 0.05, (0, 0, 9, 9)),
-    ]
-    (found,) = detector.detect([picture_of(*things)])
+    other = ("coke", 0.3, (100, 50, 200, 78)), ("beer", 0.4, (100, 50, 200, 80)), ("beer", 0.05, (0, 0, 9, 9))
+    (found,) = detector.detect([picture_of(HAMMER, *other)])
     assert [one.alternatives for one in found] == [(("beer", pytest.approx(0.4)), ("coke", pytest.approx(0.3)))]
 
 
+def seen(detector, *things, **picture):
+    """Classes and scores of the detections in a picture of things."""
+    (found,) = detector.detect([picture_of(*things, **picture)])
+    return [(one.class_name, round(one.score, 2)) for one in found]
+
+
+def test_detections_are_sorted_by_score_and_cut_at_the_threshold(detector):
+    things = [("beer", 0.6, (0, 0, 50, 50)), ("coke", 0.8, (300, 0, 350, 50)), ("hammer", 0.48, (100, 100, 200, 200))]
+    assert [name for name, _ in seen(detector, *things)] == ["coke", "beer"]
+
+
 def test_two_boxes_on_one_object_become_one_detection(detector):
-    double = ("coke", 0.7, (100, 50, 200, 77.5))
-    (found,) = detector.detect([picture_of(HAMMER, double)])
-    assert [one.class_name for one in found] == ["hammer"]
+    assert [name for name, _ in seen(detector, HAMMER, ("coke", 0.7, (100, 50, 200, 77.5)))] == ["hammer"]
+
+
+def test_a_lower_threshold_gives_more_detections(file):
+    assert len(seen(load_detector(file, DetectorOptions(threshold=0.1)), ("beer", 0.2, (0, 0, 50, 50)))) == 1
 
 
 def test_boxes_are_in_the_pictures_own_pixels_and_inside_it(detector):
@@ -135,6 +131,10 @@ def test_grey_pictures_are_accepted(detector):
     assert detector.detect([picture_of(HAMMER)[:, :, 0]])[0][0].class_name == "hammer"
 
 
+def test_no_pictures_give_no_detections(detector):
+    assert detector.detect([]) == []
+
+
 def test_pictures_of_several_sizes_at_once_are_each_judged_alone(file):
     pictures = [picture_of(HAMMER), np.zeros((7, 900), np.uint8), picture_of(("beer", 0.7, (0, 0, 50, 50)))]
     detector = load_detector(file)
@@ -143,13 +143,12 @@ def test_pictures_of_several_sizes_at_once_are_each_judged_alone(file):
     assert together == [detector.detect([picture])[0] for picture in pictures]
 
 
-def test_one_invalid_picture_among_others_is_refused(detector):
-    with pytest.raises(ValueError, match="a picture is"):
-        detector.detect([picture_of(HAMMER), np.zeros((4, 4)), picture_of(HAMMER)])
-
-
-def test_no_pictures_give_no_detections(detector):
-    assert detector.detect([]) == []
+def test_with_a_refinement_network_one_picture_gives_the_same_as_several(looks_again):
+    pictures = [
+        red_picture((50, 50, 250, 250), things=[("hammer", 0.2, LARGE)]),
+        red_picture((250, 150, 450, 450), things=[("coke", 0.3, (300, 200, 400, 400))]),
+    ]
+    assert looks_again.detect(pictures) == [looks_again.detect([one])[0] for one in pictures]
 
 
 @pytest.mark.parametrize("picture", [np.zeros((1, 1), np.uint8), np.zeros((480, 640, 3), np.uint8)])
@@ -161,6 +160,11 @@ def test_black_and_tiny_pictures_have_no_detections(detector, picture):
 def test_anything_but_a_picture_is_refused(detector, picture):
     with pytest.raises(ValueError, match="a picture is"):
         detector.detect([picture])
+
+
+def test_one_invalid_picture_among_others_is_refused(detector):
+    with pytest.raises(ValueError, match="a picture is"):
+        detector.detect([picture_of(HAMMER), np.zeros((4, 4)), picture_of(HAMMER)])
 
 
 def test_threads_that_share_it_find_the_same(detector):
@@ -185,42 +189,20 @@ def looks_again(tmp_path_factory):
     return load_detector(write_pair(tmp_path_factory.mktemp("pair") / "tiny.onnx"))
 
 
-def reddened(picture, box):
-    u0, v0, u1, v1 = box
-    picture[v0:v1, u0:u1, 0] = 255
+LARGE, FLAT = (100, 100, 200, 200), (100, 100, 200, 150)
+
+
+def red_picture(*boxes, things=(("hammer", 0.6, LARGE),)):
+    """Picture of things with red boxes over it."""
+    picture = picture_of(*things)
+    for u0, v0, u1, v1 in boxes:
+        picture[v0:v1, u0:u1, 0] = 255
     return picture
 
 
 def test_the_refinement_network_judges_uncertain_proposals(looks_again):
-    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250))
-    (found,) = looks_again.detect([picture])
+    (found,) = looks_again.detect([red_picture((50, 50, 250, 250), things=[("hammer", 0.2, LARGE)])])
     assert [(one.class_name, round(one.score, 2)) for one in found] == [("beer", 1.0)]
-
-
-def test_the_refinement_network_refines_boxes(looks_again):
-    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
-    (found,) = looks_again.detect([picture])
-    assert found[0].box == pytest.approx((105.0, 102.5, 195.0, 147.5), abs=0.01)
-
-
-# mirrored from   seen in the crop   in its mirror image   told
-# None            1.0                not looked at         1.0
-# 0.3             1.0                0.0                   0.5
-@pytest.mark.parametrize(("mirrored_from", "score"), [(None, 1.0), (0.3, 0.5)])
-def test_a_crop_and_its_mirror_image_are_judged_together(tmp_path, mirrored_from, score):
-    """A refinement network that sees red only in the left half gives half the score with the mirror image."""
-    file = write_pair(tmp_path / "tiny.onnx", left_only=True)
-    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (0, 2, 150, 400))
-    options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=mirrored_from))
-    (found,) = load_detector(file, options).detect([picture])
-    assert round(found[0].score, 1) == score
-
-
-def test_the_mirror_image_of_a_faint_proposal_is_not_judged(tmp_path):
-    file = write_pair(tmp_path / "tiny.onnx", left_only=True)
-    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
-    options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=0.3))
-    assert load_detector(file, options).detect([picture]) == [()]
 
 
 def test_the_refinement_network_can_reject_a_sure_proposal(looks_again):
@@ -228,76 +210,84 @@ def test_the_refinement_network_can_reject_a_sure_proposal(looks_again):
 
 
 def test_the_refinement_network_is_not_run_without_proposals(looks_again):
-    assert looks_again.detect([reddened(picture_of(), (50, 50, 250, 250))]) == [()]
-
-
-def test_with_a_refinement_network_one_picture_gives_the_same_as_several(looks_again):
-    pictures = [
-        reddened(picture_of(("hammer", 0.2, (100, 100, 200, 200))), (50, 50, 250, 250)),
-        reddened(picture_of(("coke", 0.3, (300, 200, 400, 400))), (250, 150, 450, 450)),
-    ]
-    assert looks_again.detect(pictures) == [looks_again.detect([one])[0] for one in pictures]
-
-
-def test_a_classifier_network_judges_what_the_refinement_network_sees(tmp_path):
-    """The classifier network sees red in the left half alone, where there is none."""
-    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
-    second, third = (write_pair(tmp_path / "two.onnx"), write_cascade(tmp_path / "three.onnx", left_only=True))
-    options = DetectorOptions(0.05)
-    assert [one.class_name for one in load_detector(second, options).detect([picture])[0]] == ["beer"]
-    assert load_detector(third, options).detect([picture]) == [()]
+    assert looks_again.detect([red_picture((50, 50, 250, 250), things=())]) == [()]
 
 
 # each network says boxes a tenth smaller than those that it gets
 # 100 wide, 50 high -> 90, 45 -> 81, 40.5 about the same middle (150, 125)
-def test_the_classifier_network_sees_crops_about_refined_boxes(tmp_path):
-    picture = reddened(picture_of(("hammer", 0.2, (100, 100, 200, 150))), (0, 2, 300, 300))
-    (found,) = load_detector(write_cascade(tmp_path / "three.onnx")).detect([picture])
-    assert found[0].box == pytest.approx((109.5, 104.75, 190.5, 145.25), abs=0.01)
+@pytest.mark.parametrize(
+    ("write", "box"), [(write_pair, (105.0, 102.5, 195.0, 147.5)), (write_cascade, (109.5, 104.75, 190.5, 145.25))]
+)
+def test_each_later_network_refines_the_boxes_of_the_one_before(tmp_path, write, box):
+    picture = red_picture((0, 2, 300, 300), things=[("hammer", 0.2, FLAT)])
+    (found,) = load_detector(write(tmp_path / "tiny.onnx")).detect([picture])
+    assert found[0].box == pytest.approx(box, abs=0.01)
 
 
-# least score that is judged   what the refinement network says   told
-# 0.12                         1.0                        what the classifier network says: nothing
-# 1.1                          1.0                        what the refinement network says
-@pytest.mark.parametrize(("least_score", "told"), [(0.12, []), (1.1, ["beer"])])
-def test_unclassified_boxes_keep_the_result_of_the_refinement_network(tmp_path, least_score, told):
-    """The classifier network sees red in the left half alone, where there is none."""
-    picture = reddened(picture_of(("hammer", 0.6, (100, 100, 200, 200))), (150, 2, 400, 400))
-    options = DetectorOptions(0.05, reclassified=ProposalOptions(least_score=least_score, mirrored_from=None))
-    (found,) = load_detector(write_cascade(tmp_path / "three.onnx", left_only=True), options).detect([picture])
-    assert [one.class_name for one in found] == told
+RIGHT_HALF = (150, 2, 400, 400)
+
+
+# The refinement network sees red only in the left half: 1.0 in the crop, 0.0 in its mirror image.
+@pytest.mark.parametrize(("mirrored_from", "score"), [(None, 1.0), (0.3, 0.5)])
+def test_a_crop_and_its_mirror_image_are_judged_together(tmp_path, mirrored_from, score):
+    options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=mirrored_from))
+    detector = load_detector(write_pair(tmp_path / "tiny.onnx", left_only=True), options)
+    (found,) = detector.detect([red_picture((0, 2, 150, 400))])
+    assert round(found[0].score, 1) == score
+
+
+def test_the_mirror_image_of_a_faint_proposal_is_not_judged(tmp_path):
+    options = DetectorOptions(0.05, proposals=ProposalOptions(mirrored_from=0.3))
+    detector = load_detector(write_pair(tmp_path / "tiny.onnx", left_only=True), options)
+    assert detector.detect([red_picture(RIGHT_HALF)]) == [()]
+
+
+def classes_right(file, **options):
+    """Classes that the networks of a file find in a picture that is red in the right half alone."""
+    (found,) = load_detector(file, DetectorOptions(0.05, **options)).detect([red_picture(RIGHT_HALF)])
+    return [one.class_name for one in found]
+
+
+# The classifier network sees red in the left half alone, where there is none.
+def test_a_classifier_network_judges_what_the_refinement_network_sees(tmp_path):
+    assert classes_right(write_pair(tmp_path / "two.onnx")) == ["beer"]
+    assert classes_right(write_cascade(tmp_path / "three.onnx", left_only=True)) == []
+
+
+# least score that is judged -> 1.0 of the refinement network is above or below it
+@pytest.mark.parametrize(("least_score", "classes"), [(0.12, []), (1.1, ["beer"])])
+def test_unclassified_boxes_keep_the_result_of_the_refinement_network(tmp_path, least_score, classes):
+    options = ProposalOptions(least_score=least_score, mirrored_from=None)
+    file = write_cascade(tmp_path / "three.onnx", left_only=True)
+    assert classes_right(file, reclassified=options) == classes
 
 
 # of two places that the refinement network sees, the third judges so many
-@pytest.mark.parametrize(("most", "told"), [(1, 1), (2, 0)])
-def test_the_best_boxes_are_classified(tmp_path, most, told):
-    picture = picture_of(("hammer", 0.6, (100, 100, 200, 200)), ("hammer", 0.6, (400, 100, 500, 200)))
-    picture = reddened(reddened(picture, (150, 2, 300, 400)), (450, 2, 600, 400))
+@pytest.mark.parametrize(("most", "count"), [(1, 1), (2, 0)])
+def test_the_best_boxes_are_classified(tmp_path, most, count):
+    things = ("hammer", 0.6, LARGE), ("hammer", 0.6, (400, 100, 500, 200))
+    picture = red_picture((150, 2, 300, 400), (450, 2, 600, 400), things=things)
     options = DetectorOptions(0.05, reclassified=ProposalOptions(same=1.0, most=most, mirrored_from=None))
     (found,) = load_detector(write_cascade(tmp_path / "three.onnx", left_only=True), options).detect([picture])
-    assert len(found) == told
+    assert len(found) == count
 
 
 def test_the_quick_search_finds_the_objects_of_one_class(detector):
     picture = picture_of(HAMMER, ("coke", 0.9, (200, 150, 300, 180)))
-    assert detector.detect_class([picture], "hammer") == [
-        (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
-    ]
+    found = (Detection("hammer", pytest.approx(0.9), (100.0, 50.0, 200.0, 80.0)),)
+    assert detector.detect_class([picture], "hammer") == [found]
 
 
-# the refinement network takes red for a beer
-# proposal    asked for   found
-# hammer      beer        nothing: it is not asked
-# beer 0.2    beer        beer
+# The refinement network takes red for a beer; it is not asked about a hammer.
 @pytest.mark.parametrize(("proposal", "found"), [(("hammer", 0.9), []), (("beer", 0.2), ["beer"])])
-def test_the_quick_search_refines_only_proposals_of_the_class(tmp_path, proposal, found):
-    picture = reddened(picture_of((*proposal, (100, 100, 200, 200))), (60, 60, 240, 240))
-    detector = load_detector(write_pair(tmp_path / "pair.onnx"))
-    assert [one.class_name for one in detector.detect_class([picture], "beer")[0]] == found
+def test_the_quick_search_refines_only_proposals_of_the_class(looks_again, proposal, found):
+    picture = red_picture((60, 60, 240, 240), things=[(*proposal, LARGE)])
+    assert [one.class_name for one in looks_again.detect_class([picture], "beer")[0]] == found
 
 
-def test_the_quick_search_refuses_unknown_classes_and_anything_but_pictures(detector):
-    with pytest.raises(ValueError, match="picture"):
-        detector.detect_class([np.zeros((0, 0, 3), np.uint8)], "beer")
-    with pytest.raises(ValueError, match="screwdriver"):
-        detector.detect_class([np.zeros((240, 320), np.uint8)], "screwdriver")
+@pytest.mark.parametrize(
+    ("shape", "class_name", "message"), [((0, 0, 3), "beer", "picture"), ((240, 320), "screwdriver", "screwdriver")]
+)
+def test_the_quick_search_refuses_unknown_classes_and_anything_but_pictures(detector, shape, class_name, message):
+    with pytest.raises(ValueError, match=message):
+        detector.detect_class([np.zeros(shape, np.uint8)], class_name)

@@ -1,37 +1,25 @@
 """Exact byte products of the processor."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from onnxruntime import InferenceSession, SessionOptions
 
 from skills.perception.detector.model_files import MODEL_FILE, has_exact_byte_products, load_model
+from tests.tables import table
 
 
-@pytest.mark.parametrize(
-    ("told", "able"),
-    [
-        # what Linux tells                                          whether byte products are added exactly
-        ("flags\t\t: fpu avx2 avx512f avx512_vnni\n", True),
-        ("flags : fpu avx2 avx_vnni\n", True),
-        ("flags : fpu avx2\n", False),
-        ("flags : avx_vnni\nprocessor : 1\nflags : avx2\n", False),
-        ("Features : fp asimd asimddp\n", False),
-        ("", False),
-    ],
-)
-def test_exact_byte_products_need_the_flag_of_all_cores(tmp_path: Path, told: str, able: bool) -> None:
+@pytest.mark.parametrize(*table(__file__, "flags"))
+def test_exact_byte_products_need_the_flag_of_all_cores(tmp_path, told, able):
     file = tmp_path / "cpuinfo"
     file.write_text(told)
     assert has_exact_byte_products(file) is able
 
 
-def test_exact_byte_products_are_not_assumed_without_flags(tmp_path: Path) -> None:
+def test_exact_byte_products_are_not_assumed_without_flags(tmp_path):
     assert not has_exact_byte_products(tmp_path / "none")
 
 
-def test_detections_here_equal_those_with_exact_sums() -> None:
+def test_detections_here_equal_those_with_exact_sums():
     exact = SessionOptions()
     exact.add_session_config_entry("session.x64quantprecision", "1")
     given = {"images": np.random.default_rng(3).integers(0, 256, (1, 480, 640, 3), dtype=np.uint8)}

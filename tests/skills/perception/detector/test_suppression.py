@@ -1,5 +1,3 @@
-"""Non-maximum suppression."""
-
 import numpy as np
 import pytest
 
@@ -55,6 +53,11 @@ def test_the_number_of_detections_is_limited():
     assert len(kept(*rows, options=SuppressionOptions(most_kept=2))) == 2
 
 
+def test_no_candidates_stay_no_candidates():
+    nothing = Candidates(np.empty((0, 4), np.float32), np.empty(0, np.float32), np.empty(0, np.int64))
+    assert len(suppress(nothing, OPTIONS)) == 0
+
+
 @pytest.mark.parametrize(
     ("rows", "expected"),
     [
@@ -68,11 +71,6 @@ def test_the_number_of_detections_is_limited():
 def test_alternatives_are_other_classes_on_the_same_object(rows, expected):
     (found,) = alternative_scores(suppress(candidates(rows[0]), OPTIONS), candidates(*rows), OPTIONS)
     assert found == pytest.approx(expected)
-
-
-def test_no_candidates_stay_no_candidates():
-    nothing = Candidates(np.empty((0, 4), np.float32), np.empty(0, np.float32), np.empty(0, np.int64))
-    assert len(suppress(nothing, OPTIONS)) == 0
 
 
 def test_candidates_reach_the_threshold_and_are_sorted_by_score():
@@ -90,10 +88,10 @@ def test_the_best_candidates_are_selected():
     assert select_candidates(boxes, scores, 0.5, 3).scores.tolist() == pytest.approx([0.99, 0.98, 0.97])
 
 
+def test_scores_that_are_nan_are_no_candidates():
+    assert len(select_candidates(np.array([WHOLE], np.float32), np.array([[np.nan]], np.float32), 0.5, 10)) == 0
+
+
 @pytest.mark.parametrize("box", [(np.nan, 0, 1, 1), (0, 0, np.inf, 1), (5, 0, 5, 9), (9, 9, 2, 2)])
 def test_invalid_boxes_are_no_candidates(box):
     assert len(select_candidates(np.array([box], np.float32), np.array([[0.9]], np.float32), 0.5, 10)) == 0
-
-
-def test_scores_that_are_nan_are_no_candidates():
-    assert len(select_candidates(np.array([WHOLE], np.float32), np.array([[np.nan]], np.float32), 0.5, 10)) == 0

@@ -2,17 +2,19 @@
 
 import io
 import zipfile
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from string import Template
 
 import cv2
 import numpy as np
 import trimesh
 
-SIZE_M: Final = (0.06, 0.08, 0.12)
+SIZE_M = (0.06, 0.08, 0.12)
 """Extents of the body: a box."""
+
+
+COLLADA = Template(Path(__file__).with_name("box.dae.template").read_text())
 
 
 def box():
@@ -40,8 +42,8 @@ class MeshForm:
     """
 
     name: str
-    write: Callable[[Path], object]
-    options: Mapping[str, Any] = field(default_factory=dict)
+    write: object
+    options: dict = field(default_factory=dict)
     share: float = 1.0
     note: str | None = None
     refused: str | None = None
@@ -120,34 +122,16 @@ def png(colour):
     return bytes(cv2.imencode(".png", np.full((4, 4, 3), colour[::-1], np.uint8))[1].tobytes())
 
 
-def collada(meter=0.01, up="Y_UP", picture="skin.png"):
+def collada(meter=0.01, up="Y_UP", picture="skin.png", *, kind="triangles", node=""):
     """COLLADA file of the body with a picture, as Blender nests the names of samplers, surfaces and images."""
     turn = {"Y_UP": (0, 2, 1), "Z_UP": (0, 1, 2), "X_UP": (2, 1, 0)}[up]
     body = trimesh.creation.box(np.array(SIZE_M)[list(turn)])
     points = " ".join(f"{value / meter:.9g}" for value in body.vertices.flat)
     corners = " ".join(f"{value} 0" for value in body.faces.flat)
-    return f"""<?xml version="1.0"?>
-<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
-<asset><unit name="u" meter="{meter}"/><up_axis>{up}</up_axis></asset>
-<library_images><image id="i"><init_from>{picture}</init_from></image></library_images>
-<library_effects><effect id="e"><profile_COMMON>
-<newparam sid="s1"><surface type="2D"><init_from>i</init_from></surface></newparam>
-<newparam sid="s2"><sampler2D><source>s1</source></sampler2D></newparam>
-<technique sid="c"><lambert><diffuse><texture texture="s2" texcoord="UV"/></diffuse></lambert></technique>
-</profile_COMMON></effect></library_effects>
-<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
-<library_geometries><geometry id="g"><mesh>
-<source id="p"><float_array id="pa" count="{3 * len(body.vertices)}">{points}</float_array>
-<technique_common><accessor source="#pa" count="{len(body.vertices)}" stride="3"/></technique_common></source>
-<source id="t"><float_array id="ta" count="2">0.5 0.5</float_array>
-<technique_common><accessor source="#ta" count="1" stride="2"/></technique_common></source>
-<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
-<triangles count="{len(body.faces)}" material="k"><input semantic="VERTEX" source="#v" offset="0"/>
-<input semantic="TEXCOORD" source="#t" offset="1" set="0"/><p>{corners}</p></triangles></mesh></geometry>
-</library_geometries><library_visual_scenes><visual_scene id="vs"><node><instance_geometry url="#g"><bind_material>
-<technique_common><instance_material symbol="k" target="#m"/></technique_common></bind_material></instance_geometry>
-</node></visual_scene></library_visual_scenes><scene><instance_visual_scene url="#vs"/></scene></COLLADA>
-"""
+    counts = f"<vcount>{' '.join(['3'] * len(body.faces))}</vcount>" if kind == "polylist" else ""
+    values = {"numbers": 3 * len(body.vertices), "vertices": len(body.vertices), "faces": len(body.faces)}
+    values |= {"points": points, "corners": corners, "counts": counts, "meter": meter, "up": up, "kind": kind}
+    return COLLADA.substitute(**values, picture=picture, node=node)
 
 
 def obj(head="", *, negative=False):
@@ -198,9 +182,9 @@ def cut_off(path):
     path.write_bytes(stream.getvalue()[:300])
 
 
-SKIN: Final = "newmtl skin\nKd 0.8 0.8 0.8\nmap_Kd skin.png\n"
-FIN: Final = np.array([[(0.03, -0.04, 0.06), (0.03, 0.04, 0.06), (0.05, 0.0, 0.09)]])
-FORMS: Final[Mapping[str, MeshForm]] = {
+SKIN = "newmtl skin\nKd 0.8 0.8 0.8\nmap_Kd skin.png\n"
+FIN = np.array([[(0.03, -0.04, 0.06), (0.03, 0.04, 0.06), (0.05, 0.0, 0.09)]])
+FORMS = {
     "binary STL": MeshForm("m.stl", exported()),
     "text STL": MeshForm("m.stl", lambda path: path.write_text(trimesh.exchange.stl.export_stl_ascii(box()))),
     "STL in millimetres": MeshForm("m.stl", exported(scale=1000.0), refused="0.001 if its unit is millimetres"),

@@ -34,15 +34,17 @@ def pipe():
     return trimesh.creation.annulus(0.03, 0.04, 0.1, sections=8)
 
 
+def numbers(lines, key):
+    return np.array([line.split()[1:] for line in lines if line.startswith(f"{key} ")], float)
+
+
 def part_points(folder):
-    files = sorted(folder.glob("gadget_part_*.obj"))
-    return [np.array([line.split()[1:] for line in f.read_text().splitlines() if line[0] == "v"], float) for f in files]
+    return [numbers(file.read_text().splitlines(), "v") for file in sorted(folder.glob("gadget_part_*.obj"))]
 
 
 def test_a_box_has_the_inertia_of_a_box(tmp_path):
     made, folder = imported(trimesh.creation.box((0.2, 0.06, 0.04)), tmp_path)
-    assert made.size_m == pytest.approx((0.2, 0.06, 0.04))
-    assert made.com_m == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert (made.size_m, made.com_m) == (pytest.approx((0.2, 0.06, 0.04)), pytest.approx((0.0, 0.0, 0.0), abs=1e-9))
     expected = 0.6 / 12 * np.array([0.06**2 + 0.04**2, 0.2**2 + 0.04**2, 0.2**2 + 0.06**2])
     np.testing.assert_allclose(made.inertia_kg_m2[:3], expected, rtol=1e-6)
     assert (made.collision_parts, made.triangles, made.class_name, made.round) == (1, 12, "gadget", False)
@@ -64,8 +66,7 @@ def test_a_hollow_body_is_few_convex_parts_none_larger_than_it(tmp_path, make):
     assert 2 <= made.collision_parts == len(parts) <= 16
     assert all((np.abs(part) <= half + 1e-6).all() for part in parts)
     volumes = sum(ConvexHull(part).volume for part in parts)
-    assert 0.85 * mesh.volume < volumes < 1.1 * mesh.volume
-    assert max(map(len, parts)) <= 64
+    assert 0.85 * mesh.volume < volumes < 1.1 * mesh.volume and max(map(len, parts)) <= 64
     sdf = (folder / "gadget.sdf").read_text()
     assert sdf.count("<drake:declare_convex/>") == made.collision_parts
     assert sdf.count("<drake:mu_dynamic>0.8<") == sdf.count("<collision ")
@@ -89,17 +90,16 @@ def test_a_ball_gets_spheres_to_rest_on(tmp_path):
 def test_an_object_that_cannot_stand_is_laid_down_along_x(tmp_path):
     rod = trimesh.creation.cylinder(0.01, 0.3)
     rod.apply_transform(trimesh.transformations.rotation_matrix(0.4, [1, 1, 0]))
-    made, _ = imported(rod, tmp_path)
-    assert made.size_m == pytest.approx((0.3, 0.02, 0.02), abs=2e-4)
+    assert imported(rod, tmp_path)[0].size_m == pytest.approx((0.3, 0.02, 0.02), abs=2e-4)
 
 
-def test_a_standing_object_is_left_standing(tmp_path):
-    assert imported(trimesh.creation.box((0.04, 0.06, 0.2)), tmp_path)[0].size_m == pytest.approx((0.04, 0.06, 0.2))
-
-
-@pytest.mark.parametrize(("up", "ending"), [("y", "ply"), (None, "glb")])
-def test_y_may_be_up_and_is_in_gltf(tmp_path, up, ending):
-    made, _ = imported(trimesh.creation.box((0.04, 0.2, 0.06)), tmp_path, ending, up=up)
+# extents of a mesh that stands on its end; y may be up, and is in glTF
+@pytest.mark.parametrize(
+    ("extents_m", "up", "ending"),
+    [((0.04, 0.06, 0.2), None, "ply"), ((0.04, 0.2, 0.06), "y", "ply"), ((0.04, 0.2, 0.06), None, "glb")],
+)
+def test_a_standing_object_is_left_standing(tmp_path, extents_m, up, ending):
+    made, _ = imported(trimesh.creation.box(extents_m), tmp_path, ending, up=up)
     assert made.size_m == pytest.approx((0.04, 0.06, 0.2))
 
 
@@ -109,9 +109,7 @@ def test_a_body_inside_out_is_turned(tmp_path):
     made, folder = imported(box, tmp_path)
     assert min(made.inertia_kg_m2[:3]) > 0
     lines = (folder / "gadget.obj").read_text().splitlines()
-    points, normals = (
-        np.array([line.split()[1:] for line in lines if line.startswith(k)], float) for k in ("v ", "vn")
-    )
+    points, normals = numbers(lines, "v"), numbers(lines, "vn")
     corners = [line.split()[1:] for line in lines if line.startswith("f")]
     for first in (face[0].split("/") for face in corners):
         assert points[int(first[0]) - 1] @ normals[int(first[2]) - 1] > 0
@@ -119,10 +117,8 @@ def test_a_body_inside_out_is_turned(tmp_path):
 
 def test_edges_are_sharp_and_round_sides_are_smooth(tmp_path):
     _, folder = imported(trimesh.creation.cylinder(0.03, 0.1, sections=32), tmp_path)
-    lines = (folder / "gadget.obj").read_text().splitlines()
-    normals = np.array([line.split()[1:] for line in lines if line.startswith("vn")], float)
-    assert set(np.round(np.abs(normals[:, 2]), 2)) == {0.0, 1.0}
-    assert len(normals) == 32 + 2
+    normals = numbers((folder / "gadget.obj").read_text().splitlines(), "vn")
+    assert (set(np.round(np.abs(normals[:, 2]), 2)), len(normals)) == ({0.0, 1.0}, 32 + 2)
 
 
 def test_colours_of_triangles_stay(tmp_path):

@@ -9,6 +9,7 @@ from plant.models.builder.importing.photographs import cut_out
 from plant.models.catalogue import read_imported
 from skills.files.errors import InputError
 from skills.files.object_model import read_model
+from tests.tables import table
 
 RED, GROUND = (190, 40, 35), (120, 150, 160)
 SIZE_M = (0.08, 0.06, 0.1)
@@ -21,9 +22,8 @@ def photograph(file, box=(140, 100, 260, 250), ground=GROUND, colour=RED, *, opa
     u0, v0, u1, v1 = box
     picture[v0:v1, u0:u1] = colour
     picture = np.clip(picture + rng.normal(0, 2, picture.shape), 0, 255).astype(np.uint8)
-    alpha = np.full((320, 400, 1), 255, np.uint8)
     if not opaque:
-        alpha[:] = 0
+        alpha = np.zeros((320, 400, 1), np.uint8)
         alpha[v0:v1, u0:u1] = 255
         picture = np.dstack([picture, alpha])
     cv2.imwrite(str(file), cv2.cvtColor(picture, cv2.COLOR_RGB2BGR if opaque else cv2.COLOR_RGBA2BGRA))
@@ -44,18 +44,10 @@ def test_an_object_is_cut_out_of_its_background(tmp_path, name, opaque):
     assert np.abs(np.median(cut[cut[..., 3] > 127][:, :3], axis=0) - RED).max() < 6
 
 
-@pytest.mark.parametrize(
-    ("box", "ground", "colour", "why"),
-    [
-        ((140, 100, 260, 320), GROUND, RED, "the border cuts the object; photograph it whole"),
-        ((140, 100, 170, 140), GROUND, RED, "the object is only 4.* pixels large; photograph it from nearer"),
-        ((140, 100, 260, 250), GROUND, (125, 150, 160), "no object stands out from the background; photograph"),
-    ],
-    ids=["cut", "small", "same colour"],
-)
-def test_a_photograph_that_shows_no_whole_object_is_refused_by_name(tmp_path, box, ground, colour, why):
+@pytest.mark.parametrize(*table(__file__, "no_whole_object"))
+def test_a_photograph_that_shows_no_whole_object_is_refused_by_name(tmp_path, box, colour, why):
     with pytest.raises(InputError, match=f"photo.png: {why}"):
-        cut_out(photograph(tmp_path / "photo.png", box, ground, colour))
+        cut_out(photograph(tmp_path / "photo.png", box, colour=colour))
 
 
 def test_a_background_that_is_not_plain_is_refused(tmp_path):
@@ -74,14 +66,12 @@ def test_photographs_make_a_model_of_the_given_size_and_their_views(tmp_path):
     (photographs / "4.png").write_bytes(b"no picture")
     notes = list[str]()
     made = import_photographs(photographs, ImportOptions("mug", 0.3), out, ImportReports(note=notes.append), SIZE_M)
-    assert notes == [
-        f"left out: {photographs / '4.png'}: it is no picture; name a file in PNG, JPEG, WebP, TIFF or BMP"
-    ]
+    bad = photographs / "4.png"
+    assert notes == [f"left out: {bad}: it is no picture; name a file in PNG, JPEG, WebP, TIFF or BMP"]
     assert (made.photographs, made.size_m, made.class_name, made.mass_kg) == (4, SIZE_M, "mug", 0.3)
     assert read_imported(out) == made
     model = read_model(out)
-    assert np.ptp(model.points, axis=0) == pytest.approx(SIZE_M, abs=2e-3)
-    assert model.views.shape == (4, 24, 24, 4)
+    assert (np.ptp(model.points, axis=0), model.views.shape) == (pytest.approx(SIZE_M, abs=2e-3), (4, 24, 24, 4))
     assert (model.views[..., 3] > 127).sum(axis=(1, 2)) == pytest.approx([24 * 19] * 4, abs=25)
 
 

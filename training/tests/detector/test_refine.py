@@ -1,0 +1,139 @@
+"""From a folder of pictures and a proposal network to the refinement network's file; skipped without torch."""
+
+import json
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.skills.tiny_detector import CLASSES, picture_of, write_model
+from training.tests.random_networks import random_network
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from errand_train.detector.labels import TrainingDataError  # noqa: E402
+from errand_train.detector.learner import read_checkpoint  # noqa: E402
+from errand_train.detector.loop import CHECKPOINT  # noqa: E402
+from errand_train.detector.refine import TABLE, refine  # noqa: E402
+from errand_train.detector.schedule import Budget, RefineOptions, Report, Schedule  # noqa: E402
+from errand_train.detector.train import MODEL  # noqa: E402
+from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
+from skills.perception.detector.onnx_detector import OnnxDetector  # noqa: E402
+
+
+def write_split(folder, split, count, names=CLASSES):
+    """Pictures of noise that are said to hold many things as large as an unlearnt network's boxes."""
+    images, labels = [], []
+    for k in range(count):
+        name, noise = f"{split}{k}.png", np.random.default_rng(k).integers(0, 256, (480, 640, 3), dtype=np.uint8)
+        cv2.imwrite(str(folder / name), noise)
+        images.append({"id": k, "file_name": name, "width": 640, "height": 480})
+        corners = [(x, y) for x in range(1, 620, 24) for y in range(9, 450, 48)]
+        labels += [
+            {"id": len(labels) + n, "image_id": k, "category_id": 1 + n % 2, "bbox": [*corner, 22, 22]}
+            for n, corner in enumerate(corners)
+        ]
+    categories = [{"id": k + 1, "name": name} for k, name in enumerate(names)]
+    document = {"images": images, "annotations": labels, "categories": categories}
+    (folder / f"{split}.json").write_text(json.dumps(document))
+
+
+@pytest.fixture
+def options(tmp_path):
+    """As a data set and a proposal network stand after `errand dataset train`."""
+    data = tmp_path / "data"
+    data.mkdir()
+    write_split(data, "train", 4)
+    write_split(data, "val", 2)
+    first = real_first(tmp_path / "first.onnx")
+    return RefineOptions(
+        data, tmp_path / "out", Budget(pictures=8), model=first, examined=2, batch=4, schedule=Schedule(1e-3)
+    )
+
+
+def real_first(file):
+    """A proposal network in the form that learning can take over, which sees something everywhere."""
+    from errand_train.detector.export import export
+
+    export(random_network(0, len(CLASSES)), file, class_names=CLASSES, facts={}, score_offsets=(4.0,) * len(CLASSES))
+    return file
+
+
+def test_a_proposal_network_gets_a_refinement_network(options):
+    told = list[Report]()
+    file = refine(options, told.append)
+    assert file == refinement_file(options.out / MODEL)
+    model = load_model(options.out / MODEL)
+    assert model.refinement is not None
+    assert len(OnnxDetector(model).detect([picture_of()])) == 1
+    assert told[-1].progress == 1.0
+    assert told[-1].figures is not None
+    assert {path.name for path in options.out.iterdir()} >= {CHECKPOINT, MODEL, TABLE, "training.jsonl"}
+
+
+def test_both_get_a_classifier_network_that_belongs_to_them(options, tmp_path):
+    refine(options, lambda _: None)
+    next_one = replace(options, classifier=True, model=options.out / MODEL, out=tmp_path / "next")
+    file = refine(next_one, lambda _: None)
+    assert file == classifier_file(next_one.out / MODEL)
+    model = load_model(next_one.out / MODEL)
+    assert model.refinement is not None
+    assert model.classifier is not None
+    assert model.classifier.metadata["second"] == model.refinement.digest
+    assert len(OnnxDetector(model).detect([picture_of()])) == 1
+
+
+def test_without_a_refinement_network_there_is_no_classifier_network(options):
+    with pytest.raises(TrainingDataError, match=r"first_refinement\.onnx: cannot be copied"):
+        refine(replace(options, classifier=True), lambda _: None)
+
+
+def test_a_training_resumes_from_its_checkpoint(options):
+    refine(options, lambda _: None)
+    told = list[Report]()
+    refine(replace(options, budget=Budget(pictures=16), resume=True), told.append)
+    assert [report.steps for report in told if report.figures is not None] == [3, 4]
+
+
+def test_weights_of_another_training_are_taken_over(options, tmp_path):
+    refine(options, lambda _: None)
+    budget, start = Budget(pictures=4), options.out / CHECKPOINT
+    refine(replace(options, out=tmp_path / "next", budget=budget, start=start, schedule=Schedule(0.0)), lambda _: None)
+    before, after = (read_checkpoint(out / CHECKPOINT) for out in (options.out, tmp_path / "next"))
+    assert after["progress"]["steps"] == 1
+    averaged, weight = "module.scores.weight", "scores.weight"
+    assert before["average"][averaged].abs().max() > 0
+    assert torch.equal(before["average"][averaged], after["network"][weight])
+
+
+def test_weights_of_a_refinement_networks_file_are_taken_over(options, tmp_path):
+    start, still = refine(replace(options, budget=Budget(pictures=32)), lambda _: None), Schedule(0.0)
+    out = tmp_path / "next"
+    refine(replace(options, out=out, budget=Budget(pictures=4), start=start, schedule=still), lambda _: None)
+    before, after = (read_checkpoint(folder / CHECKPOINT) for folder in (options.out, out))
+    averaged, weight = "module.scores.weight", "scores.weight"
+    assert after["progress"]["steps"] == 1
+    assert torch.allclose(before["average"][averaged], after["network"][weight], atol=1e-4)
+
+
+def test_a_network_of_other_classes_is_refused(options):
+    for split in ("train", "val"):
+        write_split(options.data, split, 4, names=("beer", "coke", "wrench"))
+    with pytest.raises(TrainingDataError, match="knows other classes"):
+        refine(options, lambda _: None)
+
+
+def test_a_network_without_proposals_is_refused(options, tmp_path):
+    blind = write_model(tmp_path / "blind.onnx")
+    for file in options.data.glob("*.png"):
+        cv2.imwrite(str(file), picture_of())
+    with pytest.raises(TrainingDataError, match="finds nothing"):
+        refine(replace(options, model=blind), lambda _: None)
+
+
+def test_a_file_that_is_no_network_is_refused(options):
+    (options.data / "none.onnx").write_bytes(b"none")
+    with pytest.raises(TrainingDataError, match=r"none\.onnx.*damaged or no ONNX file"):
+        refine(replace(options, model=options.data / "none.onnx"), lambda _: None)

@@ -7,6 +7,7 @@ import stat
 import subprocess
 import sys
 import threading
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -525,12 +526,24 @@ def test_a_message_that_cannot_be_used_is_told_and_raises_nothing(calls, stand, 
 
 
 @pytest.mark.mission
+@contextmanager
+def killed_after(time_s, process):
+    """Kills a process that would be waited for longer."""
+    timer = threading.Timer(time_s, process.kill)
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
 def test_a_server_process_runs_a_called_mission_and_ends_at_sigterm(tmp_path):
     where = ["--out", str(tmp_path)]
     added = CliRunner().invoke(app, ["queue", "add", "go_to_pose", "--on", "call pose", "--no-record", *where])
     assert added.exit_code == 0, added.output
     serve = [sys.executable, "-m", "executive.cli", "queue", "serve", "--quiet", "--json", "--port", "0", *where]
-    with subprocess.Popen(serve, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as server:
+    pipes = {"text": True, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen(serve, cwd=ROOT, **pipes) as server, killed_after(120.0, server):
         port = next(int(line.split(":")[3].split("/")[0]) for line in server.stderr if line.startswith("Calls:"))
         token = (tmp_path / ".errand" / "missions.sqlite-token").read_text().strip()
         connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)

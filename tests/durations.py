@@ -33,7 +33,8 @@ class Durations:
         self.collected_s = 0.0
 
     def pytest_collection_finish(self):
-        self.collected_s = time.monotonic() - self.began_s
+        if not self.seconds:  # a worker that takes the place of one that crashed collects later
+            self.collected_s = time.monotonic() - self.began_s
 
     def pytest_xdist_node_collection_finished(self):
         self.pytest_collection_finish()

@@ -81,7 +81,7 @@ class Fast:
         return True if collection_path in self.slow else None
 
     def pytest_terminal_summary(self, terminalreporter):
-        terminalreporter.write_line(f"left out: missions, and the {len(self.slow)} slow files of tests/slow.txt")
+        terminalreporter.write_line(f"left out: the {len(self.slow)} slow files of tests/slow.txt")
 
 
 def rows(seconds):
@@ -90,6 +90,8 @@ def rows(seconds):
 
 
 def main():
+    if not FILE.is_file():
+        raise SystemExit(f"there is no {FILE.relative_to(ROOT)}: run `make test` first")
     files = json.loads(FILE.read_text())["files"]
     SLOW.write_text("".join(f"{name}\n" for name in sorted(row["name"] for row in files if row["seconds"] > SLOW_S)))
 

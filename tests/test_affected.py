@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.affected import ROOT, touched
+from tests.affected import ROOT, changed_files, imports, touched
 
 
 @pytest.mark.parametrize(
@@ -16,6 +16,11 @@ from tests.affected import ROOT, touched
         ("tests/executive/words/test_command.py", "plant/worlds/flat/objects.yaml", False),
         ("tests/executive/words/test_command.py", "skills/navigate/mppi.py", False),
         ("tests/executive/words/test_command.py", "README.md", False),
+        ("tests/docs/test_readme.py", "README.md", True),
+        ("tests/skills/faults/test_faults.py", "tests/skills/faults/test_faults.yaml", True),
+        ("tests/skills/navigate/test_navigate.py", "tests/skills/conftest.py", True),
+        ("tests/plant/test_engine.py", "tests/skills/conftest.py", False),
+        ("tests/executive/words/test_command.py", "executive/language/tables/ümlaut.yaml", False),
         ("tests/executive/words/test_command.py", "tests/conftest.py", True),
         ("training/tests/dataset/test_coco.py", "training/errand_train/dataset/compose.py", True),
         ("training/tests/dataset/test_coco.py", "training/errand_train/nouns.py", False),
@@ -24,3 +29,15 @@ from tests.affected import ROOT, touched
 )
 def test_a_change_touches(test, changed, expected):
     assert touched(ROOT / test, frozenset([changed])) is expected
+
+
+def test_a_module_that_is_gone_is_imported_still(tmp_path):
+    test = tmp_path / "test_it.py"
+    test.write_text("from skills.gone import it\n")
+    gone = ROOT / "skills/gone.py"
+    assert (imports(test), imports(test, frozenset([gone]))) == (frozenset(), {gone})
+
+
+def test_an_unknown_revision_is_refused_in_one_sentence():
+    with pytest.raises(pytest.UsageError, match="there is no revision 'nonsense'; name a branch"):
+        changed_files("nonsense")

@@ -52,6 +52,7 @@ def shelf(tmp_path, monkeypatch):
     return load_world(str(tmp_path))
 
 
+@pytest.mark.xfail(strict=True, reason="since the jaws have a grid of rubber, no spot of the shelf is in reach")
 def test_the_beer_before_it_is_moved_aside_and_the_coke_is_taken(shelf):
     steps = (Do.from_command(parse_command(f"Take [Nothing] to [{TAKEN}] and do [grasp] to [coke]")),)
     mission = Mission(name="shelf", world=str(shelf.folder), robot="Alice", steps=steps).with_policy(

@@ -11,7 +11,7 @@ import yaml
 from tests.docs.documents import DOCS, ROOT, commands, links, unknown_command
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-_TEST = re.compile(r"`(tests/[\w/.]+\.py)(?:::(\w+))?`")
+_TEST = re.compile(r"`((?:training/)?tests/[\w/.]+\.py)(?:::(\w+)(?:\[([^\]]+)\])?)?`")
 _FILE = re.compile(r"`((?:executive|skills|plant|training|missions|docs)/[\w/.]+\.(?:py|yaml|json|md))`")
 _ERRAND = re.compile(r"`(errand [^`]+)`")
 
@@ -30,11 +30,13 @@ def anchors(page):
 
 
 def missing_tests(text):
-    """The tests that a text names and that are not there."""
-    for file, name in _TEST.findall(text):
+    """The tests that a text names, with a row of their table or without, and that are not there."""
+    for file, name, row in _TEST.findall(text):
         path = ROOT / file
         if not path.is_file() or (name and name not in names_in(path)):
             yield f"{file}::{name}"
+        elif row and not any(row in each.read_text() for each in (path, *path.parent.glob("*.yaml"))):
+            yield f"{file}::{name}[{row}]"
 
 
 def broken_links(page):
@@ -71,7 +73,9 @@ def test_all_fourteen_points_have_a_test():
 
 
 def test_a_missing_target_is_noticed():
-    assert list(missing_tests("`tests/docs/test_pages.py::test_no_such`")) == ["tests/docs/test_pages.py::test_no_such"]
+    here, rows = "tests/executive/run/test_endings.py", "test_the_steps_under_always_are_done_on_every_end"
+    named = [f"{here}::test_no_such", f"{here}::{rows}[no such row]", f"{here}::{rows}[inner first]"]
+    assert list(missing_tests(" ".join(f"`{each}`" for each in named))) == named[:2]
     assert unknown_command("errand fly") == "no command fly"
     assert unknown_command("errand check --fast file.yaml") == "check has no --fast"
 

@@ -55,7 +55,7 @@ def act(control, robot, compiled, case, what):
 
 
 @pytest.mark.parametrize("case", RUNS, ids=lambda case: case["name"])
-def test_a_run_ends_as_it_should(compiled, run_tree, make, robot, script, published, case):
+def test_the_result_says_how_the_run_ended(compiled, run_tree, make, robot, script, published, case):
     control = Control(pace=None)
     script.seen_on, script.steps = case.get("seen_on", script.seen_on), case.get("takes", script.steps)
     script.ends.update({name: ends_of(script, name, said) for name, said in case.get("ends", {}).items()})

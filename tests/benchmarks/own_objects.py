@@ -23,7 +23,6 @@ from unittest import mock
 import cv2
 import numpy as np
 import trimesh
-import yaml
 from pydrake.geometry import (
     FramePoseVector,
     GeometryFrame,
@@ -57,8 +56,9 @@ from tests.benchmarks.find_things import room_bench
 from tests.benchmarks.flat_scene import SURFACES, FlatScene, surface_of, viewpoint_of
 from tests.benchmarks.foreign_models import CATALOGUES, OTHERS, entries
 from tests.benchmarks.harness import by, command, share, tell
+from tests.tables import yaml_beside
 
-GENERATED = yaml.safe_load(Path(__file__).with_name("own_shapes.yaml").read_text(encoding="utf-8"))
+GENERATED = yaml_beside(__file__, "own_shapes.yaml")
 OBJECTS, FOREIGN, OTHERS_AROUND, IMPORTED_OTHERS = 10, 10, 4, 2
 UPRIGHT_SHARE, TRIES = 0.75, 300
 RIM_M, CLEAR_M, REACH_M, RIGHT_WITHIN_M = 0.04, 0.04, 1.7, 0.05

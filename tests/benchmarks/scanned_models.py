@@ -6,19 +6,18 @@ brings them as binary STL files without colours. They stay where they are; nothi
 
 import struct
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import yaml
 
 from errand_train.dataset.objects.draft import Draft
 from plant.models.builder.mesh import Colour
 from tests.benchmarks.foreign_models import kept_model
+from tests.tables import yaml_beside
 
 _HEADER_BYTES = 80
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
 _SAME_POINT = 1e-5
-FACTS = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+FACTS = yaml_beside(__file__, "scanned_models.yaml")
 COLOURS = {name: tuple(rgb) for name, rgb in FACTS["colours"].items()}
 
 

@@ -80,13 +80,16 @@ def test_failures_are_counted_by_class_and_cause():
     assert [line[:2] for line in lines] == [["2", "coke"], ["1", "coke"]]
 
 
-def test_a_sheet_has_a_picture_for_each_failure_and_is_not_written_without(tmp_path):
+def test_a_sheet_has_a_picture_for_each_failure(tmp_path):
     ending, path = tmp_path / "ending.png", tmp_path / "made" / "sheet.png"
     cv2.imwrite(str(ending), np.zeros((60, 80, 3), np.uint8))
     assert "2 failed trials" in write_sheet(path, [GOOD, *[trial(**UNSEEN, ending=ending)] * 2])
     assert cv2.imread(str(path)).shape[1] == 2 * 400
-    assert "no trial failed" in write_sheet(tmp_path / "none.png", [GOOD])
-    assert not (tmp_path / "none.png").exists()
+
+
+def test_without_failures_no_sheet_is_written(tmp_path):
+    assert "no trial failed" in write_sheet(tmp_path / "sheet.png", [GOOD])
+    assert not (tmp_path / "sheet.png").exists()
 
 
 def test_work_is_timed_by_name_also_when_it_fails():
@@ -116,12 +119,15 @@ def test_a_shape_is_written_as_an_imported_object_of_its_size(tmp_path):
     assert sorted(made.size_m) == pytest.approx(sorted(random_shape(502).size_m), rel=0.02)
 
 
-def test_a_room_is_entered_once_and_neither_a_doorway_nor_an_opening_counts():
+def test_a_room_is_entered_once_and_a_doorway_is_none():
     rooms = []
     for name in ("kitchen", "kitchen", None, "hall", "hall", "bedroom", None, "hall"):
         rooms = entered(rooms, name)
     assert rooms == ["kitchen", "hall", "bedroom", "hall"]
     assert doors(rooms) == 3
+
+
+def test_the_opening_between_hall_and_living_room_is_no_door():
     assert doors(["hall", "living room", "kitchen"]) == 1
 
 

@@ -6,19 +6,18 @@ import os
 import shlex
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-import yaml
 
 from tests.benchmarks.errand_process import ROOT
 from tests.benchmarks.speech.score import NO_VOICE
 from tests.benchmarks.structured_sentences import TABLES, measured
+from tests.tables import yaml_beside
 
 LIMIT_S = 600.0
 NEEDED = {"spot_": "bosdyn.client", "speech.": "faster_whisper", "evaluation kill": "distributed"}
 """Packages without which some measures are skipped."""
-SMALLEST = yaml.safe_load(Path(__file__).with_name("smallest_cases.yaml").read_text(encoding="utf-8"))
+SMALLEST = yaml_beside(__file__, "smallest_cases.yaml")
 """Conditions on the figures of measures, by their commands."""
 
 

@@ -22,15 +22,23 @@ def parts_of(thing):
 
 
 @pytest.mark.parametrize(("module", "name"), NAMES)
-def test_a_public_name_is_there_documented_and_typed(module, name):
-    parts = parts_of(getattr(import_module(module), name))
-    assert [part for part in parts if not part.__doc__] == []
-    assert [part for part in parts if inspect.isfunction(part) and "return" not in part.__annotations__] == []
+def test_a_public_name_is_there_and_documented(module, name):
+    thing = getattr(import_module(module), name)
+    assert [part for part in parts_of(thing) if not part.__doc__] == []
 
 
-def test_names_stand_once_and_robot_context_and_skill_are_among_them():
+@pytest.mark.parametrize(("module", "name"), NAMES)
+def test_a_public_function_is_typed(module, name):
+    functions = [part for part in parts_of(getattr(import_module(module), name)) if inspect.isfunction(part)]
+    assert [function for function in functions if "return" not in function.__annotations__] == []
+
+
+def test_no_name_stands_twice():
     names = [name for _, name in NAMES]
     assert sorted(names) == sorted(set(names))
+
+
+def test_robot_context_and_skill_are_public():
     assert {("skills.robot", "Robot"), ("skills.api", "SkillContext"), ("skills.api", "Skill")} <= set(NAMES)
 
 

@@ -7,7 +7,6 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import count
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -42,10 +41,10 @@ from skills.api import (
     Surface,
 )
 from skills.api import Step as SkillStep
-from skills.files.yaml_source import read_yaml
 from skills.robot import CommandState, CommandStatus, Lease
 from skills.testing.clock import VirtualClock
 from skills.testing.robot import ScriptedRobot
+from tests.tables import yaml_beside
 from tests.visitors import OnMessage, OnTick
 
 SENSES = {"battery", "faults", "gripper", "imu", "joints", "odometry", "own_localisation", "scan"}
@@ -252,7 +251,7 @@ PORTS: dict[str, tuple[type, dict[str, Any]]] = {
 }
 PORTS["detect"] = (DetectInputs, PORTS["detect"][1])
 PORTS["grasp"] = (GraspInputs, {"tried": tuple[int, ...]})
-KNOWLEDGE = read_yaml(Path(__file__).with_name("knowledge.yaml")).data
+KNOWLEDGE = yaml_beside(__file__, "knowledge.yaml")
 GRIPPER = {"grasp": (False, True), "place": (True, False), "hand_over": (True, None)}  # held before, held after
 
 

@@ -1,13 +1,11 @@
 """A fetch computes no more than its budgets allow: a slower path cannot come in unseen on a fast machine."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 
 from executive.record.history import read_events
+from tests.tables import yaml_beside
 
-BUDGETS = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+BUDGETS = yaml_beside(__file__, "test_work.yaml")
 
 
 @pytest.mark.mission

@@ -549,18 +549,24 @@ def test_the_path_is_recorded():
     assert (len(path), list(path[-1])) == (22, pytest.approx([1, 0, 0.5]))
 
 
-@pytest.mark.parametrize(
-    ("name", "robot", "said"), [("coke", "eve", "'eve'"), ("cup", "alice", "'cup'"), ("coke", "alice", "not observed")]
-)
-def test_names_that_the_plant_lacks_and_judging_before_looking_are_refused(name, robot, said):
+@pytest.mark.parametrize(("name", "robot", "said"), [("coke", "eve", "'eve'"), ("cup", "alice", "'cup'")])
+def test_unknown_robot_and_object_are_refused_by_name(name, robot, said):
     with pytest.raises(ValueError, match=said):
-        Referee(Stage().plant, [Placement(name, name)], robots={robot: SPOT}).judge([])
+        Referee(Stage().plant, [Placement(name, name)], robots={robot: SPOT})
 
 
-def test_region_with_a_notch_knows_its_inside_and_an_impossible_one_is_refused():
+def test_judging_before_looking_is_refused():
+    with pytest.raises(ValueError, match="not observed"):
+        Referee(Stage().plant, [Placement("coke", "coke")], robots={"alice": SPOT}).judge([])
+
+
+def test_region_with_a_notch_knows_its_inside():
     region = Region("L", ((0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)), 0.0, 1.0)
     points = {(0.5, 1.5, 0.5): True, (1.5, 0.5, 0.5): True, (1.5, 1.5, 0.5): False, (0.5, 0.5, 1.5): False}
     assert {point: region.contains(point) for point in points} == points
+
+
+def test_impossible_region_is_refused():
     with pytest.raises(ValueError, match="'nook'"):
         Region("nook", ((0, 0), (1, 0)))
 
@@ -597,8 +603,11 @@ def test_a_table_is_cleared_when_all_that_stood_there_rests_on_the_other(act, so
     assert act().verdict(*[LEFT] * (source is TABLE), there) == (success, why)
 
 
-def test_a_fallen_object_and_one_in_the_gripper_do_not_stand_there():
+def test_a_fallen_object_is_missing_and_not_left():
     assert Stage().fall("coke", (1.5, 1.0, TABLE_Z), (1.5, 1.0, HALF - TOUCH)).results(LEFT, THERE) == [True, False]
+
+
+def test_an_object_in_the_gripper_does_not_stand_there():
     assert not placed_stage().watch().holds(THERE)
 
 

@@ -69,17 +69,24 @@ def test_short_paths_are_drawn_too(scene, points):
     assert drawn.shape[1:] == view.picture.shape[1:]
 
 
-def test_flat_bounds_and_a_view_from_the_target_itself_are_refused(scene):
+def test_flat_bounds_are_refused(scene):
     with pytest.raises(ValueError, match="bounds"):
         top_view(scene[2], (1, 0, 1, 3))
+
+
+def test_view_from_the_target_itself_is_refused():
     with pytest.raises(ValueError, match="same point"):
         look_at((1, 1, 1), (1, 1, 1))
 
 
-def test_view_straight_down_is_possible_and_the_horizon_is_level_with_up_at_the_top():
+def test_view_straight_down_is_possible():
     assert look_at((0, 0, 2), (0, 0, 0)).rotation().matrix()[2, 2] == pytest.approx(-1.0)
+
+
+def test_horizon_is_level_with_up_at_the_top():
     right_z, down_z, _ = look_at((0, 0, 1), (5, 2, 0.5)).rotation().matrix()[2]
-    assert right_z == pytest.approx(0.0) and down_z < 0.0
+    assert right_z == pytest.approx(0.0)
+    assert down_z < 0.0
 
 
 def test_a_free_view_faces_its_target(scene):
@@ -87,11 +94,14 @@ def test_a_free_view_faces_its_target(scene):
     np.testing.assert_allclose(red_centre(picture), [160, 120], atol=4)
 
 
-def test_best_view_avoids_the_screen_and_keeps_to_the_wanted_side_when_it_is_clear(scene):
+def test_best_view_avoids_the_screen_in_front_of_the_target(scene):
     X_WC = best_view(scene[2], (2.0, 1.0, 0.5), facing_W=(1.0, 0.0))
     picture = render_view(scene[2], X_WC, (320, 240))
     assert np.linalg.norm(red_centre(picture) - [160, 120]) < 15
     assert abs(X_WC.translation()[1] - 1.0) > 1.0
+
+
+def test_best_view_keeps_to_the_wanted_side_when_it_is_clear(scene):
     X_WC = best_view(scene[2], (2.0, 1.0, 0.5), facing_W=(0.0, -1.0))
     assert X_WC.translation()[1] < -0.5
 

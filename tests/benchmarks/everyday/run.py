@@ -8,19 +8,17 @@ and the log in the folder.
 """
 
 from collections import Counter
-from pathlib import Path
-
-import yaml
 
 from executive.app.evaluate.evaluation_file import seed_range
 from tests.benchmarks.errand_process import report_of, run_errand
 from tests.benchmarks.harness import benchmark
+from tests.tables import yaml_beside
 
 VERDICTS = {True: "fulfilled", False: "not fulfilled", None: "not judged"}
 
 
 def cases(world: str = "flat", only: str = ""):
-    rows = yaml.safe_load(Path(__file__).with_name(f"{world}.yaml").read_text(encoding="utf-8"))
+    rows = yaml_beside(__file__, f"{world}.yaml")
     chosen = seed_range(only) if only else range(1, len(rows) + 1)
     return [(number, rows[number - 1]["say"], rows[number - 1]["seed"], world) for number in chosen]
 

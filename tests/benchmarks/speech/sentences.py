@@ -2,13 +2,11 @@
 
 import random
 from dataclasses import dataclass
-from pathlib import Path
-
-import yaml
 
 from executive.words.command import Task
+from tests.tables import yaml_beside
 
-PATTERNS = yaml.safe_load(Path(__file__).with_name("patterns.yaml").read_text(encoding="utf-8"))
+PATTERNS = yaml_beside(__file__, "patterns.yaml")
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,15 @@
 """The auction: who is given what."""
 
 from collections import Counter
-from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from executive.app.auction import Auction, Bid, award
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
-AUCTIONS = read_yaml(Path(__file__).with_name("bids.yaml")).data
+AUCTIONS = yaml_beside(__file__, "bids.yaml")
 
 
 @pytest.mark.parametrize("name", AUCTIONS)

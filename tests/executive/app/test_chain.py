@@ -25,10 +25,16 @@ def test_a_split_puts_the_held_object_on_a_table_and_takes_it_from_there():
     assert lines(split) == ([str(TAKE), put], [take, str(PUT)], "desk")
 
 
-def test_each_table_gives_a_split_and_with_an_empty_gripper_nothing_is_handed_over():
+def test_each_table_gives_a_split():
     found = list(splits((TAKE, PUT, GO), ["desk", "shelf"]))
     assert [split.table for split in found] == ["desk", "shelf", None]
+
+
+def test_between_commands_with_an_empty_gripper_nothing_is_handed_over():
     assert list(splits((GO, GO), ["desk"])) == [Split((GO,), (GO,))]
+
+
+def test_a_single_command_cannot_be_split():
     assert list(splits((GO,), ["desk"])) == []
 
 

@@ -1,7 +1,5 @@
 """What is said in a run with several robots: who of them is meant."""
 
-from pathlib import Path
-
 import pytest
 
 from executive.app.conversations import Conversations
@@ -11,9 +9,9 @@ from executive.mission.request import Request
 from executive.run.control import Control
 from executive.run.control_state import Mode
 from executive.words.robot_config import RobotConfig
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
-SAID = read_yaml(Path(__file__).with_name("remarks_to_robots.yaml")).data
+SAID = yaml_beside(__file__, "remarks_to_robots.yaml")
 
 TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
 

@@ -5,7 +5,6 @@ import signal
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -31,10 +30,10 @@ from executive.words.steps import lines_of_steps
 from plant.robots.robot_kind import PlacedRobot
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 from tests.benchmarks.fleet import begun_again
 from tests.executive.conftest import COKE, default_end
+from tests.tables import yaml_beside
 
 KITCHEN = "Take [Nothing] to [kitchen] and do [Nothing] to [Nothing]"
 BEDROOM = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
@@ -188,7 +187,7 @@ def test_three_missions_are_done_by_two_robots(fleet, script):
     assert [robot.holder for robot in fleet.robots.values()] == [None, None]
 
 
-FLEETS = read_yaml(Path(__file__).with_name("fleets.yaml")).data
+FLEETS = yaml_beside(__file__, "fleets.yaml")
 MISSIONS = {"go bedroom": BEDROOM, "go kitchen": KITCHEN, "take": TAKE, "take and put": (TAKE, PUT)}
 
 
@@ -263,12 +262,17 @@ def test_status_shows_what_runs_and_what_waits_while_it_does(fleet, script):
     assert states[1] == [("Alice", "success"), ("Bob", "success"), ("Alice", "running")]
 
 
-def test_the_store_has_the_robot_of_each_mission_and_the_log_is_sent_live(fleet):
+def test_the_store_has_the_robot_of_each_mission(fleet):
+    fleet.queue(KITCHEN)
+    fleet.run()
+    given = GivenMissions(fleet.store).all()[1]
+    assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)
+
+
+def test_the_log_of_a_fleet_is_sent_live(fleet):
     fleet.queue(KITCHEN)
     followed = []
     fleet.run(live=SimpleNamespace(follow=followed.append))
-    given = GivenMissions(fleet.store).all()[1]
-    assert (given.robot, given.done, given.blocked) == ("Alice", 1, None)
     assert [log.path for log in followed] == [fleet.out / "log.mcap"]
 
 

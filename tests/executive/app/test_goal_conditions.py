@@ -1,7 +1,6 @@
 """The goal conditions of missions, and what the referee is told of them."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -14,8 +13,8 @@ from executive.words.leaf_steps import CallSkill, Do, Speak, UseMission
 from executive.words.mission import Mission
 from executive.words.policy import OnFailure, Policy
 from executive.words.steps import Loop, Repeat
-from skills.files.yaml_source import read_yaml
 from skills.speak.skill import Speak as SpeakSkill
+from tests.tables import yaml_beside
 
 
 def conditions(knowledge, *texts):
@@ -31,7 +30,7 @@ def facts_of(condition, expected):
     return {key: facts[key] for key in expected}
 
 
-CONDITIONS = read_yaml(Path(__file__).with_name("conditions.yaml")).data
+CONDITIONS = yaml_beside(__file__, "conditions.yaml")
 
 
 @pytest.mark.parametrize("case", CONDITIONS, ids=lambda case: case["commands"][-1])
@@ -184,21 +183,25 @@ def each_with(**facts):
     return lambda said: [replace(one, **facts) for one in said]
 
 
-TWICE = [Repeat(loop=Loop(times=2), steps=(block,)) for block in (HELLO, Speak(speak="Hello"))]
-# What is to be said, what becomes of what was said, and the verdict.
-SPEECH = [
-    ((TWICE[0],), list, True, 'It said "Hello".'),
-    ((TWICE[0],), lambda said: (), False, 'It did not say "Hello".'),
-    ((TWICE[1],), list, True, 'It said "Hello".'),
-    ((TWICE[1],), lambda said: (), False, 'It did not say "Hello".'),
-    ((HELLO,), each_with(asked=False), True, 'It said "Hello".'),
-    ((HELLO,), each_with(asked=True), False, 'It did not say "Hello".'),
-    ((HELLO,), each_with(silent="bedroom"), True, 'It showed "Hello" in the silent zone bedroom.'),
-    ((HELLO, Speak(speak="{n}")), lambda said: said[:1], False, 'It said "Hello". It did not say "{n}".'),
-]
+@pytest.mark.parametrize(("heard", "success", "did"), [(list, True, "said"), (lambda said: (), False, "did not say")])
+@pytest.mark.parametrize("block", [HELLO, Speak(speak="Hello")])
+def test_a_mission_that_only_speaks_is_judged_by_what_was_said(spoken, block, heard, success, did):
+    verdict, _ = spoken(Repeat(loop=Loop(times=2), steps=(block,)), heard=heard)
+    assert (verdict.success, verdict.why) == (success, f'It {did} "Hello".')
 
 
-@pytest.mark.parametrize(("steps", "heard", "success", "why"), SPEECH)
-def test_steps_that_speak_are_judged_by_what_was_said_and_a_question_does_not_count(spoken, steps, heard, success, why):
-    verdict, _ = spoken(*steps, heard=heard, variables={"n": 1})
-    assert (verdict.success, verdict.why) == (success, why)
+# Was "Hello" a question that was asked while a step was to say it? Then the step has not said it.
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_question_does_not_count_as_the_text_of_a_step(spoken, asked):
+    verdict, _ = spoken(HELLO, heard=each_with(asked=asked))
+    assert verdict.success is not asked
+
+
+def test_a_text_shown_in_a_silent_zone_counts_and_the_verdict_says_so(spoken):
+    verdict, _ = spoken(HELLO, heard=each_with(silent="bedroom"))
+    assert (verdict.success, verdict.why) == (True, 'It showed "Hello" in the silent zone bedroom.')
+
+
+def test_one_sentence_counts_for_one_step(spoken):
+    verdict, _ = spoken(HELLO, Speak(speak="{n}"), heard=lambda said: said[:1], variables={"n": 1})
+    assert (verdict.success, verdict.why) == (False, 'It said "Hello". It did not say "{n}".')

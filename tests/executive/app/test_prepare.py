@@ -12,10 +12,10 @@ from executive.cli.run_command import refuse_unaddressed
 from executive.mission.request import Request
 from executive.words.robot_config import RobotConfig
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
+from tests.tables import yaml_beside
 
-MEANT = read_yaml(Path(__file__).with_name("sentences_to_robots.yaml")).data
+MEANT = yaml_beside(__file__, "sentences_to_robots.yaml")
 
 TWO = (RobotConfig("Alice", "spot"), RobotConfig("Bob", "spot"))
 
@@ -159,7 +159,7 @@ def test_any_of_the_robots_of_the_option_may_be_called():
     refuse_unaddressed(Request("Hey Bob, go to the kitchen", require_wake=True, robots=robots))
 
 
-REFUSED = read_yaml(Path(__file__).with_name("refused_parts.yaml")).data
+REFUSED = yaml_beside(__file__, "refused_parts.yaml")
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])

@@ -26,7 +26,7 @@ from executive.store.standing_missions import MOST_WAITING, StandingMissions
 from executive.store.triggers import Missed, OnCall, OnTopic, trigger_of
 from executive.view.serving import CallError
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
 TOKEN = "a-token-of-the-test"
 
@@ -126,7 +126,7 @@ def states(store):
     return [each.state.value for each in store.missions() if each.state is not MissionState.STANDING]
 
 
-SERVERS = read_yaml(Path(__file__).with_name("servers.yaml")).data
+SERVERS = yaml_beside(__file__, "servers.yaml")
 
 
 @pytest.mark.parametrize("case", SERVERS, ids=lambda case: case["name"])

@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 
 import pytest
 
@@ -11,7 +10,7 @@ from executive.mission.request import Request
 from executive.words.knowledge import Door, Knowledge, ObjectFacts, Person, Place, Pose, SurfaceFacts
 from executive.words.mission import Route
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
 SQUARE = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
 KNOWLEDGE = Knowledge(
@@ -38,7 +37,7 @@ def read(tmp_path):
     return made
 
 
-SCENARIOS = read_yaml(Path(__file__).with_name("scenarios.yaml")).data
+SCENARIOS = yaml_beside(__file__, "scenarios.yaml")
 
 
 @pytest.mark.parametrize("case", SCENARIOS, ids=lambda case: case["name"])
@@ -53,7 +52,7 @@ def test_a_scenario_says_what_its_file_says_and_comes_back_from_the_json_of_its_
         assert Route.model_validate(route).model_dump(mode="json", exclude_unset=True) == json.loads(json.dumps(route))
 
 
-REFUSED = read_yaml(Path(__file__).with_name("refused_scenarios.yaml")).data
+REFUSED = yaml_beside(__file__, "refused_scenarios.yaml")
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])

@@ -10,7 +10,6 @@ import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 from typing import Final
 from unittest.mock import patch
 
@@ -22,13 +21,13 @@ from executive.mission.request import Request
 from executive.store.missions import MissionStore
 from executive.store.standing_missions import StandingMissions
 from executive.store.triggers import Missed, OnCall
-from skills.files.yaml_source import read_yaml
 from tests.hostile_values import TEXTS
+from tests.tables import yaml_beside
 
 __all__ = ["Place", "WorkBegins", "arguments", "called", "commands", "defect", "hostile_texts", "places", "prepare"]
 
 LIMIT_S: Final = 20
-CALLS: Final = read_yaml(Path(__file__).with_name("hostile_calls.yaml")).data
+CALLS: Final = yaml_beside(__file__, "hostile_calls.yaml")
 GOOD: Final[Mapping[str, Mapping[str, str]]] = CALLS["good"]
 _UNTOLD: Final = re.compile(r"Traceback|<class|NoneType| object at 0x|\b[A-Z][A-Za-z]+Error\b|re\.compile|\(\?:|\\d")
 _CONTROL: Final = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\x80-\x9f]")

@@ -2,14 +2,13 @@
 
 import json
 import time
-from pathlib import Path
 
 import pytest
 
-from skills.files.yaml_source import read_yaml
 from tests.executive.cli.calls import errand
+from tests.tables import yaml_beside
 
-ODD_TEXTS = read_yaml(Path(__file__).with_name("odd_sentences.yaml")).data
+ODD_TEXTS = yaml_beside(__file__, "odd_sentences.yaml")
 
 ODD = ODD_TEXTS | {"one endless word": "a" * 100_000, "ten thousand words": "fetch " * 10_000}
 

@@ -2,7 +2,6 @@
 
 import json
 import shlex
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,9 +16,9 @@ from executive.store.database import form
 from executive.store.missions import MissionStore
 from executive.store.standing_missions import StandingMissions
 from executive.store.triggers import OnCall
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
-GOLDEN: dict[str, Any] = read_yaml(Path(__file__).with_name("request_options.yaml")).data
+GOLDEN: dict[str, Any] = yaml_beside(__file__, "request_options.yaml")
 NOT_OF_THE_REQUEST = {
     *("--listen", "--json", "--quiet", "--tree", "--profile", "--store", "--anyway", "--voice"),
     *("--view", "--view-for", "--view-port", "--foxglove", "--help"),

@@ -26,13 +26,13 @@ from executive.words.goal import RefereeReport
 from executive.words.leaf_steps import steps_of_commands
 from executive.words.mission import Mission
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 from tests.executive.cli import calls
 from tests.executive.distribution import write_distribution
+from tests.tables import yaml_beside
 
 RUN_REQUEST = "executive.app.runs.run_request"
-SESSIONS = read_yaml(Path(__file__).with_name("queue_sessions.yaml")).data
+SESSIONS = yaml_beside(__file__, "queue_sessions.yaml")
 GO = "Take [Nothing] to [%s] and do [Nothing] to [Nothing]"
 PARTS = """name: two
 robots: {alice: spot, bob: fetch}

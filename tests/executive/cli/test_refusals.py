@@ -1,14 +1,13 @@
 """Wrong words and files on the command line: one line with status 2 that names the place, and nothing is written."""
 
 import shlex
-from pathlib import Path
 
 import pytest
 
-from skills.files.yaml_source import read_yaml
 from tests.executive.cli.calls import errand
+from tests.tables import yaml_beside
 
-REFUSALS = read_yaml(Path(__file__).with_name("refusals.yaml")).data
+REFUSALS = yaml_beside(__file__, "refusals.yaml")
 
 
 def contents(folder):

@@ -1,7 +1,5 @@
 """When the goal conditions of each construct must hold: what a run leaves for the referee."""
 
-from pathlib import Path
-
 import pytest
 import yaml
 
@@ -17,9 +15,9 @@ from executive.words.mission import Mission
 from executive.words.steps import Choose, Group, Loop, Repeat, Try, While
 from skills.api import Cause, Failed, Succeeded
 from skills.check_door.skill import CheckDoorInputs
-from skills.files.yaml_source import read_yaml
 from skills.speak.skill import Speak
 from tests.executive.conftest import KNOWLEDGE, scripted_skill
+from tests.tables import yaml_beside
 
 AT_END, AT_STEP = When.END_OF_MISSION, When.END_OF_STEP
 WHEN = {AT_END: "mission", AT_STEP: "step"}
@@ -53,7 +51,7 @@ def ran(knowledge, registry, run_tree, script, robot):
     return run
 
 
-GOALS = read_yaml(Path(__file__).with_name("goals.yaml")).data
+GOALS = yaml_beside(__file__, "goals.yaml")
 
 
 @pytest.mark.parametrize("case", GOALS, ids=lambda case: case["name"])

@@ -2,7 +2,6 @@
 
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -12,8 +11,8 @@ from executive.run.outcome import Outcome
 from executive.words.command import Command
 from executive.words.leaf_steps import Do, steps_of_commands
 from skills.api import Question
-from skills.files.yaml_source import read_yaml
 from skills.testing.clock import VirtualClock
+from tests.tables import yaml_beside
 
 BEGUN = "fetch me a coke from the kitchen"
 
@@ -52,7 +51,7 @@ ACTIONS = {
 }
 DIALOGUES = [
     pytest.param(dialogue, text, id=f"{dialogue['name']} {text}".strip())
-    for dialogue in read_yaml(Path(__file__).with_name("dialogues.yaml")).data
+    for dialogue in yaml_beside(__file__, "dialogues.yaml")
     for text in dialogue.get("said", [""])
 ]
 

@@ -1,10 +1,7 @@
-from pathlib import Path
-
 import pytest
-import yaml
 
 from executive.language.cleaning import clean, find_address, find_heard_wake, strip_wake
-from tests.tables import table
+from tests.tables import table, yaml_beside
 
 
 @pytest.mark.parametrize(*table(__file__, "plain_text"))
@@ -12,7 +9,7 @@ def test_text_becomes_plain(text, cleaned):
     assert clean(text) == cleaned
 
 
-TABLE = yaml.safe_load(Path(__file__).with_name("wake.yaml").read_text(encoding="utf-8"))
+TABLE = yaml_beside(__file__, "wake.yaml")
 ROBOTS = ("Alice", "Bob")
 NOBODY = TABLE["nobody"]
 CALLING = [(name, text) for name in ROBOTS for text in TABLE[name]]

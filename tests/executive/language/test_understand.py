@@ -1,18 +1,15 @@
 from functools import partial
-from pathlib import Path
 
 import pytest
-import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from executive.language.understand import Status, understand
 from executive.words.command import parse_command
-from tests.tables import table
+from tests.tables import table, yaml_beside
 
-HERE = Path(__file__).parent
-FAMILIES = yaml.safe_load((HERE / "sentences.yaml").read_text(encoding="utf-8"))
-UNUSABLE = yaml.safe_load((HERE / "refused.yaml").read_text(encoding="utf-8"))
+FAMILIES = yaml_beside(__file__, "sentences.yaml")
+UNUSABLE = yaml_beside(__file__, "refused.yaml")
 UNDERSTOOD = [(text, commands) for family in FAMILIES.values() for text, commands in family.items()]
 
 
@@ -85,7 +82,7 @@ def test_lines_are_answered_in_order_and_one_by_one(understood):
     }
 
 
-WORDS = [*yaml.safe_load((HERE / "mangled.yaml").read_text(encoding="utf-8"))]
+WORDS = [*yaml_beside(__file__, "mangled.yaml")]
 MANGLED = st.one_of(st.text(max_size=60), st.lists(st.sampled_from(WORDS), max_size=12).map(" ".join))
 
 

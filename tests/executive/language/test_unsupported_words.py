@@ -1,15 +1,12 @@
 """A part that no command supports refuses the whole sentence, and the reason names the part."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 
 from executive.language.understand import Status, understand
 from executive.words.command import parse_command
-from tests.tables import table
+from tests.tables import table, yaml_beside
 
-ROWS = yaml.safe_load(Path(__file__).with_name("unsupported_words.yaml").read_text(encoding="utf-8"))
+ROWS = yaml_beside(__file__, "unsupported_words.yaml")
 SENTENCES = [(kind, text, part) for kind, rows in ROWS.items() for text, part in rows.items()]
 
 

@@ -1,18 +1,16 @@
 """Conditions that always or never hold."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 from pydantic import TypeAdapter
 
 from executive.mission.certainty import refuse_certain, refuse_certain_comparisons
 from executive.words.condition import RANGES, Condition, ValueIs
 from executive.words.expression import Expression, ExpressionError
 from skills.quantities import Tries
+from tests.tables import yaml_beside
 
 NAMES = {**RANGES, "count": Tries}
-ROWS = yaml.safe_load(Path(__file__).with_name("certain.yaml").read_text(encoding="utf-8"))
+ROWS = yaml_beside(__file__, "certain.yaml")
 condition_of = TypeAdapter(Condition).validate_python
 
 

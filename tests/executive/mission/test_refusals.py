@@ -1,13 +1,11 @@
 """Faulty mission files: the refusal says where, what is wrong and what to do."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 
 from skills.files.errors import InputError
+from tests.tables import yaml_beside
 
-FORMS = yaml.safe_load(Path(__file__).with_name("refusals.yaml").read_text(encoding="utf-8"))
+FORMS = yaml_beside(__file__, "refusals.yaml")
 ROWS = [(form.pop("refused"), form, name) for name, form in FORMS.items()]
 REFUSED = [pytest.param(form, row, id=f"{name}: {row['input'][:40]}") for rows, form, name in ROWS for row in rows]
 

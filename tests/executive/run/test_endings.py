@@ -1,7 +1,5 @@
 """What missions always do in the end: on every end of a run, within its time, and while the run is held."""
 
-from pathlib import Path
-
 import pytest
 import yaml
 
@@ -13,7 +11,7 @@ from executive.words.leaf_steps import Awaited, CallSkill, Wait
 from executive.words.mission import Mission
 from executive.words.steps import Group
 from skills.api import Cause, Failed
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
 
 def skill(name):
@@ -52,7 +50,7 @@ def broken(skill):
     raise RuntimeError("broken")
 
 
-ENDINGS = read_yaml(Path(__file__).with_name("endings.yaml")).data
+ENDINGS = yaml_beside(__file__, "endings.yaml")
 
 
 @pytest.mark.parametrize("case", ENDINGS, ids=lambda case: case["name"])

@@ -1,7 +1,6 @@
 """What a mission found out: every answer in order, and what its claim tells of them."""
 
 import math
-from pathlib import Path
 
 import pytest
 from py_trees.behaviour import Behaviour
@@ -11,9 +10,9 @@ from executive.run.mission_history import Findings, claim, history_keys
 from executive.run.outcome import Finding, Outcome, Said
 from executive.tree.board import Board
 from skills.api import Cause, Failed, Succeeded
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
-CLAIMS = read_yaml(Path(__file__).with_name("claims.yaml")).data
+CLAIMS = yaml_beside(__file__, "claims.yaml")
 
 CHECKS = (
     "Take [Nothing] to [kitchen] and do [find] to [hammer]",

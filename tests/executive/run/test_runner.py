@@ -1,7 +1,6 @@
 """Whole missions with the scripted robot: outcomes, cancel at every node, and orderly ends."""
 
 import time
-from pathlib import Path
 
 import pytest
 from py_trees.common import Status
@@ -16,8 +15,8 @@ from executive.words.command import parse_command
 from executive.words.leaf_steps import Do
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, Succeeded
-from skills.files.yaml_source import read_yaml
 from tests.executive.conftest import default_end
+from tests.tables import yaml_beside
 from tests.visitors import OnMessage
 
 
@@ -26,7 +25,7 @@ def transitions(published):
 
 
 GO = "Take [Nothing] to [bedroom] and do [Nothing] to [Nothing]"
-RUNS = read_yaml(Path(__file__).with_name("runs.yaml")).data
+RUNS = yaml_beside(__file__, "runs.yaml")
 
 
 def ends_of(script, name, said):

@@ -25,8 +25,9 @@ def weights(model_bin):
 @pytest.mark.parametrize(
     ("name", "before", "shape", "other"),
     [("a/weight", WEIGHT, (6, 4), "c/weight"), ("c/weight", CONVOLUTION, (5, 6), "a/weight")],
+    ids=["a matrix", "a convolution as a matrix of inputs times width"],
 )
-def test_the_product_is_added_to_its_matrix_only_and_a_convolution_is_one(weights, name, before, shape, other):
+def test_the_product_is_added_to_its_matrix_only(weights, name, before, shape, other):
     low_rank, unchanged = _low_rank(*shape), weights[other].copy()
     Adapter({name: low_rank}).add_to(weights)
     wanted = before.reshape(shape) + low_rank.up.astype(float) @ low_rank.down.astype(float)

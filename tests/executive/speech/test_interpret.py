@@ -64,9 +64,15 @@ def test_misheard_words_become_known_ones(heard, meant):
     assert meant in corrected(heard)
 
 
-def test_right_words_are_left_alone_and_unknown_sound_is_not_corrected():
+def test_a_sentence_that_fits_stays_as_it_is():
     assert corrected("bring me the coke", most=1) == ["bring me the coke"]
+
+
+def test_right_words_are_left_alone():
     assert corrected("take the beer from the nest")[0].startswith("take the beer from the")
+
+
+def test_unknown_sound_is_not_corrected():
     assert corrected("bring me the newspaper subscription") == []
 
 

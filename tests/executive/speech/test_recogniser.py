@@ -15,9 +15,15 @@ def test_a_robot_that_need_not_be_called_is_no_part_of_the_prompt(flat):
     assert (words.robot_name, "Alice" in words.prompt) == (None, False)
 
 
-def test_the_prompt_holds_the_names_without_those_within_longer_ones_and_how_one_calls():
+def test_the_prompt_holds_the_names_and_how_one_calls():
     assert Vocabulary(("sofa", "coke"), "Bob").prompt.startswith("sofa, coke. Hey Bob, ")
+
+
+def test_the_prompt_omits_names_within_longer_ones():
     assert Vocabulary(("coke", "can of coke", "desk")).prompt.startswith("can of coke, desk. ")
+
+
+def test_without_names_the_prompt_lists_none():
     assert "Names" not in Vocabulary().prompt
 
 

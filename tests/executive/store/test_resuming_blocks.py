@@ -1,6 +1,5 @@
 """Blocks of which a mission is broken off in any tick and taken up by another process: they go on where they were."""
 
-from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -17,10 +16,10 @@ from executive.store.missions import MissionStore
 from executive.store.resuming import resumed_tree
 from executive.tree.compiler import compile_mission
 from skills.api import Cause, Failed, Running, Skill, Succeeded
-from skills.files.yaml_source import read_yaml
 from skills.ports import StowInputs
+from tests.tables import yaml_beside
 
-BLOCKS = read_yaml(Path(__file__).with_name("blocks.yaml")).data
+BLOCKS = yaml_beside(__file__, "blocks.yaml")
 REQUEST = Request("blocks", seed=3, name="m", world_name="flat", robot="Alice", fingerprint="print")
 
 

@@ -3,7 +3,6 @@
 import sqlite3
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 import pytest
 
@@ -14,7 +13,7 @@ from executive.store.missions import MissionState, MissionStore
 from executive.store.standing_missions import MOST_WAITING, StandingMissions, TooManyError
 from executive.store.triggers import Missed, trigger_of
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
 REQUEST = Request("go to the kitchen", seed=3, name="go kitchen", world_name="flat", robot="Alice", commands=("Take",))
 START = datetime(2026, 11, 24, 8, 0, tzinfo=UTC)  # a Tuesday
@@ -84,7 +83,7 @@ def end_mission(store, *charges):
     store.finish(number, MissionState.SUCCESS, "done")
 
 
-TIMELINES = read_yaml(Path(__file__).with_name("standing.yaml")).data
+TIMELINES = yaml_beside(__file__, "standing.yaml")
 
 
 @pytest.mark.parametrize("timeline", TIMELINES, ids=lambda timeline: timeline["name"])

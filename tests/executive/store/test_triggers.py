@@ -3,7 +3,6 @@
 import re
 import time as system_time
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 from zoneinfo import ZoneInfo
 
 import pytest
@@ -23,9 +22,9 @@ from executive.store.triggers import (
     trigger_of,
 )
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
-TEXTS = read_yaml(Path(__file__).with_name("triggers.yaml")).data
+TEXTS = yaml_beside(__file__, "triggers.yaml")
 
 BERLIN = ZoneInfo("Europe/Berlin")
 ANCHOR = datetime(2026, 1, 1, tzinfo=UTC)
@@ -74,7 +73,7 @@ def test_periods_may_be_written_in_several_forms(said, canonical):
 
 
 READERS = {"event": event_of, "period": Every.from_text, "time": schedule_of}
-REFUSED = read_yaml(Path(__file__).with_name("refused_triggers.yaml")).data
+REFUSED = yaml_beside(__file__, "refused_triggers.yaml")
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["input"])

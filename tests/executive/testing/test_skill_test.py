@@ -3,7 +3,6 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import ClassVar
 
 import pytest
@@ -11,9 +10,9 @@ import pytest
 from executive.testing.skill_test import carry_out, load_skill_tests, scripted_maker
 from skills.api import Cause, Failed, Running, Skill, Succeeded
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
 from skills.robot import Pose2D
 from skills.testing.robot import BASE_ONLY
+from tests.tables import yaml_beside
 
 
 @dataclass(frozen=True)
@@ -100,7 +99,7 @@ def test_the_report_lists_faults_and_messages(written):
     assert "0.05 s  waiting" in report
 
 
-REFUSED = read_yaml(Path(__file__).with_name("refused_tests.yaml")).data
+REFUSED = yaml_beside(__file__, "refused_tests.yaml")
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])

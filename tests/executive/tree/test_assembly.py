@@ -1,15 +1,14 @@
 """How blocks are compiled: which names and types are known where, what is in the gripper, what cannot go together."""
 
-from pathlib import Path
-
 import pytest
 import yaml
 
 from executive.tree.compiler import compile_mission
 from executive.words.mission import Mission
 from skills.files.errors import InputError
+from tests.tables import yaml_beside
 
-TABLE = yaml.safe_load(Path(__file__).with_name("assembly.yaml").read_text(encoding="utf-8"))
+TABLE = yaml_beside(__file__, "assembly.yaml")
 GO, READS_X = {"to": "hall"}, {"check": "x > 0"}
 TAKE, BEER = ({"to": "kitchen", "do": "grasp", "object": name} for name in ("coke", "beer"))
 QUESTION = {"ask": "how many?", "match": "number", "gives": {"answer": "n"}}

@@ -1,9 +1,6 @@
 """From commands to trees: which nodes, which ids, and what is refused."""
 
-from pathlib import Path
-
 import pytest
-import yaml
 from py_trees.common import Status
 
 from executive.run.outcome import Outcome
@@ -25,11 +22,9 @@ from skills.files.errors import InputError
 from skills.files.yaml_source import YamlSource
 from skills.locate_dock.skill import LocateDock
 from skills.robot import Pose2D
+from tests.tables import yaml_beside
 
-LEAVES, IMPOSSIBLE = (
-    yaml.safe_load(Path(__file__).with_name(f"{name}.yaml").read_text(encoding="utf-8"))
-    for name in ("leaves_of_a_fetch", "impossible_commands")
-)
+LEAVES, IMPOSSIBLE = (yaml_beside(__file__, f"{name}.yaml") for name in ("leaves_of_a_fetch", "impossible_commands"))
 
 
 def skills_of(tree):

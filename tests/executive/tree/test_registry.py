@@ -14,15 +14,15 @@ from pathlib import Path
 from typing import ClassVar
 
 import pytest
-import yaml
 
 import skills
 from executive.tree.registry import GROUP, built_in_skills, faults_of, installed_skills, missing_skill, skills_of
 from skills.api import Skill
 from skills.files.errors import InputError
+from tests.tables import yaml_beside
 
 ROOT = Path(__file__).resolve().parents[3]
-BROKEN = yaml.safe_load(Path(__file__).with_name("broken_skills.yaml").read_text(encoding="utf-8"))
+BROKEN = yaml_beside(__file__, "broken_skills.yaml")
 GOOD = '''
 from dataclasses import dataclass
 from skills.api import Cause, Skill, Succeeded

@@ -27,8 +27,11 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_a_written_object_is_read_back_and_its_form_rests_at_half_its_height(folder):
+def test_a_written_object_is_read_back(folder):
     assert read_imported(folder) == DRILL
+
+
+def test_its_form_lies_in_the_folder_and_rests_at_half_its_height(folder):
     form = DRILL.form(folder)
     assert form.path() == folder / "drill.sdf"
     assert (form.half_extents_m, form.rest_height_m, form.round) == ((0.1, 0.03), 0.02, False)

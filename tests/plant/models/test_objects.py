@@ -81,27 +81,33 @@ def test_has_its_mass_and_friction(loose):
     assert inspector.NumGeometriesWithRole(Role.kPerception) == 1
 
 
-def test_every_class_that_is_handled_has_several_forms_and_an_id_of_its_own():
+def test_every_class_that_is_handled_has_several_forms():
     handled = ("beer", "coke", "extinguisher", "hammer", "screwdriver", "wrench", "cylinder", "cube")
-    catalogue = load_catalogue()
-    forms = {name: len(entry.forms) for name, entry in catalogue.items() if name != "person"}
+    forms = {name: len(entry.forms) for name, entry in load_catalogue().items() if name != "person"}
     assert forms == dict.fromkeys(handled, 3)
-    ids = [entry.id for entry in catalogue.values()]
-    assert len(set(ids)) == len(ids) and min(ids) > 0
+
+
+def test_class_ids_are_distinct_and_leave_zero_to_nothing():
+    ids = [entry.id for entry in load_catalogue().values()]
+    assert len(set(ids)) == len(ids)
+    assert min(ids) > 0
 
 
 def test_the_hammer_is_heavy_at_its_head():
     assert objects.hammer().mass.com[0] > 0.05
 
 
-def test_mass_properties_follow_the_parallel_axis_theorem_and_need_a_mass():
+def test_mass_properties_follow_the_parallel_axis_theorem():
     halves = [Cylinder(radius=0.01, length=0.2, p=(0, 0, z)) for z in (0.1, -0.1)]
     both = shape_mass(Cylinder(radius=0.01, length=0.4), 2.0)
     whole = join_masses([shape_mass(half, 1.0) for half in halves])
     np.testing.assert_allclose(whole.com, 0.0, atol=1e-12)
     np.testing.assert_allclose(whole.inertia, both.inertia, rtol=1e-9, atol=1e-15)
+
+
+def test_mass_properties_without_mass_are_refused():
     with pytest.raises(ValueError, match="no mass"):
-        join_masses([shape_mass(halves[0], 0.0)])
+        join_masses([shape_mass(Cylinder(radius=0.01, length=0.2), 0.0)])
 
 
 @pytest.mark.parametrize(("write", "files"), [(build, 18), (write_forms, 3 * len(FORMS))])

@@ -18,14 +18,18 @@ def world():
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_clutter_lies_on_surfaces_and_touches_nothing_and_is_of_no_class_that_is_spared(world, seed):
+def test_clutter_lies_on_surfaces_and_touches_nothing(world, seed):
     things = place_objects(world, seed)
     clutter = place_clutter(world, things, 12, seed)
     assert len(clutter) > 6 and {each.surface for each in clutter} <= set(world.surfaces)
     outlines = [seeding.outline_of(each) for each in (*things, *clutter)]
     assert min(seeding.polygon_distance(a, b) for a, b in itertools.combinations(outlines, 2)) > 0
-    spared = place_clutter(world, things, 12, seed, spared=("coke", "beer"))
-    assert not {each.class_name for each in spared} & {"coke", "beer", "person"}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_clutter_is_of_no_class_that_the_mission_speaks_of(world, seed):
+    clutter = place_clutter(world, place_objects(world, seed), 12, seed, spared=("coke", "beer"))
+    assert not {each.class_name for each in clutter} & {"coke", "beer", "person"}
 
 
 def test_clutter_moves_nothing_that_was_there_and_is_the_same_for_a_seed(world):

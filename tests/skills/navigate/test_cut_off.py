@@ -18,7 +18,7 @@ LEFT = Doorway((2.45, 4.05), 0.9, math.pi / 2, ("study", "corridor"))
 RIGHT = Doorway((7.45, 4.05), 0.9, math.pi / 2, ("corridor", "kitchen"))
 LEFT_PANEL = Box(2.0, 4.03, 2.9, 4.07, 0.0, 2.0)
 RIGHT_PANEL = Box(7.0, 4.03, 7.9, 4.07, 0.0, 2.0)
-BEFORE_LEFT, BEFORE_RIGHT, KITCHEN = Pose2D(2.3, 5.4, 0.0), Pose2D(6.8, 5.4, 0.0), Pose2D(8.5, 2.0, -1.57)
+BEFORE_RIGHT, KITCHEN = Pose2D(6.8, 5.4, 0.0), Pose2D(8.5, 2.0, -1.57)
 
 
 def context_of(bench, doors=(LEFT, RIGHT)):

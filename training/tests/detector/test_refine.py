@@ -1,6 +1,5 @@
 """From a folder of pictures and a proposal network to the refinement network's file; skipped without torch."""
 
-import json
 from dataclasses import replace
 
 import cv2
@@ -21,23 +20,14 @@ from errand_train.detector.schedule import Budget, RefineOptions, Report, Schedu
 from errand_train.detector.train import MODEL  # noqa: E402
 from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
 from skills.perception.detector.onnx_detector import OnnxDetector  # noqa: E402
+from training.tests.detector.splits import write_split  # noqa: E402
 
 
-def write_split(folder, split, count, names=CLASSES):
+def write_noise(folder, split, count, names=CLASSES):
     """Pictures of noise that are said to hold many things as large as an unlearnt network's boxes."""
-    images, labels = [], []
-    for k in range(count):
-        name, noise = f"{split}{k}.png", np.random.default_rng(k).integers(0, 256, (480, 640, 3), dtype=np.uint8)
-        cv2.imwrite(str(folder / name), noise)
-        images.append({"id": k, "file_name": name, "width": 640, "height": 480})
-        corners = [(x, y) for x in range(1, 620, 24) for y in range(9, 450, 48)]
-        labels += [
-            {"id": len(labels) + n, "image_id": k, "category_id": 1 + n % 2, "bbox": [*corner, 22, 22]}
-            for n, corner in enumerate(corners)
-        ]
-    categories = [{"id": k + 1, "name": name} for k, name in enumerate(names)]
-    document = {"images": images, "annotations": labels, "categories": categories}
-    (folder / f"{split}.json").write_text(json.dumps(document))
+    drawn = (np.random.default_rng(number).integers(0, 256, (480, 640, 3), dtype=np.uint8) for number in range(count))
+    boxes = [[x, y, 22, 22] for x in range(1, 620, 24) for y in range(9, 450, 48)]
+    write_split(folder, split, drawn, boxes, names)
 
 
 @pytest.fixture
@@ -45,8 +35,8 @@ def options(tmp_path):
     """As a data set and a proposal network stand after `errand dataset train`."""
     data = tmp_path / "data"
     data.mkdir()
-    write_split(data, "train", 4)
-    write_split(data, "val", 2)
+    write_noise(data, "train", 4)
+    write_noise(data, "val", 2)
     first = real_first(tmp_path / "first.onnx")
     return RefineOptions(
         data, tmp_path / "out", Budget(pictures=8), model=first, examined=2, batch=4, schedule=Schedule(1e-3)
@@ -120,7 +110,7 @@ def test_weights_of_a_refinement_networks_file_are_taken_over(options, tmp_path)
 
 def test_a_network_of_other_classes_is_refused(options):
     for split in ("train", "val"):
-        write_split(options.data, split, 4, names=("beer", "coke", "wrench"))
+        write_noise(options.data, split, 4, names=("beer", "coke", "wrench"))
     with pytest.raises(TrainingDataError, match="knows other classes"):
         refine(options, lambda _: None)
 

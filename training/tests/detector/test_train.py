@@ -3,7 +3,6 @@
 import json
 from dataclasses import replace
 
-import cv2
 import numpy as np
 import pytest
 
@@ -17,31 +16,26 @@ from errand_train.detector.schedule import Budget, Phase, Schedule
 from errand_train.detector.train import MODEL, Report, TrainOptions, train
 from errand_train.detector.validate import examination
 from skills.perception.detector.model_files import load_model
+from training.tests.detector.splits import write_split
 
 NAMES = ("beer", "coke")
 SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))
 
 
-def write_split(folder, split, count):
-    images, labels = [], []
-    for k in range(count):
-        name = f"{split}{k}.png"
-        picture = np.full((240, 320, 3), 60, dtype=np.uint8)
-        picture[60:160, 100:180] = (30, 200, 30 * k)
-        cv2.imwrite(str(folder / name), picture)
-        images.append({"id": k, "file_name": name, "width": 320, "height": 240})
-        labels.append({"id": k, "image_id": k, "category_id": 1 + k % 2, "bbox": [100, 60, 80, 100]})
-    categories = [{"id": k + 1, "name": name} for k, name in enumerate(NAMES)]
-    document = {"images": images, "annotations": labels, "categories": categories}
-    (folder / f"{split}.json").write_text(json.dumps(document))
+def write_blocks(folder, split, count):
+    """Grey pictures with a green block, which is brighter in each."""
+    pictures = np.full((count, 240, 320, 3), 60, dtype=np.uint8)
+    for number, picture in enumerate(pictures):
+        picture[60:160, 100:180] = (30, 200, 30 * number)
+    write_split(folder, split, pictures, [[100, 60, 80, 100]], NAMES)
 
 
 @pytest.fixture
 def options(tmp_path):
     data = tmp_path / "data"
     data.mkdir()
-    write_split(data, "train", 4)
-    write_split(data, "val", 2)
+    write_blocks(data, "train", 4)
+    write_blocks(data, "val", 2)
     return TrainOptions(data, tmp_path / "out", Budget(pictures=8), examined=2, schedule=SMALL)
 
 

@@ -98,8 +98,8 @@ GONE = [
 ]
 
 
-@pytest.mark.parametrize(("end", "says"), GONE)
-def test_workers_or_a_scheduler_that_are_gone_are_told_and_what_has_landed_is_kept(options, monkeypatch, end, says):
+@pytest.mark.parametrize(("end", "says"), GONE, ids=["no workers", "no scheduler"])
+def test_finished_items_outlive_a_cluster_that_is_gone(options, monkeypatch, end, says):
     monkeypatch.setattr(module, "GONE_S", 0.5)
     started = distributed.LocalCluster(n_workers=1, **options)
     landed = []

@@ -1,13 +1,12 @@
 """Scenario files become runs."""
 
 import re
-from pathlib import Path
 
 import pytest
 
 from executive.app.evaluate.evaluation_file import is_evaluation, load_evaluation
 from skills.files.errors import InputError
-from skills.files.yaml_source import read_yaml
+from tests.tables import yaml_beside
 
 
 def load(tmp_path, text):
@@ -36,7 +35,7 @@ def test_an_id_is_that_of_the_content_wherever_the_files_lie(tmp_path):
     assert (ids[0] == ids[1], changed == ids[0]) == (True, False)
 
 
-REFUSED = read_yaml(Path(__file__).with_name("refused_evaluations.yaml")).data
+REFUSED = yaml_beside(__file__, "refused_evaluations.yaml")
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=lambda case: case["message"])

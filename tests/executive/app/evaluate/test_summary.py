@@ -50,8 +50,11 @@ def test_claims_are_counted_against_verdicts_with_intervals_and_causes():
     assert rows[Standing.FULFILLED].rate.interval_text == "6.3% to 54.7%"
 
 
-def test_cases_to_inspect_begin_with_false_claims_and_are_explained_by_the_referee_or_the_robot():
+def test_cases_to_inspect_begin_with_false_claims():
     assert [each.run.request.seed for each in cases_to_inspect(CASES)] == [3, 4, 5, 6, 7, 8, 9]
+
+
+def test_the_referee_explains_a_false_claim_and_the_robot_a_failure():
     assert (CASES[2].why, CASES[4].why) == ("the hammer is on the floor", "no path")
 
 
@@ -78,9 +81,12 @@ def test_the_interval_of_a_rate_is_that_of_wilson(rate, interval):
     assert rate.interval() == pytest.approx(interval, abs=5e-5)
 
 
-def test_mcnemar_counts_only_pairs_that_differ_and_fisher_knows_the_lady_tasting_tea():
+def test_mcnemar_counts_only_pairs_that_differ():
     # 8 to 1: 2 * (1 + 9) / 2**9
     assert (mcnemar(8, 1), mcnemar(0, 0)) == (pytest.approx(20 / 512), 1.0)
+
+
+def test_fisher_of_the_lady_tasting_tea():
     assert fisher(Rate(3, 4), Rate(1, 4)) == pytest.approx(0.4857, abs=1e-4)
 
 

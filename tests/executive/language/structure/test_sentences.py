@@ -2,23 +2,19 @@
 
 from functools import partial
 from itertools import product
-from pathlib import Path
 
 import pytest
-import yaml
 
 from executive.language.structure.sentence import MOST_NESTED
 from executive.language.understand import Status, ask_until_clear, understand
 from executive.words.condition import DoorOpen
 from executive.words.steps import steps_from_yaml, steps_to_yaml
 from tests.executive.language.notation import as_noted, noted
-from tests.tables import table
-
-HERE = Path(__file__).parent
+from tests.tables import table, yaml_beside
 
 
 def rows(file, kind=None):
-    tables = yaml.safe_load((HERE / file).read_text(encoding="utf-8"))
+    tables = yaml_beside(__file__, file)
     found = (
         (world, text, expected)
         for world, table in tables.items()

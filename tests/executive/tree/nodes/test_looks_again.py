@@ -1,17 +1,16 @@
 """Conditions that look: each time that one is asked the robot looks again, so that it sees what changed meanwhile."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-import yaml
 
 from executive.run.outcome import Outcome
 from executive.tree.compiler import compile_mission
 from executive.words.mission import Mission
 from skills.api import Cause, Failed, Succeeded
+from tests.tables import yaml_beside
 
-TABLE = yaml.safe_load(Path(__file__).with_name("looks_again.yaml").read_text(encoding="utf-8"))
+TABLE = yaml_beside(__file__, "looks_again.yaml")
 CASES, BRANCH, WAIT = TABLE["cases"], TABLE["steps"]["branch"], TABLE["steps"]["wait"]
 BEER = BRANCH["if"]
 

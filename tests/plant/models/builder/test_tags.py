@@ -75,12 +75,18 @@ def test_a_tag_on_a_model_faces_outwards_in_the_middle_of_its_side(crate, side):
     assert found.X_OT.IsNearlyEqualTo(X_WT, 0.03)
 
 
-def test_a_tag_is_stuck_on_each_known_side_once_where_it_fits(crate):
-    with pytest.raises(ObjectImportError, match=r"wider than the front of crate; --size 0\.128 at most"):
-        stick_on(crate, 7, 0.15, "front")
+def test_a_tag_is_stuck_on_each_side_once(crate):
     stick_on(crate, 7, 0.1, "front")
     stick_on(crate, 7, 0.1, "back")
     with pytest.raises(ObjectImportError, match="the front of crate has tag 7 already"):
         stick_on(crate, 7, 0.1, "front")
+
+
+def test_a_tag_wider_than_its_side_is_refused(crate):
+    with pytest.raises(ObjectImportError, match=r"wider than the front of crate; --size 0\.128 at most"):
+        stick_on(crate, 7, 0.15, "front")
+
+
+def test_an_unknown_side_is_refused_with_the_sides(crate):
     with pytest.raises(ObjectImportError, match="no side 'below'; give front, back, left, right or top"):
         stick_on(crate, 7, 0.1, "below")

@@ -11,9 +11,13 @@ def rows(kind):
     return [line[1:] for line in lines if line[0] == kind]
 
 
-def test_vertices_of_one_cell_are_joined_and_a_face_whose_corners_merge_vanishes():
+def test_vertices_of_one_cell_are_joined_and_faces_share_them():
     first, second = ({int(corner.split("//")[0]) for corner in face} for face in rows("f"))
     assert (len(rows("v")), len(first & second)) == (4, 2)
+
+
+def test_a_face_whose_corners_merge_vanishes():
+    assert len(rows("f")) == 2
 
 
 def test_normals_stay_with_their_faces():

@@ -137,8 +137,11 @@ def test_a_robot_without_a_dock_lists_none(spot):
         command(spot)
 
 
-def test_the_dock_is_in_the_configuration_and_unknown_commands_have_no_feedback(at_home):
+def test_the_dock_is_in_the_configuration(at_home):
     configured = client(at_home).get_docking_config()
     assert [(each.id_start, each.id_end) for each in configured] == [(DOCK_ID, DOCK_ID)]
+
+
+def test_feedback_of_an_unknown_command_is_an_invalid_request(at_home):
     with pytest.raises(InvalidRequestError):
         client(at_home).docking_command_feedback_full(4711)

@@ -63,9 +63,13 @@ def test_only_the_tablet_releases_a_robot_without_other_endpoints_until_it_is_re
     assert service.level() == CUT
 
 
-def test_an_endpoint_is_released_by_the_answer_to_its_challenge_and_a_stop_counts_at_once(service):
-    endpoint, challenge = released(service)
+def test_an_endpoint_is_released_by_the_answer_to_its_challenge(service):
+    released(service)
     assert service.level() == NONE
+
+
+def test_a_stop_counts_at_once(service):
+    endpoint, challenge = released(service)
     check_in(service, endpoint, SETTLE, challenge)
     assert service.level() == SETTLE
 

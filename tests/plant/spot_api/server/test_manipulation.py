@@ -188,14 +188,20 @@ def test_a_camera_frame_that_is_its_own_parent_is_an_invalid_request(spot):
         started(spot, walk_to_object_in_image=given)
 
 
-def test_a_server_without_a_picker_or_with_motors_off_refuses_tasks_and_knows_no_other(spot):
+def test_a_server_without_a_picker_refuses_picks(spot):
     with pytest.raises(InvalidRequestError, match="plans grasps"):
         started(spot, pick_object={"frame_name": "odom"})
-    with pytest.raises(InvalidRequestError):
-        feedback(spot, 4711)
+
+
+def test_a_task_with_motors_off_is_an_invalid_request(spot):
     spot.robot.power_off(cut_immediately=True, timeout_sec=10, update_frequency=20.0)
     with pytest.raises(InvalidRequestError, match="motors are off"):
         started(spot, walk_to_object_ray_in_world=ray(1.0, 0.0, 0.0))
+
+
+def test_feedback_of_an_unknown_task_is_an_invalid_request(spot):
+    with pytest.raises(InvalidRequestError):
+        feedback(spot, 4711)
 
 
 def test_a_grasp_from_above_is_told_from_one_from_the_side(spot):

@@ -13,6 +13,7 @@
 PYTHON ?= $(shell command -v python3.11 || echo python3)
 VENV := .venv
 BIN := $(VENV)/bin
+PLUGINS := $(wildcard plugins/*)
 # What the wheels need beyond Python: libraries of Drake, and software rendering through EGL for the cameras.
 DEBIAN := libegl1 libgl1 libgl1-mesa-dri libglib2.0-0 libsm6 libx11-6
 # Voices that speak to the tests of speech; without them those are skipped.
@@ -36,12 +37,11 @@ endef
 env: $(VENV)/.ready
 
 $(VENV)/.ready: $(VENV)/.run
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,foxglove,spot,test,browser,bench,dev]'
-	$(BIN)/python -m pip install --quiet --no-deps --editable training
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[visuals,speech,mapping,objects,cluster,foxglove,spot,test,browser,bench,dev]' $(PLUGINS:%=--editable %)
 	$(BIN)/errand warm-up
 	@touch $@
 
-$(VENV)/.run: pyproject.toml training/pyproject.toml constraints.txt | debian
+$(VENV)/.run: pyproject.toml VERSION $(PLUGINS:%=%/pyproject.toml) constraints.txt | debian
 	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' \
 	  || { echo "Errand needs Python 3.11, 3.12 or 3.13; set PYTHON=/path/to/python3.11"; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -51,7 +51,7 @@ $(VENV)/.run: pyproject.toml training/pyproject.toml constraints.txt | debian
 train: $(VENV)/.train
 
 $(VENV)/.train: $(VENV)/.ready
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[speech]' --editable training
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[speech]' --editable 'plugins/errand-train[torch]'
 	@touch $@
 
 debian:
@@ -104,4 +104,4 @@ $(VENV)/.docs: $(VENV)/.ready
 	@touch $@
 
 clean:
-	rm -rf $(VENV) out build dist *.egg-info training/build training/*.egg-info
+	rm -rf $(VENV) out build dist *.egg-info plugins/*/build plugins/*/*.egg-info

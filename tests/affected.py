@@ -15,9 +15,10 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
-PRODUCT = ("executive", "skills", "plant", "training")
-TESTS = {ROOT / "tests": ROOT, ROOT / "training/tests": ROOT / "training/errand_train"}
+from tests.sources import PLUGINS, ROOT
+
+PRODUCT = ("executive", "skills", "plant", "plugins")
+TESTS = {ROOT / "tests": ROOT} | {(ROOT / folder).parent / "tests": ROOT / folder for folder in PLUGINS}
 """Folders of tests, and the folders of modules that they mirror."""
 EVERYTHING = {"tests/conftest.py", "pyproject.toml", "constraints.txt"}
 WITHIN = 2
@@ -118,7 +119,7 @@ def imports(file: Path, gone: frozenset[Path] = frozenset()) -> frozenset[Path]:
 def module_file(name: Path, beside: Path, gone: frozenset[Path]) -> Path | None:
     """File of a module of the project, or of a helper that stands beside a test or above it; None for others."""
     above = [folder for folder in (beside, *beside.parents) if any(map(folder.is_relative_to, TESTS))]
-    for folder in (ROOT, ROOT / "training", *above):
+    for folder in (ROOT, *((ROOT / package).parent for package in PLUGINS), *above):
         for file in (folder / name.with_suffix(".py"), folder / name / "__init__.py"):
             if file.is_file() or file in gone:
                 return file

@@ -1,19 +1,10 @@
-"""Lets the tests see the distribution errand-train as installed where only its source is there."""
+"""Options of a test run, what is left to the night, and the collection of garbage."""
 
 import gc
-import shutil
-import sys
-import tempfile
-import tomllib
-from functools import partial
-from importlib.metadata import PackageNotFoundError, distribution
-from pathlib import Path
 
 import pytest
 
 from tests import affected, durations
-
-TRAINING = Path(__file__).parents[1] / "training"
 
 
 def pytest_addoption(parser):
@@ -29,25 +20,6 @@ def pytest_configure(config):
         config.pluginmanager.register(durations.Fast())
     if revision:
         config.pluginmanager.register(affected.Affected(revision))
-    try:
-        distribution("errand-train")
-    except PackageNotFoundError:
-        folder = Path(tempfile.mkdtemp(prefix="errand-train-"))
-        config.add_cleanup(partial(shutil.rmtree, folder))
-        write_metadata(folder / "errand_train.dist-info")
-        sys.path.append(str(folder))
-
-
-def write_metadata(info):
-    """Write what an installer would write of the distribution's name, summary and entry points."""
-    project = tomllib.loads((TRAINING / "pyproject.toml").read_text())["project"]
-    info.mkdir()
-    facts = {"Metadata-Version": "2.1", "Name": project["name"], "Version": project["version"]}
-    facts["Summary"] = project["description"]
-    (info / "METADATA").write_text("".join(f"{name}: {value}\n" for name, value in facts.items()))
-    groups = project["entry-points"].items()
-    lines = [f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in each.items()) for group, each in groups]
-    (info / "entry_points.txt").write_text("".join(lines))
 
 
 LONG_SUITES = ("approach.skilltest.yaml", "place.skilltest.yaml")

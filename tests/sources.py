@@ -1,6 +1,7 @@
 """What the project's modules import, define and document: each source is parsed once in a process."""
 
 import ast
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -8,7 +9,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PRODUCT = ("executive", "skills", "plant")
-TRAINING = "training/errand_train"
+PLUGINS = tuple(sorted(str(path.parent.relative_to(ROOT)) for path in ROOT.glob("plugins/*/errand_*/__init__.py")))
+"""Folders of the packages of plug-ins."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,7 @@ def modules(*folders: str) -> Mapping[str, str]:
 
 def dotted(path: str) -> str:
     """The dotted name of a module; a package's is that of its folder."""
+    path = re.sub(r"^plugins/[^/]+/", "", path)
     return path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
 
 

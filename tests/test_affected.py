@@ -4,6 +4,8 @@ import pytest
 
 from tests.affected import ROOT, changed_files, imports, touched
 
+TRAIN = "plugins/errand-train"
+
 
 @pytest.mark.parametrize(
     ("test", "changed", "expected"),
@@ -22,9 +24,13 @@ from tests.affected import ROOT, changed_files, imports, touched
         ("tests/plant/test_engine.py", "tests/skills/conftest.py", False),
         ("tests/executive/words/test_command.py", "executive/language/tables/ümlaut.yaml", False),
         ("tests/executive/words/test_command.py", "tests/conftest.py", True),
-        ("training/tests/dataset/test_coco.py", "training/errand_train/dataset/compose.py", True),
-        ("training/tests/dataset/test_coco.py", "training/errand_train/nouns.py", False),
-        ("training/tests/detector/test_refine.py", "training/tests/random_networks.py", True),
+        (
+            "plugins/errand-train/tests/dataset/test_coco.py",
+            "plugins/errand-train/errand_train/dataset/compose.py",
+            True,
+        ),
+        ("plugins/errand-train/tests/dataset/test_coco.py", "plugins/errand-train/errand_train/nouns.py", False),
+        ("plugins/errand-train/tests/detector/test_refine.py", "plugins/errand-train/tests/random_networks.py", True),
     ],
 )
 def test_a_change_touches(test, changed, expected):

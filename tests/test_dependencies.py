@@ -9,11 +9,12 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-from tests.sources import PRODUCT, ROOT, TRAINING, modules, read
+from tests.sources import PLUGINS, PRODUCT, ROOT, modules, read
 
 VERSIONS = ("3.11", "3.12", "3.13")
 PROJECTS = [
-    tomllib.loads((ROOT / name).read_text())["project"] for name in ("pyproject.toml", "training/pyproject.toml")
+    tomllib.loads(file.read_text())["project"]
+    for file in (ROOT / "pyproject.toml", *sorted(ROOT.glob("plugins/*/pyproject.toml")))
 ]
 REQUIRED = [
     Requirement(words)
@@ -51,7 +52,7 @@ def test_the_three_versions_of_python_are_declared_and_no_other():
 
 
 def test_no_module_imports_what_a_later_python_lacks():
-    sources = modules(*PRODUCT, TRAINING)
+    sources = modules(*PRODUCT, *PLUGINS)
     imported = {name.partition(".")[0] for text in sources.values() for name in read(text).imports}
     assert len(sources) > 500 and "numpy" in imported
     assert not imported & (GONE - set(sys.builtin_module_names))

@@ -1,6 +1,6 @@
 """The import rule: executive -> skills; plant -> executive.words, skills.robot, skills.files; skills imports neither.
 
-Only executive.app and executive.cli import all three. Nothing imports executive.cli, nor training, which imports all.
+Only executive.app and executive.cli import all three. Nothing of the core imports executive.cli, nor a plug-in.
 The homes of executive import each other one way, from the last of `HOMES` to the first, the words nothing but a few
 plain modules of skills. No files import each other in a circle, not for types either.
 """
@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import pytest
 
-from tests.sources import PRODUCT, TRAINING, dotted, graph_of, import_graph, modules, read
+from tests.sources import PLUGINS, PRODUCT, dotted, graph_of, import_graph, modules, read
 
 Check = Callable[[str, str], list[str]]
 Graph = Mapping[str, frozenset[str]]
@@ -87,9 +87,9 @@ def builder_imports(path: str, source: str) -> list[str]:
     return [] if own else [name for name in ours(source) if within(name, *BUILDERS)]
 
 
-def training_imports(_: str, source: str) -> list[str]:
-    """What a module imports of the training."""
-    return [name for name in read(source).imports if within(name, "errand_train")]
+def plugin_imports(_: str, source: str) -> list[str]:
+    """What a module of the core imports of plug-ins."""
+    return [name for name in read(source).imports if name.startswith("errand_")]
 
 
 def other_commands(_: str, source: str) -> list[str]:
@@ -120,12 +120,12 @@ def test_only_the_commands_that_make_models_and_worlds_import_the_builders() -> 
     assert found(builder_imports, *PRODUCT) == {}
 
 
-def test_nothing_imports_training() -> None:
-    assert found(training_imports, *PRODUCT, "missions") == {}
+def test_the_core_imports_no_plug_in() -> None:
+    assert found(plugin_imports, *PRODUCT, "missions") == {}
 
 
-def test_training_uses_of_the_command_line_only_what_plug_ins_use() -> None:
-    assert found(other_commands, TRAINING) == {}
+def test_plug_ins_use_of_the_command_line_only_what_is_public() -> None:
+    assert found(other_commands, *PLUGINS) == {}
 
 
 CALL = "def f():\n    "
@@ -156,9 +156,9 @@ CALL = "def f():\n    "
         (builder_imports, "executive/cli/map.py", "import plant.models.builder.mesh", ["plant.models.builder.mesh"]),
         (builder_imports, "executive/cli/object_command.py", f"{CALL}import plant.models.builder.importing", []),
         (builder_imports, "plant/worlds/builder/own.py", "from plant.models.builder import mesh", []),
-        (training_imports, "plant/work.py", f"{CALL}import errand_train", ["errand_train"]),
-        (other_commands, "training/errand_train/a.py", "import executive.cli.screen", ["executive.cli.screen"]),
-        (other_commands, "training/errand_train/a.py", "from executive.cli.output import console_for", []),
+        (plugin_imports, "plant/work.py", f"{CALL}import errand_train", ["errand_train"]),
+        (other_commands, "errand_train/a.py", "import executive.cli.screen", ["executive.cli.screen"]),
+        (other_commands, "errand_train/a.py", "from executive.cli.output import console_for", []),
     ],
 )  # fmt: skip
 def test_a_check_finds_breaches(check: Check, path: str, source: str, expected: list[str]) -> None:

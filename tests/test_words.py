@@ -1,12 +1,13 @@
 """The words of docstrings, code and docs: how a docstring begins, and metaphors that have a term of the field."""
 
 import re
+from pathlib import Path
 
 import pytest
 
-from tests.sources import PRODUCT, ROOT, TRAINING, modules, read
+from tests.sources import PLUGINS, PRODUCT, ROOT, modules, read
 
-PACKAGES = (*PRODUCT, TRAINING)
+PACKAGES = (*PRODUCT, *PLUGINS)
 BEGINNINGS = frozenset(
     {*("What", "How", "Where", "Who", "Why", "Which", "Whether", "When", "That", "Those", "From", "As"), "One that"}
 )
@@ -51,7 +52,8 @@ def test_the_check_finds_clauses(line: str, expected: bool) -> None:
 
 def test_names_of_tests_begin_with_what_acts() -> None:
     found = re.compile(r"def (test_(?:what|where|who|whoever|why|how|which)_\w*)")
-    sources = {path: text for path, text in modules("tests", "training/tests").items() if "/test_" in path}
+    folders = ("tests", *(f"{Path(package).parent}/tests" for package in PLUGINS))
+    sources = {path: text for path, text in modules(*folders).items() if "/test_" in path}
     assert len(sources) > 100
     assert {path: names for path, text in sources.items() if (names := found.findall(text))} == {}
 

@@ -23,6 +23,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from tests.benchmarks.harness import command, show
+from tests.sources import PLUGINS
 
 HERE = Path.cwd()
 PACKAGES = ("executive", "skills", "plant")
@@ -191,7 +192,8 @@ def caught(tree, mutant, seconds):
     order = sorted(known, key=lambda test: (not test.startswith(mirrored), seconds[test]))
     folder = next(each for each in (tree / mirrored, *(tree / mirrored).parents) if each.is_dir())
     groups = [order[first : first + GROUP] for first in range(0, len(order), GROUP)]
-    for group in groups if mutant.probed else [[str(folder)], ["tests", "training/tests"]]:
+    every = ["tests", *(f"{Path(package).parent}/tests" for package in PLUGINS)]
+    for group in groups if mutant.probed else [[str(folder)], every]:
         listed = tree / "selected.txt"
         listed.write_text("\n".join(group))
         before = mutant.apply(tree)

@@ -11,8 +11,8 @@ import yaml
 from tests.docs.documents import DOCS, ROOT, commands, links, unknown_command
 
 PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
-_TEST = re.compile(r"`((?:training/)?tests/[\w/.]+\.py)(?:::(\w+)(?:\[([^\]]+)\])?)?`")
-_FILE = re.compile(r"`((?:executive|skills|plant|training|missions|docs)/[\w/.]+\.(?:py|yaml|json|md))`")
+_TEST = re.compile(r"`((?:plugins/[\w-]+/)?tests/[\w/.]+\.py)(?:::(\w+)(?:\[([^\]]+)\])?)?`")
+_FILE = re.compile(r"`((?:executive|skills|plant|plugins|missions|docs)/[\w/.-]+\.(?:py|yaml|json|md))`")
 _ERRAND = re.compile(r"`(errand [^`]+)`")
 
 

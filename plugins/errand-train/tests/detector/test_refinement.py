@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from random_networks import random_network
 
 from tests.skills.tiny_detector import CLASSES, picture_of, write_model
-from training.tests.random_networks import random_network
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from training.tests.random_networks import random_network
+from random_networks import random_network
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")

@@ -98,7 +98,7 @@ def test_without_pycocotools_the_command_says_what_to_install(score, data, monke
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     result = score("--data", data)
     assert result.exit_code == 2
-    assert "scoring needs pycocotools; run `make train`" in result.stderr
+    assert "scoring needs pycocotools; pip install" in result.stderr
 
 
 def test_figures_are_reported_by_camera(score, data):

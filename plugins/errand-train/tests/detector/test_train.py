@@ -9,6 +9,8 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
+from splits import write_split
+
 from errand_train.detector.canvases import CanvasOptions
 from errand_train.detector.labels import TrainingDataError
 from errand_train.detector.loop import CHECKPOINT
@@ -16,7 +18,6 @@ from errand_train.detector.schedule import Budget, Phase, Schedule
 from errand_train.detector.train import MODEL, Report, TrainOptions, train
 from errand_train.detector.validate import examination
 from skills.perception.detector.model_files import load_model
-from training.tests.detector.splits import write_split
 
 NAMES = ("beer", "coke")
 SMALL = Schedule(warm_up_steps=2, phases=(Phase(0.0, CanvasOptions(96, 64), 2),))

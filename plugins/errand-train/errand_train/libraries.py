@@ -1,4 +1,4 @@
-"""Libraries that only training needs; `make train` installs them."""
+"""Libraries that only training needs; the extra `torch` brings them."""
 
 from __future__ import annotations
 
@@ -14,4 +14,7 @@ def check_libraries(needed: Sequence[str], work: str = "training") -> None:
     """Raises InputError for libraries that are not installed; `work` says what needs them."""
     missing = [name for name in needed if importlib.util.find_spec(name) is None]
     if missing:
-        raise InputError(f"{work} needs {' and '.join(missing)}", hint="run `make train` in a clone of Errand")
+        raise InputError(
+            f"{work} needs {' and '.join(missing)}",
+            hint="pip install 'errand-train[torch]'; in a clone of Errand: make train",
+        )

@@ -22,9 +22,9 @@ LINES = {
     "executive/conversation": 595,
     "executive/view": 1594,
     "executive/testing": 849,
-    "executive/app": 8332,
-    "executive/cli": 4997,
-    "skills": 30311,
+    "executive/app": 8351,
+    "executive/cli": 5032,
+    "skills": 30355,
     "plant": 22156,
 }
 MODULES, ONE_IMPORTER, SAME_NAME = 517, 95, 14
